@@ -1,0 +1,131 @@
+//! `beamsim check`
+
+use super::{Status, load, say};
+use crate::model::Assembly;
+use crate::scene::{Mesh, Scene};
+use crate::tensor::{Mat3, Vec3};
+use std::path::PathBuf;
+
+/// Reads decks and tells what would be simulated.
+pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
+    let mut worst = Status::Fine;
+    for path in decks {
+        match load::scene(path, settings) {
+            Ok(scene) => {
+                say::line(&format!("{}: {}", path.display(), scene.title.as_deref().unwrap_or("(no title)")));
+                worst = worst.max(tell(&scene));
+            }
+            Err(status) => worst = worst.max(status),
+        }
+    }
+    worst
+}
+
+fn tell(scene: &Scene) -> Status {
+    tell_beams(&scene.mesh);
+    tell_mass(scene);
+    let status = tell_size(scene);
+    say::line("effects");
+    let width = scene.reasons.iter().map(|r| r.name.len()).max().unwrap_or(0);
+    for reason in &scene.reasons {
+        let mark = if reason.active { "on " } else { "off" };
+        say::line(&format!("  {mark} {:<width$}  {}", reason.name, reason.reason));
+    }
+    status
+}
+
+fn tell_beams(mesh: &Mesh) {
+    for beam in &mesh.beams {
+        let count = beam.elements.len();
+        say::line(&format!(
+            "beam {}: length {}, {count} elements of order {}, {} nodes",
+            beam.name,
+            beam.line.length,
+            beam.order,
+            beam.nodes.len()
+        ));
+        let (start, end) = (beam.section.at(0.0), beam.section.at(1.0));
+        tell_section(&start, if start == end { "" } else { " at the start" });
+        if start != end {
+            tell_section(&end, " at the end");
+        }
+    }
+}
+
+fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
+    let k = section.stiffness;
+    say::line(&format!(
+        "  section{place}: EA {} GA [{}, {}] GJ {} EI [{}, {}]",
+        k[0][0], k[1][1], k[2][2], k[3][3], k[4][4], k[5][5]
+    ));
+    let coupled = (0..6).any(|i| (0..i).any(|j| k[i][j] != 0.0));
+    if coupled {
+        say::line("  its stiffness couples");
+    }
+    if let Some(mass) = &section.mass {
+        let j = mass.about_line.0;
+        say::line(&format!("  rhoA {} rhoJ [{}, {}, {}] mass centre {:?}", mass.mass, j[0][0], j[1][1], j[2][2], mass.offset.0));
+    }
+}
+
+/// Mass, centre and inertia about the centre, in the initial placement.
+fn tell_mass(scene: &Scene) {
+    let (mut mass, mut first, mut about_origin) = (0.0, Vec3::ZERO, Mat3::ZERO);
+    let mut add = |m: f64, centre: Vec3, own: Mat3| {
+        mass += m;
+        first += centre * m;
+        about_origin += own + (Mat3::diagonal([centre.squared(); 3]) - centre.outer(centre)) * m;
+    };
+    for beam in &scene.mesh.beams {
+        for element in &scene.mesh.elements[beam.elements.clone()] {
+            for station in &element.volume {
+                let Some(section) = beam.section.at(station.fraction).mass else { continue };
+                let inertia = section.turned(station.axes);
+                let places = element.nodes.iter().map(|&n| scene.mesh.nodes[n].place);
+                let place = places.zip(&station.shape).fold(Vec3::ZERO, |sum, (x, &n)| sum + x * n);
+                let d = inertia.offset;
+                let about_line = inertia.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * inertia.mass;
+                add(inertia.mass * station.weight, place + d, about_line * station.weight);
+            }
+        }
+    }
+    for body in &scene.bodies {
+        let d = body.inertia.offset;
+        let own = body.inertia.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.inertia.mass;
+        add(body.inertia.mass, body.place + d, own);
+    }
+    if mass == 0.0 {
+        return say::line("mass: none given");
+    }
+    let centre = first * (1.0 / mass);
+    let inertia = about_origin - (Mat3::diagonal([centre.squared(); 3]) - centre.outer(centre)) * mass;
+    say::line(&format!("mass {mass}, centre {:?}", centre.0));
+    say::line(&format!("inertia about the centre {:?}", inertia.0));
+}
+
+/// Unknowns, entries of the tangent, memory; and whether the first stage can begin.
+fn tell_size(scene: &Scene) -> Status {
+    let mut model = scene.plan.model.clone();
+    let state = model.rest();
+    let kind = scene.plan.stages[0].work.kind();
+    let equations = match model.begin_stage(0, kind, &state) {
+        Ok(equations) => equations,
+        Err(error) => {
+            say::error("deck", &format!("the first stage cannot begin: {error:?}"));
+            return Status::Wrong;
+        }
+    };
+    let (free, slots) = (equations.count(), model.slots.len());
+    let assembly = Assembly::new(model.acting(kind), equations, slots);
+    let entries = assembly.system.pattern.nonzeros();
+    // The tangent, about four times as much for its factors, places of the entries, the state and its copies.
+    let bytes = 8 * (entries + 4 * entries) + 4 * 2 * entries + 24 * 12 * slots;
+    say::line(&format!(
+        "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
+        scene.mesh.nodes.len(),
+        scene.mesh.elements.len(),
+        3 * slots,
+        bytes as f64 / 1e6
+    ));
+    Status::Fine
+}

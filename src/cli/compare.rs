@@ -1,0 +1,47 @@
+//! `beamsim compare`
+
+use super::{Status, say};
+use crate::output::HistoryReader;
+use crate::study;
+use std::path::Path;
+
+/// Prints the worst cell of each column.
+pub fn compare(a: &Path, b: &Path, rtol: f64, atol: f64) -> Status {
+    if !(rtol >= 0.0 && atol >= 0.0) {
+        say::error("deck", "--rtol and --atol must not be negative");
+        return Status::Wrong;
+    }
+    let (came, stored) = match (HistoryReader::read(a), HistoryReader::read(b)) {
+        (Ok(came), Ok(stored)) => (came, stored),
+        (Err(error), _) | (_, Err(error)) => {
+            say::error("io", &error.to_string());
+            return Status::Io;
+        }
+    };
+    let (table, extra) = match study::compare(&came, &stored, rtol, atol) {
+        Ok(found) => found,
+        Err(message) => {
+            say::error("unexpected", &message);
+            return Status::Unexpected;
+        }
+    };
+    let width = table.iter().map(|c| c.column.chars().count()).max().unwrap_or(0);
+    say::line(&format!("  {:<width$}  {:>6}  {:>24}  {:>24}  {:>10}", "column", "row", "came", "stored", "difference"));
+    for cell in &table {
+        let mark = if cell.ratio <= 1.0 { " " } else { "X" };
+        let difference = (cell.came - cell.stored).abs();
+        say::line(&format!(
+            "{mark} {:<width$}  {:>6}  {:>24?}  {:>24?}  {difference:>10.2e}",
+            cell.column, cell.row, cell.came, cell.stored
+        ));
+    }
+    if !extra.is_empty() {
+        say::line(&format!("only in {}: {}", a.display(), extra.join(", ")));
+    }
+    let beyond = table.iter().filter(|cell| cell.ratio > 1.0).count();
+    if beyond > 0 {
+        say::error("unexpected", &format!("{beyond} column(s) differ by more than {atol} + {rtol} |stored|"));
+        return Status::Unexpected;
+    }
+    Status::Fine
+}

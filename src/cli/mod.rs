@@ -1,0 +1,138 @@
+//! The command line: one file a subcommand.
+
+mod check;
+mod compare;
+mod load;
+mod progress;
+mod run;
+mod say;
+mod signals;
+mod verify;
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const AFTER_HELP: &str = "Exit status: 0 fine; 1 an expectation or comparison failed; 2 the deck or the command line is \
+                          wrong; 3 the numerics gave up; 4 a file could not be read or written; 130 or 143 interrupted.";
+
+/// Simulates slender parts that bend, twist and spin far.
+#[derive(Parser)]
+#[command(version, about, after_help = AFTER_HELP)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// A deck and changes to it.
+#[derive(clap::Args)]
+struct DeckArguments {
+    /// Decks (TOML)
+    #[arg(required = true, value_name = "DECK")]
+    decks: Vec<PathBuf>,
+    /// Change a value of the deck: param.L=12, stage.0.step=0.01, section.leg.EA=2e6
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate decks and write histories
+    Run {
+        #[command(flatten)]
+        input: DeckArguments,
+        /// Folder of the results (default: results/<deck name>)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Read a deck and tell what would be simulated
+    Check {
+        #[command(flatten)]
+        input: DeckArguments,
+    },
+    /// Run decks and hold the results against their [[expect]] tables
+    Verify {
+        #[command(flatten)]
+        input: DeckArguments,
+        /// Also write the results, as `run` does
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Compare a history with a stored one
+    Compare {
+        /// The history
+        a: PathBuf,
+        /// The stored one
+        b: PathBuf,
+        /// Allowed relative difference
+        #[arg(long, default_value_t = 1e-9)]
+        rtol: f64,
+        /// Allowed absolute difference
+        #[arg(long, default_value_t = 1e-12)]
+        atol: f64,
+    },
+    /// What accuracy costs in time (not supported yet)
+    #[command(hide = true)]
+    Cost(Rest),
+    /// Which effects act and what each costs (not supported yet)
+    #[command(hide = true)]
+    Effects(Rest),
+    /// Many runs of one deck (not supported yet)
+    #[command(hide = true)]
+    Sweep(Rest),
+    /// The JSON Schema of the deck (not supported yet)
+    #[command(hide = true)]
+    Schema(Rest),
+    /// Shell completions (not supported yet)
+    #[command(hide = true)]
+    Completions(Rest),
+}
+
+/// Whatever follows a command that is not supported yet.
+#[derive(clap::Args)]
+struct Rest {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    words: Vec<String>,
+}
+
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// Fine
+    Fine = 0,
+    /// An expectation or comparison failed
+    Unexpected = 1,
+    /// The deck or the command line is wrong
+    Wrong = 2,
+    /// The numerics gave up
+    GaveUp = 3,
+    /// A file could not be read or written
+    Io = 4,
+    /// SIGINT
+    Interrupted = 130,
+    /// SIGTERM
+    Terminated = 143,
+}
+
+/// Parses the command line and runs the command.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let status = match arguments.command {
+        Command::Run { input, out } => run::run(&input.decks, &input.set, out.as_deref()),
+        Command::Check { input } => check::check(&input.decks, &input.set),
+        Command::Verify { input, out } => verify::verify(&input.decks, &input.set, out.as_deref()),
+        Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),
+        Command::Cost(rest) => not_yet("cost", &rest),
+        Command::Effects(rest) => not_yet("effects", &rest),
+        Command::Sweep(rest) => not_yet("sweep", &rest),
+        Command::Schema(rest) => not_yet("schema", &rest),
+        Command::Completions(rest) => not_yet("completions", &rest),
+    };
+    ExitCode::from(status as u8)
+}
+
+fn not_yet(command: &str, rest: &Rest) -> Status {
+    let _ = &rest.words;
+    say::error("deck", &format!("`beamsim {command}` is not supported yet"));
+    Status::Wrong
+}

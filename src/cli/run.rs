@@ -1,0 +1,163 @@
+//! `beamsim run`
+
+use super::progress::Progress;
+use super::{Status, load, say, signals};
+use crate::drive::{Counters, Failure, Moment, Observer, Run, Snapshot};
+use crate::output::{HistoryWriter, Outcome, PartFile, Rows, run_record};
+use crate::scene::Scene;
+use crate::study::Recorder;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Runs decks one after the other.
+pub fn run(decks: &[PathBuf], settings: &[String], out: Option<&Path>) -> Status {
+    let mut worst = Status::Fine;
+    for path in decks {
+        let status = match load::scene(path, settings) {
+            Ok(scene) => {
+                let name = load::name(path);
+                let folder = folder(out, &name, decks.len() > 1);
+                let finished = simulate(&scene, &name, Some(&folder));
+                summarise(&name, &scene, &finished, &folder);
+                finished.status()
+            }
+            Err(status) => status,
+        };
+        worst = worst.max(status);
+        if signals::caught().is_some() {
+            break;
+        }
+    }
+    worst
+}
+
+/// Where the results of a deck go.
+pub fn folder(out: Option<&Path>, name: &str, several: bool) -> PathBuf {
+    match out {
+        Some(folder) if several => folder.join(name),
+        Some(folder) => folder.into(),
+        None => Path::new("results").join(name),
+    }
+}
+
+/// A run that has ended.
+pub struct Finished {
+    /// How
+    pub result: Result<(), Failure>,
+    /// With what work
+    pub counters: Counters,
+    /// What was expected on the way
+    pub recorder: Recorder,
+    /// Wall-clock seconds
+    pub seconds: f64,
+}
+
+impl Finished {
+    /// The exit status that belongs to it.
+    pub fn status(&self) -> Status {
+        match &self.result {
+            Ok(()) => Status::Fine,
+            Err(Failure::Deck(_) | Failure::Limit(_)) => Status::Wrong,
+            Err(Failure::Io(_)) => Status::Io,
+            Err(Failure::Interrupted { signal: 15, .. }) => Status::Terminated,
+            Err(Failure::Interrupted { .. }) => Status::Interrupted,
+            Err(_) => Status::GaveUp,
+        }
+    }
+}
+
+/// What watches a run from the command line.
+struct Watcher {
+    history: Option<HistoryWriter>,
+    recorder: Recorder,
+    progress: Progress,
+    dynamic: Vec<bool>,
+}
+
+impl Observer for Watcher {
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
+        self.recorder.row(snapshot);
+
+        match &mut self.history {
+            Some(history) => history.row(snapshot, self.dynamic[snapshot.stage - 1]).map_err(io_failure),
+            None => Ok(()),
+        }
+    }
+
+    fn warn(&mut self, message: &str) {
+        self.progress.note(&format!("warning: {message}"));
+    }
+
+    fn progress(&mut self, at: Moment, done: f64) -> Result<(), Failure> {
+        self.progress.tell(done, at.time, at.load);
+        match signals::caught() {
+            Some(signal) => Err(Failure::Interrupted { at, signal }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn io_failure(error: std::io::Error) -> Failure {
+    Failure::Io(error.to_string())
+}
+
+/// Runs a scene; with a folder it leaves its results there.
+pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
+    let start = Instant::now();
+    let rows = Rows { every: scene.every, interval: scene.plan.interval };
+    let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows)).transpose();
+    let (history, opened) = match history {
+        Ok(history) => (history, Ok(())),
+        Err(error) => (None, Err(io_failure(error))),
+    };
+    let mut watcher = Watcher {
+        history,
+        recorder: Recorder::new(scene),
+        progress: Progress::new(name),
+        dynamic: scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect(),
+
+    };
+    let (mut result, counters) = match opened {
+        Ok(()) => Run::new(scene.plan.clone(), &mut watcher).finish(),
+        Err(failure) => (Err(failure), Counters::default()),
+    };
+    watcher.progress.done();
+    let seconds = start.elapsed().as_secs_f64();
+    if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
+        let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds });
+        let text = format!("{record:#}\n");
+        let written = history.finish(result.is_ok()).and_then(|()| PartFile::write(folder, "run.json", text.as_bytes()));
+        if let Err(error) = written {
+            result = Err(io_failure(error));
+        }
+    }
+    Finished { result, counters, recorder: watcher.recorder, seconds }
+}
+
+/// A few lines after a run.
+fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
+    let Finished { result, counters, seconds, .. } = finished;
+    let work = &counters.work;
+    if let Some(title) = &scene.title {
+        say::line(&format!("{name}: {title}"));
+    }
+    let unknowns = scene.plan.model.slots.len() * 3;
+    let acting = scene.reasons.iter().filter(|r| r.active).map(|r| r.name).collect::<Vec<_>>().join(", ");
+    say::line(&format!("  {} elements, {unknowns} unknowns; {acting}", scene.mesh.elements.len()));
+    say::line(&format!(
+        "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s",
+        counters.steps, work.iterations, counters.cutbacks, work.chart_switches, counters.mixed_elements
+    ));
+    match result {
+        Ok(()) => say::line(&format!("  {}", folder.join("history.csv").display())),
+        Err(failure) => {
+            if !matches!(failure, Failure::Io(_)) {
+                say::line(&format!("  what was reached: {}", folder.join("history.partial.csv").display()));
+            }
+            if let Some(hint) = failure.hint() {
+                say::note(&format!("hint: {hint}"));
+            }
+            say::error(failure.name(), &failure.to_string());
+        }
+    }
+}

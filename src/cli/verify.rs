@@ -1,0 +1,76 @@
+//! `beamsim verify`
+
+use super::run::{folder, simulate};
+use super::{Status, load, say, signals};
+use crate::study::{Judgement, judge};
+use std::path::{Path, PathBuf};
+
+/// Runs decks and prints what was expected, what came, the error, the time. A folder stands for the decks in it.
+pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Status {
+    let decks = match expand(paths) {
+        Ok(decks) => decks,
+        Err(message) => {
+            say::error("io", &message);
+            return Status::Io;
+        }
+    };
+    let mut worst = Status::Fine;
+    let (mut held, mut total) = (0, 0);
+    for path in &decks {
+        let name = load::name(path);
+        let status = match load::scene(path, settings) {
+            Ok(scene) => {
+                let folder = out.map(|out| folder(Some(out), &name, decks.len() > 1));
+                let finished = simulate(&scene, &name, folder.as_deref());
+                if signals::caught().is_some() {
+                    say::error("interrupted", "stopped by a signal");
+                    return finished.status();
+                }
+                let judgements = judge(&finished.recorder, &finished.result, &finished.counters);
+                held += judgements.iter().filter(|j| j.holds).count();
+                total += judgements.len();
+                report(path, &judgements, finished.seconds);
+                if judgements.iter().all(|j| j.holds) { Status::Fine } else { Status::Unexpected }
+            }
+            Err(status) => status,
+        };
+        worst = worst.max(status);
+    }
+    say::line(&format!("{held} of {total} expectations hold in {} deck(s)", decks.len()));
+    if worst == Status::Unexpected {
+        say::error("unexpected", &format!("{} expectation(s) do not hold", total - held));
+    }
+    worst
+}
+
+/// Folders are replaced by the decks in them, in the order of their names, subfolders last.
+fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
+    let mut decks = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            decks.push(path.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let mut entries: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|e| e.path())).collect();
+        entries.sort();
+        let (folders, files): (Vec<_>, Vec<_>) = entries.into_iter().partition(|entry| entry.is_dir());
+        decks.extend(files.into_iter().filter(|file| file.extension().is_some_and(|e| e == "toml")));
+        decks.extend(expand(&folders)?);
+    }
+    Ok(decks)
+}
+
+fn report(path: &Path, judgements: &[Judgement], seconds: f64) {
+    let verdict = if judgements.iter().all(|j| j.holds) { "ok" } else { "FAILED" };
+    say::line(&format!("{verdict:<6} {} ({seconds:.3} s)", path.display()));
+    let width = |pick: fn(&Judgement) -> &str| judgements.iter().map(|j| pick(j).chars().count()).max().unwrap_or(0).min(48);
+    let (what, expected, came) = (width(|j| &j.what), width(|j| &j.expected), width(|j| &j.came));
+    for j in judgements {
+        let mark = if j.holds { " " } else { "X" };
+        let error = j.error.map_or(String::new(), |e| format!("error {e:.2e}"));
+        let ratio = j.ratio.map_or(String::new(), |r| format!(", {:.0} % of the tolerance", 100.0 * r));
+        let line = format!("  {mark} {:<what$}  {:>expected$}  {:>came$}  {error}{ratio}", j.what, j.expected, j.came);
+        say::line(line.trim_end());
+    }
+}

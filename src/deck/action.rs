@@ -1,0 +1,539 @@
+//! What acts on a scene: supports, motions, joints, bodies, springs, loads, initial velocities, histories.
+
+use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
+use super::expression::Expression;
+use super::geometry::{check_name, matrix};
+use super::reader::{Context, Item, Table, kind_of};
+use toml::de::DeValue;
+
+/// Two orthonormal directions; the third follows.
+pub type Axes = [[f64; 3]; 2];
+
+/// `[[support]]`
+#[derive(Clone, Debug)]
+pub struct Support {
+    /// The node
+    pub at: Spanned<String>,
+    /// Which of ux uy uz rx ry rz
+    pub fix: [bool; 6],
+    /// What the directions mean
+    pub axes: Option<Axes>,
+    /// Stages from 1
+    pub stages: Option<Vec<usize>>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// `[[motion]]`
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// The node
+    pub at: Spanned<String>,
+    /// What moves
+    pub what: MotionWhat,
+    /// What the directions mean
+    pub axes: Option<Axes>,
+    /// The name of the history
+    pub history: Option<Spanned<String>>,
+    /// Stages from 1
+    pub stages: Option<Vec<usize>>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// What a motion prescribes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MotionWhat {
+    /// Displacement along direction 0, 1 or 2
+    Displacement {
+        /// ux, uy, uz
+        direction: usize,
+        /// How far
+        value: f64,
+    },
+    /// The whole rotation
+    Rotation {
+        /// About this vector
+        axis: [f64; 3],
+        /// Radians
+        angle: f64,
+    },
+}
+
+/// `[[joint]]`
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// What it lets move
+    pub kind: JointKind,
+    /// The point
+    pub at: Spanned<String>,
+    /// One beam (joined to ground) or two
+    pub beams: Vec<Spanned<String>>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// Kinds of joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Rotations are free.
+    Spherical,
+}
+
+/// `[[body]]`
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// The point
+    pub at: Spanned<String>,
+    /// Mass
+    pub mass: f64,
+    /// Inertia about its own centre, global axes at the start
+    pub inertia: Option<[[f64; 3]; 3]>,
+    /// Its centre as seen from the node
+    pub offset: [f64; 3],
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// `[[spring]]`
+#[derive(Clone, Debug)]
+pub struct Spring {
+    /// The node
+    pub at: Spanned<String>,
+    /// ux uy uz rx ry rz
+    pub stiffness: [f64; 6],
+    /// What the directions mean
+    pub axes: Option<Axes>,
+    /// Stages from 1
+    pub stages: Option<Vec<usize>>,
+}
+
+/// In what frame the components of a load are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frame {
+    /// Fixed in space
+    Space,
+    /// Global axes at the start, then turning with the section
+    Body,
+    /// Local axes 1, 2, 3, turning with the section
+    Section,
+}
+
+/// A vector, constant or linear along a beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadVector {
+    /// At the start
+    pub start: [f64; 3],
+    /// At the end
+    pub end: [f64; 3],
+}
+
+/// Where a load acts.
+#[derive(Clone, Debug)]
+pub enum LoadTarget {
+    /// At a node
+    At(Spanned<String>),
+    /// Along a beam
+    Along(Spanned<String>),
+}
+
+/// `[[load]]`
+#[derive(Clone, Debug)]
+pub struct Load {
+    /// Where
+    pub target: LoadTarget,
+    /// Force
+    pub force: Option<LoadVector>,
+    /// Moment
+    pub moment: Option<LoadVector>,
+    /// Of its components
+    pub frame: Frame,
+    /// The name of the history
+    pub history: Option<Spanned<String>>,
+    /// Stages from 1
+    pub stages: Option<Vec<usize>>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// What starts moving.
+#[derive(Clone, Debug)]
+pub enum InitialTarget {
+    /// A node
+    At(Spanned<String>),
+    /// A beam
+    Beam(Spanned<String>),
+    /// Everything
+    All,
+}
+
+/// `[[initial]]`
+#[derive(Clone, Debug)]
+pub struct Initial {
+    /// What starts moving
+    pub target: InitialTarget,
+    /// Velocity
+    pub velocity: [f64; 3],
+    /// Angular velocity
+    pub spin: [f64; 3],
+    /// The point it turns about: a name or coordinates
+    pub about: Option<Spanned<super::PointRef>>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// `[history.NAME]`
+#[derive(Clone, Debug)]
+pub struct HistoryTable {
+    /// Its name
+    pub name: Spanned<String>,
+    /// What it is
+    pub body: HistoryBody,
+}
+
+/// A table or an expression of t.
+#[derive(Clone, Debug)]
+pub enum HistoryBody {
+    /// Times and values
+    Table {
+        /// Increasing
+        times: Vec<f64>,
+        /// As many
+        values: Vec<f64>,
+        /// Whether intervals are smooth
+        smooth: bool,
+    },
+    /// An expression of t, with the parameters put in
+    Expression(Expression),
+}
+
+const DIRECTIONS: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
+
+pub(super) fn read_support<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Support> {
+    let table = Table::new(context, item, "[[support]]", &["at", "fix", "axes", "stages"], &[])?;
+    let at = required_text(&table, "at");
+    let fix = table.required("fix").and_then(|item| read_fix(context, item));
+    let (axes, stages) = (read_axes(&table), read_stages(&table));
+    Some(Support { at: at?, fix: fix?, axes: axes?, stages: stages?, span: table.span.clone() })
+}
+
+fn required_text(table: &Table, key: &str) -> Option<Spanned<String>> {
+    table.context.text(table.required(key)?)
+}
+
+fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
+    let unknown = |word: &str, span: Span, list: bool| {
+        let mut diagnostic = Diagnostic::error(format!("`fix` does not know `{word}`"), span);
+        let help = "`fix` is \"all\", \"pin\" or a list of ux uy uz rx ry rz";
+        let meant = nearest(word, DIRECTIONS).filter(|_| list);
+        diagnostic.help = Some(meant.map_or(help.into(), |meant| format!("did you mean `{meant}`?")));
+        context.report(diagnostic);
+    };
+    match item.get_ref() {
+        DeValue::String(word) if word == "all" => Some([true; 6]),
+        DeValue::String(word) if word == "pin" => Some([true, true, true, false, false, false]),
+        DeValue::String(word) => {
+            if let Some(k) = DIRECTIONS.iter().position(|d| d == word) {
+                return Some(std::array::from_fn(|i| i == k));
+            }
+            unknown(word, item.span(), false);
+            None
+        }
+        DeValue::Array(_) => {
+            let words = context.texts(item)?;
+            let mut fix = [false; 6];
+            for word in &words {
+                let Some(k) = DIRECTIONS.iter().position(|d| *d == word.value) else {
+                    unknown(&word.value, word.span.clone(), true);
+                    return None;
+                };
+                if fix[k] {
+                    return context.wrong(word.span.clone(), format!("`{}` stands twice", word.value));
+                }
+                fix[k] = true;
+            }
+            if words.is_empty() {
+                return context.wrong(item.span(), "`fix` must not be empty");
+            }
+            Some(fix)
+        }
+        other => context.wrong(
+            item.span(),
+            format!("`fix` is \"all\", \"pin\" or a list of ux uy uz rx ry rz, found {}", kind_of(other)),
+        ),
+    }
+}
+
+/// `Some(None)` where there is no key.
+fn read_axes(table: &Table) -> Option<Option<Axes>> {
+    let Some(item) = table.get("axes") else { return Some(None) };
+    let context = table.context;
+    let DeValue::Array(rows) = item.get_ref() else {
+        return context.wrong(item.span(), format!("`axes` is two vectors, found {}", kind_of(item.get_ref())));
+    };
+    if rows.len() != 2 {
+        return context.wrong(item.span(), format!("`axes` is the first two of three directions, found {}", rows.len()));
+    }
+    let rows: Vec<Option<[f64; 3]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
+    let [a, b]: [Option<[f64; 3]>; 2] = rows.try_into().ok()?;
+    let (a, b) = (a?, b?);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let off = (dot(a, a) - 1.0).abs().max((dot(b, b) - 1.0).abs()).max(dot(a, b).abs());
+    if off > 1e-6 {
+        return context.wrong(item.span(), "`axes` must be two unit vectors normal to each other");
+    }
+    Some(Some([a, b]))
+}
+
+/// `Some(None)` where there is no key: all stages.
+fn read_stages(table: &Table) -> Option<Option<Vec<usize>>> {
+    let Some(item) = table.get("stages") else { return Some(None) };
+    let context = table.context;
+    let DeValue::Array(array) = item.get_ref() else {
+        let message = format!("`stages` is a list of stage numbers from 1, found {}", kind_of(item.get_ref()));
+        return context.wrong(item.span(), message);
+    };
+    if array.is_empty() {
+        return context.wrong(item.span(), "`stages` must not be empty");
+    }
+    let count = context.stage_count;
+    let number = |entry: &Item| {
+        let n = context.whole(entry, 1, usize::MAX >> 12)?;
+        if n.value > count {
+            let message = format!("there is no stage {}: the deck has {count}", n.value);
+            return context.wrong(n.span, message);
+        }
+        Some(n.value)
+    };
+    let numbers: Vec<Option<usize>> = array.iter().map(number).collect();
+    Some(Some(numbers.into_iter().collect::<Option<_>>()?))
+}
+
+pub(super) fn read_motion<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Motion> {
+    let keys = ["at", "ux", "uy", "uz", "rotate", "angle", "axes", "history", "stages"];
+    let table = Table::new(context, item, "[[motion]]", &keys, &[])?;
+    let at = required_text(&table, "at");
+    let what = read_motion_what(&table);
+    let (axes, stages, history) = (read_axes(&table), read_stages(&table), table.text("history"));
+    Some(Motion { at: at?, what: what?, axes: axes?, history, stages: stages?, span: table.span.clone() })
+}
+
+fn read_motion_what(table: &Table) -> Option<MotionWhat> {
+    let context = table.context;
+    let given: Vec<usize> = (0..3).filter(|&k| table.has(DIRECTIONS[k])).collect();
+    match (&given[..], table.get("rotate")) {
+        (&[direction], None) => {
+            if table.has("angle") {
+                return context.wrong(table.key_span("angle"), "`angle` belongs to `rotate`");
+            }
+            Some(MotionWhat::Displacement { direction, value: table.number(DIRECTIONS[direction])?.value })
+        }
+        ([], Some(item)) => {
+            let angle = table.required("angle").and_then(|item| context.number(item));
+            let axis = context.vector::<3>(item)?;
+            if axis.value == [0.0; 3] {
+                return context.wrong(axis.span, "`rotate` is an axis and must not be zero");
+            }
+            if table.has("axes") {
+                return context.wrong(table.key_span("axes"), "`rotate` is given in global axes; `axes` has no meaning here");
+            }
+            Some(MotionWhat::Rotation { axis: axis.value, angle: angle?.value })
+        }
+        ([], None) => context.wrong(table.span.clone(), "[[motion]] needs one of `ux`, `uy`, `uz`, or `rotate` with `angle`"),
+        _ => context.wrong(
+            table.span.clone(),
+            "[[motion]] prescribes one thing: one of `ux`, `uy`, `uz`, or `rotate`; use one table for each",
+        ),
+    }
+}
+
+pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Joint> {
+    let table = Table::new(context, item, "[[joint]]", &["kind", "at", "beams", "axis"], &[])?;
+    let kind = table.required("kind").and_then(|_| table.word("kind", &["spherical", "revolute"]));
+    if kind.as_ref().is_some_and(|kind| kind.value == "revolute") {
+        let span = kind.as_ref().map_or(table.span.clone(), |kind| kind.span.clone());
+        return context.wrong(span, "kind = \"revolute\" is not supported yet");
+    }
+    if table.has("axis") {
+        context.report(Diagnostic::error("a spherical joint has no `axis`", table.key_span("axis")));
+    }
+    let at = required_text(&table, "at");
+    let beams = table.required("beams").and_then(|item| {
+        let beams = context.texts(item)?;
+        match &beams[..] {
+            [a, b] if a.value == b.value => context.wrong(b.span.clone(), "a joint parts two different beams"),
+            [_] | [_, _] => Some(beams),
+            _ => context.wrong(item.span(), format!("`beams` names one beam or two, found {}", beams.len())),
+        }
+    });
+    kind?;
+    Some(Joint { kind: JointKind::Spherical, at: at?, beams: beams?, span: table.span.clone() })
+}
+
+pub(super) fn read_body<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Body> {
+    let table = Table::new(context, item, "[[body]]", &["at", "mass", "inertia", "offset"], &[])?;
+    let at = required_text(&table, "at");
+    table.required("mass");
+    let mass = table.positive("mass");
+    let inertia = match table.get("inertia") {
+        None => Some(None),
+        Some(item) => read_inertia(&table, item).map(Some),
+    };
+    let offset = if table.has("offset") { table.vector("offset").map(|v| v.value) } else { Some([0.0; 3]) };
+    Some(Body { at: at?, mass: mass?.value, inertia: inertia?, offset: offset?, span: table.span.clone() })
+}
+
+fn read_inertia(table: &Table, item: &Item) -> Option<[[f64; 3]; 3]> {
+    let is_matrix = matches!(item.get_ref(), DeValue::Array(rows) if rows.iter().any(|r| matches!(r.get_ref(), DeValue::Array(_))));
+    if is_matrix {
+        return matrix(table, "inertia", item);
+    }
+    let [a, b, c] = table.context.vector::<3>(item)?.value;
+    Some([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]])
+}
+
+pub(super) fn read_spring<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Spring> {
+    let table = Table::new(context, item, "[[spring]]", &["at", "stiffness", "axes", "stages"], &["damping"])?;
+    let at = required_text(&table, "at");
+    let stiffness = if table.has("damping") { table.get("stiffness") } else { table.required("stiffness") };
+    let stiffness = stiffness.and_then(|item| context.vector::<6>(item));
+    if let Some(k) = stiffness.as_ref().filter(|k| k.value.iter().any(|&v| v < 0.0)) {
+        context.report(Diagnostic::error("`stiffness` of a spring must not be negative", k.span.clone()));
+    }
+    let (axes, stages) = (read_axes(&table), read_stages(&table));
+    Some(Spring { at: at?, stiffness: stiffness?.value, axes: axes?, stages: stages? })
+}
+
+pub(super) fn read_load<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Load> {
+    let keys = ["at", "along", "force", "moment", "frame", "history", "stages"];
+    let table = Table::new(context, item, "[[load]]", &keys, &[])?;
+    let target = match (table.get("at"), table.get("along")) {
+        (Some(item), None) => context.text(item).map(LoadTarget::At),
+        (None, Some(item)) => context.text(item).map(LoadTarget::Along),
+        (Some(_), Some(item)) => context.wrong(item.span(), "a load acts `at` a node or `along` a beam, not both"),
+        (None, None) => context.wrong(table.span.clone(), "[[load]] needs `at` (a node) or `along` (a beam)"),
+    };
+    if !table.has("force") && !table.has("moment") {
+        context.report(Diagnostic::error("[[load]] needs `force` or `moment`", table.span.clone()));
+    }
+    let along = table.has("along");
+    let force = read_load_vector(&table, "force", along);
+    let moment = read_load_vector(&table, "moment", along);
+    let frame = if table.has("frame") {
+        table.word("frame", &["space", "body", "section"]).map(|word| match word.value {
+            "space" => Frame::Space,
+            "body" => Frame::Body,
+            _ => Frame::Section,
+        })
+    } else {
+        Some(Frame::Space)
+    };
+    let (stages, history) = (read_stages(&table), table.text("history"));
+    Some(Load {
+        target: target?,
+        force: force?,
+        moment: moment?,
+        frame: frame?,
+        history,
+        stages: stages?,
+        span: table.span.clone(),
+    })
+}
+
+/// `Some(None)` where there is no key.
+fn read_load_vector(table: &Table, key: &str, along: bool) -> Option<Option<LoadVector>> {
+    let Some(item) = table.get(key) else { return Some(None) };
+    let context = table.context;
+    let linear = match item.get_ref() {
+        DeValue::Array(rows) if rows.iter().any(|r| matches!(r.get_ref(), DeValue::Array(_))) => Some(rows),
+        _ => None,
+    };
+    let Some(rows) = linear else {
+        let vector = context.vector::<3>(item)?.value;
+        return Some(Some(LoadVector { start: vector, end: vector }));
+    };
+    if !along {
+        return context.wrong(item.span(), format!("`{key}` at a node is one vector; [start, end] belongs to `along`"));
+    }
+    if rows.len() != 2 {
+        return context.wrong(item.span(), format!("`{key}` is a vector or [start vector, end vector], found {} rows", rows.len()));
+    }
+    let rows: Vec<Option<[f64; 3]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
+    let [start, end]: [Option<[f64; 3]>; 2] = rows.try_into().ok()?;
+    Some(Some(LoadVector { start: start?, end: end? }))
+}
+
+pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Initial> {
+    let table = Table::new(context, item, "[[initial]]", &["beam", "at", "velocity", "spin", "about"], &[])?;
+    let target = match (table.get("at"), table.get("beam")) {
+        (Some(item), None) => context.text(item).map(InitialTarget::At),
+        (None, Some(item)) => context.text(item).map(InitialTarget::Beam),
+        (None, None) => Some(InitialTarget::All),
+        (Some(_), Some(item)) => context.wrong(item.span(), "[[initial]] speaks of a node (`at`) or of a `beam`, not both"),
+    };
+    if !table.has("velocity") && !table.has("spin") {
+        context.report(Diagnostic::error("[[initial]] needs `velocity` or `spin`", table.span.clone()));
+    }
+    let vector = |key: &str| if table.has(key) { table.vector::<3>(key).map(|v| v.value) } else { Some([0.0; 3]) };
+    let (velocity, spin) = (vector("velocity"), vector("spin"));
+    let about = match table.get("about").map(|item| (item, item.get_ref())) {
+        None => Some(None),
+        Some((item, DeValue::String(name))) => {
+            Some(Some(Spanned { value: super::PointRef::Name(name.to_string()), span: item.span() }))
+        }
+        Some((item, _)) => context.vector(item).map(|v| Some(v.map(super::PointRef::Coordinates))),
+    };
+    Some(Initial { target: target?, velocity: velocity?, spin: spin?, about: about?, span: table.span.clone() })
+}
+
+pub(super) fn read_history<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<HistoryTable> {
+    let name = check_name(context, name)?;
+    let what = format!("[history.{}]", name.value);
+    let table = Table::new(context, item, what.clone(), &["times", "values", "smooth", "expr"], &[])?;
+    if table.has("expr") {
+        if let Some(key) = ["times", "values", "smooth"].into_iter().find(|key| table.has(key)) {
+            return context.wrong(table.key_span(key), format!("{what} is `times` and `values`, or `expr`, not both"));
+        }
+        return read_history_expression(&table, name);
+    }
+    let times = table.required("times").and_then(|item| context.numbers(item, None));
+    let values = table.required("values").and_then(|item| context.numbers(item, None));
+    let smooth = if table.has("smooth") { table.flag("smooth")? } else { false };
+    let (times, values) = (times?, values?);
+    if times.value.is_empty() {
+        return context.wrong(times.span, "`times` must not be empty");
+    }
+    if times.value.len() != values.value.len() {
+        let message = format!("`times` has {} entries and `values` {}", times.value.len(), values.value.len());
+        return context.wrong(values.span, message);
+    }
+    if let Some(pair) = times.value.windows(2).find(|pair| pair[1] <= pair[0]) {
+        return context.wrong(times.span, format!("`times` must increase: {} follows {}", pair[1], pair[0]));
+    }
+    Some(HistoryTable { name, body: HistoryBody::Table { times: times.value, values: values.value, smooth } })
+}
+
+fn read_history_expression(table: &Table, name: Spanned<String>) -> Option<HistoryTable> {
+    let context = table.context;
+    let item = table.get("expr")?;
+    let text = match item.get_ref() {
+        DeValue::Integer(_) | DeValue::Float(_) => context.number(item)?.map(|v| v.to_string()),
+        _ => context.text(item)?,
+    };
+    let expression = match Expression::parse(&text.value) {
+        Ok(expression) => expression,
+        Err(error) => {
+            let at = text.span.start + 1 + error.offset;
+            return context.wrong(at..at + 1, format!("in the expression `{}`: {}", text.value, error.message));
+        }
+    };
+    let tried = expression.evaluate(&mut |name| if name == "t" { Some([0.0, 1.0, 0.0]) } else { context.parameters.get(name) });
+    if let Err(error) = tried {
+        if context.parameters.is_broken(&text.value) {
+            return None;
+        }
+        let at = text.span.start + 1 + error.offset;
+        return context.wrong(at..at + 1, format!("in the expression `{}`: {}", text.value, error.message));
+    }
+    Some(HistoryTable { name, body: HistoryBody::Expression(expression) })
+}

@@ -1,0 +1,162 @@
+//! What is wrong with a deck, where, and what was probably meant.
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use std::ops::Range;
+
+/// A range of bytes in the deck.
+pub type Span = Range<usize>;
+
+/// A value with the place it was read from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spanned<T> {
+    /// The value
+    pub value: T,
+    /// Where it stands
+    pub span: Span,
+}
+
+impl<T> Spanned<T> {
+    /// The same place with another value.
+    pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Spanned<U> {
+        Spanned { value: f(self.value), span: self.span }
+    }
+}
+
+/// One error or warning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnostic {
+    /// What is wrong
+    pub message: String,
+    /// Where
+    pub span: Option<Span>,
+    /// What stands there
+    pub label: String,
+    /// Another place that has to do with it, and why
+    pub context: Option<(Span, String)>,
+    /// What to do
+    pub help: Option<String>,
+    /// How bad it is
+    pub severity: Severity,
+}
+
+/// How bad a diagnostic is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The run goes on.
+    Warning,
+    /// Something in the text
+    Error,
+    /// Larger than the stated bounds
+    Limit,
+}
+
+impl Diagnostic {
+    /// An error at a place.
+    pub fn error(message: impl Into<String>, span: Span) -> Self {
+        Self {
+            message: message.into(),
+            span: Some(span),
+            label: String::new(),
+            context: None,
+            help: None,
+            severity: Severity::Error,
+        }
+    }
+
+    /// An error of the deck as a whole.
+    pub fn whole(message: impl Into<String>) -> Self {
+        Self { span: None, ..Self::error(message, 0..0) }
+    }
+
+    /// A warning at a place.
+    pub fn warning(message: impl Into<String>, span: Span) -> Self {
+        Self { severity: Severity::Warning, ..Self::error(message, span) }
+    }
+
+    /// A number beyond the stated bounds.
+    pub fn limit(message: impl Into<String>, span: Span) -> Self {
+        Self { severity: Severity::Limit, ..Self::error(message, span) }
+    }
+
+    /// Whether the run goes on.
+    pub fn is_warning(&self) -> bool {
+        self.severity == Severity::Warning
+    }
+
+    /// With a word at the caret.
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = label.into();
+        self
+    }
+
+    /// With what to do.
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// With another place.
+    pub fn context(mut self, span: Span, label: impl Into<String>) -> Self {
+        self.context = Some((span, label.into()));
+        self
+    }
+
+    /// The diagnostic as text, with the lines it speaks of.
+    pub fn render(&self, path: &str, text: &str, styled: bool) -> String {
+        let level = if self.is_warning() { Level::WARNING } else { Level::ERROR };
+        let title = level.primary_title(&self.message);
+        let mut group = match &self.span {
+            Some(span) => {
+                let mut snippet = Snippet::source(text).path(path);
+                let mut primary = AnnotationKind::Primary.span(within(span, text));
+                if !self.label.is_empty() {
+                    primary = primary.label(&self.label);
+                }
+                snippet = snippet.annotation(primary);
+                if let Some((span, label)) = &self.context {
+                    snippet = snippet.annotation(AnnotationKind::Context.span(within(span, text)).label(label));
+                }
+                title.element(snippet)
+            }
+            None => Group::with_title(title),
+        };
+        if let Some(help) = &self.help {
+            group = group.element(Level::HELP.message(help));
+        }
+        let renderer = if styled { Renderer::styled() } else { Renderer::plain() };
+        renderer.render(&[group])
+    }
+}
+
+/// Cuts a span to one that lies in the text, on character boundaries.
+fn within(span: &Span, text: &str) -> Span {
+    let clamp = |mut at: usize| {
+        at = at.min(text.len());
+        while !text.is_char_boundary(at) {
+            at -= 1;
+        }
+        at
+    };
+    let start = clamp(span.start);
+    start..clamp(span.end).max(start)
+}
+
+/// The known word that was probably meant.
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let score = |candidate: &str| {
+        let (a, b) = (word.to_lowercase(), candidate.to_lowercase());
+        if a == b { 1.0 } else { strsim::jaro_winkler(&a, &b).max(strsim::normalized_damerau_levenshtein(&a, &b)) }
+    };
+    let best = known.into_iter().map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
+    best.filter(|(score, _)| *score > 0.72).map(|(_, k)| k)
+}
+
+/// `a`, `b` or `c`
+pub fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
+    let quoted: Vec<String> = words.into_iter().map(|w| format!("`{w}`")).collect();
+    match quoted.split_last() {
+        None => "nothing".into(),
+        Some((last, [])) => last.clone(),
+        Some((last, rest)) => format!("{} or {last}", rest.join(", ")),
+    }
+}

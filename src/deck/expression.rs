@@ -1,0 +1,416 @@
+//! Arithmetic in decks: parsed once, evaluated with exact first and second derivatives over `t`.
+//!
+//! Functions come from the pure-Rust `libm`, so that a deck means the same numbers on every machine.
+
+use std::f64::consts::PI;
+
+/// A parsed expression.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expression {
+    /// A number
+    Number(f64),
+    /// A name and where it stands
+    Name(String, usize),
+    /// -a
+    Negative(Box<Expression>),
+    /// a (+ - * / ^) b
+    Binary(char, Box<Expression>, Box<Expression>),
+    /// f(a, …) of a known function with the right number of arguments
+    Call(&'static str, Vec<Expression>),
+}
+
+/// What is wrong with an expression, and at which byte of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpressionError {
+    /// What is wrong
+    pub message: String,
+    /// Byte offset in the expression
+    pub offset: usize,
+}
+
+/// Value, first and second derivative over `t`.
+pub type Jet = [f64; 3];
+
+/// Names of the functions with their numbers of arguments.
+pub const FUNCTIONS: [(&str, usize); 17] = [
+    ("sin", 1),
+    ("cos", 1),
+    ("tan", 1),
+    ("asin", 1),
+    ("acos", 1),
+    ("atan", 1),
+    ("atan2", 2),
+    ("sinh", 1),
+    ("cosh", 1),
+    ("tanh", 1),
+    ("exp", 1),
+    ("log", 1),
+    ("log10", 1),
+    ("sqrt", 1),
+    ("abs", 1),
+    ("min", 2),
+    ("max", 2),
+];
+
+/// Names with a fixed meaning.
+pub const CONSTANTS: [(&str, f64); 2] = [("pi", PI), ("deg", PI / 180.0)];
+
+/// Deepest nesting of an expression.
+const MAX_DEPTH: usize = 100;
+
+impl Expression {
+    /// Parses `text`.
+    pub fn parse(text: &str) -> Result<Self, ExpressionError> {
+        let mut parser = Parser { text, at: 0, depth: 0 };
+        let expression = parser.sum()?;
+        parser.skip_space();
+        match parser.peek() {
+            None => Ok(expression),
+            Some(c) => Err(parser.error(format!("unexpected `{c}`"))),
+        }
+    }
+
+    /// Evaluates; `lookup` gives the values of names.
+    pub fn evaluate(&self, lookup: &mut dyn FnMut(&str) -> Option<Jet>) -> Result<Jet, ExpressionError> {
+        match self {
+            Self::Number(value) => Ok([*value, 0.0, 0.0]),
+            Self::Name(name, offset) => {
+                let constant = CONSTANTS.iter().find(|(known, _)| known == name).map(|&(_, value)| [value, 0.0, 0.0]);
+                let unknown = || ExpressionError { message: format!("unknown name `{name}`"), offset: *offset };
+                constant.or_else(|| lookup(name)).ok_or_else(unknown)
+            }
+            Self::Negative(a) => Ok(a.evaluate(lookup)?.map(|x| -x)),
+            Self::Binary(operator, a, b) => Ok(binary(*operator, a.evaluate(lookup)?, b.evaluate(lookup)?)),
+            Self::Call(name, arguments) => {
+                let mut values = [[0.0; 3]; 2];
+                for (value, argument) in values.iter_mut().zip(arguments) {
+                    *value = argument.evaluate(lookup)?;
+                }
+                Ok(call(name, values[0], values[1]))
+            }
+        }
+    }
+
+    /// Calls `visit` with every name in the expression.
+    pub fn names(&self, visit: &mut dyn FnMut(&str, usize)) {
+        match self {
+            Self::Number(_) => {}
+            Self::Name(name, offset) => visit(name, *offset),
+            Self::Negative(a) => a.names(visit),
+            Self::Binary(_, a, b) => {
+                a.names(visit);
+                b.names(visit);
+            }
+            Self::Call(_, arguments) => arguments.iter().for_each(|a| a.names(visit)),
+        }
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn sum(&mut self) -> Result<Expression, ExpressionError> {
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            return Err(self.error("the expression is nested too deeply".into()));
+        }
+        let mut left = self.product()?;
+        while let Some(operator) = self.accept("+-") {
+            left = Expression::Binary(operator, Box::new(left), Box::new(self.product()?));
+        }
+        self.depth -= 1;
+        Ok(left)
+    }
+
+    fn product(&mut self) -> Result<Expression, ExpressionError> {
+        let mut left = self.signed()?;
+        while let Some(operator) = self.accept("*/") {
+            left = Expression::Binary(operator, Box::new(left), Box::new(self.signed()?));
+        }
+        Ok(left)
+    }
+
+    fn signed(&mut self) -> Result<Expression, ExpressionError> {
+        let mut negative = false;
+        while let Some(sign) = self.accept("+-") {
+            negative ^= sign == '-';
+        }
+        let value = self.power()?;
+        Ok(if negative { Expression::Negative(Box::new(value)) } else { value })
+    }
+
+    fn power(&mut self) -> Result<Expression, ExpressionError> {
+        let base = self.atom()?;
+        if self.accept("^").is_none() {
+            return Ok(base);
+        }
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            return Err(self.error("the expression is nested too deeply".into()));
+        }
+        let exponent = self.signed()?;
+        self.depth -= 1;
+        Ok(Expression::Binary('^', Box::new(base), Box::new(exponent)))
+    }
+
+    fn atom(&mut self) -> Result<Expression, ExpressionError> {
+        self.skip_space();
+        match self.peek() {
+            Some('(') => {
+                self.at += 1;
+                let inner = self.sum()?;
+                self.expect(')')?;
+                Ok(inner)
+            }
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_ascii_alphabetic() || c == '_' => self.name_or_call(),
+            Some(c) => Err(self.error(format!("unexpected `{c}`"))),
+            None => Err(self.error("the expression ends too early".into())),
+        }
+    }
+
+    fn number(&mut self) -> Result<Expression, ExpressionError> {
+        let start = self.at;
+        let digits = |parser: &mut Self| {
+            while parser.peek().is_some_and(|c| c.is_ascii_digit() || c == '_') {
+                parser.at += 1;
+            }
+        };
+        digits(self);
+        if self.peek() == Some('.') {
+            self.at += 1;
+            digits(self);
+        }
+        if matches!(self.peek(), Some('e' | 'E')) {
+            let before = self.at;
+            self.at += 1;
+            if matches!(self.peek(), Some('+' | '-')) {
+                self.at += 1;
+            }
+            if self.peek().is_some_and(|c| c.is_ascii_digit()) { digits(self) } else { self.at = before }
+        }
+        let text = self.text[start..self.at].replace('_', "");
+        let wrong = || ExpressionError { message: format!("`{text}` is not a number"), offset: start };
+        text.parse().map(Expression::Number).map_err(|_| wrong())
+    }
+
+    fn name_or_call(&mut self) -> Result<Expression, ExpressionError> {
+        let start = self.at;
+        while self.peek().is_some_and(|c| c.is_ascii_alphanumeric() || c == '_') {
+            self.at += 1;
+        }
+        let name = &self.text[start..self.at];
+        self.skip_space();
+        if self.peek() != Some('(') {
+            return Ok(Expression::Name(name.into(), start));
+        }
+        self.at += 1;
+        let Some(&(function, count)) = FUNCTIONS.iter().find(|(known, _)| *known == name) else {
+            let known = FUNCTIONS.map(|(name, _)| name).join(", ");
+            let message = format!("unknown function `{name}`; there are {known}");
+            return Err(ExpressionError { message, offset: start });
+        };
+        let mut arguments = vec![self.sum()?];
+        while self.accept(",").is_some() {
+            arguments.push(self.sum()?);
+        }
+        self.expect(')')?;
+        if arguments.len() != count {
+            let message = format!("`{function}` takes {count} argument(s), not {}", arguments.len());
+            return Err(ExpressionError { message, offset: start });
+        }
+        Ok(Expression::Call(function, arguments))
+    }
+
+    fn accept(&mut self, any_of: &str) -> Option<char> {
+        self.skip_space();
+        let c = self.peek().filter(|&c| any_of.contains(c))?;
+        self.at += c.len_utf8();
+        Some(c)
+    }
+
+    fn expect(&mut self, wanted: char) -> Result<(), ExpressionError> {
+        if self.accept(&wanted.to_string()).is_some() {
+            return Ok(());
+        }
+        Err(self.error(match self.peek() {
+            Some(c) => format!("expected `{wanted}`, found `{c}`"),
+            None => format!("expected `{wanted}` before the end"),
+        }))
+    }
+
+    fn skip_space(&mut self) {
+        while self.peek().is_some_and(char::is_whitespace) {
+            self.at += self.peek().map_or(0, char::len_utf8);
+        }
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.text[self.at..].chars().next()
+    }
+
+    fn error(&self, message: String) -> ExpressionError {
+        ExpressionError { message, offset: self.at }
+    }
+}
+
+fn binary(operator: char, a: Jet, b: Jet) -> Jet {
+    match operator {
+        '+' => [0, 1, 2].map(|i| a[i] + b[i]),
+        '-' => [0, 1, 2].map(|i| a[i] - b[i]),
+        '*' => [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]],
+        '/' => {
+            let value = a[0] / b[0];
+            let slope = (a[1] - value * b[1]) / b[0];
+            [value, slope, (a[2] - 2.0 * slope * b[1] - value * b[2]) / b[0]]
+        }
+        _ => power(a, b),
+    }
+}
+
+fn power(a: Jet, b: Jet) -> Jet {
+    let value = libm::pow(a[0], b[0]);
+    if b[1] != 0.0 || b[2] != 0.0 {
+        // a^b = exp(b log a)
+        return chain(binary('*', b, call("log", a, a)), value, value, value);
+    }
+    if a[1] == 0.0 && a[2] == 0.0 {
+        return [value, 0.0, 0.0];
+    }
+    let falling = |k: f64, factor: f64| if factor == 0.0 { 0.0 } else { factor * libm::pow(a[0], b[0] - k) };
+    chain(a, value, falling(1.0, b[0]), falling(2.0, b[0] * (b[0] - 1.0)))
+}
+
+/// f(a), given f, f' and f'' at a.
+fn chain(a: Jet, f: f64, slope: f64, bend: f64) -> Jet {
+    // A constant argument has no derivatives, whatever f' is there.
+    if a[1] == 0.0 && a[2] == 0.0 {
+        return [f, 0.0, 0.0];
+    }
+    [f, slope * a[1], bend * a[1] * a[1] + slope * a[2]]
+}
+
+fn call(name: &str, a: Jet, b: Jet) -> Jet {
+    let x = a[0];
+    match name {
+        "sin" => chain(a, libm::sin(x), libm::cos(x), -libm::sin(x)),
+        "cos" => chain(a, libm::cos(x), -libm::sin(x), -libm::cos(x)),
+        "tan" => {
+            let f = libm::tan(x);
+            chain(a, f, 1.0 + f * f, 2.0 * f * (1.0 + f * f))
+        }
+        "asin" => {
+            let slope = 1.0 / (1.0 - x * x).sqrt();
+            chain(a, libm::asin(x), slope, x * slope * slope * slope)
+        }
+        "acos" => {
+            let slope = -1.0 / (1.0 - x * x).sqrt();
+            chain(a, libm::acos(x), slope, x * slope * slope * slope)
+        }
+        "atan" => {
+            let slope = 1.0 / (1.0 + x * x);
+            chain(a, libm::atan(x), slope, -2.0 * x * slope * slope)
+        }
+        "atan2" => {
+            // The derivatives of atan(y/x), in a form that holds for every quadrant: (y'x - y x')/(x^2 + y^2).
+            let (y, x) = (a, b);
+            let r2 = x[0] * x[0] + y[0] * y[0];
+            let cross = y[1] * x[0] - y[0] * x[1];
+            let slope = cross / r2;
+            let r2_slope = 2.0 * (x[0] * x[1] + y[0] * y[1]);
+            [libm::atan2(y[0], x[0]), slope, (y[2] * x[0] - y[0] * x[2] - slope * r2_slope) / r2]
+        }
+        "sinh" => chain(a, libm::sinh(x), libm::cosh(x), libm::sinh(x)),
+        "cosh" => chain(a, libm::cosh(x), libm::sinh(x), libm::cosh(x)),
+        "tanh" => {
+            let f = libm::tanh(x);
+            chain(a, f, 1.0 - f * f, -2.0 * f * (1.0 - f * f))
+        }
+        "exp" => chain(a, libm::exp(x), libm::exp(x), libm::exp(x)),
+        "log" => chain(a, libm::log(x), 1.0 / x, -1.0 / (x * x)),
+        "log10" => {
+            let scale = std::f64::consts::LOG10_E;
+            chain(a, libm::log10(x), scale / x, -scale / (x * x))
+        }
+        "sqrt" => {
+            let f = x.sqrt();
+            chain(a, f, 0.5 / f, -0.25 / (f * x))
+        }
+        "abs" => {
+            if x < 0.0 {
+                a.map(|v| -v)
+            } else {
+                a
+            }
+        }
+        "min" => {
+            if b[0] < x {
+                b
+            } else {
+                a
+            }
+        }
+        _ => {
+            if b[0] > x {
+                b
+            } else {
+                a
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(text: &str) -> f64 {
+        Expression::parse(text).unwrap().evaluate(&mut |name| (name == "L").then_some([12.0, 0.0, 0.0])).unwrap()[0]
+    }
+
+    #[test]
+    fn arithmetic_binds_as_in_mathematics() {
+        assert_eq!(value("1 + 2*3"), 7.0);
+        assert_eq!(value("-2^2"), -4.0);
+        assert_eq!(value("2^3^2"), 512.0);
+        assert_eq!(value("2^-1"), 0.5);
+        assert_eq!(value("(1+2)*-3"), -9.0);
+        assert_eq!(value("12/2/3"), 2.0);
+        assert_eq!(value("1e3 + 1_000"), 2000.0);
+        assert_eq!(value("max(L, 2*L)"), 24.0);
+        assert!((value("sin(30*deg)") - 0.5).abs() < 1e-15);
+        assert_eq!(value("atan2(1, -1)"), 0.75 * PI);
+    }
+
+    #[test]
+    fn errors_tell_where() {
+        let error = |text: &str| Expression::parse(text).unwrap_err();
+        assert_eq!(error("1 + ").offset, 4);
+        assert_eq!(error("2*(3+4").message, "expected `)` before the end");
+        assert_eq!(error("si(3)").offset, 0);
+        assert_eq!(error("atan2(1)").message, "`atan2` takes 2 argument(s), not 1");
+        assert_eq!(error("3 $ 4").offset, 2);
+        assert!(Expression::parse(&"(".repeat(1000)).is_err());
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let texts = [
+            "sin(t)", "cos(2*t)", "tan(t)", "asin(t/3)", "acos(t/3)", "atan(t)", "atan2(t, 2-t)", "sinh(t)", "cosh(t)",
+            "tanh(t)", "exp(-t)", "log(t)", "log10(t)", "sqrt(t)", "abs(-t)", "min(t, 3)", "max(t, t^2)", "t^3", "2^t",
+            "t^t", "t/(1+t^2)", "(1-t)*t^2.5",
+        ];
+        for text in texts {
+            let parsed = Expression::parse(text).unwrap();
+            let at = |t: f64| parsed.evaluate(&mut |name| (name == "t").then_some([t, 1.0, 0.0])).unwrap();
+            let (t, h) = (0.7, 1e-5);
+            let (before, here, after) = (at(t - h), at(t), at(t + h));
+            assert!((here[1] - (after[0] - before[0]) / (2.0 * h)).abs() < 1e-8, "{text}");
+            assert!((here[2] - (after[1] - before[1]) / (2.0 * h)).abs() < 1e-8, "{text}");
+        }
+    }
+}

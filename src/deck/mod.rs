@@ -1,0 +1,171 @@
+//! The language of the deck: text in, words with their places out. It knows no mechanics.
+//!
+//! Everything that is wrong is gathered, each with file, line and column; one struct stands for one table.
+
+mod action;
+mod diagnostic;
+mod expression;
+mod geometry;
+mod overrides;
+mod parameters;
+mod procedure;
+mod reader;
+mod resolved;
+
+pub use action::{
+    Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, Load, LoadTarget, LoadVector,
+    Motion, MotionWhat, Spring, Support,
+};
+pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
+pub use expression::{Expression, Jet};
+pub use geometry::{Beam, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape};
+pub use overrides::apply;
+pub use parameters::Parameters;
+pub use procedure::{FAILURES, Effects, Expect, ExpectBody, Instant, Output, Reduce, Stage, StageBody, Until};
+
+use reader::{Context, Table};
+use std::cell::RefCell;
+use toml::de::{DeTable, DeValue};
+
+/// A deck as it stands in the text.
+#[derive(Clone, Debug, Default)]
+pub struct Deck {
+    /// What it is about
+    pub title: Option<String>,
+    /// Labels of the units: length, force, time
+    pub units: Option<[String; 3]>,
+    /// Acceleration of gravity
+    pub gravity: Option<Spanned<[f64; 3]>>,
+    /// Named places
+    pub points: Vec<(Spanned<String>, [f64; 3])>,
+    /// Materials
+    pub materials: Vec<Material>,
+    /// Sections
+    pub sections: Vec<Section>,
+    /// Beams
+    pub beams: Vec<Beam>,
+    /// Supports
+    pub supports: Vec<Support>,
+    /// Prescribed motions
+    pub motions: Vec<Motion>,
+    /// Joints
+    pub joints: Vec<Joint>,
+    /// Rigid bodies
+    pub bodies: Vec<Body>,
+    /// Springs to ground
+    pub springs: Vec<Spring>,
+    /// Loads
+    pub loads: Vec<Load>,
+    /// Initial velocities
+    pub initials: Vec<Initial>,
+    /// Histories
+    pub histories: Vec<HistoryTable>,
+    /// Stages
+    pub stages: Vec<Stage>,
+    /// Effects forced on or off
+    pub effects: Effects,
+    /// What is written
+    pub output: Output,
+    /// Expectations
+    pub expects: Vec<Expect>,
+    /// The values of `[param]`
+    pub parameters: Parameters,
+    /// The deck with expressions replaced by numbers, for run.json
+    pub resolved: serde_json::Value,
+}
+
+const KEYS: [&str; 19] = [
+    "title", "units", "gravity", "param", "point", "material", "section", "beam", "support", "motion", "joint", "body",
+    "spring", "load", "initial", "history", "stage", "effects", "output",
+];
+
+/// Reads a deck; `Err` holds everything that is wrong with its text.
+pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let (document, syntax) = DeTable::parse_recoverable(text);
+    if !syntax.is_empty() {
+        let describe = |error: &toml::de::Error| {
+            let mut diagnostic = Diagnostic::whole(error.message().trim().replace('\n', "; "));
+            diagnostic.span = error.span();
+            diagnostic
+        };
+        return Err(syntax.iter().map(describe).collect());
+    }
+    let mut diagnostics = Vec::new();
+    let parameters = match document.get_ref().get("param").map(|item| (item, item.get_ref())) {
+        Some((_, DeValue::Table(table))) => Parameters::read(table, &mut diagnostics),
+        Some((item, _)) => {
+            diagnostics.push(Diagnostic::error("`param` must be a table: [param]", item.span()));
+            Parameters::default()
+        }
+        None => Parameters::default(),
+    };
+    let stage_count = match document.get_ref().get("stage").map(|item| item.get_ref()) {
+        Some(DeValue::Array(stages)) => stages.len(),
+        _ => 0,
+    };
+    let context = Context { parameters, stage_count, diagnostics: RefCell::new(diagnostics), resolved: RefCell::default() };
+    let deck = read_tables(&context, document.get_ref());
+    let diagnostics = context.diagnostics.take();
+    if !diagnostics.iter().all(Diagnostic::is_warning) {
+        return Err(diagnostics);
+    }
+    let resolved = resolved::to_json(document.get_ref(), &context.resolved.borrow(), &context.parameters);
+    Ok((Deck { parameters: context.parameters.clone(), resolved, ..deck }, diagnostics))
+}
+
+fn read_tables(context: &Context, document: &DeTable) -> Deck {
+    let keys: Vec<&str> = KEYS.into_iter().chain(["expect"]).collect();
+    let top = Table::top(context, document, &keys, &["damping"]);
+    Deck {
+        title: top.text("title").map(|t| t.value),
+        units: procedure::read_units(&top),
+        gravity: top.vector("gravity"),
+        points: geometry::read_points(&top),
+        materials: named(&top, "material", geometry::read_material),
+        sections: named(&top, "section", geometry::read_section),
+        beams: listed(&top, "beam", geometry::read_beam),
+        supports: listed(&top, "support", action::read_support),
+        motions: listed(&top, "motion", action::read_motion),
+        joints: listed(&top, "joint", action::read_joint),
+        bodies: listed(&top, "body", action::read_body),
+        springs: listed(&top, "spring", action::read_spring),
+        loads: listed(&top, "load", action::read_load),
+        initials: listed(&top, "initial", action::read_initial),
+        histories: named(&top, "history", action::read_history),
+        stages: listed(&top, "stage", procedure::read_stage),
+        effects: procedure::read_effects(&top),
+        output: procedure::read_output(&top),
+        expects: listed(&top, "expect", procedure::read_expect),
+        parameters: Parameters::default(),
+        resolved: serde_json::Value::Null,
+    }
+}
+
+/// Reads `[[key]]` tables.
+fn listed<'a, T>(
+    top: &Table<'a>,
+    key: &str,
+    read: impl Fn(&'a Context, &'a reader::Item<'a>) -> Option<T>,
+) -> Vec<T> {
+    top.list(key).into_iter().filter_map(|item| read(top.context, item)).collect()
+}
+
+/// Reads `[key.NAME]` tables.
+fn named<'a, T>(
+    top: &Table<'a>,
+    key: &str,
+    read: impl Fn(&'a Context, Spanned<String>, &'a reader::Item<'a>) -> Option<T>,
+) -> Vec<T> {
+    let Some(item) = top.get(key) else { return Vec::new() };
+    let DeValue::Table(entries) = item.get_ref() else {
+        top.context.report(Diagnostic::error(format!("`{key}` holds named tables: [{key}.NAME]"), item.span()));
+        return Vec::new();
+    };
+    let mut all: Vec<_> = entries.iter().collect();
+    all.sort_by_key(|(name, _)| name.span().start);
+    let read_one = |(name, item): (&'a toml::Spanned<_>, &'a reader::Item<'a>)| {
+        let name: &toml::Spanned<toml::de::DeString> = name;
+        read(top.context, Spanned { value: name.get_ref().to_string(), span: name.span() }, item)
+    };
+    all.into_iter().filter_map(read_one).collect()
+}

@@ -1,0 +1,392 @@
+//! What is done with a scene: stages, output, expectations, effects forced on or off.
+
+use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
+use super::reader::{Context, Item, Table, kind_of};
+use toml::de::DeValue;
+
+/// `[[stage]]`
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// What it does
+    pub body: StageBody,
+    /// Newton's tolerance
+    pub tolerance: f64,
+    /// Newton's limit
+    pub max_iterations: usize,
+    /// Ends it early
+    pub until: Option<Until>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// Kinds of stages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StageBody {
+    /// Load control
+    Static {
+        /// Load levels
+        steps: usize,
+        /// Smaller steps where one fails
+        adaptive: bool,
+    },
+    /// Newmark
+    Dynamic {
+        /// On the run's clock
+        end: f64,
+        /// Step
+        step: f64,
+        /// beta
+        beta: f64,
+        /// gamma
+        gamma: f64,
+    },
+}
+
+/// `until = { column = …, below = …, above = … }`
+#[derive(Clone, Debug)]
+pub struct Until {
+    /// The watched column
+    pub column: Spanned<String>,
+    /// Ends below this
+    pub below: Option<f64>,
+    /// Ends above this
+    pub above: Option<f64>,
+}
+
+/// `[effects]`
+#[derive(Clone, Debug, Default)]
+pub struct Effects {
+    /// Forces rotary inertia on or off.
+    pub rotary_inertia: Option<Spanned<bool>>,
+}
+
+/// `[output]`
+#[derive(Clone, Debug, Default)]
+pub struct Output {
+    /// The nodes that are written; default: every named point that is a node
+    pub nodes: Option<Vec<Spanned<String>>>,
+    /// The groups of columns; default: u and r
+    pub columns: Option<Vec<Spanned<String>>>,
+    /// Each n-th row
+    pub every: usize,
+    /// Rows at multiples of this time
+    pub interval: Option<f64>,
+}
+
+/// `[[expect]]`
+#[derive(Clone, Debug)]
+pub struct Expect {
+    /// What is expected
+    pub body: ExpectBody,
+    /// Where the number comes from
+    pub source: Option<String>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// What is expected.
+#[derive(Clone, Debug)]
+pub enum ExpectBody {
+    /// A number
+    Column {
+        /// Of this column
+        column: Spanned<String>,
+        /// Over rows or at one
+        reduce: Reduce,
+        /// value, atol, rtol
+        value: Option<(f64, f64, f64)>,
+        /// Upper bound
+        below: Option<f64>,
+        /// Lower bound
+        above: Option<f64>,
+    },
+    /// A failure of this name
+    Fails(Spanned<String>),
+}
+
+/// Which rows an expectation looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reduce {
+    /// One instant
+    At(Instant),
+    /// Largest
+    Max,
+    /// Smallest
+    Min,
+    /// Largest magnitude
+    AbsMax,
+    /// Mean over rows
+    Mean,
+    /// Largest departure from the first row
+    Drift,
+}
+
+/// One instant of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Instant {
+    /// The last row
+    End,
+    /// A time
+    Time(f64),
+    /// The first crossing of a load factor
+    Load(f64),
+}
+
+/// Names of failures that a run can end with.
+pub const FAILURES: [&str; 9] = [
+    "deck", "mesh_too_coarse", "not_converged", "singular", "non_finite", "energy_growth", "limit", "io", "interrupted",
+];
+
+/// Most load levels or time steps of a stage.
+pub const MOST_STEPS: usize = 1_000_000_000;
+
+pub(super) fn read_units(top: &Table) -> Option<[String; 3]> {
+    let table = Table::new(top.context, top.get("units")?, "`units`", &["length", "force", "time"], &[])?;
+    let label = |key: &str| table.text(key).map_or(String::new(), |t| t.value);
+    Some(["length", "force", "time"].map(label))
+}
+
+const COMMON: [&str; 4] = ["kind", "tolerance", "max_iterations", "until"];
+const STATIC: [&str; 4] = ["steps", "adaptive", "control", "max_steps"];
+const DYNAMIC: [&str; 9] = ["end", "step", "scheme", "beta", "gamma", "alpha", "rho_inf", "adaptive", "step_tolerance"];
+
+pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Stage> {
+    let known = [&COMMON[..], &STATIC, &DYNAMIC, &["modes"]].concat();
+    let table = Table::new(context, item, "[[stage]]", &known, &[])?;
+    table.required("kind")?;
+    let kind = table.word("kind", &["static", "dynamic", "modal", "buckling"])?;
+    let body = match kind.value {
+        "static" => {
+            refuse_others(&table, "static", &STATIC);
+            read_static(&table)
+        }
+        "dynamic" => {
+            refuse_others(&table, "dynamic", &DYNAMIC);
+            read_dynamic(&table)
+        }
+        other => context.wrong(kind.span, format!("kind = \"{other}\" is not supported yet")),
+    };
+    let tolerance = read_tolerance(&table);
+    let max_iterations = match table.get("max_iterations") {
+        Some(item) => context.whole(item, 1, 10_000).map(|n| n.value),
+        None => Some(25),
+    };
+    let until = match table.get("until") {
+        Some(item) => read_until(context, item).map(Some),
+        None => Some(None),
+    };
+    Some(Stage {
+        body: body?,
+        tolerance: tolerance?,
+        max_iterations: max_iterations?,
+        until: until?,
+        span: table.span.clone(),
+    })
+}
+
+fn refuse_others(table: &Table, kind: &str, own: &[&str]) {
+    let all = [&STATIC[..], &DYNAMIC, &["modes"]].concat();
+    for key in all.iter().filter(|key| table.has(key) && !own.contains(key)) {
+        let message = format!("`{key}` does not belong to a {kind} stage");
+        table.context.report(Diagnostic::error(message, table.key_span(key)));
+    }
+}
+
+fn read_static(table: &Table) -> Option<StageBody> {
+    let context = table.context;
+    if let Some(word) = table.word("control", &["load", "arc_length"])
+        && word.value == "arc_length"
+    {
+        return context.wrong(word.span, "control = \"arc_length\" is not supported yet");
+    }
+    if table.has("max_steps") {
+        context.report(Diagnostic::error("`max_steps` belongs to control = \"arc_length\"", table.key_span("max_steps")));
+    }
+    let steps = table.required("steps").and_then(|item| context.whole(item, 1, MOST_STEPS));
+    let adaptive = if table.has("adaptive") { table.flag("adaptive") } else { Some(true) };
+    Some(StageBody::Static { steps: steps?.value, adaptive: adaptive? })
+}
+
+fn read_dynamic(table: &Table) -> Option<StageBody> {
+    let context = table.context;
+    let scheme = table.word("scheme", &["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"]);
+    if let Some(word) = scheme.as_ref().filter(|word| word.value != "newmark") {
+        return context.wrong(word.span.clone(), format!("scheme = \"{}\" is not supported yet", word.value));
+    }
+    for (key, owner) in [("alpha", "hht"), ("rho_inf", "generalized_alpha")] {
+        if table.has(key) {
+            let message = format!("`{key}` belongs to scheme = \"{owner}\"");
+            context.report(Diagnostic::error(message, table.key_span(key)));
+        }
+    }
+    if table.flag("adaptive") == Some(true) {
+        let message = "adaptive = true in a dynamic stage is not supported yet";
+        context.report(Diagnostic::error(message, table.key_span("adaptive")));
+    }
+    if table.has("step_tolerance") {
+        let message = "`step_tolerance` belongs to adaptive = true, which is not supported yet in a dynamic stage";
+        context.report(Diagnostic::error(message, table.key_span("step_tolerance")));
+    }
+    table.required("end");
+    table.required("step");
+    let (end, step) = (table.positive("end"), table.positive("step"));
+    let or = |key: &str, default: f64| if table.has(key) { table.positive(key).map(|v| v.value) } else { Some(default) };
+    let (beta, gamma) = (or("beta", 0.25), or("gamma", 0.5));
+    let (end, step) = (end?, step?);
+    if end.value / step.value > MOST_STEPS as f64 {
+        let message = format!("{:.3e} steps are more than the largest supported {MOST_STEPS}", end.value / step.value);
+        context.report(Diagnostic::limit(message, step.span));
+        return None;
+    }
+    Some(StageBody::Dynamic { end: end.value, step: step.value, beta: beta?, gamma: gamma? })
+}
+
+fn read_tolerance(table: &Table) -> Option<f64> {
+    if !table.has("tolerance") {
+        return Some(1e-9);
+    }
+    let tolerance = table.positive("tolerance")?;
+    if tolerance.value < 1.0 {
+        return Some(tolerance.value);
+    }
+    table.context.wrong(tolerance.span, format!("`tolerance` is relative and below 1, found {}", tolerance.value))
+}
+
+fn read_until<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Until> {
+    let table = Table::new(context, item, "`until`", &["column", "below", "above"], &[])?;
+    let column = table.required("column").and_then(|item| context.text(item));
+    let (below, above) = (table.number("below").map(|v| v.value), table.number("above").map(|v| v.value));
+    if !table.has("below") && !table.has("above") {
+        return context.wrong(table.span.clone(), "`until` needs `below` or `above`");
+    }
+    Some(Until { column: column?, below, above })
+}
+
+pub(super) fn read_effects(top: &Table) -> Effects {
+    let Some(item) = top.get("effects") else { return Effects::default() };
+    let keys = ["rotary_inertia", "planar"];
+    let Some(table) = Table::new(top.context, item, "[effects]", &keys, &[]) else { return Effects::default() };
+    if table.flag("planar") == Some(true) {
+        let message = "planar = true is not supported yet: every scene is simulated in three dimensions";
+        top.context.report(Diagnostic::error(message, table.key_span("planar")));
+    }
+    let rotary = table.flag("rotary_inertia");
+    Effects { rotary_inertia: rotary.map(|value| Spanned { value, span: table.key_span("rotary_inertia") }) }
+}
+
+pub(super) fn read_output(top: &Table) -> Output {
+    let default = Output { every: 1, ..Output::default() };
+    let Some(item) = top.get("output") else { return default };
+    let context = top.context;
+    let keys = ["nodes", "columns", "every", "interval", "vtk"];
+    let Some(table) = Table::new(context, item, "[output]", &keys, &[]) else { return default };
+    if table.flag("vtk") == Some(true) {
+        context.report(Diagnostic::error("vtk = true is not supported yet", table.key_span("vtk")));
+    }
+    if table.has("every") && table.has("interval") {
+        context.report(Diagnostic::error("give `every` or `interval`, not both", table.key_span("interval")));
+    }
+    let list = |key: &str| table.get(key).and_then(|item| context.texts(item));
+    Output {
+        nodes: list("nodes"),
+        columns: list("columns"),
+        every: table.get("every").and_then(|item| context.whole(item, 1, MOST_STEPS)).map_or(1, |n| n.value),
+        interval: table.positive("interval").map(|v| v.value),
+    }
+}
+
+const EXPECT_KEYS: [&str; 10] =
+    ["column", "at", "reduce", "value", "rtol", "atol", "below", "above", "source", "fails"];
+
+pub(super) fn read_expect<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Expect> {
+    let table = Table::new(context, item, "[[expect]]", &EXPECT_KEYS, &[])?;
+    let source = table.text("source").map(|t| t.value);
+    let body = if table.has("fails") { read_fails(&table) } else { read_column(&table) };
+    Some(Expect { body: body?, source, span: table.span.clone() })
+}
+
+fn read_fails(table: &Table) -> Option<ExpectBody> {
+    let context = table.context;
+    if let Some(key) = EXPECT_KEYS.into_iter().find(|key| !["fails", "source"].contains(key) && table.has(key)) {
+        return context.wrong(table.key_span(key), format!("an expected failure has no `{key}`"));
+    }
+    let name = table.text("fails")?;
+    if FAILURES.contains(&name.value.as_str()) {
+        return Some(ExpectBody::Fails(name));
+    }
+    let mut diagnostic = Diagnostic::error(format!("there is no failure `{}`", name.value), name.span);
+    diagnostic.help = Some(match nearest(&name.value, FAILURES) {
+        Some(meant) => format!("did you mean `{meant}`?"),
+        None => format!("failures are {}", super::one_of(FAILURES)),
+    });
+    context.report(diagnostic);
+    None
+}
+
+fn read_column(table: &Table) -> Option<ExpectBody> {
+    let context = table.context;
+    let column = table.required("column").and_then(|item| context.text(item));
+    let reduce = read_reduce(table);
+    let (below, above) = (table.number("below").map(|v| v.value), table.number("above").map(|v| v.value));
+    let value = if table.has("value") {
+        Some(read_value(table)?)
+    } else {
+        if let Some(key) = ["rtol", "atol"].into_iter().find(|key| table.has(key)) {
+            return context.wrong(table.key_span(key), format!("`{key}` belongs to a `value`"));
+        }
+        if !table.has("below") && !table.has("above") {
+            return context.wrong(table.span.clone(), "[[expect]] needs `value`, `below`, `above` or `fails`");
+        }
+        None
+    };
+    Some(ExpectBody::Column { column: column?, reduce: reduce?, value, below, above })
+}
+
+fn read_value(table: &Table) -> Option<(f64, f64, f64)> {
+    let context = table.context;
+    let value = table.number("value");
+    let tolerance = |key: &str| {
+        let Some(number) = table.number(key) else { return Some(0.0) };
+        if number.value >= 0.0 {
+            return Some(number.value);
+        }
+        context.wrong(number.span, format!("`{key}` must not be negative"))
+    };
+    let (atol, rtol) = (tolerance("atol"), tolerance("rtol"));
+    if !table.has("atol") && !table.has("rtol") {
+        return context.wrong(table.key_span("value"), "a `value` needs `rtol` or `atol`: how close is close enough?");
+    }
+    Some((value?.value, atol?, rtol?))
+}
+
+fn read_reduce(table: &Table) -> Option<Reduce> {
+    let context = table.context;
+    match (table.get("at"), table.get("reduce")) {
+        (None, None) => Some(Reduce::At(Instant::End)),
+        (Some(item), None) => read_instant(context, item).map(Reduce::At),
+        (None, Some(_)) => {
+            Some(match table.word("reduce", &["max", "min", "absmax", "mean", "drift"])?.value {
+                "max" => Reduce::Max,
+                "min" => Reduce::Min,
+                "absmax" => Reduce::AbsMax,
+                "mean" => Reduce::Mean,
+                _ => Reduce::Drift,
+            })
+        }
+        (Some(_), Some(item)) => {
+            context.wrong(item.span(), "an expectation looks `at` one instant or takes a `reduce` over all rows, not both")
+        }
+    }
+}
+
+fn read_instant<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Instant> {
+    match item.get_ref() {
+        DeValue::String(word) if word == "end" => Some(Instant::End),
+        DeValue::Table(_) => {
+            let table = Table::new(context, item, "`at`", &["load"], &[])?;
+            context.number(table.required("load")?).map(|v| Instant::Load(v.value))
+        }
+        DeValue::Integer(_) | DeValue::Float(_) | DeValue::String(_) => context.number(item).map(|v| Instant::Time(v.value)),
+        other => context.wrong(item.span(), format!("`at` is \"end\", a time or {{ load = … }}, found {}", kind_of(other))),
+    }
+}

@@ -1,0 +1,309 @@
+//! Reads typed values out of TOML tables, each with its place, and collects everything that is wrong.
+
+use super::diagnostic::{Diagnostic, Span, Spanned, nearest, one_of};
+use super::expression::Expression;
+use super::parameters::Parameters;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use toml::de::{DeTable, DeValue};
+
+/// A value of the deck with its place.
+pub type Item<'a> = toml::Spanned<DeValue<'a>>;
+
+/// What reading needs and gathers.
+pub struct Context {
+    /// The values of `[param]`
+    pub parameters: Parameters,
+    /// How many stages the deck has
+    pub stage_count: usize,
+    /// What is wrong so far
+    pub diagnostics: RefCell<Vec<Diagnostic>>,
+    /// The numbers that strings stood for, by the start of the string
+    pub resolved: RefCell<BTreeMap<usize, f64>>,
+}
+
+impl Context {
+    /// Adds a diagnostic.
+    pub fn report(&self, diagnostic: Diagnostic) {
+        self.diagnostics.borrow_mut().push(diagnostic);
+    }
+
+    /// Reports an error at a place; returns nothing, for use in a tail position.
+    pub fn wrong<T>(&self, span: Span, message: impl Into<String>) -> Option<T> {
+        self.report(Diagnostic::error(message, span));
+        None
+    }
+
+    /// A finite number, or an expression of one.
+    pub fn number(&self, item: &Item) -> Option<Spanned<f64>> {
+        let span = item.span();
+        let value = match item.get_ref() {
+            DeValue::Integer(integer) => {
+                let text = integer.as_str().replace('_', "");
+                i64::from_str_radix(&text, integer.radix()).ok().map(|v| v as f64).or_else(|| text.parse().ok())
+            }
+            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+            DeValue::String(text) => {
+                let value = self.expression_value(text, &span)?;
+                self.resolved.borrow_mut().insert(span.start, value);
+                Some(value)
+            }
+            other => return self.wrong(span, format!("expected a number, found {}", kind_of(other))),
+        };
+        match value {
+            Some(value) if value.is_finite() => Some(Spanned { value, span }),
+            _ => self.wrong(span, "a number must be finite"),
+        }
+    }
+
+    fn expression_value(&self, text: &str, span: &Span) -> Option<f64> {
+        let evaluated = Expression::parse(text).and_then(|e| e.evaluate(&mut |name| self.parameters.get(name)));
+        match evaluated {
+            Ok([value, ..]) if value.is_finite() => Some(value),
+            Ok([value, ..]) => {
+                self.wrong(span.clone(), format!("the expression `{text}` gives {value}; a number must be finite"))
+            }
+            Err(_) if self.parameters.is_broken(text) => None,
+            Err(error) => {
+                let at = span.start + 1 + error.offset;
+                let mut diagnostic =
+                    Diagnostic::error(format!("in the expression `{text}`: {}", error.message), at..at + 1);
+                if let Some(name) = error.message.strip_prefix("unknown name `").and_then(|n| n.strip_suffix('`')) {
+                    diagnostic.help = Some(if name == "t" {
+                        "`t` exists only in the `expr` of a history".into()
+                    } else {
+                        match nearest(name, self.parameters.names()) {
+                            Some(meant) => format!("did you mean `{meant}`?"),
+                            None => format!("define it: [param] {name} = …"),
+                        }
+                    });
+                }
+                self.report(diagnostic);
+                None
+            }
+        }
+    }
+
+    /// A list of numbers; of a certain length where one is given.
+    pub fn numbers(&self, item: &Item, length: Option<usize>) -> Option<Spanned<Vec<f64>>> {
+        let span = item.span();
+        let DeValue::Array(array) = item.get_ref() else {
+            let wanted = length.map_or("a list of numbers".into(), |n| format!("a list of {n} numbers"));
+            return self.wrong(span, format!("expected {wanted}, found {}", kind_of(item.get_ref())));
+        };
+        let values: Vec<Option<f64>> = array.iter().map(|entry| self.number(entry).map(|n| n.value)).collect();
+        if let Some(length) = length.filter(|&length| length != values.len()) {
+            return self.wrong(span, format!("expected {length} numbers, found {}", values.len()));
+        }
+        Some(Spanned { value: values.into_iter().collect::<Option<_>>()?, span })
+    }
+
+    /// Exactly N numbers.
+    pub fn vector<const N: usize>(&self, item: &Item) -> Option<Spanned<[f64; N]>> {
+        let list = self.numbers(item, Some(N))?;
+        let value = list.value.try_into().ok()?;
+        Some(Spanned { value, span: list.span })
+    }
+
+    /// A whole number in a range.
+    pub fn whole(&self, item: &Item, least: usize, most: usize) -> Option<Spanned<usize>> {
+        let Spanned { value, span } = self.number(item)?;
+        if value.fract() != 0.0 {
+            return self.wrong(span, format!("expected a whole number, found {value}"));
+        }
+        if value < least as f64 {
+            return self.wrong(span, format!("expected at least {least}, found {value}"));
+        }
+        if value > most as f64 {
+            let message = format!("{value} is more than the largest supported {most}");
+            self.report(Diagnostic::limit(message, span));
+            return None;
+        }
+        Some(Spanned { value: value as usize, span })
+    }
+
+    /// A text.
+    pub fn text(&self, item: &Item) -> Option<Spanned<String>> {
+        match item.get_ref() {
+            DeValue::String(text) => Some(Spanned { value: text.to_string(), span: item.span() }),
+            other => self.wrong(item.span(), format!("expected a text, found {}", kind_of(other))),
+        }
+    }
+
+    /// A list of texts.
+    pub fn texts(&self, item: &Item) -> Option<Vec<Spanned<String>>> {
+        match item.get_ref() {
+            DeValue::Array(array) => array.iter().map(|entry| self.text(entry)).collect(),
+            other => self.wrong(item.span(), format!("expected a list of texts, found {}", kind_of(other))),
+        }
+    }
+}
+
+/// What a value is, in the words of TOML.
+pub fn kind_of(value: &DeValue) -> &'static str {
+    match value {
+        DeValue::String(_) => "a text",
+        DeValue::Integer(_) | DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "a list",
+        DeValue::Table(_) => "a table",
+    }
+}
+
+/// A key that the contract knows but that this version does not simulate yet.
+pub type Unsupported = &'static [&'static str];
+
+/// One table of the deck.
+pub struct Table<'a> {
+    /// What reading needs
+    pub context: &'a Context,
+    /// What it is called in messages: `[[beam]]`
+    pub what: String,
+    /// Where it stands
+    pub span: Span,
+    entries: &'a DeTable<'a>,
+}
+
+impl<'a> Table<'a> {
+    /// The table `item`; keys that are not in `keys` are errors.
+    pub fn new(
+        context: &'a Context,
+        item: &'a Item<'a>,
+        what: impl Into<String>,
+        keys: &[&str],
+        unsupported: Unsupported,
+    ) -> Option<Self> {
+        let table = Self::of_names(context, item, what)?;
+        table.refuse_unknown(keys, unsupported);
+        Some(table)
+    }
+
+    /// A table whose keys are names that the user chooses.
+    pub fn of_names(context: &'a Context, item: &'a Item<'a>, what: impl Into<String>) -> Option<Self> {
+        let what = what.into();
+        let DeValue::Table(entries) = item.get_ref() else {
+            return context.wrong(item.span(), format!("{what} must be a table, found {}", kind_of(item.get_ref())));
+        };
+        Some(Self { context, what, span: item.span(), entries })
+    }
+
+    /// The top level of the deck.
+    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, keys: &[&str], unsupported: Unsupported) -> Self {
+        let table = Self { context, what: "the deck".into(), span: 0..0, entries };
+        table.refuse_unknown(keys, unsupported);
+        table
+    }
+
+    fn refuse_unknown(&self, keys: &[&str], unsupported: Unsupported) {
+        for key in self.entries.keys() {
+            let name: &str = key.get_ref();
+            if unsupported.contains(&name) {
+                let message = format!("`{name}` in {} is not supported yet", self.what);
+                self.context.report(Diagnostic::error(message, key.span()));
+            } else if !keys.contains(&name) {
+                let mut diagnostic = Diagnostic::error(format!("unknown key `{name}` in {}", self.what), key.span());
+                diagnostic.help = Some(match nearest(name, keys.iter().copied()) {
+                    Some(meant) => format!("did you mean `{meant}`?"),
+                    None => format!("{} knows {}", self.what, one_of(keys.iter().copied())),
+                });
+                self.context.report(diagnostic);
+            }
+        }
+    }
+
+    /// Whether a key stands in the table.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.contains_key(key)
+    }
+
+    /// The value of a key.
+    pub fn get(&self, key: &str) -> Option<&'a Item<'a>> {
+        self.entries.get(key)
+    }
+
+    /// Where a key stands.
+    pub fn key_span(&self, key: &str) -> Span {
+        self.entries.keys().find(|k| k.get_ref().as_ref() == key).map_or(self.span.clone(), |k| k.span())
+    }
+
+    /// The value of a key that must be there.
+    pub fn required(&self, key: &str) -> Option<&'a Item<'a>> {
+        let found = self.get(key);
+        if found.is_none() {
+            self.context.report(Diagnostic::error(format!("{} needs `{key}`", self.what), self.span.clone()));
+        }
+        found
+    }
+
+    /// Names and values in the order of the deck.
+    pub fn entries(&self) -> impl Iterator<Item = (Spanned<String>, &'a Item<'a>)> {
+        let mut all: Vec<_> = self.entries.iter().collect();
+        all.sort_by_key(|(key, _)| key.span().start);
+        all.into_iter().map(|(key, value)| (Spanned { value: key.get_ref().to_string(), span: key.span() }, value))
+    }
+
+    /// The entries of an array of tables.
+    pub fn list(&self, key: &str) -> Vec<&'a Item<'a>> {
+        match self.get(key).map(|item| item.get_ref()) {
+            None => Vec::new(),
+            Some(DeValue::Array(array)) => array.iter().collect(),
+            Some(_) => {
+                let message = format!("`{key}` is a list of tables: write [[{key}]] above each");
+                self.context.report(Diagnostic::error(message, self.key_span(key)));
+                Vec::new()
+            }
+        }
+    }
+
+    /// One of a few words.
+    pub fn word(&self, key: &str, words: &[&'static str]) -> Option<Spanned<&'static str>> {
+        let text = self.context.text(self.get(key)?)?;
+        choose(self.context, &text, key, words)
+    }
+
+    /// A positive number.
+    pub fn positive(&self, key: &str) -> Option<Spanned<f64>> {
+        let number = self.context.number(self.get(key)?)?;
+        if number.value > 0.0 {
+            return Some(number);
+        }
+        self.context.wrong(number.span, format!("`{key}` must be positive, found {}", number.value))
+    }
+
+    /// A number.
+    pub fn number(&self, key: &str) -> Option<Spanned<f64>> {
+        self.context.number(self.get(key)?)
+    }
+
+    /// A vector of N numbers.
+    pub fn vector<const N: usize>(&self, key: &str) -> Option<Spanned<[f64; N]>> {
+        self.context.vector(self.get(key)?)
+    }
+
+    /// A text.
+    pub fn text(&self, key: &str) -> Option<Spanned<String>> {
+        self.context.text(self.get(key)?)
+    }
+
+    /// True or false.
+    pub fn flag(&self, key: &str) -> Option<bool> {
+        let item = self.get(key)?;
+        match item.get_ref() {
+            DeValue::Boolean(value) => Some(*value),
+            other => self.context.wrong(item.span(), format!("`{key}` is true or false, found {}", kind_of(other))),
+        }
+    }
+}
+
+/// The word that a text is, out of a few.
+pub fn choose(context: &Context, text: &Spanned<String>, key: &str, words: &[&'static str]) -> Option<Spanned<&'static str>> {
+    if let Some(word) = words.iter().find(|w| **w == text.value) {
+        return Some(Spanned { value: word, span: text.span.clone() });
+    }
+    let message = format!("`{key}` is {}, not `{}`", one_of(words.iter().copied()), text.value);
+    let mut diagnostic = Diagnostic::error(message, text.span.clone());
+    diagnostic.help = nearest(&text.value, words.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
+    context.report(diagnostic);
+    None
+}

@@ -1,0 +1,167 @@
+//! What a run can end with, by name and with its numbers.
+
+use crate::model::{Model, SlotKind};
+use crate::tensor::Vec3;
+use std::fmt;
+
+/// When something happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// Stage, from 1
+    pub stage: usize,
+    /// The run's clock
+    pub time: f64,
+    /// The load factor
+    pub load: f64,
+}
+
+/// Where something happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// The name of the node
+    pub node: String,
+    /// Displacement or rotation
+    pub kind: SlotKind,
+    /// Direction, global components
+    pub direction: Vec3,
+}
+
+/// A failure of a run. The names are part of the contract with users.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Failure {
+    /// Something in the deck that only shows when a stage begins
+    Deck(String),
+    /// Newton's iteration found no balance.
+    NotConverged {
+        /// When
+        at: Moment,
+        /// The worst residual's place
+        place: Place,
+        /// Its size
+        residual: f64,
+        /// The force it is compared to
+        force: f64,
+        /// Iterations of the last attempt
+        iterations: usize,
+        /// Cut-backs tried before giving up
+        cutbacks: u64,
+    },
+    /// A mechanism or a loose part
+    Singular {
+        /// When
+        at: Moment,
+        /// What moves freely
+        place: Option<Place>,
+    },
+    /// A force that is not finite
+    NonFinite {
+        /// When
+        at: Moment,
+        /// The effect that gave it
+        effect: Option<&'static str>,
+        /// The node
+        node: String,
+    },
+    /// Neighbouring nodes turn too far against each other.
+    MeshTooCoarse {
+        /// When
+        at: Moment,
+        /// First and second node of the pair's element
+        nodes: [String; 2],
+        /// Radians
+        relative_rotation: f64,
+    },
+    /// Larger than the stated bounds
+    Limit(String),
+    /// A file that could not be written
+    Io(String),
+    /// Stopped by a signal
+    Interrupted {
+        /// When
+        at: Moment,
+        /// SIGINT is 2, SIGTERM 15
+        signal: i32,
+    },
+}
+
+impl Failure {
+    /// The name of the failure.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Deck(_) => "deck",
+            Self::NotConverged { .. } => "not_converged",
+            Self::Singular { .. } => "singular",
+            Self::NonFinite { .. } => "non_finite",
+            Self::MeshTooCoarse { .. } => "mesh_too_coarse",
+            Self::Limit(_) => "limit",
+            Self::Io(_) => "io",
+            Self::Interrupted { .. } => "interrupted",
+        }
+    }
+
+    /// What to try.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::NotConverged { at, .. } if at.time == 0.0 && at.load < 1.0 => Some(
+                "smaller load levels were tried; a limit point (the load cannot grow further on this path) or a \
+                 buckling load may lie just ahead",
+            ),
+            Self::NotConverged { .. } => Some("try a smaller `step`, or a finer mesh where it turns most"),
+            Self::Singular { .. } => Some("add a support, a spring or a joint that holds this direction, or give it mass"),
+            Self::MeshTooCoarse { .. } => Some("use more `elements` there"),
+            Self::NonFinite { .. } => Some("look for values near the limits of floating-point numbers in the deck"),
+            Self::Deck(_) | Self::Limit(_) | Self::Io(_) | Self::Interrupted { .. } => None,
+        }
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "stage {}, time {}, load factor {}", self.stage, self.time, self.load)
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let what = if self.kind == SlotKind::Displacement { "displacement" } else { "rotation" };
+        let [x, y, z] = self.direction.0;
+        let axis = ["x", "y", "z"].into_iter().zip(self.direction.0).find(|(_, c)| c.abs() > 0.999_999);
+        match (axis, what) {
+            (Some((name, _)), "displacement") => write!(f, "node \"{}\", displacement along {name}", self.node),
+            (Some((name, _)), _) => write!(f, "node \"{}\", rotation about {name}", self.node),
+            (None, what) => write!(f, "node \"{}\", {what} [{x:.3}, {y:.3}, {z:.3}]", self.node),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Deck(message) | Self::Limit(message) | Self::Io(message) => f.write_str(message),
+            Self::NotConverged { at, place, residual, force, iterations, cutbacks } => write!(
+                f,
+                "no balance at {at}: after {iterations} iterations and {cutbacks} cut-backs the residual at {place} is \
+                 {residual:.3e}, the largest force {force:.3e}"
+            ),
+            Self::Singular { at, place: Some(place) } => {
+                write!(f, "nothing holds {place} ({at}): a mechanism or a loose part")
+            }
+            Self::Singular { at, place: None } => write!(f, "the tangent cannot be solved with at {at}"),
+            Self::NonFinite { at, effect, node } => {
+                let effect = effect.unwrap_or("the sum of forces");
+                write!(f, "{effect} is not finite at node \"{node}\" ({at})")
+            }
+            Self::MeshTooCoarse { at, nodes: [a, b], relative_rotation } => write!(
+                f,
+                "the element between \"{a}\" and \"{b}\" turns by {relative_rotation:.3} rad from node to node ({at})"
+            ),
+            Self::Interrupted { at, signal } => write!(f, "stopped by signal {signal} at {at}"),
+        }
+    }
+}
+
+/// The place of a slot, along `direction`.
+pub(super) fn place(model: &Model, slot: usize, direction: Vec3) -> Place {
+    let info = &model.slots[slot];
+    Place { node: info.node.clone(), kind: info.kind, direction: direction.normalized().unwrap_or(Vec3::ZERO) }
+}

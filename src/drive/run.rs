@@ -1,0 +1,355 @@
+//! A run from its plan: the stages one after the other, watched by an observer.
+
+use super::failure::{Failure, Moment, place};
+use super::ledger::{Bookkeeper, Ledger};
+use crate::model::{Assembly, Jump, Model, StageError, StageKind, charts};
+use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
+use crate::system::{Node, State, System};
+use crate::tensor::Vec3;
+use std::sync::Arc;
+
+/// What is to be done.
+#[derive(Clone)]
+pub struct Plan {
+    /// The scene
+    pub model: Model,
+    /// Velocities at the start of the first dynamic stage
+    pub initial: Vec<InitialMotion>,
+    /// The stages in their order
+    pub stages: Vec<Stage>,
+    /// Rows of dynamic stages are wanted at multiples of this time.
+    pub interval: Option<f64>,
+    /// Whether the energy account is asked for
+    pub energy: bool,
+}
+
+/// Velocities given to nodes: velocity + spin x (place - about).
+#[derive(Clone, Debug)]
+pub struct InitialMotion {
+    /// The nodes with their initial places
+    pub nodes: Vec<(Node, Vec3)>,
+    /// Velocity
+    pub velocity: Vec3,
+    /// Spatial angular velocity
+    pub spin: Vec3,
+    /// The point it turns about
+    pub about: Vec3,
+}
+
+/// One stage.
+#[derive(Clone)]
+pub struct Stage {
+    /// What is done
+    pub work: StageWork,
+    /// Newton's tolerance
+    pub tolerance: f64,
+    /// Newton's limit
+    pub max_iterations: usize,
+    /// Ends the stage early
+    pub until: Option<Until>,
+}
+
+/// What a stage does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StageWork {
+    /// Equal load levels
+    Static {
+        /// Their number
+        steps: usize,
+        /// Whether a level that fails is approached in smaller steps
+        adaptive: bool,
+    },
+    /// Newmark's steps
+    Dynamic {
+        /// Time on the run's clock at which it ends
+        end: f64,
+        /// Step
+        step: f64,
+        /// beta
+        beta: f64,
+        /// gamma
+        gamma: f64,
+    },
+}
+
+impl StageWork {
+    /// Its kind.
+    pub fn kind(&self) -> StageKind {
+        match self {
+            Self::Static { .. } => StageKind::Static,
+            Self::Dynamic { .. } => StageKind::Dynamic,
+        }
+    }
+}
+
+/// A condition that ends a stage at the first row beyond it.
+#[derive(Clone)]
+pub struct Until {
+    /// The watched column
+    pub column: Arc<dyn Fn(&Snapshot) -> f64 + Send + Sync>,
+    /// Ends below this
+    pub below: Option<f64>,
+    /// Ends above this
+    pub above: Option<f64>,
+}
+
+/// What an observer sees of a converged state.
+pub struct Snapshot<'a> {
+    /// Stage, from 1
+    pub stage: usize,
+    /// The state
+    pub state: &'a State,
+    /// Its forces
+    pub system: &'a System,
+    /// The scene
+    pub model: &'a Model,
+    /// The energy account, where it is kept
+    pub ledger: Ledger,
+    /// Work so far
+    pub counters: &'a Counters,
+}
+
+/// Watches a run. It cannot change it, only end it.
+pub trait Observer {
+    /// A converged state: the start, a load level, a time step.
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure>;
+
+    /// A remark that is not a failure.
+    fn warn(&mut self, _message: &str) {}
+
+    /// How far the run has come, from 0 to 1; called at each attempt. It may end the run.
+    fn progress(&mut self, _at: Moment, _done: f64) -> Result<(), Failure> {
+        Ok(())
+    }
+}
+
+/// Work done in a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Counters {
+    /// Converged levels and time steps
+    pub steps: u64,
+    /// Attempts that were taken back
+    pub cutbacks: u64,
+    /// Mixed elements, summed over converged states
+    pub mixed_elements: u64,
+    /// Iterations, factorisations, chart switches, seconds
+    pub work: Work,
+    /// Evaluations of instances by effect
+    pub evaluations: Vec<(&'static str, u64)>,
+}
+
+/// A run in progress.
+pub struct Run<'o> {
+    pub(super) model: Model,
+    pub(super) state: State,
+    pub(super) counters: Counters,
+    pub(super) observer: &'o mut dyn Observer,
+    pub(super) plan: Plan,
+    pub(super) bookkeeper: Bookkeeper,
+    pub(super) stage: usize,
+    started: bool,
+    warned_coarse: bool,
+    moving: bool,
+}
+
+/// What one stage works with.
+pub(super) struct Workshop {
+    pub assembly: Assembly,
+    pub solver: LinearSolver,
+    pub newton: Newton,
+    pub until: Option<Until>,
+}
+
+impl<'o> Run<'o> {
+    /// A run at its start.
+    pub fn new(plan: Plan, observer: &'o mut dyn Observer) -> Self {
+        let model = plan.model.clone();
+        Self {
+            state: model.rest(),
+            bookkeeper: Bookkeeper::new(model.slots.len()),
+            model,
+            plan,
+            counters: Counters::default(),
+            observer,
+            stage: 0,
+            started: false,
+            warned_coarse: false,
+            moving: false,
+        }
+    }
+
+    /// Runs all stages. Whatever happens, the counters tell how far it came.
+    pub fn finish(mut self) -> (Result<(), Failure>, Counters) {
+        let result = self.run_stages();
+        (result, self.counters)
+    }
+
+    fn run_stages(&mut self) -> Result<(), Failure> {
+        let stages = self.plan.stages.clone();
+        for (number, stage) in stages.iter().enumerate() {
+            self.stage = number;
+            let mut workshop = self.open_stage(stage)?;
+            let result = match stage.work {
+                StageWork::Static { steps, adaptive } => self.run_static(&mut workshop, steps, adaptive),
+                StageWork::Dynamic { end, step, beta, gamma } => self.run_dynamic(&mut workshop, end, step, beta, gamma),
+            };
+            self.count_evaluations(&workshop.assembly);
+            result?;
+            self.model.end_stage(&self.state);
+        }
+        Ok(())
+    }
+
+    /// Settles loads and constraints of the stage, and analyses the pattern of its unknowns.
+    fn open_stage(&mut self, stage: &Stage) -> Result<Workshop, Failure> {
+        let kind = stage.work.kind();
+        let begun = self.model.begin_stage(self.stage, kind, &self.state);
+        let equations = begun.map_err(|error| self.describe(error))?;
+        let count = equations.count();
+        let slots = self.model.slots.len();
+        let assembly = Assembly::new(self.model.acting(kind), equations, slots);
+        let Some(solver) = LinearSolver::new(&assembly.system.pattern) else {
+            return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
+        };
+        let convergence = Convergence { tolerance: stage.tolerance };
+        let newton = Newton::new(convergence, stage.max_iterations, count, slots);
+        Ok(Workshop { assembly, solver, newton, until: stage.until.clone() })
+    }
+
+    /// The first dynamic stage gives the initial velocities.
+    pub(super) fn takes_initial_motion(&mut self) -> bool {
+        !std::mem::replace(&mut self.moving, true)
+    }
+
+    /// The present moment.
+    pub(super) fn moment(&self) -> Moment {
+        Moment { stage: self.stage + 1, time: self.state.time, load: self.state.load }
+    }
+
+    /// Opens the energy account of the stage; at the start of the run also writes the first row.
+    pub(super) fn open_account(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+        if self.plan.energy {
+            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
+        }
+        if std::mem::replace(&mut self.started, true) {
+            return Ok(());
+        }
+        self.show(workshop)
+    }
+
+    /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
+    pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+        charts::wind(&mut self.state, &self.model.rotations);
+        self.judge_mesh()?;
+        self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
+        if self.plan.energy {
+            self.bookkeeper.add_step(&self.model, &self.state, &workshop.assembly.system);
+        }
+        Ok(())
+    }
+
+    /// Shows a row to the observer.
+    pub(super) fn show(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+        let snapshot = Snapshot {
+            stage: self.stage + 1,
+            state: &self.state,
+            system: &workshop.assembly.system,
+            model: &self.model,
+            ledger: self.bookkeeper.ledger(),
+            counters: &self.counters,
+        };
+        self.observer.row(&snapshot)
+    }
+
+    fn snapshot<'a>(&'a self, workshop: &'a Workshop) -> Snapshot<'a> {
+        Snapshot {
+            stage: self.stage + 1,
+            state: &self.state,
+            system: &workshop.assembly.system,
+            model: &self.model,
+            ledger: self.bookkeeper.ledger(),
+            counters: &self.counters,
+        }
+    }
+
+    /// Whether the stage shall end at the present row.
+    pub(super) fn is_over(&self, workshop: &Workshop) -> bool {
+        let Some(until) = &workshop.until else { return false };
+        let value = (until.column)(&self.snapshot(workshop));
+        until.below.is_some_and(|bound| value < bound) || until.above.is_some_and(|bound| value > bound)
+    }
+
+    fn judge_mesh(&mut self) -> Result<(), Failure> {
+        let limit = if self.warned_coarse { charts::COARSE } else { charts::COARSE_WARNING };
+        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
+        let nodes = &self.model.elements[element];
+        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
+        let failure = Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle };
+        if angle > charts::COARSE {
+            return Err(failure);
+        }
+        self.warned_coarse = true;
+        self.observer.warn(&format!("{failure}: more elements would tell the shape better"));
+        Ok(())
+    }
+
+    fn count_evaluations(&mut self, assembly: &Assembly) {
+        for &(name, count) in &assembly.evaluations {
+            match self.counters.evaluations.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, sum)) => *sum += count,
+                None => self.counters.evaluations.push((name, count)),
+            }
+        }
+    }
+
+    /// Names what Newton ended with.
+    pub(super) fn name_failure(&self, failure: NewtonFailure, system: &System) -> Failure {
+        let at = self.moment();
+        match failure {
+            NewtonFailure::NotConverged { residual, iterations } => Failure::NotConverged {
+                at,
+                place: place(&self.model, residual.slot as usize, residual.value),
+                residual: residual.value.norm(),
+                force: residual.force,
+                iterations,
+                cutbacks: self.counters.cutbacks,
+            },
+            NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
+            NewtonFailure::NotFinite { effect, slot } => {
+                Failure::NonFinite { at, effect, node: self.model.slots[slot].node.clone() }
+            }
+        }
+    }
+
+    /// Names the node and the direction that move most in a motion without stiffness.
+    pub(super) fn name_mechanism(&self, vector: Option<NullVector>, system: &System) -> Failure {
+        let at = self.moment();
+        let Some(vector) = vector else { return Failure::Singular { at, place: None } };
+        let mut field = vec![Vec3::ZERO; self.model.slots.len()];
+        system.pattern.equations.scatter(&vector.entries, None, &mut field);
+        let largest = (0..field.len()).fold(0, |best, k| if field[k].norm() > field[best].norm() { k } else { best });
+        Failure::Singular { at, place: Some(place(&self.model, largest, field[largest])) }
+    }
+
+    fn describe(&self, error: StageError) -> Failure {
+        let node = |slot: u32| &self.model.slots[slot as usize].node;
+        let stage = self.stage + 1;
+        Failure::Deck(match error {
+            StageError::Conflict(conflict) => format!(
+                "stage {stage}: constraints on node \"{}\" act along directions that are neither the same nor orthogonal",
+                node(conflict.slot)
+            ),
+            StageError::Jump(Jump { motion, from, to }) => format!(
+                "stage {stage}: motion {} of node \"{}\" would have to jump from {from} to {to}; give it a `history` that \
+                 starts where the node is",
+                motion + 1,
+                node(self.model.motions[motion].slot)
+            ),
+            StageError::TurnedHinge(slot) => format!(
+                "stage {stage}: a support takes hold of single rotation components of node \"{}\", which has already \
+                 turned; hold all three, or hold them from the first stage on",
+                node(slot)
+            ),
+        })
+    }
+}

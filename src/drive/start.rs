@@ -1,0 +1,116 @@
+//! The start of a dynamic stage: velocities, and accelerations from equilibrium at its first instant.
+
+use super::failure::Failure;
+use super::run::{InitialMotion, Run, Workshop};
+use crate::kernel::Weights;
+use crate::rotation::Rotation;
+use crate::system::{Equations, Slot, State, System};
+use crate::tensor::{Mat3, Vec3};
+use nalgebra::{Matrix3, SymmetricEigen};
+
+impl Run<'_> {
+    /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
+    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        if self.takes_initial_motion() {
+            let initial = std::mem::take(&mut self.plan.initial);
+            initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
+        }
+        let equations = &workshop.assembly.system.pattern.equations;
+        for slot in 0..self.state.v.len() {
+            let held = equations.held_part(slot as Slot, self.state.v[slot]);
+            self.state.v[slot] -= held;
+            self.state.a[slot] = Vec3::ZERO;
+        }
+        let time = self.state.time;
+        self.model.set_clock(&mut self.state, time, 1.0);
+        self.change_charts();
+        self.solve_accelerations(workshop)?;
+        self.open_account(workshop)
+    }
+
+    fn solve_accelerations(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        let Workshop { assembly, solver, .. } = workshop;
+        assembly.forget();
+        assembly.evaluate(&self.state, Weights::MASS, None);
+        let system = &mut assembly.system;
+        let mut right_hand_side = vec![0.0; system.pattern.equations.count()];
+        system.right_hand_side(&mut right_hand_side);
+        let slots = self.state.q.len();
+        ignore_massless(system, slots, &mut right_hand_side);
+        self.counters.work.factorisations += 1;
+        if !(solver.factorise(system) && solver.solve(&mut right_hand_side)) {
+            let vector = solver.null_vector(system);
+            return Err(self.name_mechanism(vector, &workshop.assembly.system));
+        }
+        let mut accelerations = vec![Vec3::ZERO; slots];
+        system.pattern.equations.scatter(&right_hand_side, None, &mut accelerations);
+        self.state.a.iter_mut().zip(accelerations).for_each(|(a, solved)| *a += solved);
+        // The forces of the start, for reactions and the energy account.
+        workshop.assembly.evaluate(&self.state, Weights::NONE, None);
+        Ok(())
+    }
+}
+
+/// v = velocity + spin x (x - about), and the rate of P from the spin: Pd = T^-T w.
+fn set_in_motion(state: &mut State, motion: &InitialMotion) {
+    for &(node, place) in &motion.nodes {
+        let (u, p) = (node.u as usize, node.p as usize);
+        let x = place + state.q[u];
+        state.v[u] = motion.velocity + motion.spin.cross(x - motion.about);
+        state.v[p] = Rotation::new(state.q[p]).t_inverse().transpose_mul(motion.spin);
+    }
+}
+
+/// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
+/// zero. They are the null directions of the diagonal blocks.
+fn ignore_massless(system: &mut System, slots: usize, right_hand_side: &mut [f64]) {
+    for slot in 0..slots {
+        let numbers = system.pattern.equations.of(slot as Slot);
+        let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
+        let block = diagonal_block(system, numbers);
+        let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
+        let symmetric = Matrix3::from_fn(|i, j| {
+            // A held direction is given mass, so that it does not count as massless.
+            let held = if i == j && !free.contains(&i) { weight } else { 0.0 };
+            0.5 * (block.0[i][j] + block.0[j][i]) + held
+        });
+        let eigen = SymmetricEigen::new(symmetric);
+        for k in 0..3 {
+            let v = eigen.eigenvectors.column(k);
+            if eigen.eigenvalues[k].abs() > 1e-12 * weight {
+                continue;
+            }
+            let along: f64 = free.iter().map(|&i| v[i] * right_hand_side[numbers[i] as usize]).sum();
+            for &i in &free {
+                right_hand_side[numbers[i] as usize] -= along * v[i];
+                for &j in &free {
+                    add_entry(system, numbers[i], numbers[j], weight * v[i] * v[j]);
+                }
+            }
+        }
+    }
+}
+
+fn diagonal_block(system: &System, numbers: [u32; 3]) -> Mat3 {
+    let entry = |row: u32, column: u32| match place(system, row, column) {
+        Some(place) => system.values[place],
+        None => 0.0,
+    };
+    Mat3(numbers.map(|row| numbers.map(|column| entry(row, column))))
+}
+
+fn add_entry(system: &mut System, row: u32, column: u32, value: f64) {
+    if let Some(place) = place(system, row, column) {
+        system.values[place] += value;
+    }
+}
+
+/// Where an entry is stored, if both directions are free.
+fn place(system: &System, row: u32, column: u32) -> Option<usize> {
+    if row == Equations::HELD || column == Equations::HELD {
+        return None;
+    }
+    let starts = &system.pattern.column_starts;
+    let (start, end) = (starts[column as usize] as usize, starts[column as usize + 1] as usize);
+    system.pattern.rows[start..end].binary_search(&row).ok().map(|k| start + k)
+}

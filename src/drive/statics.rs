@@ -1,0 +1,107 @@
+//! Load control: equal levels, approached in smaller steps where Newton fails.
+
+use super::failure::Failure;
+use super::run::{Run, Workshop};
+use crate::integrate::Equilibrium;
+use crate::kernel::Weights;
+use crate::model::{StageKind, charts};
+use crate::solve::NewtonFailure;
+use crate::tensor::Vec3;
+
+/// A level is not approached in steps smaller than this part of it.
+const SMALLEST_PART: f64 = 1.0 / 4096.0;
+
+impl Run<'_> {
+    /// All levels of a static stage.
+    pub(super) fn run_static(&mut self, workshop: &mut Workshop, steps: usize, adaptive: bool) -> Result<(), Failure> {
+        self.start_static(workshop)?;
+        let mut increment = 1.0 / steps as f64;
+        for level in 1..=steps {
+            let target = level as f64 / steps as f64;
+            increment = self.reach(workshop, target, increment, 1.0 / steps as f64, adaptive)?;
+            self.counters.steps += 1;
+            self.show(workshop)?;
+            if self.is_over(workshop) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
+    fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        self.state.v.fill(Vec3::ZERO);
+        self.state.a.fill(Vec3::ZERO);
+        let time = self.state.time;
+        let held = self.state.q.clone();
+        self.model.set_clock(&mut self.state, time, 0.0);
+        self.state.q = held;
+        charts::switch(&mut self.state, &self.model.rotations, 0.0);
+        charts::freeze(&mut self.state, &self.model.elements);
+        workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
+        if workshop.solver.factorise(&workshop.assembly.system)
+            && let Some(vector) = workshop.solver.null_vector(&workshop.assembly.system)
+        {
+            return Err(self.name_mechanism(Some(vector), &workshop.assembly.system));
+        }
+        self.open_account(workshop)
+    }
+
+    /// Goes to the load factor `target`; returns the increment that the next level may begin with.
+    fn reach(
+        &mut self,
+        workshop: &mut Workshop,
+        target: f64,
+        mut increment: f64,
+        level: f64,
+        adaptive: bool,
+    ) -> Result<f64, Failure> {
+        let mut good = self.state.clone();
+        while good.load < target {
+            let rest = target - good.load;
+            let next = if increment >= rest * (1.0 - 1e-9) { target } else { good.load + increment };
+            self.observer.progress(self.moment(), self.static_progress(next))?;
+            match self.attempt(workshop, next) {
+                Ok(()) => {
+                    self.accept(workshop)?;
+                    good.copy_from(&self.state);
+                    increment = (2.0 * increment).min(level);
+                }
+                Err(failure) => {
+                    let smaller = 0.5 * increment.min(rest);
+                    if !adaptive || smaller < SMALLEST_PART * level {
+                        return Err(self.give_up(workshop, failure, &good));
+                    }
+                    self.counters.cutbacks += 1;
+                    increment = smaller;
+                    self.state.copy_from(&good);
+                }
+            }
+        }
+        Ok(increment)
+    }
+
+    /// One attempt at a load factor. Prescribed motions enter with the first correction.
+    fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
+        let before = self.state.q.clone();
+        let time = self.state.time;
+        self.model.set_clock(&mut self.state, time, load);
+        let lift: Vec<Vec3> = self.state.q.iter().zip(&before).map(|(&after, &before)| after - before).collect();
+        self.state.q = before;
+        let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
+        let Workshop { assembly, solver, newton, .. } = workshop;
+        let work = &mut self.counters.work;
+        newton.solve(&self.model, assembly, solver, &mut self.state, &Equilibrium, StageKind::Static, moved, work)
+    }
+
+    /// Goes back to the last good state, and says whether the tangent there has become singular.
+    fn give_up(&mut self, workshop: &mut Workshop, failure: NewtonFailure, good: &crate::system::State) -> Failure {
+        let named = self.name_failure(failure, &workshop.assembly.system);
+        self.state.copy_from(good);
+        named
+    }
+
+    fn static_progress(&self, load: f64) -> f64 {
+        (self.stage as f64 + load) / self.plan.stages.len() as f64
+    }
+}

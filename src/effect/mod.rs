@@ -1,0 +1,228 @@
+//! Physical effects: one file an effect, one value a kind, holding every instance of that kind in the scene.
+//!
+//! An effect exists in a run only because the deck calls for it; see `scene::compose`.
+
+pub mod beam_elasticity;
+pub mod beam_mass;
+pub mod gravity;
+pub mod line_load;
+pub mod node_load;
+pub mod rigid_body;
+pub mod rotary_inertia;
+pub mod section_inertia;
+pub mod spring;
+
+use crate::kernel::seam::Converted;
+use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::tensor::{Mat3, Vec3};
+
+/// Stored energy of one state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of motion
+    pub kinetic: f64,
+    /// Of beams and springs
+    pub strain: f64,
+}
+
+/// Mass and momenta of one state, global components, about the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Momentum {
+    /// Total mass
+    pub mass: f64,
+    /// First moment of mass: mass times the place of the centre
+    pub moment: Vec3,
+    /// Linear momentum
+    pub linear: Vec3,
+    /// Angular momentum about the origin
+    pub angular: Vec3,
+}
+
+impl Momentum {
+    /// Of nothing.
+    pub const ZERO: Self = Self { mass: 0.0, moment: Vec3::ZERO, linear: Vec3::ZERO, angular: Vec3::ZERO };
+
+    /// Adds another part.
+    pub fn add(&mut self, other: Self) {
+        self.mass += other.mass;
+        self.moment += other.moment;
+        self.linear += other.linear;
+        self.angular += other.angular;
+    }
+}
+
+/// Round-off that an exact zero of the force may show, in force and moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Noise {
+    /// Force
+    pub force: f64,
+    /// Moment
+    pub moment: f64,
+}
+
+/// One kind of physical effect with all its instances.
+pub trait Effect: Send + Sync {
+    /// Its name in `check` and run.json.
+    fn name(&self) -> &'static str;
+
+    /// What its forces are.
+    fn category(&self) -> Category;
+
+    /// The slots that meet in each instance.
+    fn cliques(&self) -> Cliques;
+
+    /// Whether its forces depend on the state at all; forces that do not have no tangent.
+    fn has_tangent(&self) -> bool {
+        true
+    }
+
+    /// Whether it acts in a static stage: inertia does not.
+    fn acts_in_statics(&self) -> bool {
+        self.category() != Category::Inertia
+    }
+
+    /// Points it needs memory for.
+    fn memory_points(&self) -> usize {
+        0
+    }
+
+    /// Adds forces, and the tangent of the weights that are not zero.
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink);
+
+    /// After a solve, before the state is corrected by `dq`: remembers what the next tangent is formed with.
+    fn extrapolate(&self, _at: &State, _dq: &[Vec3], _memory: &mut Memory) {}
+
+    /// Stored energy.
+    fn energy(&self, _at: &State) -> Energy {
+        Energy::default()
+    }
+
+    /// Mass and momenta.
+    fn momentum(&self, _at: &State) -> Momentum {
+        Momentum::ZERO
+    }
+
+    /// The round-off of its forces.
+    fn noise(&self, _at: &State) -> Noise {
+        Noise::default()
+    }
+}
+
+/// A beam element as effects know it: its number in the scene and its nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Connection<const N: usize> {
+    /// The number of the element in the scene, an index of [`State::mixed`]
+    pub element: u32,
+    /// Its nodes
+    pub nodes: [Node; N],
+    /// Their initial places
+    pub places: [Vec3; N],
+}
+
+impl<const N: usize> Connection<N> {
+    /// The motions of the nodes, each in its own chart.
+    #[inline]
+    pub fn motions(&self, at: &State) -> [NodeMotion; N] {
+        self.nodes.map(|node| at.motion(node))
+    }
+
+    /// The motions of the nodes, all in the chart of the first.
+    pub fn motions_in_one_chart(&self, at: &State) -> [NodeMotion; N] {
+        let motions = self.motions(at);
+        match at.mixed[self.element as usize] {
+            0 => motions,
+            mask => {
+                let converted = Converted::new(&motions, mask).nodes;
+                std::array::from_fn(|i| converted[i])
+            }
+        }
+    }
+
+    /// The slots u1, P1, u2, P2, ….
+    pub fn slots(&self) -> impl Iterator<Item = u32> {
+        self.nodes.into_iter().flat_map(|node| [node.u, node.p])
+    }
+
+    /// Evaluates the element in one chart, and where its nodes sit in different ones pulls the result back.
+    #[inline]
+    fn evaluate(
+        &self,
+        at: &State,
+        weights: Weights,
+        rates: bool,
+        rotation_block: impl Fn(usize) -> usize,
+        out: &mut ElementSystem,
+        kernel: impl Fn(&[NodeMotion; N], Weights, &mut ElementSystem),
+    ) {
+        let nodes = self.motions(at);
+        let mask = at.mixed[self.element as usize];
+        let cleared = |nodes: &[NodeMotion; N], weights: Weights, out: &mut ElementSystem| {
+            out.clear();
+            kernel(nodes, weights, out);
+        };
+        if mask == 0 {
+            return cleared(&nodes, weights, out);
+        }
+        let converted = Converted::new(&nodes, mask);
+        let in_one_chart = std::array::from_fn(|i| converted.nodes[i]);
+        converted.pull_back(weights, rates, rotation_block, out, |weights, out| cleared(&in_one_chart, weights, out));
+    }
+}
+
+/// The block of node j's rotation in elements with displacements and rotations.
+fn after_displacement(j: usize) -> usize {
+    2 * j + 1
+}
+
+/// Batches of elements of two, three and four nodes.
+#[derive(Clone, Debug)]
+pub struct ByOrder<A, B, C> {
+    /// Two nodes
+    pub two: Vec<A>,
+    /// Three nodes
+    pub three: Vec<B>,
+    /// Four nodes
+    pub four: Vec<C>,
+}
+
+impl<A, B, C> Default for ByOrder<A, B, C> {
+    fn default() -> Self {
+        Self { two: Vec::new(), three: Vec::new(), four: Vec::new() }
+    }
+}
+
+impl<A, B, C> ByOrder<A, B, C> {
+    /// Whether no element is in any batch.
+    pub fn is_empty(&self) -> bool {
+        self.two.is_empty() && self.three.is_empty() && self.four.is_empty()
+    }
+}
+
+/// Where each instance of a batch begins counting: batches follow each other in the order two, three, four.
+macro_rules! for_each_batch {
+    ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {{
+        let mut $first = 0;
+        {
+            let $batch = &$batches.two;
+            $body;
+            $first += $batch.len();
+        }
+        {
+            let $batch = &$batches.three;
+            $body;
+            $first += $batch.len();
+        }
+        {
+            let $batch = &$batches.four;
+            $body;
+            let _ = $first;
+        }
+    }};
+}
+pub(crate) use for_each_batch;
+
+/// v . J v / 2
+fn quadratic(j: Mat3, v: Vec3) -> f64 {
+    0.5 * v.dot(j * v)
+}

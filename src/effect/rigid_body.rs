@@ -1,0 +1,91 @@
+//! Rigid bodies at nodes, with their mass centre at an offset.
+
+use super::{Effect, Energy, Momentum, quadratic};
+use crate::kernel::inertia::{self, Inertia, Spin};
+use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::tensor::Vec3;
+
+/// A body.
+#[derive(Clone, Copy, Debug)]
+pub struct Body {
+    /// The node it sits at
+    pub node: Node,
+    /// The node's initial place
+    pub place: Vec3,
+    /// Its mass properties about the node
+    pub inertia: Inertia,
+}
+
+/// The inertia of all bodies.
+#[derive(Clone, Debug, Default)]
+pub struct RigidBody {
+    /// The bodies
+    pub bodies: Vec<Body>,
+}
+
+impl Effect for RigidBody {
+    fn name(&self) -> &'static str {
+        "rigid body inertia"
+    }
+
+    fn category(&self) -> Category {
+        Category::Inertia
+    }
+
+    fn cliques(&self) -> Cliques {
+        let mut cliques = Cliques::default();
+        self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
+        cliques
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+        let mut system = ElementSystem::new(2);
+        for (k, body) in self.bodies.iter().enumerate() {
+            let force = inertia::body(&body.inertia, &at.motion(body.node), weights);
+            system.clear();
+            system.add_force(0, force.u);
+            system.add_force(1, force.p);
+            system.set_tangent(0, 0, force.uu);
+            system.set_tangent(0, 1, force.up);
+            system.set_tangent(1, 0, force.pu);
+            system.set_tangent(1, 1, force.pp);
+            out.add(k, &system);
+        }
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        Energy { kinetic: self.bodies.iter().map(|b| kinetic(&b.inertia, &at.motion(b.node))).sum(), strain: 0.0 }
+    }
+
+    fn momentum(&self, at: &State) -> Momentum {
+        let mut sum = Momentum::ZERO;
+        self.bodies.iter().for_each(|b| sum.add(momentum(&b.inertia, b.place, &at.motion(b.node), 1.0)));
+        sum
+    }
+}
+
+/// m v.v/2 + m v.R(Omega x d) + Omega.J0 Omega/2
+pub(super) fn kinetic(inertia: &Inertia, motion: &NodeMotion) -> f64 {
+    let spin = Spin::new(motion.p, motion.p_rate, Vec3::ZERO);
+    let v = motion.u_rate;
+    let relative = spin.rotation.r * spin.omega.cross(inertia.offset);
+    inertia.mass * (0.5 * v.squared() + v.dot(relative)) + quadratic(inertia.about_node, spin.omega)
+}
+
+/// The momenta of `weight` times these mass properties at the node that started at `place`.
+pub(super) fn momentum(inertia: &Inertia, place: Vec3, motion: &NodeMotion, weight: f64) -> Momentum {
+    let spin = Spin::new(motion.p, motion.p_rate, Vec3::ZERO);
+    let (r, m) = (spin.rotation.r, inertia.mass);
+    let x = place + motion.u;
+    let arm = r * inertia.offset;
+    let linear = (motion.u_rate + r * spin.omega.cross(inertia.offset)) * m;
+    // About the node: J0 Omega + m d x R^T v.
+    let about_node = r * (inertia.about_node * spin.omega) + arm.cross(motion.u_rate) * m;
+    Momentum {
+        mass: m * weight,
+        moment: (x + arm) * (m * weight),
+        linear: linear * weight,
+        angular: (x.cross(linear) + about_node) * weight,
+    }
+}

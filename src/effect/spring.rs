@@ -1,0 +1,92 @@
+//! Springs from nodes to ground.
+//!
+//! A rotational spring acts on the rotation vector continued since the start (`State::wound`): wound up by two turns
+//! it pulls with 4 pi times its stiffness, and it does not notice when the node changes its chart. With the wound vector
+//! Pw = P + 2 pi k n, D = dPw/dP and stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
+
+use super::{Effect, Energy};
+use crate::kernel::{ElementSystem, Weights};
+use crate::real::Real;
+use crate::rotation::{Complement, nearest_turn};
+use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::tensor::{Mat3, Vec3};
+use std::f64::consts::PI;
+
+/// One spring.
+#[derive(Clone, Copy, Debug)]
+pub struct Instance {
+    /// The node it holds
+    pub node: Node,
+    /// Its stiffness against displacement, global components
+    pub translation: Mat3,
+    /// Its stiffness against rotation, global components
+    pub rotation: Mat3,
+    /// The number of its amplitude: 0 in stages where it is absent, else 1
+    pub amplitude: usize,
+}
+
+/// All springs.
+#[derive(Clone, Debug, Default)]
+pub struct Spring {
+    /// The springs
+    pub springs: Vec<Instance>,
+}
+
+impl Effect for Spring {
+    fn name(&self) -> &'static str {
+        "springs to ground"
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn cliques(&self) -> Cliques {
+        let mut cliques = Cliques::default();
+        self.springs.iter().for_each(|spring| cliques.push([spring.node.u, spring.node.p]));
+        cliques
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+        let mut system = ElementSystem::new(2);
+        for (k, spring) in self.springs.iter().enumerate() {
+            let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
+            let on = at.amplitude[spring.amplitude];
+            let turns = nearest_turn(p, at.wound[spring.node.p as usize]);
+            let (moment, tangent) = rotational(spring.rotation * on, turns, p);
+            system.clear();
+            system.add_force(0, spring.translation * u * on);
+            system.add_force(1, moment);
+            system.add_tangent(0, 0, spring.translation * (on * weights.stiffness));
+            system.add_tangent(1, 1, tangent * weights.stiffness);
+            out.add(k, &system);
+        }
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        let one = |spring: &Instance| {
+            let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
+            let wound = wind(nearest_turn(p, at.wound[spring.node.p as usize]), p);
+            0.5 * at.amplitude[spring.amplitude] * (u.dot(spring.translation * u) + wound.dot(spring.rotation * wound))
+        };
+        Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
+    }
+}
+
+/// Pw = P + 2 pi k n
+fn wind<T: Real>(turns: f64, p: Vec3<T>) -> Vec3<T> {
+    if turns == 0.0 { p } else { p * (T::one() + T::constant(2.0 * PI * turns) / p.norm()) }
+}
+
+/// Force and tangent of a rotational spring that has been wound by whole `turns`.
+pub fn rotational<T: Real>(stiffness: Mat3, turns: f64, p: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
+    let k = Mat3::constant(stiffness);
+    if turns == 0.0 {
+        return (k * p, k);
+    }
+    // D = I + k (I - B): the complement chart's B, turned into whole turns the other way.
+    let b = Complement::new(p, Vec3::zero(), Vec3::zero()).b;
+    let d = Mat3::identity() + (Mat3::identity() - b).scale(turns);
+    let pull = k * wind(turns, p);
+    (d.transpose_mul(pull), d.transpose_matmul(k * d) - Complement::geometric(p, pull).scale(turns))
+}

@@ -1,0 +1,33 @@
+//! Time integration as coefficients: how a correction of the unknowns changes velocities and accelerations, and with
+//! which weights stiffness, damping and mass enter the tangent.
+
+mod newmark;
+
+pub use newmark::Newmark;
+
+use crate::kernel::Weights;
+use crate::system::State;
+use crate::tensor::Vec3;
+
+/// What Newton needs to know of a step.
+pub trait Method {
+    /// The weights of the tangent of a step.
+    fn weights(&self) -> Weights;
+
+    /// Adds a correction of the unknowns.
+    fn correct(&self, state: &mut State, dq: &[Vec3]);
+}
+
+/// Statics: the unknowns alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Equilibrium;
+
+impl Method for Equilibrium {
+    fn weights(&self) -> Weights {
+        Weights::STIFFNESS
+    }
+
+    fn correct(&self, state: &mut State, dq: &[Vec3]) {
+        state.q.iter_mut().zip(dq).for_each(|(q, &dq)| *q += dq);
+    }
+}

@@ -1,0 +1,144 @@
+//! Inertia at a point: of a cross-section or of a rigid body (equations (62)–(71), and their form with an offset).
+
+use super::element::{NodeMotion, Weights};
+use crate::real::Real;
+use crate::rotation::Rotation;
+use crate::tensor::{Mat3, Vec3};
+
+/// Mass properties in global components of the initial placement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertia {
+    /// m: mass, or mass per length
+    pub mass: f64,
+    /// d: the mass centre as seen from the node or the centre line
+    pub offset: Vec3,
+    /// J0: the inertia about the node or the centre line (not about the mass centre)
+    pub about_node: Mat3,
+}
+
+/// The spin of a point: Omega = T Pd, Acc = T Pdd + Td Pd, both material.
+#[derive(Clone, Copy, Debug)]
+pub struct Spin<T = f64> {
+    /// R, T and the derivative tensors
+    pub rotation: Rotation<T>,
+    /// Omega, material angular velocity
+    pub omega: Vec3<T>,
+    /// Acc, material angular acceleration
+    pub acceleration: Vec3<T>,
+    p_rate: Vec3<T>,
+    p_rate2: Vec3<T>,
+}
+
+impl<T: Real> Spin<T> {
+    /// The spin that belongs to a rotation vector and its rates.
+    #[inline(always)]
+    pub fn new(p: Vec3<T>, p_rate: Vec3<T>, p_rate2: Vec3<T>) -> Self {
+        let rotation = Rotation::new(p);
+        let omega = rotation.t * p_rate;
+        let acceleration = rotation.t * p_rate2 + rotation.t_rate(p_rate) * p_rate;
+        Self { rotation, omega, acceleration, p_rate, p_rate2 }
+    }
+
+    /// The weighted derivatives of Acc and of Omega with respect to the rotation unknowns:
+    ///
+    /// ```text
+    /// dAcc   = s (C5 + C1(Pdd)) + d C4 + m T          dOmega = s C1(Pd) + d T
+    /// ```
+    #[inline(always)]
+    fn derivatives(&self, w: Weights) -> (Mat3<T>, Mat3<T>) {
+        let rotation = &self.rotation;
+        let mut acceleration = rotation.t.scale(w.mass);
+        let mut omega = Mat3::zero();
+        if w.damping != 0.0 {
+            acceleration += rotation.c4(self.p_rate).scale(w.damping);
+            omega += rotation.t.scale(w.damping);
+        }
+        if w.stiffness != 0.0 {
+            acceleration += (rotation.c5(self.p_rate) + rotation.c1(self.p_rate2)).scale(w.stiffness);
+            omega += rotation.c1(self.p_rate).scale(w.stiffness);
+        }
+        (acceleration, omega)
+    }
+}
+
+/// Force and tangent of rotary inertia without an offset, conjugate to P:
+///
+/// ```text
+/// h = J Acc + Omega x J Omega,  f = T^T h
+/// J_PP = T^T [J dAcc + G dOmega] + s C2(h),  G = Omega~ J - (J Omega)~
+/// ```
+#[inline(always)]
+pub fn rotary<T: Real>(j: Mat3, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, Mat3<T>) {
+    let j = Mat3::constant(j);
+    let (rotation, omega) = (&spin.rotation, spin.omega);
+    let momentum = j * omega;
+    let h = j * spin.acceleration + omega.cross(momentum);
+    let force = rotation.t.transpose_mul(h);
+    if weights == Weights::NONE {
+        return (force, Mat3::zero());
+    }
+    let (d_acceleration, d_omega) = spin.derivatives(weights);
+    let gyroscopic = Mat3::skew_mul(omega, j) - momentum.skew();
+    let mut tangent = rotation.t.transpose_matmul(j * d_acceleration + gyroscopic * d_omega);
+    if weights.stiffness != 0.0 {
+        tangent += rotation.c2(h).scale(weights.stiffness);
+    }
+    (force, tangent)
+}
+
+/// Force and tangent of a rigid body or an eccentric section, conjugate to u and P.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct BodyForce<T = f64> {
+    pub u: Vec3<T>,
+    pub p: Vec3<T>,
+    pub uu: Mat3<T>,
+    pub up: Mat3<T>,
+    pub pu: Mat3<T>,
+    pub pp: Mat3<T>,
+}
+
+/// With s = Acc x d + Omega x (Omega x d) and h = J0 Acc + Omega x J0 Omega + m d x R^T u'':
+///
+/// ```text
+/// f_u = m (u'' + R s),  f_P = T^T h
+/// ```
+#[inline(always)]
+pub fn body<T: Real>(inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> BodyForce<T> {
+    let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
+    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
+    let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
+    let momentum = j0 * omega;
+    let pull = r.transpose_mul(motion.u_rate2);
+    let omega_d = omega.cross(d);
+    let s = spin.acceleration.cross(d) + omega.cross(omega_d);
+    let h = j0 * spin.acceleration + omega.cross(momentum) + d.cross(pull).scale(m);
+    let mut out = BodyForce {
+        u: (motion.u_rate2 + r * s).scale(m),
+        p: t.transpose_mul(h),
+        uu: Mat3::zero(),
+        up: Mat3::zero(),
+        pu: Mat3::zero(),
+        pp: Mat3::zero(),
+    };
+    if weights == Weights::NONE {
+        return out;
+    }
+    let (d_acceleration, d_omega) = spin.derivatives(weights);
+    let gyroscopic = Mat3::skew_mul(omega, j0) - momentum.skew();
+    let coriolis = omega_d.skew() + Mat3::skew_mul(omega, d.skew());
+    let mut up = -(Mat3::skew_mul(d, d_acceleration) + coriolis * d_omega);
+    let mut pp = j0 * d_acceleration + gyroscopic * d_omega;
+    if weights.stiffness != 0.0 {
+        up -= Mat3::skew_mul(s, t).scale(weights.stiffness);
+        pp += Mat3::skew_mul(d, Mat3::skew_mul(pull, t)).scale(m * weights.stiffness);
+    }
+    out.uu = Mat3::identity().scale(m * weights.mass);
+    out.up = (r * up).scale(m);
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())).scale(m * weights.mass);
+    out.pp = t.transpose_matmul(pp);
+    if weights.stiffness != 0.0 {
+        out.pp += spin.rotation.c2(h).scale(weights.stiffness);
+    }
+    out
+}

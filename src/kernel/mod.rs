@@ -1,0 +1,14 @@
+//! Pure functions at a Gauss point or of one element (Makinen 2007, section 3): no ids, no files, no allocation.
+//!
+//! Every kernel writes forces in one sign, g = f_int + f_acc - f_ext, and tangents as derivatives of g, so that loads,
+//! stiffness and inertia add up without a case distinction.
+
+pub mod beam;
+pub mod elastic;
+pub mod element;
+pub mod inertia;
+pub mod load;
+pub mod seam;
+pub mod shape;
+
+pub use element::{ElementSystem, MAX_NODES, NodeMotion, Weights};

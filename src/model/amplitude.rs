@@ -1,0 +1,126 @@
+//! How strongly a load acts: through stages, along the load factor, over time.
+
+use super::history::History;
+use std::sync::Arc;
+
+/// What a stage does with the clock and the load factor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StageKind {
+    /// The load factor goes from 0 to 1, the clock stands.
+    Static,
+    /// The clock runs, the load factor is 1.
+    Dynamic,
+}
+
+/// The stages in which something acts.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct StageSet(pub Option<Vec<usize>>);
+
+impl StageSet {
+    /// Whether stage number `stage` (from 0) is one of them; no list means all.
+    pub fn contains(&self, stage: usize) -> bool {
+        self.0.as_ref().is_none_or(|stages| stages.contains(&stage))
+    }
+}
+
+/// What an amplitude does in the present stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Course {
+    Hold(f64),
+    Ramp { from: f64, to: f64 },
+    History(StageKind),
+}
+
+/// The factor of a load.
+#[derive(Clone)]
+pub struct Amplitude {
+    history: Option<Arc<dyn History>>,
+    stages: StageSet,
+    /// Switched at once instead of ramped: springs.
+    switched: bool,
+    course: Course,
+    reached: f64,
+    has_acted: bool,
+}
+
+impl Amplitude {
+    /// Of a load with this history, or the default one: up with the load factor of the first static stage in which it
+    /// acts, then in full; in full from the start of a dynamic stage.
+    pub fn of_load(history: Option<Arc<dyn History>>, stages: StageSet) -> Self {
+        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0, has_acted: false }
+    }
+
+    /// Of something that is there or not.
+    pub fn of_switch(stages: StageSet) -> Self {
+        Self { switched: true, ..Self::of_load(None, stages) }
+    }
+
+    /// Settles what it does in stage number `stage`.
+    pub fn begin_stage(&mut self, stage: usize, kind: StageKind) {
+        let acts = self.stages.contains(stage);
+        self.course = match (acts, kind, &self.history) {
+            (true, ..) if self.switched => Course::Hold(1.0),
+            (true, kind, Some(_)) => Course::History(kind),
+            (true, ..) if self.has_acted => Course::Hold(self.reached),
+            (true, StageKind::Static, None) => Course::Ramp { from: 0.0, to: 1.0 },
+            (true, StageKind::Dynamic, None) => Course::Hold(1.0),
+            (false, StageKind::Static, _) if !self.switched => Course::Ramp { from: self.reached, to: 0.0 },
+            (false, ..) => Course::Hold(0.0),
+        };
+        self.has_acted |= acts;
+    }
+
+    /// Remembers where the stage ended.
+    pub fn end_stage(&mut self, time: f64, load: f64) {
+        self.reached = self.at(time, load);
+    }
+
+    /// The factor at `time` and `load`.
+    pub fn at(&self, time: f64, load: f64) -> f64 {
+        match self.course {
+            Course::Hold(value) => value,
+            Course::Ramp { from, to } => from + (to - from) * load,
+            Course::History(kind) => {
+                let x = if kind == StageKind::Static { load } else { time };
+                self.history.as_ref().map_or(1.0, |history| history.at(x)[0])
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use StageKind::{Dynamic, Static};
+
+    /// The factor at the half of each stage, stage after stage.
+    fn halves(mut amplitude: Amplitude, kinds: &[StageKind]) -> Vec<f64> {
+        let half = |(stage, &kind): (usize, &StageKind)| {
+            amplitude.begin_stage(stage, kind);
+            let value = amplitude.at(0.0, if kind == Static { 0.5 } else { 1.0 });
+            amplitude.end_stage(0.0, 1.0);
+            value
+        };
+        kinds.iter().enumerate().map(half).collect()
+    }
+
+    #[test]
+    fn a_load_without_history_ramps_once_and_stays() {
+        let load = || Amplitude::of_load(None, StageSet::default());
+        assert_eq!(halves(load(), &[Static, Static, Dynamic]), [0.5, 1.0, 1.0]);
+        assert_eq!(halves(load(), &[Dynamic, Static]), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_load_whose_stage_is_over_is_ramped_down_or_dropped() {
+        let first = || Amplitude::of_load(None, StageSet(Some(vec![0])));
+        assert_eq!(halves(first(), &[Static, Static, Static]), [0.5, 0.5, 0.0]);
+        assert_eq!(halves(first(), &[Static, Dynamic]), [0.5, 0.0]);
+    }
+
+    #[test]
+    fn a_switch_is_never_ramped() {
+        let second = Amplitude::of_switch(StageSet(Some(vec![1])));
+        assert_eq!(halves(second, &[Static, Static, Static]), [0.0, 1.0, 0.0]);
+    }
+}

@@ -1,0 +1,83 @@
+//! Changes of chart at nodes, and the choice of charts in elements.
+
+use crate::kernel::seam;
+use crate::rotation::{Complement, Rotation, relative_angle, unwound};
+use crate::system::{Node, Slot, State};
+use crate::tensor::Vec3;
+use std::f64::consts::PI;
+
+/// The band beyond pi in which a node keeps its chart in dynamics, so that it cannot chatter.
+pub const DYNAMIC_BAND: f64 = 1e-3;
+
+/// Most complements taken of one node at once: a node that turned further has no honest direction left.
+const MOST_CHANGES: usize = 10_000;
+
+/// Neighbours that turn more than this against each other are too far apart for the element between them.
+pub const COARSE: f64 = 2.8;
+
+/// From here on a warning.
+pub const COARSE_WARNING: f64 = PI / 2.0;
+
+/// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left.
+pub fn switch(state: &mut State, rotations: &[Slot], band: f64) -> usize {
+    let mut switched = 0;
+    for &slot in rotations {
+        let slot = slot as usize;
+        for _ in 0..MOST_CHANGES {
+            let p = state.q[slot];
+            // NaN never passes: what is not finite is named by the assembly, not turned for ever.
+            if p.squared() <= (PI + band) * (PI + band) || !p.is_finite() {
+                break;
+            }
+            let change = Complement::new(p, state.v[slot], state.a[slot]);
+            state.q[slot] = change.p;
+            state.v[slot] = change.velocity;
+            state.a[slot] = change.acceleration;
+            switched += 1;
+        }
+    }
+    switched
+}
+
+/// Chooses for each element the nodes that are converted into the chart of its first, and counts the mixed elements.
+pub fn freeze(state: &mut State, elements: &[Vec<Node>]) -> usize {
+    let mut mixed = 0;
+    for (element, nodes) in elements.iter().enumerate() {
+        let mut p = [Vec3::ZERO; crate::kernel::MAX_NODES];
+        for (p, node) in p.iter_mut().zip(nodes) {
+            *p = state.q[node.p as usize];
+        }
+        let mask = seam::conversion(&p[..nodes.len()]);
+        state.mixed[element] = mask;
+        mixed += usize::from(mask != 0);
+    }
+    mixed
+}
+
+/// Continues the wound rotation vectors to the present state.
+pub fn wind(state: &mut State, rotations: &[Slot]) {
+    for &slot in rotations {
+        let slot = slot as usize;
+        state.wound[slot] = unwound(state.q[slot], state.wound[slot]);
+    }
+}
+
+/// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle).
+pub fn coarsest(state: &State, elements: &[Vec<Node>], limit: f64) -> Option<(usize, f64)> {
+    let mut worst: Option<(usize, f64)> = None;
+    for (element, nodes) in elements.iter().enumerate() {
+        for pair in nodes.windows(2) {
+            let (a, b) = (state.q[pair[0].p as usize], state.q[pair[1].p as usize]);
+            // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
+            if (a - b).squared() < limit * limit {
+                continue;
+            }
+            let angle = relative_angle(Rotation::new(a).r, Rotation::new(b).r);
+            if angle > limit && worst.is_none_or(|(_, w)| angle > w) {
+                worst = Some((element, angle));
+            }
+        }
+    }
+    worst
+}
+

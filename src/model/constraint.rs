@@ -1,0 +1,164 @@
+//! What acts on the state instead of the forces: supports and prescribed motions.
+
+use super::amplitude::{StageKind, StageSet};
+use super::history::History;
+use crate::system::{Direction, Slot, State};
+use crate::tensor::Vec3;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Directions of a node that are held where a stage finds them.
+#[derive(Clone, Debug)]
+pub struct Support {
+    /// The held directions
+    pub directions: Vec<Direction>,
+    /// When it is there
+    pub stages: StageSet,
+}
+
+/// What a motion prescribes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MotionKind {
+    /// The displacement along an axis
+    Translation,
+    /// The whole rotation, about a fixed axis
+    Rotation,
+}
+
+/// A prescribed motion: value (length or angle) times its course.
+#[derive(Clone)]
+pub struct Motion {
+    /// What it prescribes
+    pub kind: MotionKind,
+    /// The slot it moves
+    pub slot: Slot,
+    /// Unit vector: direction or axis of rotation
+    pub axis: Vec3,
+    /// Displacement or angle that the history multiplies
+    pub value: f64,
+    /// Its history; without one it goes with the load factor.
+    pub history: Option<Arc<dyn History>>,
+    /// When it acts
+    pub stages: StageSet,
+    /// Present course
+    course: Course,
+    has_acted: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Course {
+    Off,
+    Hold(f64),
+    Ramp { from: f64 },
+    History(StageKind),
+}
+
+/// A motion that would have to jump when a stage begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Jump {
+    /// The number of the motion in the deck
+    pub motion: usize,
+    /// Where the node is
+    pub from: f64,
+    /// Where the motion begins
+    pub to: f64,
+}
+
+impl Motion {
+    /// A motion before the first stage.
+    pub fn new(
+        kind: MotionKind,
+        slot: Slot,
+        axis: Vec3,
+        value: f64,
+        history: Option<Arc<dyn History>>,
+        stages: StageSet,
+    ) -> Self {
+        Self { kind, slot, axis, value, history, stages, course: Course::Off, has_acted: false }
+    }
+
+    /// Settles what it does in stage number `stage`; `Err` where it would have to jump (from, to).
+    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State, length: f64) -> Result<(), (f64, f64)> {
+        let (from, aside) = self.reached(state);
+        if !self.stages.contains(stage) {
+            self.course = Course::Off;
+            return Ok(());
+        }
+        self.course = match (kind, &self.history) {
+            (kind, Some(_)) => Course::History(kind),
+            (_, None) if self.has_acted => Course::Hold(from),
+            (StageKind::Static, None) => Course::Ramp { from },
+            (StageKind::Dynamic, None) => Course::Hold(self.value),
+        };
+        self.has_acted = true;
+        let scale = if self.kind == MotionKind::Translation { length } else { 1.0 };
+        let to = self.at(state.time, 0.0)[0];
+        let jumps = kind == StageKind::Dynamic && (to - from).abs() > 1e-9 * scale;
+        if jumps || aside > 1e-9 { Err((from, to)) } else { Ok(()) }
+    }
+
+    /// Where the node is along the axis, and how far its rotation is off the axis.
+    fn reached(&self, state: &State) -> (f64, f64) {
+        let slot = self.slot as usize;
+        match self.kind {
+            MotionKind::Translation => (state.q[slot].dot(self.axis), 0.0),
+            MotionKind::Rotation => {
+                let along = state.wound[slot].dot(self.axis);
+                (along, (state.wound[slot] - self.axis * along).norm())
+            }
+        }
+    }
+
+    /// Whether it acts in the present stage.
+    pub fn acts(&self) -> bool {
+        !matches!(self.course, Course::Off)
+    }
+
+    /// The directions that it prescribes.
+    pub fn directions(&self) -> Vec<Direction> {
+        match self.kind {
+            MotionKind::Translation => vec![Direction { slot: self.slot, axis: self.axis }],
+            MotionKind::Rotation => Vec3::UNIT.map(|axis| Direction { slot: self.slot, axis }).to_vec(),
+        }
+    }
+
+    /// Value and two derivatives over time.
+    fn at(&self, time: f64, load: f64) -> [f64; 3] {
+        match self.course {
+            Course::Off => [0.0; 3],
+            Course::Hold(value) => [value, 0.0, 0.0],
+            Course::Ramp { from } => [from + (self.value - from) * load, 0.0, 0.0],
+            Course::History(kind) => {
+                let x = if kind == StageKind::Static { load } else { time };
+                let [value, rate, rate2] = self.history.as_ref().map_or([1.0, 0.0, 0.0], |history| history.at(x));
+                let moves = if kind == StageKind::Static { 0.0 } else { self.value };
+                [self.value * value, moves * rate, moves * rate2]
+            }
+        }
+    }
+
+    /// Sets position, velocity and acceleration in the state at its time and load. A rotation about n is P = theta n,
+    /// Pd = theta' n, Pdd = theta'' n, with theta at the representative nearest to the present chart.
+    pub fn impose(&self, state: &mut State) {
+        if !self.acts() {
+            return;
+        }
+        let [value, rate, rate2] = self.at(state.time, state.load);
+        let (slot, n) = (self.slot as usize, self.axis);
+        match self.kind {
+            MotionKind::Translation => {
+                let replace = |field: &mut Vec3, value: f64| *field += n * (value - field.dot(n));
+                replace(&mut state.q[slot], value);
+                replace(&mut state.v[slot], rate);
+                replace(&mut state.a[slot], rate2);
+            }
+            MotionKind::Rotation => {
+                let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();
+                state.q[slot] = n * (value + 2.0 * PI * turns);
+                state.v[slot] = n * rate;
+                state.a[slot] = n * rate2;
+                state.wound[slot] = n * value;
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
+
+mod amplitude;
+pub mod charts;
+mod constraint;
+mod history;
+
+pub use amplitude::{Amplitude, StageKind, StageSet};
+pub use constraint::{Jump, Motion, MotionKind, Support};
+pub use history::{History, Table};
+
+use crate::effect::{Effect, Energy, Momentum, Noise};
+use crate::kernel::Weights;
+use crate::system::{Category, Direction, Equations, FrameConflict, Memory, Node, Pattern, Slot, State, System};
+use crate::tensor::Vec3;
+use std::sync::Arc;
+
+/// What a slot holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SlotKind {
+    /// A displacement
+    Displacement,
+    /// A rotation vector
+    Rotation,
+}
+
+/// A slot, and the node that it is named after.
+#[derive(Clone, Debug)]
+pub struct SlotInfo {
+    /// What it holds
+    pub kind: SlotKind,
+    /// The name of its node, for messages
+    pub node: String,
+    /// The initial place of its node
+    pub place: Vec3,
+}
+
+/// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
+#[derive(Clone)]
+pub struct Model {
+    /// All slots
+    pub slots: Vec<SlotInfo>,
+    /// The slots with rotation vectors
+    pub rotations: Vec<Slot>,
+    /// The nodes of each beam element
+    pub elements: Vec<Vec<Node>>,
+    /// What acts
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// The factors of loads and springs
+    pub amplitudes: Vec<Amplitude>,
+    /// Supports
+    pub supports: Vec<Support>,
+    /// Prescribed motions
+    pub motions: Vec<Motion>,
+    /// The length to which displacements are compared: the diagonal of the scene's box, or 1
+    pub length: f64,
+}
+
+/// Why a stage cannot begin.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StageError {
+    /// Two constraints on one node are neither the same nor orthogonal.
+    Conflict(FrameConflict),
+    /// A motion would have to jump.
+    Jump(Jump),
+    /// A support would hold single components of a rotation that is not zero there.
+    TurnedHinge(Slot),
+}
+
+impl Model {
+    /// The state before the first stage.
+    pub fn rest(&self) -> State {
+        State::rest(self.slots.len(), self.elements.len(), self.amplitudes.len())
+    }
+
+    /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
+    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<Equations, StageError> {
+        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind));
+        for (number, motion) in self.motions.iter_mut().enumerate() {
+            let jump = |(from, to)| StageError::Jump(Jump { motion: number, from, to });
+            motion.begin_stage(stage, kind, state, self.length).map_err(jump)?;
+        }
+        let held = self.held_directions(stage);
+        self.refuse_turned_hinges(&held, state)?;
+        Equations::new(self.slots.len(), &held).map_err(StageError::Conflict)
+    }
+
+    /// Remembers where the stage left the loads.
+    pub fn end_stage(&mut self, state: &State) {
+        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.end_stage(state.time, state.load));
+    }
+
+    fn held_directions(&self, stage: usize) -> Vec<Direction> {
+        let supports = self.supports.iter().filter(|support| support.stages.contains(stage));
+        let moved = self.motions.iter().filter(|motion| motion.acts());
+        supports.flat_map(|s| s.directions.clone()).chain(moved.flat_map(Motion::directions)).collect()
+    }
+
+    /// One or two held components of a rotation vector survive a change of chart only where they are zero.
+    fn refuse_turned_hinges(&self, held: &[Direction], state: &State) -> Result<(), StageError> {
+        for &slot in &self.rotations {
+            let here: Vec<_> = held.iter().filter(|d| d.slot == slot).collect();
+            let turned = here.iter().any(|d| state.q[slot as usize].dot(d.axis).abs() > 1e-9);
+            if turned && here.len() < 3 {
+                return Err(StageError::TurnedHinge(slot));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions.
+    pub fn set_clock(&self, state: &mut State, time: f64, load: f64) {
+        (state.time, state.load) = (time, load);
+        for (value, amplitude) in state.amplitude.iter_mut().zip(&self.amplitudes) {
+            *value = amplitude.at(time, load);
+        }
+        self.motions.iter().for_each(|motion| motion.impose(state));
+    }
+
+    /// The effects that act in a stage of this kind, with their numbers.
+    pub fn acting(&self, kind: StageKind) -> Vec<Arc<dyn Effect>> {
+        let acts = |effect: &&Arc<dyn Effect>| kind == StageKind::Dynamic || effect.acts_in_statics();
+        self.effects.iter().filter(acts).cloned().collect()
+    }
+
+    /// The stored energy.
+    pub fn energy(&self, state: &State) -> Energy {
+        let mut sum = Energy::default();
+        for effect in &self.effects {
+            let part = effect.energy(state);
+            sum.kinetic += part.kinetic;
+            sum.strain += part.strain;
+        }
+        sum
+    }
+
+    /// Mass and momenta.
+    pub fn momentum(&self, state: &State) -> Momentum {
+        let mut sum = Momentum::ZERO;
+        self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
+        sum
+    }
+}
+
+/// The effects of one stage with their scratch, and the system they add to.
+pub struct Assembly {
+    effects: Vec<Arc<dyn Effect>>,
+    memories: Vec<Memory>,
+    /// Forces and tangent
+    pub system: System,
+    /// Evaluations of each effect's instances so far, by name
+    pub evaluations: Vec<(&'static str, u64)>,
+    sizes: Vec<u64>,
+}
+
+impl Assembly {
+    /// The system of these effects on these equations.
+    pub fn new(effects: Vec<Arc<dyn Effect>>, equations: Equations, slots: usize) -> Self {
+        let cliques: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
+        let memory = |e: &Arc<dyn Effect>| Memory { points: vec![[0.0; 6]; e.memory_points()], valid: false };
+        Self {
+            memories: effects.iter().map(memory).collect(),
+            evaluations: effects.iter().map(|effect| (effect.name(), 0)).collect(),
+            sizes: cliques.iter().map(|c| c.len() as u64).collect(),
+            system: System::new(Pattern::new(equations, cliques), slots),
+            effects,
+        }
+    }
+
+    /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`].
+    pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+        self.system.clear(lift);
+        for (number, effect) in self.effects.iter().enumerate() {
+            let with_tangent = weights != Weights::NONE && effect.has_tangent();
+            let mut sink = self.system.sink(number, effect.category(), with_tangent);
+            effect.add(state, &self.memories[number], weights, &mut sink);
+            self.evaluations[number].1 += self.sizes[number];
+        }
+    }
+
+    /// Lets effects remember what the next tangent is formed with, before the state is corrected by `dq`.
+    pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
+        for (effect, memory) in self.effects.iter().zip(&mut self.memories).filter(|(e, _)| e.memory_points() > 0) {
+            effect.extrapolate(state, dq, memory);
+        }
+    }
+
+    /// Forgets what was remembered: a new step begins.
+    pub fn forget(&mut self) {
+        self.memories.iter_mut().for_each(|memory| memory.valid = false);
+    }
+
+    /// The largest round-off among the effects.
+    pub fn noise(&self, state: &State) -> Noise {
+        let mut largest = Noise::default();
+        for noise in self.effects.iter().map(|effect| effect.noise(state)) {
+            largest.force = largest.force.max(noise.force);
+            largest.moment = largest.moment.max(noise.moment);
+        }
+        largest
+    }
+
+    /// The name of the first effect whose forces are not finite, and the slot.
+    pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
+        for (number, effect) in self.effects.iter().enumerate() {
+            self.system.clear(None);
+            effect.add(state, &self.memories[number], Weights::NONE, &mut self.system.sink(number, effect.category(), false));
+            let forces = &self.system.force[effect.category() as usize];
+            if let Some(slot) = forces.iter().position(|f| !f.is_finite()) {
+                return Some((effect.name(), slot));
+            }
+        }
+        None
+    }
+
+    /// Whether any force belongs to this category.
+    pub fn has(&self, category: Category) -> bool {
+        self.effects.iter().any(|effect| effect.category() == category)
+    }
+}

@@ -1,0 +1,49 @@
+//! Files that are written under another name and renamed when they are whole.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file in the making: `name.part` beside its final place.
+#[derive(Debug)]
+pub struct PartFile {
+    folder: PathBuf,
+    part: PathBuf,
+}
+
+impl PartFile {
+    /// Creates the folder, and in it the part.
+    pub fn create(folder: &Path, name: &str) -> io::Result<(Self, File)> {
+        fs::create_dir_all(folder).map_err(|e| about(folder, &e))?;
+        let part = folder.join(format!("{name}.part"));
+        let file = File::create(&part).map_err(|e| about(&part, &e))?;
+        Ok((Self { folder: folder.into(), part }, file))
+    }
+
+    /// Writes a whole file at once.
+    pub fn write(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
+        let (part, mut file) = Self::create(folder, name)?;
+        io::Write::write_all(&mut file, content).map_err(|e| about(&part.part, &e))?;
+        part.finish(&file, name)
+    }
+
+    /// Gives the part, which must be flushed, its final name.
+    pub fn finish(self, file: &File, name: &str) -> io::Result<()> {
+        let done = self.folder.join(name);
+        file.sync_all().and_then(|()| fs::rename(&self.part, &done)).map_err(|e| about(&done, &e))
+    }
+}
+
+/// Removes a file of an earlier run.
+pub fn remove_if_there(folder: &Path, name: &str) -> io::Result<()> {
+    let path = folder.join(name);
+    match fs::remove_file(&path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(about(&path, &error)),
+        _ => Ok(()),
+    }
+}
+
+/// The same error with the name of the file.
+fn about(path: &Path, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
+}

@@ -1,0 +1,133 @@
+//! history.csv: one row a load level or time step, one column a number.
+
+use super::files::{PartFile, remove_if_there};
+use crate::drive::Snapshot;
+use crate::probe::Probe;
+use std::fmt::Write;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Which rows are written: each n-th, or those at multiples of a time; the last one always.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rows {
+    /// Each n-th
+    pub every: usize,
+    /// At multiples of this time
+    pub interval: Option<f64>,
+}
+
+impl Rows {
+    fn contains(&self, number: u64, dynamic: bool, time: f64) -> bool {
+        match self.interval {
+            Some(interval) if dynamic => {
+                let turns = time / interval;
+                (turns - turns.round()).abs() < 1e-9 * turns.abs().max(1.0)
+            }
+            Some(_) => true,
+            None => number % self.every as u64 == 0,
+        }
+    }
+}
+
+/// Writes the history of a run.
+pub struct HistoryWriter {
+    folder: PathBuf,
+    part: PartFile,
+    writer: csv::Writer<File>,
+    rows: Rows,
+    probes: Vec<Probe>,
+    values: Vec<f64>,
+    text: String,
+    seen: u64,
+    pending: Option<csv::ByteRecord>,
+}
+
+impl HistoryWriter {
+    /// Begins a history in `folder`.
+    pub fn create(folder: &Path, probes: Vec<Probe>, rows: Rows) -> io::Result<Self> {
+        let (part, file) = PartFile::create(folder, "history.csv")?;
+        let mut writer = csv::Writer::from_writer(file);
+        let names = probes.iter().flat_map(|probe| probe.names.iter().map(String::as_str));
+        writer.write_record(["stage", "time", "load"].into_iter().chain(names)).map_err(io::Error::from)?;
+        Ok(Self {
+            folder: folder.into(),
+            part,
+            writer,
+            rows,
+            probes,
+            values: Vec::new(),
+            text: String::new(),
+            seen: 0,
+            pending: None,
+        })
+    }
+
+    /// Takes a converged state; writes it if its row is wanted.
+    pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
+        self.values.clear();
+        self.values.extend([at.state.time, at.state.load]);
+        for probe in &self.probes {
+            probe.read(at, &mut self.values);
+        }
+        let mut record = csv::ByteRecord::new();
+        record.push_field(at.stage.to_string().as_bytes());
+        for value in &self.values {
+            self.text.clear();
+            // Debug formatting is the shortest text that reads back to the same float, with an exponent where shorter.
+            let _ = write!(self.text, "{value:?}");
+            record.push_field(self.text.as_bytes());
+        }
+        let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
+        self.seen += 1;
+        if wanted {
+            self.pending = None;
+            return self.writer.write_byte_record(&record).map_err(io::Error::from);
+        }
+        self.pending = Some(record);
+        Ok(())
+    }
+
+    /// Ends the history: `history.csv` if the run finished, else `history.partial.csv`.
+    pub fn finish(mut self, finished: bool) -> io::Result<()> {
+        if let Some(record) = self.pending.take() {
+            self.writer.write_byte_record(&record).map_err(io::Error::from)?;
+        }
+        let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
+        let (name, other) = if finished {
+            ("history.csv", "history.partial.csv")
+        } else {
+            ("history.partial.csv", "history.csv")
+        };
+        self.part.finish(&file, name)?;
+        remove_if_there(&self.folder, other)
+    }
+}
+
+/// A stored history.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HistoryReader {
+    /// Names of the columns
+    pub names: Vec<String>,
+    /// Row by row
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl HistoryReader {
+    /// Reads a table of numbers with a line of names above.
+    pub fn read(path: &Path) -> io::Result<Self> {
+        let wrong = |message: String| io::Error::other(format!("{}: {message}", path.display()));
+        let file = File::open(path).map_err(|e| wrong(e.to_string()))?;
+        let mut reader = csv::Reader::from_reader(file);
+        let names = reader.headers().map_err(|e| wrong(e.to_string()))?.iter().map(str::to_string).collect();
+        let mut rows = Vec::new();
+        for (number, record) in reader.records().enumerate() {
+            let record = record.map_err(|e| wrong(e.to_string()))?;
+            let parse = |field: &str| {
+                field.trim().parse::<f64>().map_err(|_| wrong(format!("row {}: `{field}` is not a number", number + 1)))
+            };
+            rows.push(record.iter().map(parse).collect::<io::Result<_>>()?);
+        }
+        Ok(Self { names, rows })
+    }
+}

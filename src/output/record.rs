@@ -1,0 +1,104 @@
+//! run.json: what was simulated, what it took, how it ended.
+
+use crate::drive::{Counters, Failure, Moment, Place};
+use crate::scene::Scene;
+use serde_json::{Map, Value, json};
+
+/// How a run ended.
+pub struct Outcome<'a> {
+    /// The failure, if it was one
+    pub result: &'a Result<(), Failure>,
+    /// The work done
+    pub counters: &'a Counters,
+    /// Wall-clock seconds of the run
+    pub seconds: f64,
+}
+
+/// The content of run.json.
+pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
+    let effects: Vec<Value> = scene
+        .reasons
+        .iter()
+        .map(|r| json!({ "name": r.name, "active": r.active, "reason": r.reason }))
+        .collect();
+    let status = outcome.result.as_ref().map_or_else(Failure::name, |()| "finished");
+    let mut record = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "status": status,
+        "deck": scene.resolved,
+        "effects": effects,
+        "counters": counters(outcome.counters),
+        "seconds": {
+            "total": outcome.seconds,
+            "evaluation": outcome.counters.work.evaluation_seconds,
+            "solve": outcome.counters.work.solve_seconds,
+        },
+    });
+    if let Err(failure) = outcome.result {
+        record["failure"] = numbers(failure);
+    }
+    record
+}
+
+fn counters(counters: &Counters) -> Value {
+    let evaluations: Map<String, Value> = counters.evaluations.iter().map(|&(name, n)| (name.into(), json!(n))).collect();
+    json!({
+        "steps": counters.steps,
+        "cutbacks": counters.cutbacks,
+        "iterations": counters.work.iterations,
+        "factorisations": counters.work.factorisations,
+        "chart_switches": counters.work.chart_switches,
+        "mixed_elements": counters.mixed_elements,
+        "evaluations": evaluations,
+    })
+}
+
+/// The numbers of a failure.
+fn numbers(failure: &Failure) -> Value {
+    let mut record = json!({ "name": failure.name(), "message": failure.to_string() });
+    if let Some(hint) = failure.hint() {
+        record["hint"] = json!(hint);
+    }
+    let when = |at: &Moment, record: &mut Value| {
+        record["stage"] = json!(at.stage);
+        record["time"] = json!(at.time);
+        record["load"] = json!(at.load);
+    };
+    let place = |place: &Place, record: &mut Value| {
+        record["node"] = json!(place.node);
+        record["direction"] = json!(place.direction.0);
+        record["unknown"] = json!(format!("{:?}", place.kind).to_lowercase());
+    };
+    match failure {
+        Failure::NotConverged { at, place: node, residual, force, iterations, cutbacks } => {
+            when(at, &mut record);
+            place(node, &mut record);
+            record["residual"] = json!(residual);
+            record["force"] = json!(force);
+            record["iterations"] = json!(iterations);
+            record["cutbacks"] = json!(cutbacks);
+        }
+        Failure::Singular { at, place: node } => {
+            when(at, &mut record);
+            if let Some(node) = node {
+                place(node, &mut record);
+            }
+        }
+        Failure::NonFinite { at, effect, node } => {
+            when(at, &mut record);
+            record["effect"] = json!(effect);
+            record["node"] = json!(node);
+        }
+        Failure::MeshTooCoarse { at, nodes, relative_rotation } => {
+            when(at, &mut record);
+            record["nodes"] = json!(nodes);
+            record["relative_rotation"] = json!(relative_rotation);
+        }
+        Failure::Interrupted { at, signal } => {
+            when(at, &mut record);
+            record["signal"] = json!(signal);
+        }
+        Failure::Deck(_) | Failure::Limit(_) | Failure::Io(_) => {}
+    }
+    record
+}

@@ -1,0 +1,118 @@
+//! Places that can be looked at: nodes, and points within elements.
+
+use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement};
+use crate::kernel::element::MAX_NODES;
+use crate::kernel::seam::{Converted, conversion};
+use crate::kernel::shape::gauss;
+use crate::kernel::NodeMotion;
+use crate::system::{Node, State};
+use crate::tensor::{Mat3, Vec3};
+use std::sync::Arc;
+
+/// A place that moves with the nodes of one element, by the element's own shape functions; or just a node.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// Nodes, their initial places, and their shape functions here
+    pub nodes: Vec<(Node, Vec3, f64)>,
+    /// The section axes E1, E2, E3 of the initial placement as columns
+    pub frame: Mat3,
+}
+
+impl Place {
+    /// The motion of the place.
+    pub fn motion(&self, state: &State) -> NodeMotion {
+        if let [(node, _, _)] = self.nodes[..] {
+            return state.motion(node);
+        }
+        let motions: Vec<NodeMotion> = self.nodes.iter().map(|&(node, _, _)| state.motion(node)).collect();
+        let mut p = [Vec3::ZERO; MAX_NODES];
+        p.iter_mut().zip(&motions).for_each(|(p, motion)| *p = motion.p);
+        let converted = Converted::new(&motions, conversion(&p[..motions.len()]));
+        let sum = |field: fn(&NodeMotion) -> Vec3| {
+            let parts = self.nodes.iter().zip(&converted.nodes);
+            parts.fold(Vec3::ZERO, |sum, (&(_, _, weight), motion)| sum + field(motion) * weight)
+        };
+        NodeMotion {
+            u: sum(|m| m.u),
+            u_rate: sum(|m| m.u_rate),
+            u_rate2: sum(|m| m.u_rate2),
+            p: sum(|m| m.p),
+            p_rate: sum(|m| m.p_rate),
+            p_rate2: sum(|m| m.p_rate2),
+        }
+    }
+
+    /// Where it was at the start.
+    pub fn initial(&self) -> Vec3 {
+        self.nodes.iter().fold(Vec3::ZERO, |sum, &(_, place, weight)| sum + place * weight)
+    }
+
+    /// The wound rotation vector of the nearest node.
+    pub fn wound(&self, state: &State) -> Vec3 {
+        let nearest = self.nodes.iter().max_by(|a, b| a.2.total_cmp(&b.2)).map(|&(node, ..)| node);
+        nearest.map_or(Vec3::ZERO, |node| state.wound[node.p as usize])
+    }
+
+    /// The node, where the place is one.
+    pub fn node(&self) -> Option<Node> {
+        match self.nodes[..] {
+            [(node, _, _)] => Some(node),
+            _ => None,
+        }
+    }
+}
+
+/// A point within beam elements: between two elements of a beam it has two sides.
+#[derive(Clone)]
+pub struct BeamPoint {
+    /// The elasticity of the scene
+    pub elasticity: Arc<BeamElasticity>,
+    /// Number of the element in the scene, and xi in it
+    pub sides: Vec<(u32, f64)>,
+    /// The section axes as columns
+    pub frame: Mat3,
+}
+
+impl BeamPoint {
+    /// Gamma and K, N and M, in section axes: Gauss values extrapolated in the element, the mean of both sides.
+    pub fn strain_and_stress(&self, state: &State) -> [[f64; 6]; 2] {
+        let mut mean = [[0.0; 6]; 2];
+        for &(element, xi) in &self.sides {
+            let values = self.one_side(element, xi, state);
+            for (sum, part) in mean.iter_mut().flatten().zip(values.iter().flatten()) {
+                *sum += part / self.sides.len() as f64;
+            }
+        }
+        mean
+    }
+
+    fn one_side(&self, element: u32, xi: f64, state: &State) -> [[f64; 6]; 2] {
+        let elements = &self.elasticity.elements;
+        let two = elements.two.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
+        let three = || elements.three.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
+        let four = || elements.four.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
+        two.or_else(three).or_else(four).unwrap_or([[0.0; 6]; 2])
+    }
+
+    fn extrapolated<const N: usize, const G: usize>(
+        &self,
+        element: &ElasticElement<N, G>,
+        xi: f64,
+        state: &State,
+    ) -> [[f64; 6]; 2] {
+        let abscissas: Vec<f64> = gauss(G).iter().map(|&(x, _)| x).collect();
+        let mut out = [[0.0; 6]; 2];
+        for (g, (strain, stress)) in element.strains_and_stresses(state).iter().enumerate() {
+            let others = (0..G).filter(|&k| k != g);
+            let weight: f64 = others.map(|k| (xi - abscissas[k]) / (abscissas[g] - abscissas[k])).product();
+            let local = |v: Vec3| self.frame.transpose_mul(v).0;
+            let parts = [[local(strain.gamma), local(strain.kappa)], [local(stress.n), local(stress.m)]];
+            for (sum, part) in out.iter_mut().zip(&parts) {
+                for (s, p) in sum.iter_mut().zip(part.iter().flatten()) {
+                    *s += weight * p;
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,56 @@
+//! The scalar of the kernels: `f64` in a run, dual numbers in the tests that hold every tangent
+//! against automatic differentiation, lanes of several elements where speed asks for it.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// What a kernel may ask of a number. Only operations that IEEE 754 rounds exactly, so that a history does
+/// not depend on the machine: no fused multiply-add, no function of the platform's `libm`.
+pub trait Real:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + Mul<f64, Output = Self>
+{
+    /// The constant `value`.
+    fn constant(value: f64) -> Self;
+
+    /// The square root.
+    fn sqrt(self) -> Self;
+
+    /// The value itself; of several lanes the largest. It may choose an algorithm, never enter a result.
+    fn largest(self) -> f64;
+
+    /// Zero.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::constant(0.0)
+    }
+
+    /// One.
+    #[inline(always)]
+    fn one() -> Self {
+        Self::constant(1.0)
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        self
+    }
+}

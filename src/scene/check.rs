@@ -1,0 +1,135 @@
+//! What can be said of a deck before its mechanics is built.
+
+use super::mesh::Mesh;
+use crate::deck::{self, Deck, Diagnostic, SectionBody, Spanned, StageBody};
+use crate::model::{StageSet, Support};
+use crate::system::Direction;
+use crate::tensor::Vec3;
+
+/// Checks names, stages, and what a stage needs.
+pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    if deck.stages.is_empty() {
+        diagnostics.push(Diagnostic::whole("the deck has no [[stage]]: nothing would be simulated"));
+    }
+    if deck.beams.is_empty() && deck.bodies.is_empty() {
+        diagnostics.push(Diagnostic::whole("the deck has no [[beam]] and no [[body]]: there is nothing to simulate"));
+    }
+    refuse_twins("beam", deck.beams.iter().map(|b| &b.name), diagnostics);
+    clocks_go_forward(deck, diagnostics);
+    mass_where_needed(deck, diagnostics);
+    warn_of_equal_places(deck, diagnostics);
+    warn_of_idle_initials(deck, diagnostics);
+}
+
+fn refuse_twins<'a>(
+    kind: &str,
+    names: impl Iterator<Item = &'a Spanned<String>>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let mut known: Vec<&Spanned<String>> = Vec::new();
+    for name in names {
+        if let Some(first) = known.iter().find(|k| k.value == name.value) {
+            let diagnostic = Diagnostic::error(format!("there are two {kind}s `{}`", name.value), name.span.clone());
+            diagnostics.push(diagnostic.context(first.span.clone(), "the first"));
+        }
+        known.push(name);
+    }
+}
+
+fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let mut clock = 0.0;
+    for stage in &deck.stages {
+        if let StageBody::Dynamic { end, .. } = stage.body {
+            if end <= clock {
+                let message = format!("`end` is {end} on the run's clock, but the stage starts at {clock}");
+                diagnostics.push(Diagnostic::error(message, stage.span.clone()));
+            }
+            clock = end;
+        }
+    }
+}
+
+/// Inertia and gravity need mass.
+fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let dynamic = deck.stages.iter().any(|s| matches!(s.body, StageBody::Dynamic { .. }));
+    let weighed = deck.gravity.as_ref().is_some_and(|g| g.value != [0.0; 3]);
+    if !dynamic && !weighed {
+        return;
+    }
+    let why = if dynamic { "a dynamic stage" } else { "`gravity`" };
+    for section in &deck.sections {
+        let used = deck.beams.iter().find(|b| b.sections.iter().any(|s| s.value == section.name.value));
+        let Some(beam) = used else { continue };
+        let missing = match &section.body {
+            SectionBody::Resultants { mass: None, .. } => Some("`rhoA`"),
+            SectionBody::Full { mass: None, .. } => Some("`mass`"),
+            SectionBody::Shaped { material, .. } => {
+                let found = deck.materials.iter().find(|m| m.name.value == material.value);
+                found.filter(|m| m.density.is_none()).map(|_| "a material with `rho`")
+            }
+            _ => None,
+        };
+        if let Some(missing) = missing {
+            let message = format!("section `{}` needs {missing} for {why}", section.name.value);
+            let diagnostic = Diagnostic::error(message, section.name.span.clone());
+            diagnostics.push(diagnostic.context(beam.name.span.clone(), "used by this beam"));
+        }
+    }
+}
+
+/// Points at one place are not joined.
+fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let used = |name: &str| deck.beams.iter().any(|beam| match &beam.path {
+        deck::Path::Through(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
+        deck::Path::Arc(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
+    });
+    for (k, (name, place)) in deck.points.iter().enumerate() {
+        for (other, there) in &deck.points[..k] {
+            if place == there && used(&name.value) && used(&other.value) {
+                let message = format!("the points `{}` and `{}` lie at the same place and stay apart", other.value, name.value);
+                let diagnostic = Diagnostic::warning(message, name.span.clone());
+                diagnostics.push(diagnostic.help("beams are joined where they name the same point"));
+            }
+        }
+    }
+}
+
+fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let dynamic = deck.stages.iter().any(|s| matches!(s.body, StageBody::Dynamic { .. }));
+    if let (Some(initial), false) = (deck.initials.first(), dynamic || deck.stages.is_empty()) {
+        let message = "[[initial]] needs a dynamic stage: this deck has none";
+        diagnostics.push(Diagnostic::error(message, initial.span.clone()));
+    }
+}
+
+/// A point mass on no beam has no rotation to speak of: it is held, so that the tangent stays regular.
+pub fn loose_rotations(deck: &Deck, mesh: &Mesh) -> Vec<Support> {
+    let mut supports = Vec::new();
+    for body in &deck.bodies {
+        let Some(&node) = mesh.points.get(&body.at.value) else { continue };
+        let turned = |name: &str| name == body.at.value;
+        let has_beam = mesh.beams.iter().any(|beam| beam.nodes.contains(&node));
+        let has_inertia = deck.bodies.iter().any(|b| turned(&b.at.value) && (b.inertia.is_some() || b.offset != [0.0; 3]));
+        let has_spring = deck.springs.iter().any(|s| turned(&s.at.value) && s.stiffness[3..] != [0.0; 3]);
+        let is_moved = deck.motions.iter().any(|m| turned(&m.at.value));
+        if !(has_beam || has_inertia || has_spring || is_moved) {
+            let slot = mesh.nodes[node].node.p;
+            let directions = Vec3::UNIT.map(|axis| Direction { slot, axis }).to_vec();
+            supports.push(Support { directions, stages: StageSet::default() });
+        }
+    }
+    supports
+}
+
+/// The diagonal of the box around the scene, or 1.
+pub fn diagonal(mesh: &Mesh) -> f64 {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for node in &mesh.nodes {
+        for k in 0..3 {
+            low[k] = low[k].min(node.place.0[k]);
+            high[k] = high[k].max(node.place.0[k]);
+        }
+    }
+    let diagonal = Vec3([0, 1, 2].map(|k| high[k] - low[k])).norm();
+    if diagonal.is_finite() && diagonal > 0.0 { diagonal } else { 1.0 }
+}

@@ -1,0 +1,453 @@
+//! Which effects act: for each table that stands in the deck one effect, and for each the reason.
+
+use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
+use super::names;
+use super::section::MassPerLength;
+use crate::deck::{self, Deck, Diagnostic, Frame, LoadTarget, LoadVector};
+use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement};
+use crate::effect::beam_mass::{BeamMass, MassElement};
+use crate::effect::gravity::{BeamGravity, BodyGravity};
+use crate::effect::line_load::{Intensity, LineLoad, LineLoadKind, LoadedElement};
+use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
+use crate::effect::rigid_body::{Body, RigidBody};
+use crate::effect::rotary_inertia::{RotaryElement, RotaryInertia};
+use crate::effect::section_inertia::{EccentricElement, SectionInertia};
+use crate::effect::spring::{self, Spring};
+use crate::effect::{ByOrder, Connection, Effect};
+use crate::kernel::beam::{StiffnessPoint, VolumePoint};
+use crate::kernel::inertia::Inertia;
+use crate::model::{Amplitude, History, StageSet};
+use crate::tensor::{Mat3, Vec3};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Pushes an element with volume points into the batch of its order.
+macro_rules! push_volume {
+    ($batches:expr, $kind:ident, $mesh:expr, $number:expr, $element:expr, $quantity:expr) => {
+        match $element.nodes.len() {
+            2 => $batches.two.push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
+            3 => $batches.three.push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
+            _ => $batches.four.push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
+        }
+    };
+}
+/// An effect that a scene may have: acting or not, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reason {
+    /// The effect
+    pub name: &'static str,
+    /// Whether it acts
+    pub active: bool,
+    /// Why
+    pub reason: String,
+}
+
+/// The effects of a scene with what they need.
+pub struct Composition {
+    /// The effects
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Every effect that beamsim knows, acting or not
+    pub reasons: Vec<Reason>,
+    /// The factors of loads and springs
+    pub amplitudes: Vec<Amplitude>,
+    /// The elasticity, for resultants
+    pub elasticity: Option<Arc<BeamElasticity>>,
+    /// Rigid bodies
+    pub bodies: Vec<Body>,
+}
+
+/// Collects effects while the tables of the deck are walked through.
+struct Composer<'a> {
+    deck: &'a Deck,
+    mesh: &'a Mesh,
+    histories: &'a HashMap<String, Arc<dyn History>>,
+    diagnostics: &'a mut Vec<Diagnostic>,
+    out: Composition,
+    known_amplitudes: HashMap<(Option<String>, Option<Vec<usize>>), usize>,
+    dynamic: bool,
+}
+
+/// Composes the effects of a deck.
+pub fn compose(
+    deck: &Deck,
+    mesh: &Mesh,
+    histories: &HashMap<String, Arc<dyn History>>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Composition {
+    let dynamic = deck.stages.iter().any(|stage| matches!(stage.body, deck::StageBody::Dynamic { .. }));
+    let out = Composition { effects: Vec::new(), reasons: Vec::new(), amplitudes: Vec::new(), elasticity: None, bodies: Vec::new() };
+    let mut composer =
+        Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
+    composer.elasticity();
+    composer.springs();
+    composer.beam_inertia();
+    composer.out.bodies = composer.bodies();
+    composer.gravity();
+    composer.body_inertia();
+    composer.node_loads();
+    composer.line_loads();
+    composer.never();
+    composer.out
+}
+
+impl Composer<'_> {
+    fn push(&mut self, effect: impl Effect + 'static, reason: String) {
+        self.reason(effect.name(), true, reason);
+        self.out.effects.push(Arc::new(effect));
+    }
+
+    fn reason(&mut self, name: &'static str, active: bool, reason: impl Into<String>) {
+        self.out.reasons.push(Reason { name, active, reason: reason.into() });
+    }
+
+    /// The number of the amplitude with this history and these stages.
+    fn amplitude(&mut self, history: Option<&deck::Spanned<String>>, stages: Option<&Vec<usize>>) -> Option<usize> {
+        let key = (history.map(|h| h.value.clone()), stages.cloned());
+        if let Some(&number) = self.known_amplitudes.get(&key) {
+            return Some(number);
+        }
+        let function = match history {
+            None => None,
+            Some(name) => match self.histories.get(&name.value) {
+                Some(function) => Some(function.clone()),
+                None => {
+                    let known = self.deck.histories.iter().map(|h| h.name.value.as_str());
+                    self.diagnostics.push(names::unknown("history", name, known));
+                    return None;
+                }
+            },
+        };
+        self.out.amplitudes.push(Amplitude::of_load(function, stage_set(stages)));
+        self.known_amplitudes.insert(key, self.out.amplitudes.len() - 1);
+        Some(self.out.amplitudes.len() - 1)
+    }
+
+    fn node(&mut self, name: &deck::Spanned<String>) -> Option<(usize, Option<(usize, f64)>)> {
+        self.mesh.find_node(self.deck, name).map_err(|d| self.diagnostics.push(d)).ok()
+    }
+
+    fn elasticity(&mut self) {
+        let count = self.mesh.elements.len();
+        if count == 0 {
+            return self.reason("beam elasticity", false, "no beams");
+        }
+        let mut elements = ByOrder::default();
+        self.each_element(|beam, number, element, mesh| match element.nodes.len() {
+            2 => elements.two.push(elastic::<2, 1>(mesh, beam, number, element)),
+            3 => elements.three.push(elastic::<3, 2>(mesh, beam, number, element)),
+            _ => elements.four.push(elastic::<4, 3>(mesh, beam, number, element)),
+        });
+        let effect = Arc::new(BeamElasticity { elements });
+        self.reason("beam elasticity", true, format!("{count} beam elements"));
+        self.out.elasticity = Some(effect.clone());
+        self.out.effects.push(effect);
+    }
+
+    fn each_element(&self, mut visit: impl FnMut(&MeshBeam, usize, &MeshElement, &Mesh)) {
+        for beam in &self.mesh.beams {
+            for number in beam.elements.clone() {
+                visit(beam, number, &self.mesh.elements[number], self.mesh);
+            }
+        }
+    }
+
+    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
+    fn beam_inertia(&mut self) {
+        let names = ["beam mass", "rotary inertia", "eccentric section inertia"];
+        if !self.dynamic || self.mesh.elements.is_empty() {
+            let why = if self.mesh.elements.is_empty() { "no beams" } else { "no dynamic stage" };
+            return names.into_iter().for_each(|name| self.reason(name, false, why));
+        }
+        let wanted = self.deck.effects.rotary_inertia.as_ref().map(|flag| flag.value);
+        let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
+        self.each_element(|beam, number, element, mesh| {
+            let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
+            if found.iter().any(|m| m.offset != Vec3::ZERO) {
+                push_volume!(eccentric, EccentricElement, mesh, number, element, |k, s| found[k].turned(s.axes));
+                return;
+            }
+            if found.iter().any(|m| m.mass != 0.0) {
+                match element.nodes.len() {
+                    2 => mass.two.push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
+                    3 => mass.three.push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
+                    _ => mass.four.push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
+                }
+            }
+            if found.iter().any(|m| m.about_line != Mat3::ZERO) && wanted != Some(false) {
+                push_volume!(rotary, RotaryElement, mesh, number, element, |k, s| found[k].turned(s.axes).about_node);
+            }
+        });
+        let (mass, rotary, eccentric) = (BeamMass { elements: mass }, RotaryInertia { elements: rotary }, SectionInertia { elements: eccentric });
+        if mass.elements.is_empty() {
+            self.reason(names[0], false, "no section has mass on its centre line");
+        } else {
+            self.push(mass, "a dynamic stage, and sections with `rhoA`".into());
+        }
+        match (rotary.elements.is_empty(), wanted) {
+            (_, Some(false)) => self.reason(names[1], false, "switched off in [effects]"),
+            (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
+            _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
+        }
+        if eccentric.elements.is_empty() {
+            self.reason(names[2], false, "no section has its mass centre off the centre line");
+        } else {
+            self.push(eccentric, "sections with an eccentric `mass`".into());
+        }
+    }
+
+    fn bodies(&mut self) -> Vec<Body> {
+        let bodies = &self.deck.bodies;
+        bodies.iter().filter_map(|body| self.body(body)).collect()
+    }
+
+    fn body(&mut self, body: &deck::Body) -> Option<Body> {
+        let (node, _) = self.node(&body.at)?;
+        let centre = Mat3(body.inertia.unwrap_or([[0.0; 3]; 3]));
+        if let Some(inertia) = body.inertia
+            && !is_inertia(inertia)
+        {
+            let message = "`inertia` of a body has positive principal values, none larger than the sum of the others";
+            self.diagnostics.push(Diagnostic::error(message, body.span.clone()));
+            return None;
+        }
+        let d = Vec3(body.offset);
+        let steiner = (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.mass;
+        let inertia = Inertia { mass: body.mass, offset: d, about_node: centre + steiner };
+        let node = &self.mesh.nodes[node];
+        Some(Body { node: node.node, place: node.place, inertia })
+    }
+
+    fn body_inertia(&mut self) {
+        let bodies = self.out.bodies.clone();
+        match (bodies.is_empty(), self.dynamic) {
+            (true, _) => self.reason("rigid body inertia", false, "no [[body]]"),
+            (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
+            _ => {
+                let reason = format!("{} [[body]] table(s) and a dynamic stage", bodies.len());
+                self.push(RigidBody { bodies }, reason);
+            }
+        }
+    }
+
+    fn gravity(&mut self) {
+        let bodies = self.out.bodies.clone();
+        let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
+        let Some(acceleration) = acceleration else {
+            let why = if self.deck.gravity.is_some() { "`gravity` is zero" } else { "no `gravity`" };
+            self.reason("gravity on beams", false, why);
+            return self.reason("gravity on bodies", false, why);
+        };
+        let Some(amplitude) = self.amplitude(None, None) else { return };
+        if self.mesh.elements.is_empty() {
+            self.reason("gravity on beams", false, "no beams");
+        } else {
+            let mut elements = ByOrder::default();
+            self.each_element(|beam, number, element, mesh| {
+                let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
+                push_volume!(elements, EccentricElement, mesh, number, element, |k, s| found[k].turned(s.axes));
+            });
+            self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
+        }
+        if bodies.is_empty() {
+            self.reason("gravity on bodies", false, "no [[body]]");
+        } else {
+            self.push(BodyGravity { acceleration, amplitude, bodies }, "`gravity` is set".into());
+        }
+    }
+
+    fn springs(&mut self) {
+        let mut springs = Vec::new();
+        for spring in &self.deck.springs {
+            let Some((node, _)) = self.node(&spring.at) else { continue };
+            self.out.amplitudes.push(Amplitude::of_switch(stage_set(spring.stages.as_ref())));
+            let axes = super::constraints::axes(spring.axes);
+            let k = spring.stiffness;
+            let turned = |k: [f64; 3]| axes * Mat3::diagonal(k) * axes.transpose();
+            springs.push(spring::Instance {
+                node: self.mesh.nodes[node].node,
+                translation: turned([k[0], k[1], k[2]]),
+                rotation: turned([k[3], k[4], k[5]]),
+                amplitude: self.out.amplitudes.len() - 1,
+            });
+        }
+        if springs.is_empty() {
+            self.reason("springs to ground", false, "no [[spring]]");
+        } else {
+            let reason = format!("{} [[spring]] table(s)", springs.len());
+            self.push(Spring { springs }, reason);
+        }
+    }
+
+    fn node_loads(&mut self) {
+        use NodeLoadKind::{MaterialForce, MaterialMoment, SpatialForce, SpatialMoment};
+        let kinds = [SpatialForce, SpatialMoment, MaterialForce, MaterialMoment];
+        let mut loads: [Vec<node_load::Instance>; 4] = Default::default();
+        for load in &self.deck.loads {
+            let LoadTarget::At(at) = &load.target else { continue };
+            let Some((node, on)) = self.node(at) else { continue };
+            let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
+            let Some(frame) = self.load_axes(load, at, node, on) else { continue };
+            let node = self.mesh.nodes[node].node;
+            let spatial = load.frame == Frame::Space;
+            for (vector, kind) in [(load.force, if spatial { 0 } else { 2 }), (load.moment, if spatial { 1 } else { 3 })] {
+                if let Some(vector) = vector {
+                    loads[kind].push(node_load::Instance { node, vector: frame * Vec3(vector.start), amplitude });
+                }
+            }
+        }
+        for (kind, loads) in kinds.into_iter().zip(loads) {
+            let effect = NodeLoad { kind, loads };
+            if effect.loads.is_empty() {
+                self.reason(effect.name(), false, "no such [[load]] at a node");
+            } else {
+                let reason = format!("{} at nodes", effect.loads.len());
+                self.push(effect, reason);
+            }
+        }
+    }
+
+    /// From the components of a load at a node to global ones at the start.
+    fn load_axes(
+        &mut self,
+        load: &deck::Load,
+        at: &deck::Spanned<String>,
+        node: usize,
+        on: Option<(usize, f64)>,
+    ) -> Option<Mat3> {
+        if load.frame != Frame::Section {
+            return Some(Mat3::IDENTITY);
+        }
+        let beams = self.mesh.beams_at(&names::Found::Node(node, on));
+        match beams[..] {
+            [(beam, fraction)] => Some(self.mesh.beams[beam].frame(fraction)),
+            [] => {
+                let message = format!("frame = \"section\" needs a section, and no beam meets the node `{}`", at.value);
+                self.diagnostics.push(Diagnostic::error(message, at.span.clone()));
+                None
+            }
+            _ => {
+                let message = format!("several beams meet at `{}`; whose section is meant?", at.value);
+                let (first, fraction) = beams[0];
+                let end = if fraction > 0.5 { "end" } else { "start" };
+                let help = format!("name the node on a beam, such as `{}@{end}`", self.mesh.beams[first].name);
+                self.diagnostics.push(Diagnostic::error(message, at.span.clone()).help(help));
+                None
+            }
+        }
+    }
+
+    fn line_loads(&mut self) {
+        let (mut spatial, mut material) = (ByOrder::default(), ByOrder::default());
+        for load in &self.deck.loads {
+            let LoadTarget::Along(along) = &load.target else { continue };
+            let Some(beam) = self.mesh.beams.iter().find(|b| b.name == along.value) else {
+                if !self.deck.beams.iter().any(|b| b.name.value == along.value) {
+                    let known = self.deck.beams.iter().map(|b| b.name.value.as_str());
+                    self.diagnostics.push(names::unknown("beam", along, known));
+                }
+                continue;
+            };
+            let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
+            let out = if load.frame == Frame::Space { &mut spatial } else { &mut material };
+            for number in beam.elements.clone() {
+                let element = &self.mesh.elements[number];
+                match element.nodes.len() {
+                    2 => out.two.push(loaded(self.mesh, number, element, load, amplitude)),
+                    3 => out.three.push(loaded(self.mesh, number, element, load, amplitude)),
+                    _ => out.four.push(loaded(self.mesh, number, element, load, amplitude)),
+                }
+            }
+        }
+        for (kind, elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
+            let effect = LineLoad { kind, elements };
+            if effect.elements.is_empty() {
+                self.reason(effect.name(), false, "no such [[load]] along a beam");
+            } else {
+                self.push(effect, "[[load]] along a beam".into());
+            }
+        }
+    }
+
+    /// What is known and never acts yet.
+    fn never(&mut self) {
+        let seams = !self.mesh.elements.is_empty();
+        let why = if seams { "as soon as neighbouring nodes sit in different charts" } else { "no beams" };
+        self.reason("mixed elements", seams, why);
+        self.reason("damping", false, "not supported yet");
+        self.reason("planar", false, "not supported yet: every scene is simulated in three dimensions");
+    }
+}
+
+/// The stages of the deck count from 1, those of a run from 0.
+pub fn stage_set(stages: Option<&Vec<usize>>) -> StageSet {
+    StageSet(stages.map(|stages| stages.iter().map(|s| s - 1).collect()))
+}
+
+fn connect<const N: usize>(mesh: &Mesh, number: usize, element: &MeshElement) -> Connection<N> {
+    Connection {
+        element: number as u32,
+        nodes: std::array::from_fn(|i| mesh.nodes[element.nodes[i]].node),
+        places: std::array::from_fn(|i| mesh.nodes[element.nodes[i]].place),
+    }
+}
+
+fn volume<const N: usize, Q>(element: &MeshElement, quantity: impl Fn(usize, &Station) -> Q) -> [VolumePoint<N, Q>; N] {
+    std::array::from_fn(|k| {
+        let station = &element.volume[k];
+        VolumePoint {
+            shape: std::array::from_fn(|i| station.shape[i]),
+            weight: station.weight,
+            quantity: quantity(k, station),
+        }
+    })
+}
+
+fn elastic<const N: usize, const G: usize>(
+    mesh: &Mesh,
+    beam: &MeshBeam,
+    number: usize,
+    element: &MeshElement,
+) -> ElasticElement<N, G> {
+    let point = |k: usize| {
+        let station = &element.inner[k];
+        StiffnessPoint {
+            shape: std::array::from_fn(|i| station.shape[i]),
+            slope: std::array::from_fn(|i| station.slope[i]),
+            weight: station.weight,
+            tangent: station.axes.column(0),
+            stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+        }
+    };
+    ElasticElement { connection: connect(mesh, number, element), points: std::array::from_fn(point) }
+}
+
+fn loaded<const N: usize>(
+    mesh: &Mesh,
+    number: usize,
+    element: &MeshElement,
+    load: &deck::Load,
+    amplitude: usize,
+) -> LoadedElement<N> {
+    let points = volume(element, |_, station| {
+        let axes = if load.frame == Frame::Section { station.exact_axes } else { Mat3::IDENTITY };
+        let at = |vector: Option<LoadVector>| {
+            let [start, end] = vector.map_or([[0.0; 3]; 2], |v| [v.start, v.end]).map(Vec3);
+            axes * (start + (end - start) * station.fraction)
+        };
+        Intensity { force: at(load.force), moment: at(load.moment) }
+    });
+    LoadedElement { connection: connect(mesh, number, element), points, amplitude }
+}
+
+fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {
+    let none = MassPerLength { mass: 0.0, offset: Vec3::ZERO, about_line: Mat3::ZERO };
+    beam.section.at(station.fraction).mass.unwrap_or(none)
+}
+
+/// Whether a matrix can be the inertia of a body: principal values not negative, none beyond the sum of the others.
+fn is_inertia(matrix: [[f64; 3]; 3]) -> bool {
+    let eigen = nalgebra::SymmetricEigen::new(nalgebra::Matrix3::from_fn(|i, j| matrix[i][j])).eigenvalues;
+    let slack = 1e-9 * eigen.amax();
+    let sum = eigen.sum();
+    eigen.iter().all(|&value| value >= -slack && 2.0 * value <= sum + slack)
+}

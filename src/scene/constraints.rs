@@ -1,0 +1,194 @@
+//! Supports and motions: from tables to held directions, and the clashes between them.
+
+use super::mesh::Mesh;
+use super::names;
+use super::compose::stage_set;
+use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, MotionWhat, Span};
+use crate::model::{History, Motion, MotionKind, StageSet, Support, Table};
+use crate::system::{Direction, Slot};
+use crate::tensor::{Mat3, Vec3};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Three directions as columns; the deck gives the first two.
+pub fn axes(axes: Option<Axes>) -> Mat3 {
+    let Some([a, b]) = axes else { return Mat3::IDENTITY };
+    let (a, b) = (Vec3(a), Vec3(b));
+    Mat3::from_columns(a, b, a.cross(b))
+}
+
+/// An expression of t as a history.
+struct Formula {
+    expression: Expression,
+    parameters: deck::Parameters,
+}
+
+impl History for Formula {
+    fn at(&self, x: f64) -> [f64; 3] {
+        let value = self.expression.evaluate(&mut |name| {
+            if name == "t" { Some([x, 1.0, 0.0]) } else { self.parameters.get(name) }
+        });
+        // Names were checked when the deck was read.
+        value.unwrap_or([f64::NAN; 3])
+    }
+}
+
+/// The histories of a deck by name.
+pub fn histories(deck: &Deck) -> HashMap<String, Arc<dyn History>> {
+    let one = |history: &deck::HistoryTable| {
+        let function: Arc<dyn History> = match &history.body {
+            HistoryBody::Table { times, values, smooth } => {
+                Arc::new(Table { times: times.clone(), values: values.clone(), smooth: *smooth })
+            }
+            HistoryBody::Expression(expression) => {
+                Arc::new(Formula { expression: expression.clone(), parameters: deck.parameters.clone() })
+            }
+        };
+        (history.name.value.clone(), function)
+    };
+    deck.histories.iter().map(one).collect()
+}
+
+/// A held direction with the table it comes from.
+struct Held {
+    direction: Direction,
+    stages: StageSet,
+    span: Span,
+    what: &'static str,
+}
+
+/// Supports and motions of a deck.
+pub fn constraints(
+    deck: &Deck,
+    mesh: &Mesh,
+    histories: &HashMap<String, Arc<dyn History>>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> (Vec<Support>, Vec<Motion>) {
+    let mut held = Vec::new();
+    let mut supports = Vec::new();
+    for support in &deck.supports {
+        match mesh.find_node(deck, &support.at) {
+            Ok((node, _)) => {
+                let node = mesh.nodes[node].node;
+                let directions = directions(support.fix, axes(support.axes), node.u, node.p);
+                let stages = stage_set(support.stages.as_ref());
+                note(&mut held, &directions, &stages, &support.span, "support");
+                supports.push(Support { directions, stages });
+            }
+            Err(diagnostic) => diagnostics.push(diagnostic),
+        }
+    }
+    for joint in deck.joints.iter().filter(|joint| joint.beams.len() == 1) {
+        if let Some(&node) = mesh.points.get(&joint.at.value) {
+            let slot = mesh.nodes[node].node.u;
+            let directions = Vec3::UNIT.map(|axis| Direction { slot, axis }).to_vec();
+            note(&mut held, &directions, &StageSet::default(), &joint.span, "joint to ground");
+            supports.push(Support { directions, stages: StageSet::default() });
+        }
+    }
+    let mut motions = Vec::new();
+    for motion in &deck.motions {
+        match read_motion(deck, mesh, histories, motion) {
+            Ok(found) => {
+                refuse_early_jump(deck, motion, &found, diagnostics);
+                warn_of_kinks(deck, motion, diagnostics);
+                note(&mut held, &found.directions(), &found.stages, &motion.span, "motion");
+                motions.push(found);
+            }
+            Err(diagnostic) => diagnostics.push(diagnostic),
+        }
+    }
+    refuse_clashes(deck, mesh, &held, diagnostics);
+    (supports, motions)
+}
+
+fn directions(fix: [bool; 6], axes: Mat3, u: Slot, p: Slot) -> Vec<Direction> {
+    let one = |k: usize| Direction { slot: if k < 3 { u } else { p }, axis: axes.column(k % 3) };
+    (0..6).filter(|&k| fix[k]).map(one).collect()
+}
+
+fn note(held: &mut Vec<Held>, directions: &[Direction], stages: &StageSet, span: &Span, what: &'static str) {
+    let one = |&direction: &Direction| Held { direction, stages: stages.clone(), span: span.clone(), what };
+    held.extend(directions.iter().map(one));
+}
+
+fn read_motion(
+    deck: &Deck,
+    mesh: &Mesh,
+    histories: &HashMap<String, Arc<dyn History>>,
+    motion: &deck::Motion,
+) -> Result<Motion, Diagnostic> {
+    let (node, _) = mesh.find_node(deck, &motion.at)?;
+    let node = mesh.nodes[node].node;
+    let history = match &motion.history {
+        None => None,
+        Some(name) => Some(histories.get(&name.value).cloned().ok_or_else(|| {
+            names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()))
+        })?),
+    };
+    let stages = stage_set(motion.stages.as_ref());
+    Ok(match motion.what {
+        MotionWhat::Displacement { direction, value } => {
+            let axis = axes(motion.axes).column(direction);
+            Motion::new(MotionKind::Translation, node.u, axis, value, history, stages)
+        }
+        MotionWhat::Rotation { axis, angle } => {
+            let Some(axis) = Vec3(axis).normalized() else {
+                return Err(Diagnostic::error("`rotate` is an axis and must not be zero", motion.span.clone()));
+            };
+            Motion::new(MotionKind::Rotation, node.p, axis, angle, history, stages)
+        }
+    })
+}
+
+/// A motion that acts in a dynamic first stage must start where everything starts: at zero.
+fn refuse_early_jump(deck: &Deck, motion: &deck::Motion, found: &Motion, diagnostics: &mut Vec<Diagnostic>) {
+    let dynamic = matches!(deck.stages.first().map(|s| &s.body), Some(deck::StageBody::Dynamic { .. }));
+    if !dynamic || !found.stages.contains(0) {
+        return;
+    }
+    let start = found.value * found.history.as_ref().map_or(1.0, |history| history.at(0.0)[0]);
+    if start.abs() > 1e-12 * found.value.abs() || start.is_nan() {
+        let message = format!("this motion begins with a jump from 0 to {start}");
+        let help = "a dynamic stage starts where the scene is; give the motion a `history` that begins with 0";
+        diagnostics.push(Diagnostic::error(message, motion.span.clone()).help(help));
+    }
+}
+
+/// A kink of the velocity excites the stiff axial vibrations of a beam.
+fn warn_of_kinks(deck: &Deck, motion: &deck::Motion, diagnostics: &mut Vec<Diagnostic>) {
+    let dynamic = |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Dynamic { .. });
+    let named = |history: &&deck::HistoryTable| motion.history.as_ref().is_some_and(|name| name.value == history.name.value);
+    let Some(history) = deck.histories.iter().find(named) else { return };
+    if let HistoryBody::Table { values, smooth: false, .. } = &history.body
+        && deck.stages.iter().any(dynamic)
+        && values.windows(2).any(|pair| pair[0] != pair[1])
+    {
+        let message = format!("the history `{}` of this motion has kinks: velocities jump there", history.name.value);
+        let diagnostic = Diagnostic::warning(message, motion.span.clone());
+        diagnostics.push(diagnostic.help("`smooth = true` makes velocity and acceleration continuous"));
+    }
+}
+
+/// Directions at one node must be the same or orthogonal, and a motion needs its own.
+fn refuse_clashes(deck: &Deck, mesh: &Mesh, held: &[Held], diagnostics: &mut Vec<Diagnostic>) {
+    let meet = |a: &Held, b: &Held| (0..deck.stages.len().max(1)).any(|s| a.stages.contains(s) && b.stages.contains(s));
+    let mut reported: Vec<(usize, usize)> = Vec::new();
+    for (k, b) in held.iter().enumerate() {
+        for a in held[..k].iter().filter(|a| a.direction.slot == b.direction.slot && a.span != b.span) {
+            let cosine = a.direction.axis.dot(b.direction.axis).abs();
+            let same = cosine > 1.0 - 1e-9;
+            let harmless = cosine <= 1e-9 || (same && a.what != "motion" && b.what != "motion");
+            let pair = (a.span.start, b.span.start);
+            if harmless || !meet(a, b) || reported.contains(&pair) {
+                continue;
+            }
+            reported.push(pair);
+            let slot = b.direction.slot;
+            let node = mesh.nodes.iter().find(|n| n.node.u == slot || n.node.p == slot).map_or("?", |n| n.name.as_str());
+            let how = if same { "the same direction" } else { "directions that are neither the same nor orthogonal" };
+            let message = format!("this {} and another {} hold {how} of node `{node}`", b.what, a.what);
+            diagnostics.push(Diagnostic::error(message, b.span.clone()).context(a.span.clone(), format!("the other {}", a.what)));
+        }
+    }
+}

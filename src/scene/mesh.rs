@@ -1,0 +1,337 @@
+//! From centre lines to nodes and elements.
+
+use super::path::{self, CentreLine};
+use super::section::{self, SectionCourse};
+use super::names;
+use crate::deck::{self, Deck, Diagnostic, PointRef, Spanned};
+use crate::kernel::shape;
+use crate::system::Node;
+use crate::tensor::{Mat3, Vec3};
+use std::collections::HashMap;
+
+/// A node of the mesh.
+#[derive(Clone, Debug)]
+pub struct MeshNode {
+    /// Its slots
+    pub node: Node,
+    /// Its initial place
+    pub place: Vec3,
+    /// Its name for messages: of the point, or beam and number
+    pub name: String,
+}
+
+/// An integration point of an element.
+#[derive(Clone, Debug)]
+pub struct Station {
+    /// Shape functions
+    pub shape: Vec<f64>,
+    /// Their derivatives over arc length
+    pub slope: Vec<f64>,
+    /// Gauss weight times ds/dxi
+    pub weight: f64,
+    /// Fraction of the beam's length
+    pub fraction: f64,
+    /// The section axes of the interpolated line as columns; the first is its tangent
+    pub axes: Mat3,
+    /// The section axes of the exact curve
+    pub exact_axes: Mat3,
+}
+
+/// An element of the mesh.
+#[derive(Clone, Debug)]
+pub struct MeshElement {
+    /// Indices of its nodes
+    pub nodes: Vec<usize>,
+    /// Points for internal forces
+    pub inner: Vec<Station>,
+    /// Points for mass and line loads
+    pub volume: Vec<Station>,
+}
+
+/// A beam as meshed.
+#[derive(Clone, Debug)]
+pub struct MeshBeam {
+    /// Its name
+    pub name: String,
+    /// Its nodes from start to end
+    pub nodes: Vec<usize>,
+    /// The fraction of the length of each node
+    pub fractions: Vec<f64>,
+    /// The numbers of its elements
+    pub elements: std::ops::Range<usize>,
+    /// Nodes of an element, less one
+    pub order: usize,
+    /// Its centre line
+    pub line: CentreLine,
+    /// Its section along the way
+    pub section: SectionCourse,
+}
+
+/// All nodes, beams and elements.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// The nodes
+    pub nodes: Vec<MeshNode>,
+    /// The beams
+    pub beams: Vec<MeshBeam>,
+    /// The elements, beam after beam
+    pub elements: Vec<MeshElement>,
+    /// The node of each named point that is one: the first-named beam's where a joint parts it
+    pub points: HashMap<String, usize>,
+    /// The node of a point for beams that a joint parted there
+    pub parted: HashMap<(String, String), usize>,
+    slots: u32,
+}
+
+impl Mesh {
+    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to `diagnostics`.
+    pub fn new(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Self {
+        let mut mesh = Self::default();
+        mesh.part_joints(deck, diagnostics);
+        if let Err(diagnostic) = refuse_too_many(deck) {
+            diagnostics.push(diagnostic);
+            return mesh;
+        }
+        for beam in &deck.beams {
+            let planned = mesh.plan(beam, deck);
+            match planned {
+                Ok((line, section)) => mesh.add_beam(beam, line, section, diagnostics),
+                Err(diagnostic) => diagnostics.push(diagnostic),
+            }
+        }
+        for body in &deck.bodies {
+            mesh.add_body_point(&body.at, deck, diagnostics);
+        }
+        mesh
+    }
+
+    /// The number of slots.
+    pub fn slots(&self) -> usize {
+        self.slots as usize
+    }
+
+    /// Adds a node with slots of its own, or one that shares the displacement of another.
+    fn add_node(&mut self, place: Vec3, name: String, shares: Option<usize>) -> usize {
+        let mut slot = || {
+            self.slots += 1;
+            self.slots - 1
+        };
+        let u = shares.map_or_else(&mut slot, |other| self.nodes[other].node.u);
+        let node = Node { u, p: slot() };
+        self.nodes.push(MeshNode { node, place, name });
+        self.nodes.len() - 1
+    }
+
+    /// Makes the nodes of points that joints part, before any beam asks for them.
+    fn part_joints(&mut self, deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+        for joint in &deck.joints {
+            let Some(place) = names::point(deck, &joint.at.value) else {
+                diagnostics.push(names::unknown("point", &joint.at, names::points(deck)));
+                continue;
+            };
+            let known: Vec<_> = joint.beams.iter().filter(|b| deck.beams.iter().any(|beam| beam.name.value == b.value)).collect();
+            if known.len() < joint.beams.len() {
+                for beam in joint.beams.iter().filter(|b| !known.iter().any(|k| k.value == b.value)) {
+                    diagnostics.push(names::unknown("beam", beam, deck.beams.iter().map(|b| b.name.value.as_str())));
+                }
+                continue;
+            }
+            if let Some(away) = known.iter().find(|name| !passes(deck, &name.value, &joint.at.value)) {
+                let message = format!("beam `{}` does not meet the point `{}`", away.value, joint.at.value);
+                diagnostics.push(Diagnostic::error(message, away.span.clone()));
+                continue;
+            }
+            let point = joint.at.value.clone();
+            let main = match self.points.get(&point) {
+                Some(&main) => main,
+                None => self.add_point(&point, place),
+            };
+            if let [_, second] = &joint.beams[..] {
+                let key = (second.value.clone(), point.clone());
+                if self.parted.contains_key(&key) {
+                    let message = format!("beam `{}` is already parted at `{point}`", second.value);
+                    diagnostics.push(Diagnostic::error(message, second.span.clone()));
+                    continue;
+                }
+                let node = self.add_node(place, format!("{point} ({})", second.value), Some(main));
+                self.parted.insert(key, node);
+            }
+        }
+    }
+
+    fn add_point(&mut self, name: &str, place: Vec3) -> usize {
+        let node = self.add_node(place, name.into(), None);
+        self.points.insert(name.into(), node);
+        node
+    }
+
+    fn add_body_point(&mut self, at: &Spanned<String>, deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+        // Other names, such as `arm@end`, are looked up when the body is composed.
+        if at.value.contains(['@', ':']) || self.points.contains_key(&at.value) {
+            return;
+        }
+        match names::point(deck, &at.value) {
+            Some(place) => {
+                self.add_point(&at.value, place);
+            }
+            None => diagnostics.push(names::unknown("point", at, names::points(deck))),
+        }
+    }
+
+    /// Centre line and section of a beam.
+    fn plan(&self, beam: &deck::Beam, deck: &Deck) -> Result<(CentreLine, SectionCourse), Diagnostic> {
+        let find = |name: &Spanned<String>| {
+            let found = deck.sections.iter().find(|s| s.name.value == name.value);
+            found.ok_or_else(|| names::unknown("section", name, deck.sections.iter().map(|s| s.name.value.as_str())))
+        };
+        let section = match &beam.sections[..] {
+            [start, end] => section::taper([find(start)?, find(end)?], &deck.materials)?,
+            [one, ..] => SectionCourse::Uniform(section::matrices(find(one)?, &deck.materials)?),
+            [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
+        };
+        let place = |point: &Spanned<PointRef>| match &point.value {
+            PointRef::Coordinates(x) => Ok(Vec3(*x)),
+            PointRef::Name(name) => names::point(deck, name).ok_or_else(|| {
+                let name = Spanned { value: name.clone(), span: point.span.clone() };
+                names::unknown("point", &name, names::points(deck))
+            }),
+        };
+        let line = path::centre_line(beam, &place)?;
+        let (pieces, counts) = (line.pieces.len(), beam.elements.value.len());
+        if counts != 1 && counts != pieces {
+            let message = format!("`elements` has {counts} entries, beam `{}` has {pieces} piece(s)", beam.name.value);
+            return Err(Diagnostic::error(message, beam.elements.span.clone()));
+        }
+        Ok((line, section))
+    }
+
+    fn add_beam(
+        &mut self,
+        beam: &deck::Beam,
+        line: CentreLine,
+        section: SectionCourse,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
+        let counts = &beam.elements.value;
+        let count = |piece: usize| counts[piece.min(counts.len() - 1)];
+        let corners: Vec<Option<&str>> = corner_names(&beam.path);
+        let first_element = self.elements.len();
+        let (mut nodes, mut fractions) = (Vec::new(), Vec::new());
+        for piece in 0..line.pieces.len() {
+            let steps = count(piece) * beam.order;
+            for step in usize::from(piece > 0)..=steps {
+                let t = step as f64 / steps as f64;
+                let corner = if step == 0 { corners[piece] } else { corners[piece + 1].filter(|_| step == steps) };
+                let place = line.pieces[piece].place(t);
+                nodes.push(self.node_on_beam(&beam.name.value, corner, place, nodes.len()));
+                fractions.push(line.fraction(piece, t));
+            }
+        }
+        let mut first_node = 0;
+        for piece in 0..line.pieces.len() {
+            for element in 0..count(piece) {
+                let own = &nodes[first_node..=first_node + beam.order];
+                let range = [element as f64 / count(piece) as f64, (element + 1) as f64 / count(piece) as f64];
+                if own.iter().enumerate().any(|(i, a)| own[..i].contains(a)) {
+                    let message = format!("an element of beam `{}` starts and ends at the same node", beam.name.value);
+                    diagnostics.push(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
+                    return;
+                }
+                self.elements.push(self.element(own, &line, piece, range));
+                first_node += beam.order;
+            }
+        }
+        self.beams.push(MeshBeam {
+            name: beam.name.value.clone(),
+            nodes,
+            fractions,
+            elements: first_element..self.elements.len(),
+            order: beam.order,
+            line,
+            section,
+        });
+    }
+
+    /// The node at a corner with a name, or a new one.
+    fn node_on_beam(&mut self, beam: &str, corner: Option<&str>, place: Vec3, number: usize) -> usize {
+        let Some(point) = corner else { return self.add_node(place, format!("{beam}:{number}"), None) };
+        let parted = self.parted.get(&(beam.to_string(), point.to_string())).copied();
+        if let Some(node) = parted.or_else(|| self.points.get(point).copied()) {
+            return node;
+        }
+        self.add_point(point, place)
+    }
+
+    fn element(&self, nodes: &[usize], line: &CentreLine, piece: usize, range: [f64; 2]) -> MeshElement {
+        let places: Vec<Vec3> = nodes.iter().map(|&n| self.nodes[n].place).collect();
+        let stations = |count: usize| -> Vec<Station> {
+            shape::gauss(count).iter().map(|&(xi, w)| station(&places, line, piece, range, xi, w)).collect()
+        };
+        MeshElement { nodes: nodes.to_vec(), inner: stations(nodes.len() - 1), volume: stations(nodes.len()) }
+    }
+}
+
+/// Shape functions and their derivatives over xi, for 2, 3 or 4 nodes.
+pub fn shape_at(nodes: usize, xi: f64) -> (Vec<f64>, Vec<f64>) {
+    match nodes {
+        2 => (shape::values::<2>(xi).to_vec(), shape::derivatives::<2>(xi).to_vec()),
+        3 => (shape::values::<3>(xi).to_vec(), shape::derivatives::<3>(xi).to_vec()),
+        _ => (shape::values::<4>(xi).to_vec(), shape::derivatives::<4>(xi).to_vec()),
+    }
+}
+
+fn station(places: &[Vec3], line: &CentreLine, piece: usize, range: [f64; 2], xi: f64, gauss_weight: f64) -> Station {
+    let (shape, slope) = shape_at(places.len(), xi);
+    let along = |weights: &[f64]| places.iter().zip(weights).fold(Vec3::ZERO, |sum, (&x, &n)| sum + x * n);
+    let stretch = along(&slope);
+    let jacobian = stretch.norm();
+    let t = range[0] + (range[1] - range[0]) * 0.5 * (xi + 1.0);
+    let fraction = line.fraction(piece, t);
+    Station {
+        slope: slope.iter().map(|d| d / jacobian).collect(),
+        shape,
+        weight: gauss_weight * jacobian,
+        fraction,
+        axes: line.axes(piece, stretch * (1.0 / jacobian), fraction),
+        exact_axes: line.axes(piece, line.pieces[piece].tangent(t), fraction),
+    }
+}
+
+/// The names at the ends of the pieces of a path.
+fn corner_names(path: &deck::Path) -> Vec<Option<&str>> {
+    fn name(point: &Spanned<PointRef>) -> Option<&str> {
+        match &point.value {
+            PointRef::Name(name) => Some(name),
+            PointRef::Coordinates(_) => None,
+        }
+    }
+    match path {
+        deck::Path::Through(points) => points.iter().map(name).collect(),
+        deck::Path::Arc([start, _, end]) => vec![name(start), name(end)],
+    }
+}
+
+/// Whether a beam names a point where the mesh puts a node.
+fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
+    let found = deck.beams.iter().find(|b| b.name.value == beam);
+    found.is_some_and(|b| corner_names(&b.path).contains(&Some(point)))
+}
+
+/// Counts nodes before any memory is taken.
+fn refuse_too_many(deck: &Deck) -> Result<(), Diagnostic> {
+    let mut total = 0_usize;
+    for beam in &deck.beams {
+        let pieces = match &beam.path {
+            deck::Path::Through(points) => points.len() - 1,
+            deck::Path::Arc(_) => 1,
+        };
+        let counts = &beam.elements.value;
+        let elements = if counts.len() == 1 { counts[0].saturating_mul(pieces) } else { counts.iter().sum() };
+        total = total.saturating_add(elements.saturating_mul(beam.order));
+        if total > deck::MOST_ELEMENTS {
+            let message = format!("more than the largest supported {} nodes", deck::MOST_ELEMENTS);
+            return Err(Diagnostic::limit(message, beam.elements.span.clone()));
+        }
+    }
+    Ok(())
+}

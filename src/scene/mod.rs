@@ -1,0 +1,274 @@
+//! From a deck to a scene: the one place that sees words and numbers both.
+
+mod check;
+mod compose;
+mod constraints;
+mod mesh;
+mod names;
+mod output;
+mod path;
+mod section;
+
+pub use compose::Reason;
+pub use mesh::{Mesh, MeshBeam};
+pub use section::{MassPerLength, SectionMatrices};
+
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Spanned, StageBody};
+use crate::effect::rigid_body::Body;
+use crate::drive::{InitialMotion, Plan, Stage, StageWork, Until};
+use crate::model::{Model, SlotInfo, SlotKind};
+use crate::probe::{Probe, Quantity};
+use crate::system::Node;
+use crate::tensor::Vec3;
+use output::Columns;
+use std::sync::Arc;
+
+/// A deck made ready to run.
+pub struct Scene {
+    /// What it is about
+    pub title: Option<String>,
+    /// What is to be done
+    pub plan: Plan,
+    /// The columns of the history
+    pub probes: Vec<Probe>,
+    /// Each n-th row is written.
+    pub every: usize,
+    /// What is expected
+    pub expectations: Vec<Expectation>,
+    /// Which effects act, and why
+    pub reasons: Vec<Reason>,
+    /// Nodes, beams, elements
+    pub mesh: Mesh,
+    /// Rigid bodies
+    pub bodies: Vec<Body>,
+    /// The deck with expressions replaced by numbers
+    pub resolved: serde_json::Value,
+}
+
+/// What is expected of a run.
+#[derive(Clone)]
+pub struct Expectation {
+    /// The column or failure as it stands in the deck
+    pub name: String,
+    /// What is expected
+    pub kind: ExpectationKind,
+    /// Where the number comes from
+    pub source: Option<String>,
+}
+
+/// Kinds of expectations.
+#[derive(Clone)]
+pub enum ExpectationKind {
+    /// Of a column of the history
+    Column {
+        /// The probe and the component of it
+        probe: Probe,
+        /// See `probe`
+        component: usize,
+        /// Over which rows
+        reduce: Reduce,
+        /// In which bounds
+        bounds: Bounds,
+    },
+    /// Of a counter of the run
+    Counter {
+        /// Its name, without `run.`
+        name: String,
+        /// In which bounds
+        bounds: Bounds,
+    },
+    /// That it fails
+    Fails,
+}
+
+/// The bounds of an expected number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// value, atol, rtol
+    pub value: Option<(f64, f64, f64)>,
+    /// Upper bound
+    pub below: Option<f64>,
+    /// Lower bound
+    pub above: Option<f64>,
+}
+
+/// Counters that an expectation can look at.
+pub const RUN_COUNTERS: [&str; 5] = ["steps", "iterations", "cutbacks", "chart_switches", "mixed_elements"];
+
+/// Builds a scene; the second part holds warnings.
+pub fn build(deck: &Deck) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let mut diagnostics = Vec::new();
+    check::deck(deck, &mut diagnostics);
+    let mesh = Mesh::new(deck, &mut diagnostics);
+    // Where the mesh is wrong, what follows would only complain about its consequences.
+    if diagnostics.iter().all(Diagnostic::is_warning) || !mesh.nodes.is_empty() {
+        let scene = build_on(deck, mesh, &mut diagnostics);
+        if let (Some(scene), true) = (scene, diagnostics.iter().all(Diagnostic::is_warning)) {
+            return Ok((scene, diagnostics));
+        }
+    }
+    Err(diagnostics)
+}
+
+fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
+    let complete = mesh.beams.len() == deck.beams.len();
+    let histories = constraints::histories(deck);
+    let mut found = Vec::new();
+    let composition = compose::compose(deck, &mesh, &histories, &mut found);
+    let (supports, motions) = constraints::constraints(deck, &mesh, &histories, &mut found);
+    let columns = Columns { deck, mesh: &mesh, elasticity: composition.elasticity.as_ref() };
+    let probes = columns.written(&mut found);
+    let stages = stages(deck, &columns, &mut found);
+    let expectations = expectations(deck, &columns, &mut found);
+    let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
+    // Names on beams that could not be meshed are not unknown.
+    diagnostics.extend(found.into_iter().filter(|_| complete));
+    let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
+    let expected = expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
+    let model = Model {
+        slots: slots(&mesh),
+        rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
+        elements: mesh.elements.iter().map(|e| e.nodes.iter().map(|&n| mesh.nodes[n].node).collect()).collect(),
+        effects: composition.effects,
+        amplitudes: composition.amplitudes,
+        supports: supports.into_iter().chain(check::loose_rotations(deck, &mesh)).collect(),
+        motions,
+        length: check::diagonal(&mesh),
+    };
+    Some(Scene {
+        title: deck.title.clone(),
+        plan: Plan {
+            energy: expected || probes.iter().any(energy),
+            model,
+            initial: initial.into_iter().rev().collect(),
+            stages,
+            interval: deck.output.interval,
+        },
+        probes,
+        every: deck.output.every,
+        expectations,
+        reasons: composition.reasons,
+        mesh,
+        bodies: composition.bodies,
+        resolved: deck.resolved.clone(),
+    })
+}
+
+/// What each slot holds, named after its node.
+fn slots(mesh: &Mesh) -> Vec<SlotInfo> {
+    let empty = SlotInfo { kind: SlotKind::Displacement, node: String::new(), place: Vec3::ZERO };
+    let mut slots = vec![empty; mesh.slots()];
+    for node in mesh.nodes.iter().rev() {
+        let info = |kind| SlotInfo { kind, node: node.name.clone(), place: node.place };
+        slots[node.node.u as usize] = info(SlotKind::Displacement);
+        slots[node.node.p as usize] = info(SlotKind::Rotation);
+    }
+    slots
+}
+
+fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    for stage in &deck.stages {
+        let until = stage.until.as_ref().and_then(|until| match columns.find(&until.column) {
+            Ok((probe, component)) => {
+                let column = Arc::new(move |at: &crate::drive::Snapshot| {
+                    let mut values = Vec::new();
+                    probe.read(at, &mut values);
+                    values[component]
+                });
+                Some(Until { column, below: until.below, above: until.above })
+            }
+            Err(diagnostic) => {
+                diagnostics.push(diagnostic);
+                None
+            }
+        });
+        let work = match stage.body {
+            StageBody::Static { steps, adaptive } => StageWork::Static { steps, adaptive },
+            StageBody::Dynamic { end, step, beta, gamma } => StageWork::Dynamic { end, step, beta, gamma },
+        };
+        stages.push(Stage { work, tolerance: stage.tolerance, max_iterations: stage.max_iterations, until });
+    }
+    stages
+}
+
+fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Expectation> {
+    let mut found = Vec::new();
+    for expect in &deck.expects {
+        let source = expect.source.clone();
+        match &expect.body {
+            ExpectBody::Fails(name) => {
+                found.push(Expectation { name: name.value.clone(), kind: ExpectationKind::Fails, source });
+            }
+            ExpectBody::Column { column, reduce, value, below, above } => {
+                let bounds = Bounds { value: *value, below: *below, above: *above };
+                match expected_column(column, *reduce, bounds, columns) {
+                    Ok(kind) => found.push(Expectation { name: column.value.clone(), kind, source }),
+                    Err(diagnostic) => diagnostics.push(diagnostic),
+                }
+            }
+        }
+    }
+    found
+}
+
+fn expected_column(
+    column: &Spanned<String>,
+    reduce: Reduce,
+    bounds: Bounds,
+    columns: &Columns,
+) -> Result<ExpectationKind, Diagnostic> {
+    if let Some(counter) = column.value.strip_prefix("run.") {
+        if !RUN_COUNTERS.contains(&counter) {
+            let name = Spanned { value: counter.to_string(), span: column.span.clone() };
+            return Err(names::unknown("counter", &name, RUN_COUNTERS.into_iter()));
+        }
+        if reduce != Reduce::At(Instant::End) {
+            let message = "a counter is looked at at the end of the run";
+            return Err(Diagnostic::error(message, column.span.clone()));
+        }
+        return Ok(ExpectationKind::Counter { name: counter.into(), bounds });
+    }
+    let modal = ["mode", "buckling"].iter().any(|p| column.value.starts_with(p)) && column.value.contains('.');
+    if modal && columns.find(column).is_err() {
+        let message = format!("`{}` is not supported yet: there are no modal and buckling stages", column.value);
+        return Err(Diagnostic::error(message, column.span.clone()));
+    }
+    let (probe, component) = columns.find(column)?;
+    Ok(ExpectationKind::Column { probe, component, reduce, bounds })
+}
+
+fn initial(deck: &Deck, mesh: &Mesh, initial: &deck::Initial, diagnostics: &mut Vec<Diagnostic>) -> Option<InitialMotion> {
+    let mut report = |diagnostic: Diagnostic| diagnostics.push(diagnostic);
+    let nodes: Vec<usize> = match &initial.target {
+        deck::InitialTarget::All => (0..mesh.nodes.len()).collect(),
+        deck::InitialTarget::At(at) => match mesh.find_node(deck, at) {
+            Ok((node, _)) => vec![node],
+            Err(diagnostic) => {
+                report(diagnostic);
+                return None;
+            }
+        },
+        deck::InitialTarget::Beam(name) => match mesh.beams.iter().find(|b| b.name == name.value) {
+            Some(beam) => beam.nodes.clone(),
+            None => {
+                report(names::unknown("beam", name, deck.beams.iter().map(|b| b.name.value.as_str())));
+                return None;
+            }
+        },
+    };
+    let about = match &initial.about {
+        None => Vec3::ZERO,
+        Some(Spanned { value: PointRef::Coordinates(x), .. }) => Vec3(*x),
+        Some(Spanned { value: PointRef::Name(name), span }) => match names::point(deck, name) {
+            Some(place) => place,
+            None => {
+                let name = Spanned { value: name.clone(), span: span.clone() };
+                report(names::unknown("point", &name, names::points(deck)));
+                return None;
+            }
+        },
+    };
+    let nodes: Vec<(Node, Vec3)> = nodes.into_iter().map(|n| (mesh.nodes[n].node, mesh.nodes[n].place)).collect();
+    Some(InitialMotion { nodes, velocity: Vec3(initial.velocity), spin: Vec3(initial.spin), about })
+}

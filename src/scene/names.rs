@@ -1,0 +1,198 @@
+//! From names in the deck to nodes and places of the mesh.
+
+use super::mesh::{Mesh, MeshBeam, shape_at};
+use crate::deck::{Deck, Diagnostic, Spanned, nearest, one_of};
+use crate::probe::Place;
+use crate::tensor::{Mat3, Vec3};
+
+/// What a name stands for.
+#[derive(Clone, Debug)]
+pub enum Found {
+    /// A node of the mesh, and where it was named on a beam: beam and fraction of its length
+    Node(usize, Option<(usize, f64)>),
+    /// A place within an element: beam and fraction of its length
+    Between(usize, f64),
+}
+
+/// The place of a named point.
+pub fn point(deck: &Deck, name: &str) -> Option<Vec3> {
+    deck.points.iter().find(|(known, _)| known.value == name).map(|(_, x)| Vec3(*x))
+}
+
+/// The names of all points.
+pub fn points(deck: &Deck) -> impl Iterator<Item = &str> {
+    deck.points.iter().map(|(name, _)| name.value.as_str())
+}
+
+/// "there is no section `x`", with what was probably meant.
+pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item = &'a str>) -> Diagnostic {
+    let known: Vec<&str> = known.collect();
+    let diagnostic = Diagnostic::error(format!("there is no {kind} `{}`", name.value), name.span.clone());
+    match nearest(&name.value, known.iter().copied()) {
+        Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
+        None if known.is_empty() => diagnostic.help(format!("the deck defines no {kind}")),
+        None if known.len() <= 12 => diagnostic.help(format!("there is {}", one_of(known))),
+        None => diagnostic,
+    }
+}
+
+impl Mesh {
+    /// Looks a name up: a point, `beam@start`, `beam@end`, `beam@0.25`, `beam:3`.
+    pub fn find(&self, deck: &Deck, name: &Spanned<String>) -> Result<Found, Diagnostic> {
+        if let Some((beam, rest)) = name.value.split_once('@') {
+            return self.find_fraction(deck, name, beam, rest);
+        }
+        if let Some((beam, rest)) = name.value.split_once(':') {
+            return self.find_number(deck, name, beam, rest);
+        }
+        if let Some(&node) = self.points.get(&name.value) {
+            return Ok(Found::Node(node, None));
+        }
+        match point(deck, &name.value) {
+            Some(place) => Err(self.no_node(name, place)),
+            None => Err(unknown("node", name, points(deck))
+                .help_if_none("a node is a named point, or on a beam `name@start`, `name@end`, `name@0.25`, `name:3`")),
+        }
+    }
+
+    /// Looks a node up: places within elements are refused.
+    pub fn find_node(&self, deck: &Deck, name: &Spanned<String>) -> Result<(usize, Option<(usize, f64)>), Diagnostic> {
+        match self.find(deck, name)? {
+            Found::Node(node, on) => Ok((node, on)),
+            Found::Between(beam, fraction) => {
+                let beam = &self.beams[beam];
+                let message = format!("`{}` lies within an element of beam `{}`, it is no node", name.value, beam.name);
+                Err(Diagnostic::error(message, name.span.clone()).help(propose(beam, fraction)))
+            }
+        }
+    }
+
+    fn beam(&self, deck: &Deck, name: &Spanned<String>, beam: &str) -> Result<usize, Diagnostic> {
+        self.beams.iter().position(|b| b.name == beam).ok_or_else(|| {
+            let name = Spanned { value: beam.to_string(), span: name.span.clone() };
+            unknown("beam", &name, deck.beams.iter().map(|b| b.name.value.as_str()))
+        })
+    }
+
+    fn find_fraction(&self, deck: &Deck, name: &Spanned<String>, beam: &str, rest: &str) -> Result<Found, Diagnostic> {
+        let number = self.beam(deck, name, beam)?;
+        let fraction = match rest {
+            "start" => 0.0,
+            "end" => 1.0,
+            text => match text.parse::<f64>() {
+                Ok(fraction) if (0.0..=1.0).contains(&fraction) => fraction,
+                _ => {
+                    let message = format!("`{rest}` is no place on beam `{beam}`");
+                    let help = "after @ stands start, end, or a fraction of the length from 0 to 1";
+                    return Err(Diagnostic::error(message, name.span.clone()).help(help));
+                }
+            },
+        };
+        let mesh_beam = &self.beams[number];
+        let at_node = mesh_beam.fractions.iter().position(|f| (f - fraction).abs() < 1e-9);
+        Ok(match at_node {
+            Some(k) => Found::Node(mesh_beam.nodes[k], Some((number, fraction))),
+            None => Found::Between(number, fraction),
+        })
+    }
+
+    fn find_number(&self, deck: &Deck, name: &Spanned<String>, beam: &str, rest: &str) -> Result<Found, Diagnostic> {
+        let number = self.beam(deck, name, beam)?;
+        let mesh_beam = &self.beams[number];
+        match rest.parse::<usize>().ok().filter(|&k| k < mesh_beam.nodes.len()) {
+            Some(k) => Ok(Found::Node(mesh_beam.nodes[k], Some((number, mesh_beam.fractions[k])))),
+            None => {
+                let last = mesh_beam.nodes.len() - 1;
+                let message = format!("beam `{beam}` has no node `{rest}`: its nodes are 0 to {last}");
+                Err(Diagnostic::error(message, name.span.clone()))
+            }
+        }
+    }
+
+    /// A point that is no node: perhaps it lies on a beam, and a finer mesh would put one there.
+    fn no_node(&self, name: &Spanned<String>, place: Vec3) -> Diagnostic {
+        let message = format!("the point `{}` is no node of the mesh", name.value);
+        let diagnostic = Diagnostic::error(message, name.span.clone());
+        let on = self.beams.iter().find_map(|beam| beam.line.find(place).map(|fraction| (beam, fraction)));
+        match on {
+            Some((beam, fraction)) => diagnostic.help(format!("it lies on beam `{}`; {}", beam.name, propose(beam, fraction))),
+            None => diagnostic.help("no beam goes through it and no body sits there"),
+        }
+    }
+
+    /// The place of a name, for looking at.
+    pub fn place(&self, found: &Found) -> Place {
+        match *found {
+            Found::Node(node, on) => {
+                let node = &self.nodes[node];
+                Place { nodes: vec![(node.node, node.place, 1.0)], frame: self.frame(found, on) }
+            }
+            Found::Between(beam, fraction) => {
+                let (element, xi) = self.beams[beam].element_at(fraction);
+                let nodes = &self.elements[element].nodes;
+                let (shape, _) = shape_at(nodes.len(), xi);
+                let parts = nodes.iter().zip(shape).map(|(&n, weight)| (self.nodes[n].node, self.nodes[n].place, weight));
+                Place { nodes: parts.collect(), frame: self.beams[beam].frame(fraction) }
+            }
+        }
+    }
+
+    /// The section axes at a name: of the beam it was named on, else of the first beam there, else the global ones.
+    fn frame(&self, found: &Found, on: Option<(usize, f64)>) -> Mat3 {
+        let on = on.or_else(|| self.beams_at(found).into_iter().next());
+        on.map_or(Mat3::IDENTITY, |(beam, fraction)| self.beams[beam].frame(fraction))
+    }
+
+    /// The beams that meet at a name, with the fraction of their length.
+    pub fn beams_at(&self, found: &Found) -> Vec<(usize, f64)> {
+        match *found {
+            Found::Between(beam, fraction) => vec![(beam, fraction)],
+            Found::Node(_, Some(on)) => vec![on],
+            Found::Node(node, None) => {
+                let there = |(number, beam): (usize, &MeshBeam)| {
+                    beam.nodes.iter().position(|&n| n == node).map(|k| (number, beam.fractions[k]))
+                };
+                self.beams.iter().enumerate().filter_map(there).collect()
+            }
+        }
+    }
+}
+
+impl MeshBeam {
+    /// The element at a fraction of the length, and xi in it.
+    pub fn element_at(&self, fraction: f64) -> (usize, f64) {
+        let count = self.elements.len();
+        let ends = |k: usize| (self.fractions[k * self.order], self.fractions[(k + 1) * self.order]);
+        let element = (0..count).find(|&k| fraction <= ends(k).1).unwrap_or(count - 1);
+        let (start, end) = ends(element);
+        (self.elements.start + element, 2.0 * (fraction - start) / (end - start) - 1.0)
+    }
+
+    /// The section axes of the exact curve at a fraction of the length.
+    pub fn frame(&self, fraction: f64) -> Mat3 {
+        let (piece, t) = self.line.locate(fraction);
+        self.line.axes(piece, self.line.pieces[piece].tangent(t), fraction)
+    }
+}
+
+/// How many elements would put a node at a fraction of the length.
+fn propose(beam: &MeshBeam, fraction: f64) -> String {
+    let (piece, t) = beam.line.locate(fraction);
+    let whole = |n: &usize| {
+        let place = t * (n * beam.order) as f64;
+        (place - place.round()).abs() < 1e-9
+    };
+    let now = beam.elements.len();
+    match (now.max(1)..=10_000).find(whole) {
+        Some(n) if beam.line.pieces.len() == 1 => format!("`elements = {n}` puts a node there"),
+        Some(n) => format!("{n} `elements` on piece {} put a node there", piece + 1),
+        None => "split the beam there: name the point in `through`".into(),
+    }
+}
+
+impl Diagnostic {
+    /// Help, where there is none yet.
+    fn help_if_none(self, help: &str) -> Self {
+        if self.help.is_some() { self } else { self.help(help) }
+    }
+}

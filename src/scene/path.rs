@@ -1,0 +1,233 @@
+//! Centre lines: straight pieces and circular arcs, and the section axes along them.
+
+use crate::deck::{self, Diagnostic, PointRef, Span, Spanned};
+use crate::tensor::{Mat3, Vec3};
+use std::f64::consts::PI;
+
+/// One piece of a centre line.
+#[derive(Clone, Debug)]
+pub struct Piece {
+    /// Start
+    pub start: Vec3,
+    /// End
+    pub end: Vec3,
+    curve: Curve,
+    /// Arc length
+    pub length: f64,
+    /// The vector whose part normal to the tangent is local axis 3
+    axis3: Vec3,
+}
+
+#[derive(Clone, Debug)]
+enum Curve {
+    Line,
+    /// x = centre + radius (cos a e + sin a f), a from 0 to `angle`
+    Arc { centre: Vec3, radius: f64, e: Vec3, f: Vec3, angle: f64 },
+}
+
+/// The centre line of a beam with its section axes.
+#[derive(Clone, Debug)]
+pub struct CentreLine {
+    /// The pieces in order
+    pub pieces: Vec<Piece>,
+    /// Arc length of all
+    pub length: f64,
+    twist: [f64; 2],
+}
+
+impl Piece {
+    /// The place at the fraction `t` of the piece; ends are met to the last bit.
+    pub fn place(&self, t: f64) -> Vec3 {
+        if t == 0.0 {
+            return self.start;
+        }
+        if t == 1.0 {
+            return self.end;
+        }
+        match &self.curve {
+            Curve::Line => self.start + (self.end - self.start) * t,
+            Curve::Arc { centre, radius, e, f, angle } => {
+                let a = t * angle;
+                *centre + (*e * libm::cos(a) + *f * libm::sin(a)) * *radius
+            }
+        }
+    }
+
+    /// The unit tangent at the fraction `t`.
+    pub fn tangent(&self, t: f64) -> Vec3 {
+        match &self.curve {
+            Curve::Line => (self.end - self.start) * (1.0 / self.length),
+            Curve::Arc { e, f, angle, .. } => {
+                let a = t * angle;
+                *f * libm::cos(a) - *e * libm::sin(a)
+            }
+        }
+    }
+
+    /// The section axes for the unit tangent `e1`, before twist: E3 is the part of axis3 normal to it, E2 = E3 x E1.
+    pub fn untwisted_axes(&self, e1: Vec3) -> Mat3 {
+        let normal = self.axis3 - e1 * self.axis3.dot(e1);
+        let e3 = normal.normalized().unwrap_or(self.axis3);
+        Mat3::from_columns(e1, e3.cross(e1), e3)
+    }
+}
+
+impl CentreLine {
+    /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the beam's length.
+    pub fn axes(&self, piece: usize, e1: Vec3, s: f64) -> Mat3 {
+        let axes = self.pieces[piece].untwisted_axes(e1);
+        let angle = self.twist[0] + (self.twist[1] - self.twist[0]) * s;
+        if angle == 0.0 {
+            return axes;
+        }
+        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let [e1, e2, e3] = [0, 1, 2].map(|k| axes.column(k));
+        Mat3::from_columns(e1, e2 * cos + e3 * sin, e3 * cos - e2 * sin)
+    }
+
+    /// The fraction of the beam's length at the fraction `t` of a piece.
+    pub fn fraction(&self, piece: usize, t: f64) -> f64 {
+        let before: f64 = self.pieces[..piece].iter().map(|p| p.length).sum();
+        (before + t * self.pieces[piece].length) / self.length
+    }
+
+    /// The piece and the fraction in it at the fraction `s` of the beam's length.
+    pub fn locate(&self, s: f64) -> (usize, f64) {
+        let mut along = s * self.length;
+        for (number, piece) in self.pieces.iter().enumerate() {
+            if along <= piece.length * (1.0 + 1e-12) || number + 1 == self.pieces.len() {
+                return (number, (along / piece.length).clamp(0.0, 1.0));
+            }
+            along -= piece.length;
+        }
+        (0, 0.0)
+    }
+
+    /// The fraction of the length at which a place lies on the line, if it does.
+    pub fn find(&self, place: Vec3) -> Option<f64> {
+        let near = |p: Vec3| (p - place).norm() < 1e-9 * self.length;
+        self.pieces.iter().enumerate().find_map(|(number, piece)| {
+            let t = match &piece.curve {
+                Curve::Line => (place - piece.start).dot(piece.tangent(0.0)) / piece.length,
+                Curve::Arc { centre, e, f, angle, .. } => {
+                    let (x, y) = ((place - *centre).dot(*e), (place - *centre).dot(*f));
+                    libm::atan2(y, x).rem_euclid(2.0 * PI) / angle
+                }
+            };
+            ((0.0..=1.0).contains(&t) && near(piece.place(t))).then(|| self.fraction(number, t))
+        })
+    }
+}
+
+/// The centre line of a beam; `places` gives the coordinates of named points.
+pub fn centre_line(
+    beam: &deck::Beam,
+    place: &dyn Fn(&Spanned<PointRef>) -> Result<Vec3, Diagnostic>,
+) -> Result<CentreLine, Diagnostic> {
+    let given = beam.axis3.as_ref().map(|axis| Spanned { value: Vec3(axis.value), span: axis.span.clone() });
+    if let Some(axis) = given.as_ref().filter(|axis| axis.value == Vec3::ZERO) {
+        return Err(Diagnostic::error("`axis3` must not be zero", axis.span.clone()));
+    }
+    let pieces = match &beam.path {
+        deck::Path::Through(points) => {
+            let places: Vec<Vec3> = points.iter().map(place).collect::<Result<_, _>>()?;
+            let piece = |k: usize| line(beam, places[k], places[k + 1], given.as_ref(), &points[k + 1].span);
+            (0..places.len() - 1).map(piece).collect::<Result<Vec<_>, _>>()?
+        }
+        deck::Path::Arc(points) => {
+            let [a, b, c] = [place(&points[0])?, place(&points[1])?, place(&points[2])?];
+            vec![arc(beam, [a, b, c], given.as_ref(), &points[1].span)?]
+        }
+    };
+    let length = pieces.iter().map(|p| p.length).sum();
+    Ok(CentreLine { pieces, length, twist: beam.twist.unwrap_or([0.0; 2]) })
+}
+
+fn line(
+    beam: &deck::Beam,
+    start: Vec3,
+    end: Vec3,
+    axis3: Option<&Spanned<Vec3>>,
+    span: &Span,
+) -> Result<Piece, Diagnostic> {
+    let length = (end - start).norm();
+    let size = start.norm().max(end.norm());
+    if !length.is_finite() || length <= 1e-12 * size || length == 0.0 {
+        let message = format!("a piece of beam `{}` has no length: it starts and ends at the same place", beam.name.value);
+        return Err(Diagnostic::error(message, span.clone()));
+    }
+    let tangent = (end - start) * (1.0 / length);
+    let along_z = tangent.cross(Vec3::UNIT[2]).norm() < 1e-6;
+    let default = if along_z { Vec3::UNIT[1] } else { Vec3::UNIT[2] };
+    let axis = axis3.map_or(default, |axis| axis.value);
+    if let Some(axis) = axis3.filter(|axis| axis.value.cross(tangent).norm() <= 1e-6 * axis.value.norm()) {
+        let message = format!("`axis3` is parallel to a piece of beam `{}`", beam.name.value);
+        return Err(Diagnostic::error(message, axis.span.clone()).help("local axis 3 is its part normal to the beam"));
+    }
+    Ok(Piece { start, end, curve: Curve::Line, length, axis3: axis })
+}
+
+fn arc(
+    beam: &deck::Beam,
+    [a, b, c]: [Vec3; 3],
+    axis3: Option<&Spanned<Vec3>>,
+    span: &Span,
+) -> Result<Piece, Diagnostic> {
+    let (u, v) = (b - a, c - a);
+    let cross = u.cross(v);
+    let sizes = u.norm() * v.norm();
+    if sizes.is_nan() || cross.norm() <= 1e-9 * sizes || (c - b).norm() <= 1e-12 * v.norm() || sizes == 0.0 {
+        let message = format!("the three points of the arc of beam `{}` lie on a line", beam.name.value);
+        return Err(Diagnostic::error(message, span.clone()).help("for a straight beam use `through`"));
+    }
+    let normal = cross * (1.0 / cross.norm());
+    let to_centre = (cross.cross(u) * v.squared() + v.cross(cross) * u.squared()) * (0.5 / cross.squared());
+    let (centre, radius) = (a + to_centre, to_centre.norm());
+    let e = (a - centre) * (1.0 / radius);
+    let f = normal.cross(e);
+    let angle = libm::atan2((c - centre).dot(f), (c - centre).dot(e)).rem_euclid(2.0 * PI);
+    let axis = axis3.map_or(normal, |axis| axis.value);
+    let piece =
+        Piece { start: a, end: c, curve: Curve::Arc { centre, radius, e, f, angle }, length: radius * angle, axis3: axis };
+    if let Some(axis) = axis3 {
+        // It must leave a normal part everywhere: look closely enough for any arc.
+        let parallel = |k: i32| piece.tangent(f64::from(k) / 720.0).cross(axis.value).norm() <= 1e-2 * axis.value.norm();
+        if (0..=720).any(parallel) {
+            let message = format!("`axis3` is parallel to the arc of beam `{}` somewhere", beam.name.value);
+            return Err(Diagnostic::error(message, axis.span.clone()));
+        }
+    }
+    Ok(piece)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(points: [[f64; 3]; 3]) -> Piece {
+        let text = "[section.s]\nEA = 1\nGA = 1\nGJ = 1\nEI = 1\n[[beam]]\nname = \"b\"\nsection = \"s\"\narc = [[0,0,0],[1,0,0],[1,1,0]]\nelements = 1";
+        let (deck, _) = deck::read(text).unwrap();
+        arc(&deck.beams[0], points.map(Vec3), None, &(0..0)).unwrap()
+    }
+
+    #[test]
+    fn an_arc_passes_its_three_points() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let quarter = piece([[1.0, 0.0, 0.0], [half, half, 0.0], [0.0, 1.0, 0.0]]);
+        assert!((quarter.length - PI / 2.0).abs() < 1e-15);
+        assert!((quarter.place(0.5) - Vec3([half, half, 0.0])).norm() < 1e-15);
+        assert!((quarter.tangent(0.0) - Vec3([0.0, 1.0, 0.0])).norm() < 1e-15);
+        let long_way = piece([[1.0, 0.0, 0.0], [-half, -half, 0.0], [0.0, 1.0, 0.0]]);
+        assert!((long_way.length - 1.5 * PI).abs() < 1e-14, "clockwise through the lower half");
+    }
+
+    #[test]
+    fn axes_are_right_handed_and_twist_about_the_tangent() {
+        let quarter = piece([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]]);
+        let line = CentreLine { length: quarter.length, pieces: vec![quarter], twist: [0.0, PI / 2.0] };
+        let e1 = line.pieces[0].tangent(1.0);
+        let (plain, turned) = (line.pieces[0].untwisted_axes(e1), line.axes(0, e1, 1.0));
+        assert!((plain.column(0).cross(plain.column(1)) - plain.column(2)).norm() < 1e-15);
+        assert!((turned.column(1) - plain.column(2)).norm() < 1e-15);
+    }
+}

@@ -1,0 +1,318 @@
+//! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
+
+use crate::deck::{self, Diagnostic, SectionBody, Shape, Span, Spanned};
+use crate::kernel::elastic::Stiffness;
+use crate::kernel::inertia::Inertia;
+use crate::tensor::{Mat3, Vec3};
+use nalgebra::{Matrix6, SymmetricEigen};
+use std::f64::consts::PI;
+
+/// Stiffness and mass of a section, local axes, order Gamma1 Gamma2 Gamma3 K1 K2 K3.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SectionMatrices {
+    /// Stiffness
+    pub stiffness: [[f64; 6]; 6],
+    /// Mass per length, where given
+    pub mass: Option<MassPerLength>,
+}
+
+/// Mass properties per length, local axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassPerLength {
+    /// Mass
+    pub mass: f64,
+    /// Mass centre in the section
+    pub offset: Vec3,
+    /// Inertia about the centre line
+    pub about_line: Mat3,
+}
+
+/// The section of a beam from its start to its end.
+#[derive(Clone, Debug)]
+pub enum SectionCourse {
+    /// One section
+    Uniform(SectionMatrices),
+    /// Dimensions linear in arc length
+    Shaped {
+        /// At start and end
+        shapes: [Shape; 2],
+        /// The material of both
+        material: deck::Material,
+        /// Shear factors of both, where given
+        shear_factors: [Option<[f64; 2]>; 2],
+    },
+    /// Each entry linear in arc length
+    Blended([SectionMatrices; 2]),
+}
+
+impl SectionCourse {
+    /// The section at the fraction `s` of the arc length.
+    pub fn at(&self, s: f64) -> SectionMatrices {
+        match self {
+            Self::Uniform(section) => section.clone(),
+            Self::Shaped { shapes, material, shear_factors } => {
+                let shape = blend_shapes(shapes, s);
+                let factor = match shear_factors {
+                    [Some(a), Some(b)] => Some([0, 1].map(|k| mix(a[k], b[k], s))),
+                    [one, other] => one.or(*other),
+                };
+                shaped(shape, material, factor)
+            }
+            Self::Blended([a, b]) => blend(a, b, s),
+        }
+    }
+}
+
+fn mix(a: f64, b: f64, s: f64) -> f64 {
+    a + (b - a) * s
+}
+
+fn blend_shapes(shapes: &[Shape; 2], s: f64) -> Shape {
+    match (shapes[0], shapes[1]) {
+        (Shape::Circle { radius: a }, Shape::Circle { radius: b }) => Shape::Circle { radius: mix(a, b, s) },
+        (Shape::Tube { radius: a, thickness: ta }, Shape::Tube { radius: b, thickness: tb }) => {
+            Shape::Tube { radius: mix(a, b, s), thickness: mix(ta, tb, s) }
+        }
+        (Shape::Rectangle { width: wa, height: ha }, Shape::Rectangle { width: wb, height: hb }) => {
+            Shape::Rectangle { width: mix(wa, wb, s), height: mix(ha, hb, s) }
+        }
+        (other, _) => other,
+    }
+}
+
+fn blend(a: &SectionMatrices, b: &SectionMatrices, s: f64) -> SectionMatrices {
+    let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| mix(a.stiffness[i][j], b.stiffness[i][j], s)));
+    let mass = a.mass.zip(b.mass).map(|(a, b)| {
+        let mass = mix(a.mass, b.mass, s);
+        let first = a.offset * (a.mass * (1.0 - s)) + b.offset * (b.mass * s);
+        MassPerLength {
+            mass,
+            offset: if mass > 0.0 { first * (1.0 / mass) } else { Vec3::ZERO },
+            about_line: a.about_line * (1.0 - s) + b.about_line * s,
+        }
+    });
+    SectionMatrices { stiffness, mass }
+}
+
+/// The matrices of a section of the deck.
+pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result<SectionMatrices, Diagnostic> {
+    let span = &section.name.span;
+    match &section.body {
+        SectionBody::Resultants { stiffness, mass, rotary } => {
+            let diagonal = Mat3::diagonal(rotary.unwrap_or([0.0; 3]));
+            let mass = match (mass, rotary) {
+                (None, None) => None,
+                (mass, _) => Some(MassPerLength { mass: mass.unwrap_or(0.0), offset: Vec3::ZERO, about_line: diagonal }),
+            };
+            let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { stiffness[i] } else { 0.0 }));
+            Ok(SectionMatrices { stiffness, mass })
+        }
+        SectionBody::Full { stiffness, mass } => full(section, stiffness, mass.as_ref(), span),
+        SectionBody::Shaped { shape, material, shear_factor } => {
+            Ok(shaped(*shape, find_material(material, materials)?, *shear_factor))
+        }
+    }
+}
+
+/// The course of a taper between two sections.
+pub fn taper(
+    ends: [&deck::Section; 2],
+    materials: &[deck::Material],
+) -> Result<SectionCourse, Diagnostic> {
+    if let [
+        SectionBody::Shaped { shape: a, material: ma, shear_factor: fa },
+        SectionBody::Shaped { shape: b, material: mb, shear_factor: fb },
+    ] = ends.map(|section| &section.body)
+    {
+        let alike = std::mem::discriminant(a) == std::mem::discriminant(b) && ma.value == mb.value;
+        let material = find_material(ma, materials)?.clone();
+        if alike && fa.is_some() == fb.is_some() {
+            return Ok(SectionCourse::Shaped { shapes: [*a, *b], material, shear_factors: [*fa, *fb] });
+        }
+    }
+    Ok(SectionCourse::Blended([matrices(ends[0], materials)?, matrices(ends[1], materials)?]))
+}
+
+fn find_material<'a>(name: &Spanned<String>, materials: &'a [deck::Material]) -> Result<&'a deck::Material, Diagnostic> {
+    materials.iter().find(|m| m.name.value == name.value).ok_or_else(|| {
+        super::names::unknown("material", name, materials.iter().map(|m| m.name.value.as_str()))
+    })
+}
+
+fn full(
+    section: &deck::Section,
+    stiffness: &[[f64; 6]; 6],
+    mass: Option<&[[f64; 6]; 6]>,
+    span: &Span,
+) -> Result<SectionMatrices, Diagnostic> {
+    let name = &section.name.value;
+    if Matrix6::from_fn(|i, j| stiffness[i][j]).cholesky().is_none() {
+        let message = format!("`stiffness` of section `{name}` must be positive definite");
+        return Err(Diagnostic::error(message, span.clone()));
+    }
+    let mass = match mass {
+        None => None,
+        Some(mass) => Some(mass_properties(mass).map_err(|why| {
+            Diagnostic::error(format!("`mass` of section `{name}` {why}"), span.clone())
+                .help("a mass matrix is [m I, -m d~; m d~, J] with the mass m, the mass centre d and the inertia J about the centre line")
+        })?),
+    };
+    Ok(SectionMatrices { stiffness: *stiffness, mass })
+}
+
+/// m, d and J of [m I, -m d~; m d~, J].
+fn mass_properties(matrix: &[[f64; 6]; 6]) -> Result<MassPerLength, String> {
+    let m = matrix[0][0];
+    let scale = matrix.iter().flatten().fold(0.0_f64, |s, v| s.max(v.abs()));
+    let mut first = Vec3::ZERO;
+    if m > 0.0 {
+        first = Vec3([matrix[5][1], matrix[3][2], matrix[4][0]]);
+    }
+    let coupling = first.skew();
+    for i in 0..3 {
+        for j in 0..3 {
+            let translation = if i == j { m } else { 0.0 };
+            let off = (matrix[i][j] - translation).abs().max((matrix[3 + i][j] - coupling.0[i][j]).abs());
+            if off > 1e-9 * scale {
+                return Err("is not the mass of a rigid section".into());
+            }
+        }
+    }
+    let eigen = SymmetricEigen::new(Matrix6::from_fn(|i, j| matrix[i][j]));
+    if eigen.eigenvalues.min() < -1e-12 * scale {
+        return Err("must not have negative eigenvalues".into());
+    }
+    let about_line = Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[3 + i][3 + j])));
+    Ok(MassPerLength { mass: m, offset: if m > 0.0 { first * (1.0 / m) } else { first }, about_line })
+}
+
+/// EA, GA with Cowper's (1966) shear factors, GJ with Saint-Venant torsion, EI.
+fn shaped(shape: Shape, material: &deck::Material, shear_factor: Option<[f64; 2]>) -> SectionMatrices {
+    let Geometry { area, bending, torsion, shear } = geometry(shape, material.poisson);
+    let [k2, k3] = shear_factor.unwrap_or(shear);
+    let (e, g) = (material.young, material.shear);
+    let diagonal = [e * area, g * area * k2, g * area * k3, g * torsion, e * bending[0], e * bending[1]];
+    let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { diagonal[i] } else { 0.0 }));
+    let mass = material.density.map(|rho| MassPerLength {
+        mass: rho * area,
+        offset: Vec3::ZERO,
+        about_line: Mat3::diagonal([bending[0] + bending[1], bending[0], bending[1]].map(|i| rho * i)),
+    });
+    SectionMatrices { stiffness, mass }
+}
+
+struct Geometry {
+    area: f64,
+    /// Second moments of area about axes 2 and 3
+    bending: [f64; 2],
+    torsion: f64,
+    /// Shear factors along 2 and 3
+    shear: [f64; 2],
+}
+
+fn geometry(shape: Shape, nu: f64) -> Geometry {
+    match shape {
+        Shape::Circle { radius } => {
+            let second = PI * radius.powi(4) / 4.0;
+            let factor = 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu);
+            Geometry { area: PI * radius * radius, bending: [second; 2], torsion: 2.0 * second, shear: [factor; 2] }
+        }
+        Shape::Tube { radius, thickness } => {
+            let inner = radius - thickness;
+            let second = PI * (radius.powi(4) - inner.powi(4)) / 4.0;
+            let m = inner / radius;
+            let m2 = (1.0 + m * m) * (1.0 + m * m);
+            let factor = 6.0 * (1.0 + nu) * m2 / ((7.0 + 6.0 * nu) * m2 + (20.0 + 12.0 * nu) * m * m);
+            Geometry {
+                area: PI * (radius * radius - inner * inner),
+                bending: [second; 2],
+                torsion: 2.0 * second,
+                shear: [factor; 2],
+            }
+        }
+        Shape::Rectangle { width, height } => {
+            let factor = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu);
+            Geometry {
+                area: width * height,
+                bending: [width * height.powi(3) / 12.0, height * width.powi(3) / 12.0],
+                torsion: rectangle_torsion(width, height),
+                shear: [factor; 2],
+            }
+        }
+    }
+}
+
+/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art. 109):
+/// a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
+fn rectangle_torsion(width: f64, height: f64) -> f64 {
+    let (a, b) = (width.max(height), width.min(height));
+    let term = |n: f64| libm::tanh(n * PI * a / (2.0 * b)) / n.powi(5);
+    let sum: f64 = (0..200).map(|k| term(2.0 * f64::from(k) + 1.0)).sum();
+    a * b.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * (b / a) * sum)
+}
+
+impl SectionMatrices {
+    /// The stiffness in global components, for section axes R0.
+    pub fn stiffness_in(&self, r0: Mat3) -> Stiffness {
+        let block = |row: usize, column: usize| {
+            Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.stiffness[3 * row + i][3 * column + j])))
+        };
+        let turned = |m: Mat3| r0 * m * r0.transpose();
+        let coupling = block(0, 1);
+        Stiffness {
+            cn: turned(block(0, 0)),
+            cm: turned(block(1, 1)),
+            cc: (coupling != Mat3::ZERO).then(|| turned(coupling)),
+        }
+    }
+}
+
+impl MassPerLength {
+    /// The mass properties in global components.
+    pub fn turned(&self, r0: Mat3) -> Inertia {
+        Inertia { mass: self.mass, offset: r0 * self.offset, about_node: r0 * self.about_line * r0.transpose() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torsion_of_rectangles_agrees_with_the_published_table() {
+        // Timoshenko & Goodier, Theory of Elasticity, table of k1 for b/a = 1, 2, 10.
+        for (ratio, k1) in [(1.0, 0.1406), (2.0, 0.229), (10.0, 0.312)] {
+            assert!((rectangle_torsion(ratio, 1.0) / ratio - k1).abs() < 6e-4, "{ratio}");
+        }
+    }
+
+    #[test]
+    fn a_tube_without_a_hole_is_a_circle() {
+        let (tube, circle) = (
+            geometry(Shape::Tube { radius: 2.0, thickness: 2.0 }, 0.3),
+            geometry(Shape::Circle { radius: 2.0 }, 0.3),
+        );
+        assert!((tube.area - circle.area).abs() < 1e-14 && (tube.shear[0] - circle.shear[0]).abs() < 1e-15);
+    }
+
+    #[test]
+    fn mass_matrices_of_rigid_sections_are_understood() {
+        let (m, d, j) = (2.0, Vec3([0.0, 0.1, -0.2]), Mat3::diagonal([3.0, 2.0, 1.5]));
+        let coupling = d.skew() * m;
+        let mut matrix = [[0.0; 6]; 6];
+        for i in 0..3 {
+            matrix[i][i] = m;
+            for k in 0..3 {
+                matrix[3 + i][k] = coupling.0[i][k];
+                matrix[k][3 + i] = coupling.0[i][k];
+                matrix[3 + i][3 + k] = j.0[i][k];
+            }
+        }
+        let properties = mass_properties(&matrix).unwrap();
+        assert_eq!((properties.mass, properties.about_line), (m, j));
+        assert!((properties.offset - d).norm() < 1e-16);
+        matrix[0][1] = 0.5;
+        matrix[1][0] = 0.5;
+        assert!(mass_properties(&matrix).is_err());
+    }
+}

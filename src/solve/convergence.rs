@@ -1,0 +1,112 @@
+//! The stop test of Newton's iteration, in terms that do not depend on units.
+
+use crate::effect::Noise;
+use crate::model::{Model, SlotKind};
+use crate::system::{Equations, Slot, System};
+use crate::tensor::Vec3;
+
+/// The bounds of the test.
+///
+/// A state has converged when every translational residual is below `tolerance` F and every rotational one below
+/// `tolerance` F l, or at its round-off floor; F is the largest nodal force, or moment over l, among internal, external,
+/// inertia and support forces, and l the length of the scene. A last correction below 1e-12 in |du|/l and |dpsi| ends it too.
+#[derive(Clone, Copy, Debug)]
+pub struct Convergence {
+    /// Relative to the largest force
+    pub tolerance: f64,
+}
+
+/// Correction below which nothing more can be gained, relative to the length of the scene, and in radians.
+const SMALLEST_CORRECTION: f64 = 1e-12;
+
+/// Sums of a few products carry a few times the round-off of one.
+const NOISE_FACTOR: f64 = 4.0;
+
+/// The largest residual, as a multiple of what the test allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Its size over the allowed size
+    pub ratio: f64,
+    /// Its slot
+    pub slot: Slot,
+    /// The free part of the residual there: a force, or a moment conjugate to the rotation vector
+    pub value: Vec3,
+    /// The force F to which it is compared
+    pub force: f64,
+}
+
+/// What the test says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// In balance
+    Converged,
+    /// Not yet
+    Continue,
+    /// A force is not finite.
+    NotFinite,
+}
+
+impl Convergence {
+    /// Judges the forces of `system`, and the last correction where there was one.
+    pub fn judge(&self, model: &Model, system: &System, noise: Noise, dq: Option<&[Vec3]>) -> (Verdict, Residual) {
+        let residual = self.residual(model, system, noise);
+        if !(residual.ratio.is_finite() && residual.force.is_finite()) {
+            return (Verdict::NotFinite, residual);
+        }
+        let small = dq.is_some_and(|dq| correction(model, dq) <= SMALLEST_CORRECTION);
+        let verdict = if residual.ratio <= 1.0 || small { Verdict::Converged } else { Verdict::Continue };
+        (verdict, residual)
+    }
+
+    fn residual(&self, model: &Model, system: &System, noise: Noise) -> Residual {
+        let force = largest_force(model, system);
+        let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force };
+        for (slot, info) in model.slots.iter().enumerate() {
+            let value = free_part(&system.pattern.equations, slot as Slot, system.total(slot));
+            let (arm, noise) = match info.kind {
+                SlotKind::Displacement => (1.0, noise.force),
+                SlotKind::Rotation => (model.length, noise.moment),
+            };
+            let allowed = (self.tolerance * force * arm).max(NOISE_FACTOR * noise);
+            let size = value.norm();
+            let ratio = if size == 0.0 { 0.0 } else { size / allowed };
+            // NaN compares with nothing, so it is let in by hand.
+            if ratio > worst.ratio || ratio.is_nan() {
+                worst = Residual { ratio, slot: slot as Slot, value, force };
+            }
+        }
+        worst
+    }
+}
+
+/// F: the largest nodal force, or moment over the length, among all categories and what constraints hold.
+fn largest_force(model: &Model, system: &System) -> f64 {
+    let mut largest = 0.0_f64;
+    for (slot, info) in model.slots.iter().enumerate() {
+        let arm = if info.kind == SlotKind::Rotation { model.length } else { 1.0 };
+        let total = system.total(slot);
+        let held = total - free_part(&system.pattern.equations, slot as Slot, total);
+        let parts = [system.force[0][slot], system.force[1][slot], system.force[2][slot], held];
+        let squared = parts.iter().map(|f| f.squared()).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
+        let force = squared.sqrt() / arm;
+        if force > largest || force.is_nan() {
+            largest = force;
+        }
+    }
+    largest
+}
+
+/// The part of a force in the free directions of its slot, in local components.
+fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
+    let held = equations.held_part(slot, force);
+    force - held
+}
+
+/// The largest correction, displacements over the length of the scene.
+pub(super) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
+    let size = |(info, dq): (&crate::model::SlotInfo, &Vec3)| match info.kind {
+        SlotKind::Displacement => dq.norm() / model.length,
+        SlotKind::Rotation => dq.norm(),
+    };
+    model.slots.iter().zip(dq).map(size).fold(0.0, f64::max)
+}

@@ -1,0 +1,148 @@
+//! Sparse linear systems by faer: one symbolic analysis a stage, one numeric factorisation an iteration.
+
+use crate::system::{Pattern, System};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::Conj;
+use faer::mat::MatMut;
+use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::Par;
+
+/// LU with partial pivoting and a fill-reducing column order.
+///
+/// Tangents are unsymmetric as soon as something turns or a moment is fixed in space, and indefinite beyond limit points;
+/// LU serves all of them.
+pub struct LinearSolver {
+    symbolic: SymbolicLu<u32>,
+    numeric: NumericLu<u32, f64>,
+    memory: MemBuffer,
+    factored: bool,
+}
+
+/// An unknown that moves without any force: a mechanism or a loose part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NullVector {
+    /// One entry an equation; the largest tells what moves.
+    pub entries: Vec<f64>,
+}
+
+/// x.Jx over sum |x_i J_ij x_j| below which a direction has no stiffness but round-off.
+const NO_STIFFNESS: f64 = 4.0 * f64::EPSILON;
+
+impl LinearSolver {
+    /// Analyses a pattern. `None` where memory for it cannot be had.
+    pub fn new(pattern: &Pattern) -> Option<Self> {
+        let symbolic = factorize_symbolic_lu(structure(pattern), Default::default()).ok()?;
+        let factor = symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default());
+        let solve = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
+        let memory = MemBuffer::try_new(factor.or(solve)).ok()?;
+        Some(Self { symbolic, numeric: NumericLu::new(), memory, factored: false })
+    }
+
+    /// Factorises the tangent; `false` where a pivot cannot be found.
+    pub fn factorise(&mut self, system: &System) -> bool {
+        let entries = system.pattern.nonzeros();
+        let matrix = SparseColMatRef::new(structure(&system.pattern), &system.values[..entries]);
+        let stack = MemStack::new(&mut self.memory);
+        let done = self.symbolic.factorize_numeric_lu(&mut self.numeric, matrix, Par::Seq, stack, Default::default());
+        self.factored = done.is_ok();
+        self.factored
+    }
+
+    /// Solves with the last factorisation; `false` where the solution is not finite.
+    pub fn solve(&mut self, right_hand_side: &mut [f64]) -> bool {
+        if right_hand_side.is_empty() {
+            return true;
+        }
+        if !self.factored {
+            return false;
+        }
+        let n = right_hand_side.len();
+        let lu = LuRef::new_unchecked(&self.symbolic, &self.numeric);
+        let stack = MemStack::new(&mut self.memory);
+        lu.solve_in_place_with_conj(Conj::No, MatMut::from_column_major_slice_mut(right_hand_side, n, 1), Par::Seq, stack);
+        right_hand_side.iter().all(|x| x.is_finite())
+    }
+
+    /// Looks for a direction in which the tangent has no stiffness, by inverse iteration with the last factorisation.
+    /// Unknowns are scaled by their diagonal, so that forces and moments compare.
+    pub fn null_vector(&mut self, system: &System) -> Option<NullVector> {
+        if let Some(empty) = empty_column(system) {
+            let mut entries = vec![0.0; system.pattern.equations.count()];
+            entries[empty] = 1.0;
+            return Some(NullVector { entries });
+        }
+        let scale: Vec<f64> = diagonal(system).iter().map(|d| d.abs().max(f64::MIN_POSITIVE).sqrt()).collect();
+        let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
+        for _ in 0..3 {
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+            if !self.solve(&mut x) {
+                return self.null_vector_of_shifted(system);
+            }
+            let largest = x.iter().zip(&scale).fold(0.0_f64, |m, (x, s)| m.max((x * s).abs()));
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / largest);
+        }
+        let unscaled: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
+        (stiffness_of(system, &unscaled) <= NO_STIFFNESS).then_some(NullVector { entries: x })
+    }
+
+    /// The same where the factorisation broke down: the diagonal is raised by a little first.
+    fn null_vector_of_shifted(&mut self, system: &System) -> Option<NullVector> {
+        let mut shifted = system.clone();
+        for place in diagonal_places(system).into_iter().flatten() {
+            shifted.values[place] *= 1.0 + 1e-10;
+        }
+        if !self.factorise(&shifted) {
+            return None;
+        }
+        let mut x = vec![1.0; system.pattern.equations.count()];
+        for _ in 0..3 {
+            if !self.solve(&mut x) {
+                return None;
+            }
+            let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            x.iter_mut().for_each(|x| *x /= largest);
+        }
+        Some(NullVector { entries: x })
+    }
+}
+
+fn structure(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
+    let n = pattern.equations.count();
+    SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows)
+}
+
+/// Where the diagonal entry of each column is stored.
+fn diagonal_places(system: &System) -> Vec<Option<usize>> {
+    let pattern = &system.pattern;
+    let place = |column: usize| {
+        let (start, end) = (pattern.column_starts[column] as usize, pattern.column_starts[column + 1] as usize);
+        pattern.rows[start..end].binary_search(&(column as u32)).ok().map(|k| start + k)
+    };
+    (0..pattern.equations.count()).map(place).collect()
+}
+
+fn diagonal(system: &System) -> Vec<f64> {
+    diagonal_places(system).into_iter().map(|place| place.map_or(0.0, |place| system.values[place])).collect()
+}
+
+/// A column without any entry that is not zero.
+fn empty_column(system: &System) -> Option<usize> {
+    let starts = &system.pattern.column_starts;
+    (0..system.pattern.equations.count())
+        .find(|&c| system.values[starts[c] as usize..starts[c + 1] as usize].iter().all(|&v| v == 0.0))
+}
+
+/// |x.Jx| over sum |x_i J_ij x_j|
+fn stiffness_of(system: &System, x: &[f64]) -> f64 {
+    let starts = &system.pattern.column_starts;
+    let (mut sum, mut size) = (0.0, 0.0);
+    for column in 0..x.len() {
+        for k in starts[column] as usize..starts[column + 1] as usize {
+            let term = x[system.pattern.rows[k] as usize] * system.values[k] * x[column];
+            sum += term;
+            size += term.abs();
+        }
+    }
+    if size == 0.0 { 0.0 } else { sum.abs() / size }
+}

@@ -1,0 +1,156 @@
+//! Newton's iteration on one step or load level.
+
+use super::convergence::{Convergence, Residual, Verdict, correction};
+use super::linear::{LinearSolver, NullVector};
+use crate::integrate::Method;
+use crate::model::{Assembly, Model, StageKind, charts};
+use crate::system::State;
+use crate::tensor::Vec3;
+use std::time::Instant;
+
+/// Work done, added up over a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// Linear solves
+    pub iterations: u64,
+    /// Factorisations
+    pub factorisations: u64,
+    /// Changes of chart
+    pub chart_switches: u64,
+    /// Seconds spent on forces and tangents, scattered into the system
+    pub evaluation_seconds: f64,
+    /// Seconds spent on factorising and solving
+    pub solve_seconds: f64,
+}
+
+/// Runs `part` and adds its seconds to `seconds`.
+fn timed<R>(seconds: &mut f64, part: impl FnOnce() -> R) -> R {
+    let start = Instant::now();
+    let result = part();
+    *seconds += start.elapsed().as_secs_f64();
+    result
+}
+
+/// Why an iteration did not end in balance.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NewtonFailure {
+    /// Too many iterations, or corrections that run away
+    NotConverged {
+        /// The worst residual of the last iterate
+        residual: Residual,
+        /// Iterations spent
+        iterations: usize,
+    },
+    /// The tangent cannot be solved with.
+    Singular(Option<NullVector>),
+    /// A force is not finite.
+    NotFinite {
+        /// The effect that gave it, if one did
+        effect: Option<&'static str>,
+        /// Where
+        slot: usize,
+    },
+}
+
+/// The iteration with its scratch.
+pub struct Newton {
+    /// When to stop
+    pub convergence: Convergence,
+    /// Linear solves allowed
+    pub max_iterations: usize,
+    right_hand_side: Vec<f64>,
+    dq: Vec<Vec3>,
+}
+
+/// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
+const RUNAWAY: f64 = 1e6;
+
+impl Newton {
+    /// For a stage with these unknowns.
+    pub fn new(convergence: Convergence, max_iterations: usize, equations: usize, slots: usize) -> Self {
+        Self { convergence, max_iterations, right_hand_side: vec![0.0; equations], dq: vec![Vec3::ZERO; slots] }
+    }
+
+    /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
+    /// in with the first correction, so that the rest of the structure follows them linearly.
+    #[allow(clippy::too_many_arguments)]
+    pub fn solve(
+        &mut self,
+        model: &Model,
+        assembly: &mut Assembly,
+        solver: &mut LinearSolver,
+        state: &mut State,
+        method: &dyn Method,
+        kind: StageKind,
+        lift: Option<&[Vec3]>,
+        work: &mut Work,
+    ) -> Result<(), NewtonFailure> {
+        assembly.forget();
+        let noise = assembly.noise(state);
+        let mut lift = lift;
+        let mut iterations = 0;
+        loop {
+            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), lift));
+            let last = (iterations > 0).then_some(&self.dq[..]);
+            let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
+            match verdict {
+                Verdict::Converged if lift.is_none() => return Ok(()),
+                Verdict::NotFinite => return Err(not_finite(assembly, state, residual)),
+                _ if iterations >= self.max_iterations => {
+                    return Err(NewtonFailure::NotConverged { residual, iterations });
+                }
+                _ => {}
+            }
+            self.find_correction(assembly, solver, lift, work)?;
+            iterations += 1;
+            if correction(model, &self.dq) > RUNAWAY {
+                return Err(NewtonFailure::NotConverged { residual, iterations });
+            }
+            assembly.extrapolate(state, &self.dq);
+            method.correct(state, &self.dq);
+            lift = None;
+            if kind == StageKind::Static {
+                self.change_charts(model, state, work);
+            }
+        }
+    }
+
+    /// Solves J dq = -g; held directions take their part of `lift`.
+    fn find_correction(
+        &mut self,
+        assembly: &Assembly,
+        solver: &mut LinearSolver,
+        lift: Option<&[Vec3]>,
+        work: &mut Work,
+    ) -> Result<(), NewtonFailure> {
+        let system = &assembly.system;
+        system.right_hand_side(&mut self.right_hand_side);
+        work.factorisations += 1;
+        work.iterations += 1;
+        let right_hand_side = &mut self.right_hand_side;
+        let solved = timed(&mut work.solve_seconds, || solver.factorise(system) && solver.solve(right_hand_side));
+        if !solved {
+            return Err(NewtonFailure::Singular(solver.null_vector(system)));
+        }
+        system.pattern.equations.scatter(&self.right_hand_side, lift, &mut self.dq);
+        Ok(())
+    }
+
+    /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn.
+    fn change_charts(&mut self, model: &Model, state: &mut State, work: &mut Work) {
+        let switched = charts::switch(state, &model.rotations, 0.0);
+        if switched > 0 {
+            work.chart_switches += switched as u64;
+            charts::freeze(state, &model.elements);
+            // What was a correction before is none in the new chart: it may not end the iteration.
+            self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
+        }
+    }
+}
+
+fn not_finite(assembly: &mut Assembly, state: &State, residual: Residual) -> NewtonFailure {
+    match assembly.culprit(state) {
+        Some((effect, slot)) => NewtonFailure::NotFinite { effect: Some(effect), slot },
+        None => NewtonFailure::NotFinite { effect: None, slot: residual.slot as usize },
+    }
+}

@@ -1,0 +1,87 @@
+//! A history against a stored one, column by column.
+
+use crate::output::HistoryReader;
+
+/// The worst cell of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The column
+    pub column: String,
+    /// Number of the worst row, from 1
+    pub row: usize,
+    /// The value of the first history there
+    pub came: f64,
+    /// The value of the stored one
+    pub stored: f64,
+    /// |came - stored| as a multiple of the allowed difference
+    pub ratio: f64,
+}
+
+/// Compares the columns that `stored` has; a column or row that `came` lacks is an error.
+///
+/// A cell passes where |came - stored| <= atol + rtol |stored|. Columns that are only in `came` are returned by name.
+pub fn compare(
+    came: &HistoryReader,
+    stored: &HistoryReader,
+    rtol: f64,
+    atol: f64,
+) -> Result<(Vec<Comparison>, Vec<String>), String> {
+    if came.rows.len() != stored.rows.len() {
+        return Err(format!("{} rows against {} stored ones", came.rows.len(), stored.rows.len()));
+    }
+    let mut table = Vec::new();
+    for (k, column) in stored.names.iter().enumerate() {
+        let Some(other) = came.names.iter().position(|name| name == column) else {
+            return Err(format!("the column `{column}` is missing"));
+        };
+        let cells = came.rows.iter().zip(&stored.rows).map(|(a, b)| (a[other], b[k]));
+        let judged = cells.enumerate().map(|(row, (came, stored))| {
+            let allowed = atol + rtol * stored.abs();
+            let difference = (came - stored).abs();
+            // Equal cells pass whatever the tolerance; cells that are no numbers never do, unless both are none.
+            let same = came == stored || (came.is_nan() && stored.is_nan());
+            let ratio = if same { 0.0 } else { difference / allowed };
+            let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+            Comparison { column: column.clone(), row: row + 1, came, stored, ratio }
+        });
+        table.extend(judged.max_by(|a, b| a.ratio.total_cmp(&b.ratio)));
+    }
+    let extra = came.names.iter().filter(|name| !stored.names.contains(name)).cloned().collect();
+    Ok((table, extra))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn history(rows: &[[f64; 2]]) -> HistoryReader {
+        let names = ["time", "u"].map(String::from).to_vec();
+        HistoryReader { names, rows: rows.iter().map(|r| r.to_vec()).collect() }
+    }
+
+    #[test]
+    fn the_worst_cell_of_each_column_is_told() {
+        let a = history(&[[0.0, 1.0], [1.0, 2.0 + 1e-6], [2.0, 3.0]]);
+        let b = history(&[[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
+        let (table, extra) = compare(&a, &b, 1e-9, 0.0).unwrap();
+        assert!(extra.is_empty());
+        assert_eq!(table[0].ratio, 0.0);
+        assert_eq!(table[1].row, 2);
+        assert!((table[1].ratio - 500.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn missing_rows_and_columns_are_errors() {
+        let (a, b) = (history(&[[0.0, 1.0]]), history(&[[0.0, 1.0], [1.0, 1.0]]));
+        assert!(compare(&a, &b, 1.0, 1.0).is_err());
+        let mut c = history(&[[0.0, 1.0]]);
+        c.names[1] = "v".into();
+        assert!(compare(&a, &c, 1.0, 1.0).unwrap_err().contains("`v`"));
+    }
+
+    #[test]
+    fn nan_never_equals_a_number() {
+        let (a, b) = (history(&[[0.0, f64::NAN]]), history(&[[0.0, 1.0]]));
+        assert_eq!(compare(&a, &b, 1.0, 1.0).unwrap().0[1].ratio, f64::INFINITY);
+    }
+}

@@ -1,0 +1,7 @@
+//! What is done with whole runs.
+
+mod compare;
+mod verify;
+
+pub use compare::{Comparison, compare};
+pub use verify::{Judgement, Recorder, judge};

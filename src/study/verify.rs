@@ -1,0 +1,224 @@
+//! Expectations held against a run.
+
+use crate::deck::{Instant, Reduce};
+use crate::drive::{Counters, Failure, Snapshot};
+use crate::scene::{Bounds, Expectation, ExpectationKind, Scene};
+
+/// Follows the expected columns through every converged state.
+pub struct Recorder {
+    expectations: Vec<Expectation>,
+    rows: Vec<Vec<Row>>,
+    scratch: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Row {
+    time: f64,
+    load: f64,
+    value: f64,
+}
+
+/// What became of an expectation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// Column, counter or failure, and where it was looked at
+    pub what: String,
+    /// What was expected
+    pub expected: String,
+    /// What came
+    pub came: String,
+    /// The departure from the expected value, where there is one
+    pub error: Option<f64>,
+    /// The departure over the allowed one, where there is one
+    pub ratio: Option<f64>,
+    /// Whether it holds
+    pub holds: bool,
+}
+
+impl Recorder {
+    /// For the expectations of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        let expectations = scene.expectations.clone();
+        Self { rows: vec![Vec::new(); expectations.len()], expectations, scratch: Vec::new() }
+    }
+
+    /// Takes a converged state.
+    pub fn row(&mut self, at: &Snapshot) {
+        for (expectation, rows) in self.expectations.iter().zip(&mut self.rows) {
+            if let ExpectationKind::Column { probe, component, .. } = &expectation.kind {
+                self.scratch.clear();
+                probe.read(at, &mut self.scratch);
+                rows.push(Row { time: at.state.time, load: at.state.load, value: self.scratch[*component] });
+            }
+        }
+    }
+}
+
+/// Judges every expectation; a failure that nobody expected is judged too.
+pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Counters) -> Vec<Judgement> {
+    let came = result.as_ref().map_or_else(Failure::name, |()| "finished");
+    let mut judgements: Vec<Judgement> = Vec::new();
+    let expects_failure = recorder.expectations.iter().any(|e| matches!(e.kind, ExpectationKind::Fails));
+    if let (Err(failure), false) = (result, expects_failure) {
+        judgements.push(Judgement {
+            what: "the run".into(),
+            expected: "finished".into(),
+            came: format!("{}: {failure}", failure.name()),
+            error: None,
+            ratio: None,
+            holds: false,
+        });
+    }
+    for (expectation, rows) in recorder.expectations.iter().zip(&recorder.rows) {
+        judgements.push(match &expectation.kind {
+            ExpectationKind::Fails => Judgement {
+                what: "the run".into(),
+                expected: expectation.name.clone(),
+                came: came.into(),
+                error: None,
+                ratio: None,
+                holds: came == expectation.name,
+            },
+            ExpectationKind::Counter { name, bounds } => {
+                hold(expectation.name.clone(), bounds, Some(counter(counters, name) as f64))
+            }
+            ExpectationKind::Column { reduce: how, bounds, .. } => {
+                hold(format!("{} {}", expectation.name, describe(how)), bounds, reduce(rows, *how))
+            }
+        });
+    }
+    judgements
+}
+
+fn counter(counters: &Counters, name: &str) -> u64 {
+    match name {
+        "steps" => counters.steps,
+        "iterations" => counters.work.iterations,
+        "cutbacks" => counters.cutbacks,
+        "chart_switches" => counters.work.chart_switches,
+        _ => counters.mixed_elements,
+    }
+}
+
+fn describe(reduce: &Reduce) -> String {
+    match reduce {
+        Reduce::At(Instant::End) => "at the end".into(),
+        Reduce::At(Instant::Time(time)) => format!("at time {time}"),
+        Reduce::At(Instant::Load(load)) => format!("at load {load}"),
+        Reduce::Max => "max".into(),
+        Reduce::Min => "min".into(),
+        Reduce::AbsMax => "absmax".into(),
+        Reduce::Mean => "mean".into(),
+        Reduce::Drift => "drift".into(),
+    }
+}
+
+fn hold(what: String, bounds: &Bounds, came: Option<f64>) -> Judgement {
+    let mut expected = Vec::new();
+    let (mut holds, mut error, mut ratio) = (true, None, None);
+    let value = came.unwrap_or(f64::NAN);
+    if let Some((wanted, atol, rtol)) = bounds.value {
+        expected.push(format!("{wanted}"));
+        let departure = (value - wanted).abs();
+        let allowed = atol + rtol * wanted.abs();
+        holds &= departure <= allowed;
+        error = Some(departure);
+        ratio = Some(if departure == 0.0 { 0.0 } else { departure / allowed });
+    }
+    if let Some(bound) = bounds.below {
+        expected.push(format!("< {bound}"));
+        holds &= value < bound;
+    }
+    if let Some(bound) = bounds.above {
+        expected.push(format!("> {bound}"));
+        holds &= value > bound;
+    }
+    let came = came.map_or("was not reached".into(), |value| format!("{value:?}"));
+    Judgement { what, expected: expected.join(" and "), came, error, ratio, holds }
+}
+
+fn reduce(rows: &[Row], how: Reduce) -> Option<f64> {
+    let first = rows.first()?.value;
+    // A value that is not a number must not be passed over.
+    let fold = |pick: fn(f64, f64) -> f64, of: &dyn Fn(f64) -> f64| {
+        rows.iter().map(|row| of(row.value)).reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
+    };
+    match how {
+        Reduce::Max => fold(f64::max, &|v| v),
+        Reduce::Min => fold(f64::min, &|v| v),
+        Reduce::AbsMax => fold(f64::max, &f64::abs),
+        Reduce::Drift => fold(f64::max, &|v| (v - first).abs()),
+        Reduce::Mean => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
+        Reduce::At(Instant::End) => rows.last().map(|row| row.value),
+        Reduce::At(Instant::Time(time)) => at_time(rows, time),
+        Reduce::At(Instant::Load(load)) => at_load(rows, load),
+    }
+}
+
+/// The last row at that time, or between the two rows around it.
+fn at_time(rows: &[Row], time: f64) -> Option<f64> {
+    let slack = 1e-12 * time.abs();
+    let before = rows.iter().rev().find(|row| row.time <= time + slack)?;
+    if (before.time - time).abs() <= slack {
+        return Some(before.value);
+    }
+    let after = rows.iter().find(|row| row.time > time)?;
+    Some(between(time, (before.time, before.value), (after.time, after.value)))
+}
+
+/// The first crossing of a load factor.
+fn at_load(rows: &[Row], load: f64) -> Option<f64> {
+    let slack = 1e-12 * load.abs().max(1.0);
+    let reached = rows.iter().position(|row| row.load >= load - slack)?;
+    let after = rows[reached];
+    if reached == 0 || (after.load - load).abs() <= slack {
+        return (after.load <= load + slack).then_some(after.value);
+    }
+    let before = rows[reached - 1];
+    Some(between(load, (before.load, before.value), (after.load, after.value)))
+}
+
+fn between(x: f64, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> f64 {
+    y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows() -> Vec<Row> {
+        let row = |(time, load, value)| Row { time, load, value };
+        [(0.0, 0.0, 1.0), (0.0, 0.5, 3.0), (0.0, 1.0, 4.0), (1.0, 1.0, -6.0), (3.0, 1.0, 0.0)].map(row).to_vec()
+    }
+
+    #[test]
+    fn rows_are_reduced_as_the_deck_says() {
+        let value = |how| reduce(&rows(), how).unwrap();
+        assert_eq!(value(Reduce::Max), 4.0);
+        assert_eq!(value(Reduce::Min), -6.0);
+        assert_eq!(value(Reduce::AbsMax), 6.0);
+        assert_eq!(value(Reduce::Mean), 0.4);
+        assert_eq!(value(Reduce::Drift), 7.0);
+        assert_eq!(value(Reduce::At(Instant::End)), 0.0);
+    }
+
+    #[test]
+    fn instants_lie_between_rows() {
+        let value = |instant| reduce(&rows(), Reduce::At(instant));
+        assert_eq!(value(Instant::Time(0.0)), Some(4.0));
+        assert_eq!(value(Instant::Time(0.5)), Some(-1.0));
+        assert_eq!(value(Instant::Time(2.0)), Some(-3.0));
+        assert_eq!(value(Instant::Time(4.0)), None);
+        assert_eq!(value(Instant::Load(0.25)), Some(2.0));
+        assert_eq!(value(Instant::Load(1.0)), Some(4.0));
+        assert_eq!(value(Instant::Load(1.5)), None);
+    }
+
+    #[test]
+    fn nan_holds_nothing() {
+        let bounds = Bounds { value: Some((1.0, 10.0, 0.0)), below: None, above: None };
+        assert!(!hold("x".into(), &bounds, Some(f64::NAN)).holds);
+        assert!(!hold("x".into(), &bounds, None).holds);
+        assert!(hold("x".into(), &bounds, Some(2.0)).holds);
+    }
+}

@@ -1,0 +1,174 @@
+//! Forces and tangent of the whole scene, and the sink through which one effect adds to them.
+
+use super::equations::Equations;
+use super::pattern::{Pattern, Places};
+use super::state::Slot;
+use crate::kernel::ElementSystem;
+use crate::tensor::{Mat3, Vec3};
+
+/// What a force is; the stop test of Newton and the energy account look at them apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Category {
+    /// Stress resultants and springs
+    Internal,
+    /// Mass times acceleration, in all its forms
+    Inertia,
+    /// Loads, entered with the opposite sign
+    External,
+}
+
+impl Category {
+    /// All of them, in the order of [`System::force`].
+    pub const ALL: [Self; 3] = [Self::Internal, Self::Inertia, Self::External];
+}
+
+/// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
+///
+/// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).
+#[derive(Clone, Debug)]
+pub struct System {
+    /// The pattern of the tangent
+    pub pattern: Pattern,
+    /// By category and slot
+    pub force: [Vec<Vec3>; 3],
+    /// The values of the tangent; one more than the pattern has entries, the last is rubbish.
+    pub values: Vec<f64>,
+    /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
+    lift: Option<Vec<Vec3>>,
+    lifted: Vec<f64>,
+}
+
+impl System {
+    /// A system of zeros.
+    pub fn new(pattern: Pattern, slots: usize) -> Self {
+        let zero = vec![Vec3::ZERO; slots];
+        let (entries, equations) = (pattern.nonzeros() + 1, pattern.equations.count());
+        Self {
+            pattern,
+            force: [zero.clone(), zero.clone(), zero],
+            values: vec![0.0; entries],
+            lift: None,
+            lifted: vec![0.0; equations],
+        }
+    }
+
+    /// Sets forces and tangent to zero. `lift` holds increments of the held directions that the next correction
+    /// shall take with it.
+    pub fn clear(&mut self, lift: Option<&[Vec3]>) {
+        self.force.iter_mut().for_each(|f| f.fill(Vec3::ZERO));
+        self.values.fill(0.0);
+        self.lifted.fill(0.0);
+        self.lift = lift.map(<[Vec3]>::to_vec);
+    }
+
+    /// The sum of the forces at a slot.
+    #[inline]
+    pub fn total(&self, slot: usize) -> Vec3 {
+        self.force[0][slot] + self.force[1][slot] + self.force[2][slot]
+    }
+
+    /// The right-hand side of the correction: -g - J lift on the free equations.
+    pub fn right_hand_side(&self, out: &mut [f64]) {
+        let equations = &self.pattern.equations;
+        for slot in 0..self.force[0].len() {
+            let local = equations.to_local(slot as Slot, self.total(slot));
+            for (k, number) in equations.of(slot as Slot).into_iter().enumerate() {
+                if number != Equations::HELD {
+                    out[number as usize] = -local.0[k] - self.lifted[number as usize];
+                }
+            }
+        }
+    }
+
+    /// The sink of effect number `effect`.
+    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool) -> Sink<'_> {
+        Sink {
+            places: &self.pattern.places[effect],
+            equations: &self.pattern.equations,
+            force: &mut self.force[category as usize],
+            values: &mut self.values,
+            lift: self.lift.as_deref(),
+            lifted: &mut self.lifted,
+            with_tangent,
+        }
+    }
+}
+
+/// Through this an effect adds the force and tangent of its instances.
+pub struct Sink<'a> {
+    places: &'a Places,
+    equations: &'a Equations,
+    force: &'a mut [Vec3],
+    values: &'a mut [f64],
+    lift: Option<&'a [Vec3]>,
+    lifted: &'a mut [f64],
+    with_tangent: bool,
+}
+
+impl Sink<'_> {
+    /// Adds instance `k`; the blocks of `element` are in the order of the slots of its clique.
+    #[inline]
+    pub fn add(&mut self, k: usize, element: &ElementSystem) {
+        let slots = self.places.cliques.get(k);
+        for (block, &slot) in slots.iter().enumerate() {
+            self.force[slot as usize] += element.force_block(block);
+        }
+        if !self.with_tangent {
+            return;
+        }
+        if self.places.special[k] {
+            return self.add_special(k, element);
+        }
+        for (&place, &value) in self.places.of(k).iter().zip(element.tangent()) {
+            self.values[place as usize] += value;
+        }
+    }
+
+    /// As [`Sink::add`], for instances with turned axes or held directions.
+    fn add_special(&mut self, k: usize, element: &ElementSystem) {
+        let slots = self.places.cliques.get(k);
+        let mut local = element.clone();
+        let frames: Vec<Option<Mat3>> = slots.iter().map(|&slot| self.equations.frame(slot)).collect();
+        for row in 0..slots.len() {
+            for column in 0..slots.len() {
+                let mut block = element.tangent_block(row, column);
+                if let Some(frame) = frames[row] {
+                    block = frame.transpose_matmul(block);
+                }
+                if let Some(frame) = frames[column] {
+                    block = block * frame;
+                }
+                local.set_tangent(row, column, block);
+            }
+        }
+        for (&place, &value) in self.places.of(k).iter().zip(local.tangent()) {
+            self.values[place as usize] += value;
+        }
+        if let Some(lift) = self.lift {
+            self.add_lift(k, &local, lift);
+        }
+    }
+
+    fn add_lift(&mut self, k: usize, local: &ElementSystem, lift: &[Vec3]) {
+        let slots = self.places.cliques.get(k);
+        for (column, &slot) in slots.iter().enumerate() {
+            let mut increment = self.equations.to_local(slot, lift[slot as usize]);
+            for (j, number) in self.equations.of(slot).into_iter().enumerate() {
+                if number != Equations::HELD {
+                    increment.0[j] = 0.0;
+                }
+            }
+            if increment == Vec3::ZERO {
+                continue;
+            }
+            for (row, &other) in slots.iter().enumerate() {
+                let push = local.tangent_block(row, column) * increment;
+                for (i, number) in self.equations.of(other).into_iter().enumerate() {
+                    if number != Equations::HELD {
+                        self.lifted[number as usize] += push.0[i];
+                    }
+                }
+            }
+        }
+    }
+}

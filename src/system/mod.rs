@@ -1,0 +1,11 @@
+//! What effects read and write: the state, the equations, the sparsity pattern, forces and tangent.
+
+mod assembly;
+mod equations;
+mod pattern;
+mod state;
+
+pub use assembly::{Category, Sink, System};
+pub use equations::{Direction, Equations, FrameConflict};
+pub use pattern::{Cliques, Pattern};
+pub use state::{Memory, Node, Slot, State};

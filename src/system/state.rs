@@ -1,0 +1,91 @@
+//! The state of a scene: one 3-vector of unknowns a slot, with its rates.
+
+use crate::kernel::NodeMotion;
+use crate::kernel::seam::Conversion;
+use crate::tensor::Vec3;
+
+/// The index of a 3-vector of unknowns: a displacement or a rotation vector.
+pub type Slot = u32;
+
+/// Where a node keeps its displacement and its rotation vector. Nodes that a spherical joint connects share `u`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// The slot of the displacement
+    pub u: Slot,
+    /// The slot of the rotation vector
+    pub p: Slot,
+}
+
+/// Everything that changes in a run. Effects are functions of it.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// The run's clock. Static stages do not advance it.
+    pub time: f64,
+    /// The load factor of a static stage; 1 in a dynamic one.
+    pub load: f64,
+    /// Displacements, and rotation vectors each in its present chart (global components).
+    pub q: Vec<Vec3>,
+    /// dq/dt; zero in static stages.
+    pub v: Vec<Vec3>,
+    /// d2q/dt2; zero in static stages.
+    pub a: Vec<Vec3>,
+    /// The factor of each load, valid at `time` and `load`.
+    pub amplitude: Vec<f64>,
+    /// For each beam element the nodes that are converted into the chart of the first; frozen while Newton iterates.
+    pub mixed: Vec<Conversion>,
+    /// For each rotation slot the rotation vector continued without jumps since the start; valid at the last converged
+    /// state. It tells a wound spring, and the columns `rc`, which of the turns they are in.
+    pub wound: Vec<Vec3>,
+}
+
+impl State {
+    /// At rest in the initial placement.
+    pub fn rest(slots: usize, elements: usize, amplitudes: usize) -> Self {
+        let zero = vec![Vec3::ZERO; slots];
+        Self {
+            time: 0.0,
+            load: 0.0,
+            q: zero.clone(),
+            v: zero.clone(),
+            a: zero.clone(),
+            amplitude: vec![0.0; amplitudes],
+            mixed: vec![0; elements],
+            wound: zero,
+        }
+    }
+
+    /// Takes over another state of the same scene without allocating.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.time = other.time;
+        self.load = other.load;
+        self.q.copy_from_slice(&other.q);
+        self.v.copy_from_slice(&other.v);
+        self.a.copy_from_slice(&other.a);
+        self.amplitude.copy_from_slice(&other.amplitude);
+        self.mixed.copy_from_slice(&other.mixed);
+        self.wound.copy_from_slice(&other.wound);
+    }
+
+    /// The motion of a node.
+    #[inline]
+    pub fn motion(&self, node: Node) -> NodeMotion {
+        let (u, p) = (node.u as usize, node.p as usize);
+        NodeMotion {
+            u: self.q[u],
+            u_rate: self.v[u],
+            u_rate2: self.a[u],
+            p: self.q[p],
+            p_rate: self.v[p],
+            p_rate2: self.a[p],
+        }
+    }
+}
+
+/// What one effect must remember while Newton iterates: six numbers a point. It can be dropped at any time.
+#[derive(Clone, Debug, Default)]
+pub struct Memory {
+    /// The remembered numbers; valid only while `valid`.
+    pub points: Vec<[f64; 6]>,
+    /// Whether `points` belongs to the present iteration.
+    pub valid: bool,
+}
