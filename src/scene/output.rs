@@ -32,6 +32,10 @@ impl Columns<'_> {
                 known.push(group);
             }
         }
+        if let (Some(_), Some(rc)) = (known.iter().find(|g| g.value == "r"), known.iter().find(|g| g.value == "rc")) {
+            let message = "`r` and `rc` have the same columns: ask for one of them";
+            diagnostics.push(Diagnostic::error(message, rc.span.clone()));
+        }
         let mut probes = Vec::new();
         for node in self.written_nodes(diagnostics) {
             for group in known.iter().filter(|g| NODE_GROUPS.iter().any(|(name, _)| *name == g.value)) {
@@ -80,7 +84,9 @@ impl Columns<'_> {
             "resultant" => Quantity::Resultant(self.beam_point(node, &found)?),
             _ => Quantity::Strain(self.beam_point(node, &found)?),
         };
-        let names = suffixes(group).unwrap_or_default().iter().map(|suffix| format!("{}.{suffix}", node.value));
+        // The continued rotation vector has the columns of the rotation vector: a history holds one of the two.
+        let columns = if group == "rc" { "r" } else { group };
+        let names = suffixes(columns).unwrap_or_default().iter().map(|suffix| format!("{}.{suffix}", node.value));
         Ok(Probe { names: names.collect(), quantity })
     }
 
@@ -126,9 +132,15 @@ impl Columns<'_> {
         let group = NODE_GROUPS.iter().find_map(|(group, s)| s.iter().position(|s| *s == suffix).map(|k| (*group, k)));
         let node = Spanned { value: node.to_string(), span: name.span.clone() };
         match group {
+            Some(("r", component)) if self.continues_rotations() => Ok((self.node_probe(&node, "rc")?, component)),
             Some((group, component)) => Ok((self.node_probe(&node, group)?, component)),
             None => Err(self.no_column(name)),
         }
+    }
+
+    /// Whether the columns rx ry rz are continued from row to row.
+    fn continues_rotations(&self) -> bool {
+        self.deck.output.columns.as_ref().is_some_and(|columns| columns.iter().any(|c| c.value == "rc"))
     }
 
     fn no_column(&self, name: &Spanned<String>) -> Diagnostic {

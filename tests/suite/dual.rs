@@ -152,6 +152,11 @@ fn dual_numbers_differentiate() {
     let exact = [4.5 * root * (b - 1.0 / b) - 1.0, 3.0 * a * root * (1.0 + 1.0 / (b * b)) - 1.0];
     for k in 0..2 {
         let error = (f.partials[k] - exact[k]).abs();
-        assert!(error < 1e-13, "derivative {k} at ({a}, {b}): {} instead of {}, error {error:e}", f.partials[k], exact[k]);
+        assert!(
+            error < 1e-13,
+            "derivative {k} at ({a}, {b}): {} instead of {}, error {error:e}",
+            f.partials[k],
+            exact[k]
+        );
     }
 }

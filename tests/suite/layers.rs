@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the bottom to the top; each imports only what stands before it.
+#[rustfmt::skip]
 const ORDER: [&str; 13] = [
     "real", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "drive", "probe", "output",
     "study",
@@ -137,7 +138,8 @@ fn imported_modules(code: &str) -> Vec<(usize, String)> {
 fn lines_with_crate(code: &str, name: &str) -> Vec<usize> {
     let mut lines = Vec::new();
     for (line, before, after) in occurrences(code, name) {
-        let is_part = before.ends_with("::") && !before.trim_end_matches("::").ends_with([' ', '\n', '(', '<', '&', '{']);
+        let is_part =
+            before.ends_with("::") && !before.trim_end_matches("::").ends_with([' ', '\n', '(', '<', '&', '{']);
         let is_use = before.ends_with("use ") || before.ends_with("use ::") || after.starts_with("::");
         if is_use && !is_part {
             lines.push(line);
@@ -188,7 +190,7 @@ fn crates_are_used_only_in_their_rooms() {
     let mut faults = Vec::new();
     for (file, code) in library() {
         for (name, rooms) in CRATES {
-            if rooms.iter().any(|room| file.starts_with(room)) {
+            if rooms.iter().any(|room| file.starts_with(*room)) {
                 continue;
             }
             for line in lines_with_crate(&code, name) {
@@ -203,7 +205,8 @@ fn crates_are_used_only_in_their_rooms() {
 fn the_reader_of_imports_reads() {
     let text = "//! [`crate::study`]\nuse crate::real::Real; // crate::cli\n/* crate::deck\n*/\nlet a = crate::tensor::Vec3::ZERO;\nuse crate::{kernel::{beam, load}, system};\nfn mycrate::x() {}\n";
     let found = imported_modules(&without_comments(text));
-    let expected = [(2, "real"), (5, "tensor"), (6, "kernel"), (6, "system")].map(|(line, name)| (line, name.to_string()));
+    let expected =
+        [(2_usize, "real"), (5, "tensor"), (6, "kernel"), (6, "system")].map(|(line, name)| (line, name.to_string()));
     assert_eq!(found, expected);
     let text = "use toml::de;\nuse toml_edit::Item;\nlet a: toml::Value;\nuse super::toml::x;\nuse toml;\nlet toml = 1;\nx(::toml::y);\n";
     assert_eq!(lines_with_crate(text, "toml"), [1, 3, 5, 7]);

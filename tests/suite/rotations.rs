@@ -228,7 +228,13 @@ fn the_geometric_matrix_of_the_change_of_chart_is_a_derivative() {
         let moving = Complement::new(variables::<3>(p, 0), Vec3::zero(), Vec3::zero());
         let pulled = moving.b.transpose_mul(fixed);
         let geometric = Complement::geometric(p, force);
-        agree_vector("B^T f", p, Complement::new(p, Vec3::ZERO, Vec3::ZERO).b.transpose_mul(force), values(pulled), 1e-14);
+        agree_vector(
+            "B^T f",
+            p,
+            Complement::new(p, Vec3::ZERO, Vec3::ZERO).b.transpose_mul(force),
+            values(pulled),
+            1e-14,
+        );
         agree("D(B^T f)", p, geometric, jacobian(pulled, 0), 1e-12);
         agree("D(B^T f) = D(B^T f)^T", p, geometric, geometric.transpose(), 1e-13);
     }

@@ -574,9 +574,15 @@ fn elastic_seam_holds<const N: usize>() {
             let converted = Converted::new(&nodes, mask);
             let one_chart: [NodeMotion; N] = from_fn(|i| converted.nodes[i]);
             let mut out: ElementSystem = ElementSystem::new(2 * N);
-            converted.pull_back(Weights::NONE, false, |j| 2 * j + 1, &mut out, |_, system| {
-                *system = elastic(&points, &one_chart, 0.0);
-            });
+            converted.pull_back(
+                Weights::NONE,
+                false,
+                |j| 2 * j + 1,
+                &mut out,
+                |_, system| {
+                    *system = elastic(&points, &one_chart, 0.0);
+                },
+            );
             let what = format!("force against energy, {what}, {N} nodes, mask {mask:b}, nodes {nodes:?}");
             agree(&what, out.force(), &energy.partials[..6 * N], 1e-12);
         }
