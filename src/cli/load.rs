@@ -16,11 +16,7 @@ pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Status> {
         say::error("deck", &message);
         Status::Wrong
     })?;
-    let built = deck::read(&text).and_then(|(deck, warnings)| {
-        let (scene, more) = scene::build(&deck)?;
-        Ok((scene, [warnings, more].concat()))
-    });
-    match built {
+    match scene::from_text(&text) {
         Ok((scene, warnings)) => {
             show(path, &text, &warnings);
             Ok(scene)

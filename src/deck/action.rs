@@ -298,7 +298,7 @@ fn read_stages(table: &Table) -> Option<Option<Vec<usize>>> {
     }
     let count = context.stage_count;
     let number = |entry: &Item| {
-        let n = context.whole(entry, 1, usize::MAX >> 12)?;
+        let n = context.whole(entry, 1, usize::MAX)?;
         if n.value > count {
             let message = format!("there is no stage {}: the deck has {count}", n.value);
             return context.wrong(n.span, message);

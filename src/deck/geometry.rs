@@ -322,7 +322,12 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     let path = read_path(&table);
     let elements = table.required("elements").and_then(|item| read_counts(context, item));
     let order = match table.get("order") {
-        Some(item) => context.whole(item, 1, 3).map(|o| o.value),
+        Some(item) => context.whole(item, 1, usize::MAX).and_then(|order| {
+            if order.value <= 3 {
+                return Some(order.value);
+            }
+            context.wrong(order.span, format!("`order` is 1, 2 or 3, found {}", order.value))
+        }),
         None => Some(1),
     };
     let (axis3, twist) = (table.vector("axis3"), table.vector("twist").map(|t| t.value));

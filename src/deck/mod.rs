@@ -70,6 +70,10 @@ pub struct Deck {
     pub expects: Vec<Expect>,
     /// The values of `[param]`
     pub parameters: Parameters,
+    /// How many stages stand in the text
+    pub stage_count: usize,
+    /// Whether every table that defines a name could be read: else names may seem unknown that are not
+    pub names_complete: bool,
     /// The deck with expressions replaced by numbers, for run.json
     pub resolved: serde_json::Value,
 }
@@ -79,16 +83,12 @@ const KEYS: [&str; 19] = [
     "spring", "load", "initial", "history", "stage", "effects", "output",
 ];
 
-/// Reads a deck; `Err` holds everything that is wrong with its text.
+/// Reads a deck. What is wrong with it comes beside it, so that the scene can tell what else is; `Err` where the text is no
+/// TOML.
 pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (document, syntax) = DeTable::parse_recoverable(text);
     if !syntax.is_empty() {
-        let describe = |error: &toml::de::Error| {
-            let mut diagnostic = Diagnostic::whole(error.message().trim().replace('\n', "; "));
-            diagnostic.span = error.span();
-            diagnostic
-        };
-        return Err(syntax.iter().map(describe).collect());
+        return Err(describe_syntax(&syntax));
     }
     let mut diagnostics = Vec::new();
     let parameters = match document.get_ref().get("param").map(|item| (item, item.get_ref())) {
@@ -105,33 +105,52 @@ pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     };
     let context = Context { parameters, stage_count, diagnostics: RefCell::new(diagnostics), resolved: RefCell::default() };
     let deck = read_tables(&context, document.get_ref());
-    let diagnostics = context.diagnostics.take();
-    if !diagnostics.iter().all(Diagnostic::is_warning) {
-        return Err(diagnostics);
-    }
     let resolved = resolved::to_json(document.get_ref(), &context.resolved.borrow(), &context.parameters);
-    Ok((Deck { parameters: context.parameters.clone(), resolved, ..deck }, diagnostics))
+    let deck = Deck { parameters: context.parameters.clone(), resolved, stage_count, ..deck };
+    Ok((deck, context.diagnostics.take()))
+}
+
+/// The first syntax error, and keys that stand twice; the parser's other errors are mostly consequences of the first.
+fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
+    let describe = |error: &toml::de::Error| {
+        let mut diagnostic = Diagnostic::whole(error.message().trim().replace('\n', "; "));
+        diagnostic.span = error.span();
+        diagnostic
+    };
+    let twice = |error: &toml::de::Error| error.message().contains("duplicate key");
+    errors.iter().enumerate().filter(|(k, error)| *k == 0 || twice(error)).map(|(_, error)| describe(error)).collect()
 }
 
 fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let keys: Vec<&str> = KEYS.into_iter().chain(["expect"]).collect();
     let top = Table::top(context, document, &keys, &["damping"]);
+    let before = context.errors();
+    let points = geometry::read_points(&top);
+    let materials = named(&top, "material", geometry::read_material);
+    let sections = named(&top, "section", geometry::read_section);
+    let beams = listed(&top, "beam", geometry::read_beam);
+    let joints = listed(&top, "joint", action::read_joint);
+    let bodies = listed(&top, "body", action::read_body);
+    let histories = named(&top, "history", action::read_history);
+    let names_complete = context.errors() == before;
     Deck {
+        names_complete,
+        stage_count: 0,
         title: top.text("title").map(|t| t.value),
         units: procedure::read_units(&top),
         gravity: top.vector("gravity"),
-        points: geometry::read_points(&top),
-        materials: named(&top, "material", geometry::read_material),
-        sections: named(&top, "section", geometry::read_section),
-        beams: listed(&top, "beam", geometry::read_beam),
+        points,
+        materials,
+        sections,
+        beams,
         supports: listed(&top, "support", action::read_support),
         motions: listed(&top, "motion", action::read_motion),
-        joints: listed(&top, "joint", action::read_joint),
-        bodies: listed(&top, "body", action::read_body),
+        joints,
+        bodies,
         springs: listed(&top, "spring", action::read_spring),
         loads: listed(&top, "load", action::read_load),
         initials: listed(&top, "initial", action::read_initial),
-        histories: named(&top, "history", action::read_history),
+        histories,
         stages: listed(&top, "stage", procedure::read_stage),
         effects: procedure::read_effects(&top),
         output: procedure::read_output(&top),

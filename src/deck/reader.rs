@@ -28,6 +28,11 @@ impl Context {
         self.diagnostics.borrow_mut().push(diagnostic);
     }
 
+    /// How many errors there are so far.
+    pub fn errors(&self) -> usize {
+        self.diagnostics.borrow().iter().filter(|d| !d.is_warning()).count()
+    }
+
     /// Reports an error at a place; returns nothing, for use in a tail position.
     pub fn wrong<T>(&self, span: Span, message: impl Into<String>) -> Option<T> {
         self.report(Diagnostic::error(message, span));
@@ -163,6 +168,8 @@ pub struct Table<'a> {
     /// Where it stands
     pub span: Span,
     entries: &'a DeTable<'a>,
+    /// Keys that unknown ones were probably meant to be: that they are missing has been said.
+    misspelt: Vec<String>,
 }
 
 impl<'a> Table<'a> {
@@ -174,7 +181,7 @@ impl<'a> Table<'a> {
         keys: &[&str],
         unsupported: Unsupported,
     ) -> Option<Self> {
-        let table = Self::of_names(context, item, what)?;
+        let mut table = Self::of_names(context, item, what)?;
         table.refuse_unknown(keys, unsupported);
         Some(table)
     }
@@ -185,17 +192,17 @@ impl<'a> Table<'a> {
         let DeValue::Table(entries) = item.get_ref() else {
             return context.wrong(item.span(), format!("{what} must be a table, found {}", kind_of(item.get_ref())));
         };
-        Some(Self { context, what, span: item.span(), entries })
+        Some(Self { context, what, span: item.span(), entries, misspelt: Vec::new() })
     }
 
     /// The top level of the deck.
     pub fn top(context: &'a Context, entries: &'a DeTable<'a>, keys: &[&str], unsupported: Unsupported) -> Self {
-        let table = Self { context, what: "the deck".into(), span: 0..0, entries };
+        let mut table = Self { context, what: "the deck".into(), span: 0..0, entries, misspelt: Vec::new() };
         table.refuse_unknown(keys, unsupported);
         table
     }
 
-    fn refuse_unknown(&self, keys: &[&str], unsupported: Unsupported) {
+    fn refuse_unknown(&mut self, keys: &[&str], unsupported: Unsupported) {
         for key in self.entries.keys() {
             let name: &str = key.get_ref();
             if unsupported.contains(&name) {
@@ -204,7 +211,10 @@ impl<'a> Table<'a> {
             } else if !keys.contains(&name) {
                 let mut diagnostic = Diagnostic::error(format!("unknown key `{name}` in {}", self.what), key.span());
                 diagnostic.help = Some(match nearest(name, keys.iter().copied()) {
-                    Some(meant) => format!("did you mean `{meant}`?"),
+                    Some(meant) => {
+                        self.misspelt.push(meant.into());
+                        format!("did you mean `{meant}`?")
+                    }
                     None => format!("{} knows {}", self.what, one_of(keys.iter().copied())),
                 });
                 self.context.report(diagnostic);
@@ -230,7 +240,7 @@ impl<'a> Table<'a> {
     /// The value of a key that must be there.
     pub fn required(&self, key: &str) -> Option<&'a Item<'a>> {
         let found = self.get(key);
-        if found.is_none() {
+        if found.is_none() && !self.misspelt.iter().any(|meant| meant == key) {
             self.context.report(Diagnostic::error(format!("{} needs `{key}`", self.what), self.span.clone()));
         }
         found

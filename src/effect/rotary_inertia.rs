@@ -1,4 +1,4 @@
-//! Rotary inertia of beam sections without eccentric mass: mass, gyroscopic and centrifugal terms ((62)–(71)).
+//! Rotary inertia of beam sections without eccentric mass: mass, gyroscopic and centrifugal terms ((51), (52), (68)–(71)).
 
 use super::{ByOrder, Connection, Effect, Energy, Momentum, for_each_batch, quadratic};
 use crate::kernel::beam::VolumePoint;

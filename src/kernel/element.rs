@@ -108,7 +108,7 @@ impl<T: Real> ElementSystem<T> {
     /// The force of a block.
     #[inline(always)]
     pub fn force_block(&self, block: usize) -> Vec3<T> {
-        Vec3([0, 1, 2].map(|i| self.force[3 * block + i]))
+        Vec3([self.force[3 * block], self.force[3 * block + 1], self.force[3 * block + 2]])
     }
 
     /// Replaces the force of a block.
@@ -131,7 +131,11 @@ impl<T: Real> ElementSystem<T> {
     /// A block of the tangent.
     #[inline(always)]
     pub fn tangent_block(&self, row: usize, column: usize) -> Mat3<T> {
-        Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.tangent[(3 * row + i) * self.rows + 3 * column + j])))
+        let line = |i: usize| {
+            let start = (3 * row + i) * self.rows + 3 * column;
+            [self.tangent[start], self.tangent[start + 1], self.tangent[start + 2]]
+        };
+        Mat3([line(0), line(1), line(2)])
     }
 
     /// Replaces a block of the tangent.

@@ -1,4 +1,4 @@
-//! Inertia at a point: of a cross-section or of a rigid body (equations (62)–(71), and their form with an offset).
+//! Inertia at a point: of a cross-section or of a rigid body (equations (51), (52), (68)–(71), and their form with an offset).
 
 use super::element::{NodeMotion, Weights};
 use crate::real::Real;

@@ -1,4 +1,4 @@
-//! Loads at a point: dead and following forces and moments, with their tangents (equations (72)–(75), appendix A.4).
+//! Loads at a point: dead and following forces and moments, with their tangents (equations (72)–(75), (A4)).
 //!
 //! Everything is returned as g = -f_ext and dg, see [`crate::kernel`].
 

@@ -29,7 +29,7 @@ pub struct Rotation<T = f64> {
 }
 
 impl<T: Real> Rotation<T> {
-    /// R and T of the rotation vector `p` (definitions 2.1 and 2.3):
+    /// R and T of the rotation vector `p` (definition 2.1 and equation (8)):
     ///
     /// ```text
     /// R = f0 I + f1 P~ + f2 P(x)P        T = f1 I - f2 P~ + f3 P(x)P
@@ -56,7 +56,7 @@ impl<T: Real> Rotation<T> {
         Mat3::identity() + skew.scale(0.5) + skew * skew * e
     }
 
-    /// C1(V) = D_P (T V), (A3):
+    /// C1(V) = D_P (T V), (A1):
     ///
     /// ```text
     /// C1 = c1 V(x)P - c2 (PxV)(x)P + c3 (P.V) P(x)P - c4 V~ + c5 [(P.V) I + P(x)V]
@@ -79,7 +79,7 @@ impl<T: Real> Rotation<T> {
             + (Mat3::diagonal([pv; 3]) + p.outer(v)) * c.c5
     }
 
-    /// dT/dt for the rate `w` of P, (A5):
+    /// dT/dt for the rate `w` of P, (A6):
     ///
     /// ```text
     /// Td = c1 (P.W) I - c2 (P.W) P~ + c3 (P.W) P(x)P + c4 W~ + c5 (W(x)P + P(x)W)
@@ -126,7 +126,7 @@ impl<T: Real> Rotation<T> {
             - p.skew() * (c.c2 * pw)
     }
 
-    /// C5(W) = D_P (Td(W) W), (A14). With q = P.W:
+    /// C5(W) = D_P (Td(W) W), (A13). With q = P.W:
     ///
     /// ```text
     /// C5 = [c3 q^2 + c5 W.W] I + [d3 q^2 + c3 W.W] P(x)P + 2 c3 q P(x)W + (d1 + c3) q W(x)P

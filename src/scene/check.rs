@@ -8,7 +8,7 @@ use crate::tensor::Vec3;
 
 /// Checks names, stages, and what a stage needs.
 pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    if deck.stages.is_empty() {
+    if deck.stage_count == 0 {
         diagnostics.push(Diagnostic::whole("the deck has no [[stage]]: nothing would be simulated"));
     }
     if deck.beams.is_empty() && deck.bodies.is_empty() {

@@ -95,7 +95,7 @@ impl Mesh {
         for beam in &deck.beams {
             let planned = mesh.plan(beam, deck);
             match planned {
-                Ok((line, section)) => mesh.add_beam(beam, line, section, diagnostics),
+                Ok((line, section)) => mesh.add_beam(deck, beam, line, section, diagnostics),
                 Err(diagnostic) => diagnostics.push(diagnostic),
             }
         }
@@ -207,6 +207,7 @@ impl Mesh {
 
     fn add_beam(
         &mut self,
+        deck: &Deck,
         beam: &deck::Beam,
         line: CentreLine,
         section: SectionCourse,
@@ -215,13 +216,18 @@ impl Mesh {
         let counts = &beam.elements.value;
         let count = |piece: usize| counts[piece.min(counts.len() - 1)];
         let corners: Vec<Option<&str>> = corner_names(&beam.path);
+        let between = named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
         let first_element = self.elements.len();
         let (mut nodes, mut fractions) = (Vec::new(), Vec::new());
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
             for step in usize::from(piece > 0)..=steps {
                 let t = step as f64 / steps as f64;
-                let corner = if step == 0 { corners[piece] } else { corners[piece + 1].filter(|_| step == steps) };
+                let corner = match step {
+                    0 => corners[piece],
+                    _ if step == steps => corners[piece + 1],
+                    _ => between.filter(|&(_, at)| at == step).map(|(name, _)| name),
+                };
                 let place = line.pieces[piece].place(t);
                 nodes.push(self.node_on_beam(&beam.name.value, corner, place, nodes.len()));
                 fractions.push(line.fraction(piece, t));
@@ -309,6 +315,18 @@ fn corner_names(path: &deck::Path) -> Vec<Option<&str>> {
         deck::Path::Through(points) => points.iter().map(name).collect(),
         deck::Path::Arc([start, _, end]) => vec![name(start), name(end)],
     }
+}
+
+/// The named middle point of an arc and its step, where the mesh puts a node there.
+fn named_between<'a>(
+    path: &'a deck::Path,
+    line: &CentreLine,
+    steps: impl Fn(usize) -> usize,
+    place: &dyn Fn(&str) -> Option<Vec3>,
+) -> Option<(&'a str, usize)> {
+    let deck::Path::Arc([_, Spanned { value: PointRef::Name(name), .. }, _]) = path else { return None };
+    let at = line.find(place(name)?)? * steps(0) as f64;
+    ((at - at.round()).abs() < 1e-9).then(|| (name.as_str(), at.round() as usize))
 }
 
 /// Whether a beam names a point where the mesh puts a node.

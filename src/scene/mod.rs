@@ -95,19 +95,28 @@ pub struct Bounds {
 /// Counters that an expectation can look at.
 pub const RUN_COUNTERS: [&str; 5] = ["steps", "iterations", "cutbacks", "chart_switches", "mixed_elements"];
 
-/// Builds a scene; the second part holds warnings.
-pub fn build(deck: &Deck) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let mut diagnostics = Vec::new();
-    check::deck(deck, &mut diagnostics);
-    let mesh = Mesh::new(deck, &mut diagnostics);
-    // Where the mesh is wrong, what follows would only complain about its consequences.
-    if diagnostics.iter().all(Diagnostic::is_warning) || !mesh.nodes.is_empty() {
-        let scene = build_on(deck, mesh, &mut diagnostics);
-        if let (Some(scene), true) = (scene, diagnostics.iter().all(Diagnostic::is_warning)) {
-            return Ok((scene, diagnostics));
+/// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
+pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let (deck, mut diagnostics) = deck::read(text)?;
+    let scene = if deck.names_complete { build(&deck, &mut diagnostics) } else { None };
+    let mut told: Vec<Diagnostic> = Vec::new();
+    for diagnostic in diagnostics {
+        if !told.contains(&diagnostic) {
+            told.push(diagnostic);
         }
     }
-    Err(diagnostics)
+    match scene {
+        Some(scene) if told.iter().all(Diagnostic::is_warning) => Ok((scene, told)),
+        _ => Err(told),
+    }
+}
+
+/// Builds a scene; what is wrong goes to `diagnostics`.
+fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
+    check::deck(deck, diagnostics);
+    let mesh = Mesh::new(deck, diagnostics);
+    // Where no beam could be meshed, what follows would only complain about its consequences.
+    if mesh.nodes.is_empty() { None } else { build_on(deck, mesh, diagnostics) }
 }
 
 fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
@@ -125,6 +134,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     diagnostics.extend(found.into_iter().filter(|_| complete));
     let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
     let expected = expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
+    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
     let model = Model {
         slots: slots(&mesh),
         rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
@@ -138,7 +148,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     Some(Scene {
         title: deck.title.clone(),
         plan: Plan {
-            energy: expected || probes.iter().any(energy),
+            energy: expected || watched || probes.iter().any(energy),
             model,
             initial: initial.into_iter().rev().collect(),
             stages,

@@ -201,6 +201,14 @@ fn shaped(shape: Shape, material: &deck::Material, shear_factor: Option<[f64; 2]
     SectionMatrices { stiffness, mass }
 }
 
+fn cube(x: f64) -> f64 {
+    x * x * x
+}
+
+fn fourth(x: f64) -> f64 {
+    x * x * x * x
+}
+
 struct Geometry {
     area: f64,
     /// Second moments of area about axes 2 and 3
@@ -213,13 +221,13 @@ struct Geometry {
 fn geometry(shape: Shape, nu: f64) -> Geometry {
     match shape {
         Shape::Circle { radius } => {
-            let second = PI * radius.powi(4) / 4.0;
+            let second = PI * fourth(radius) / 4.0;
             let factor = 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu);
             Geometry { area: PI * radius * radius, bending: [second; 2], torsion: 2.0 * second, shear: [factor; 2] }
         }
         Shape::Tube { radius, thickness } => {
             let inner = radius - thickness;
-            let second = PI * (radius.powi(4) - inner.powi(4)) / 4.0;
+            let second = PI * (fourth(radius) - fourth(inner)) / 4.0;
             let m = inner / radius;
             let m2 = (1.0 + m * m) * (1.0 + m * m);
             let factor = 6.0 * (1.0 + nu) * m2 / ((7.0 + 6.0 * nu) * m2 + (20.0 + 12.0 * nu) * m * m);
@@ -234,7 +242,7 @@ fn geometry(shape: Shape, nu: f64) -> Geometry {
             let factor = 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu);
             Geometry {
                 area: width * height,
-                bending: [width * height.powi(3) / 12.0, height * width.powi(3) / 12.0],
+                bending: [width * cube(height) / 12.0, height * cube(width) / 12.0],
                 torsion: rectangle_torsion(width, height),
                 shear: [factor; 2],
             }
@@ -246,9 +254,9 @@ fn geometry(shape: Shape, nu: f64) -> Geometry {
 /// a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
 fn rectangle_torsion(width: f64, height: f64) -> f64 {
     let (a, b) = (width.max(height), width.min(height));
-    let term = |n: f64| libm::tanh(n * PI * a / (2.0 * b)) / n.powi(5);
+    let term = |n: f64| libm::tanh(n * PI * a / (2.0 * b)) / (n * fourth(n));
     let sum: f64 = (0..200).map(|k| term(2.0 * f64::from(k) + 1.0)).sum();
-    a * b.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * (b / a) * sum)
+    a * cube(b) * (1.0 / 3.0 - 64.0 / (PI * fourth(PI)) * (b / a) * sum)
 }
 
 impl SectionMatrices {

@@ -1,6 +1,6 @@
 //! The functions f0 … f7 and the coefficients made of them against numbers computed with 60-digit arithmetic.
 
-#![allow(clippy::needless_range_loop)]
+#![allow(clippy::needless_range_loop, clippy::approx_constant)]
 
 use crate::dual::Dual;
 use beamsim::real::Real;
