@@ -64,7 +64,10 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
     }
     if let Some(mass) = &section.mass {
         let j = mass.about_line.0;
-        say::line(&format!("  rhoA {} rhoJ [{}, {}, {}] mass centre {:?}", mass.mass, j[0][0], j[1][1], j[2][2], mass.offset.0));
+        say::line(&format!(
+            "  rhoA {} rhoJ [{}, {}, {}] mass centre {:?}",
+            mass.mass, j[0][0], j[1][1], j[2][2], mass.offset.0
+        ));
     }
 }
 

@@ -39,7 +39,10 @@ fn text(path: &Path) -> Result<String, Status> {
     };
     let size = fs::metadata(path).map_err(|e| refuse(e.to_string()))?.len();
     if size > LARGEST_DECK {
-        say::error("limit", &format!("{}: {size} bytes are more than the largest supported {LARGEST_DECK}", path.display()));
+        say::error(
+            "limit",
+            &format!("{}: {size} bytes are more than the largest supported {LARGEST_DECK}", path.display()),
+        );
         return Err(Status::Wrong);
     }
     let bytes = fs::read(path).map_err(|e| refuse(e.to_string()))?;

@@ -115,7 +115,6 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
         recorder: Recorder::new(scene),
         progress: Progress::new(name),
         dynamic: scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect(),
-
     };
     let (mut result, counters) = match opened {
         Ok(()) => Run::new(scene.plan.clone(), &mut watcher).finish(),
@@ -126,7 +125,8 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
         let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds });
         let text = format!("{record:#}\n");
-        let written = history.finish(result.is_ok()).and_then(|()| PartFile::write(folder, "run.json", text.as_bytes()));
+        let written =
+            history.finish(result.is_ok()).and_then(|()| PartFile::write(folder, "run.json", text.as_bytes()));
         if let Err(error) = written {
             result = Err(io_failure(error));
         }

@@ -64,7 +64,8 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
 fn report(path: &Path, judgements: &[Judgement], seconds: f64) {
     let verdict = if judgements.iter().all(|j| j.holds) { "ok" } else { "FAILED" };
     say::line(&format!("{verdict:<6} {} ({seconds:.3} s)", path.display()));
-    let width = |pick: fn(&Judgement) -> &str| judgements.iter().map(|j| pick(j).chars().count()).max().unwrap_or(0).min(48);
+    let width =
+        |pick: fn(&Judgement) -> &str| judgements.iter().map(|j| pick(j).chars().count()).max().unwrap_or(0).min(48);
     let (what, expected, came) = (width(|j| &j.what), width(|j| &j.expected), width(|j| &j.came));
     for j in judgements {
         let mark = if j.holds { " " } else { "X" };

@@ -272,7 +272,8 @@ fn read_axes(table: &Table) -> Option<Option<Axes>> {
         return context.wrong(item.span(), format!("`axes` is two vectors, found {}", kind_of(item.get_ref())));
     };
     if rows.len() != 2 {
-        return context.wrong(item.span(), format!("`axes` is the first two of three directions, found {}", rows.len()));
+        return context
+            .wrong(item.span(), format!("`axes` is the first two of three directions, found {}", rows.len()));
     }
     let rows: Vec<Option<[f64; 3]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
     let [a, b]: [Option<[f64; 3]>; 2] = rows.try_into().ok()?;
@@ -335,11 +336,14 @@ fn read_motion_what(table: &Table) -> Option<MotionWhat> {
                 return context.wrong(axis.span, "`rotate` is an axis and must not be zero");
             }
             if table.has("axes") {
-                return context.wrong(table.key_span("axes"), "`rotate` is given in global axes; `axes` has no meaning here");
+                return context
+                    .wrong(table.key_span("axes"), "`rotate` is given in global axes; `axes` has no meaning here");
             }
             Some(MotionWhat::Rotation { axis: axis.value, angle: angle?.value })
         }
-        ([], None) => context.wrong(table.span.clone(), "[[motion]] needs one of `ux`, `uy`, `uz`, or `rotate` with `angle`"),
+        ([], None) => {
+            context.wrong(table.span.clone(), "[[motion]] needs one of `ux`, `uy`, `uz`, or `rotate` with `angle`")
+        }
         _ => context.wrong(
             table.span.clone(),
             "[[motion]] prescribes one thing: one of `ux`, `uy`, `uz`, or `rotate`; use one table for each",
@@ -384,7 +388,8 @@ pub(super) fn read_body<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
 }
 
 fn read_inertia(table: &Table, item: &Item) -> Option<[[f64; 3]; 3]> {
-    let is_matrix = matches!(item.get_ref(), DeValue::Array(rows) if rows.iter().any(|r| matches!(r.get_ref(), DeValue::Array(_))));
+    let is_matrix =
+        matches!(item.get_ref(), DeValue::Array(rows) if rows.iter().any(|r| matches!(r.get_ref(), DeValue::Array(_))));
     if is_matrix {
         return matrix(table, "inertia", item);
     }
@@ -456,7 +461,10 @@ fn read_load_vector(table: &Table, key: &str, along: bool) -> Option<Option<Load
         return context.wrong(item.span(), format!("`{key}` at a node is one vector; [start, end] belongs to `along`"));
     }
     if rows.len() != 2 {
-        return context.wrong(item.span(), format!("`{key}` is a vector or [start vector, end vector], found {} rows", rows.len()));
+        return context.wrong(
+            item.span(),
+            format!("`{key}` is a vector or [start vector, end vector], found {} rows", rows.len()),
+        );
     }
     let rows: Vec<Option<[f64; 3]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
     let [start, end]: [Option<[f64; 3]>; 2] = rows.try_into().ok()?;
@@ -469,7 +477,9 @@ pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
         (Some(item), None) => context.text(item).map(InitialTarget::At),
         (None, Some(item)) => context.text(item).map(InitialTarget::Beam),
         (None, None) => Some(InitialTarget::All),
-        (Some(_), Some(item)) => context.wrong(item.span(), "[[initial]] speaks of a node (`at`) or of a `beam`, not both"),
+        (Some(_), Some(item)) => {
+            context.wrong(item.span(), "[[initial]] speaks of a node (`at`) or of a `beam`, not both")
+        }
     };
     if !table.has("velocity") && !table.has("spin") {
         context.report(Diagnostic::error("[[initial]] needs `velocity` or `spin`", table.span.clone()));
@@ -486,7 +496,11 @@ pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
     Some(Initial { target: target?, velocity: velocity?, spin: spin?, about: about?, span: table.span.clone() })
 }
 
-pub(super) fn read_history<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<HistoryTable> {
+pub(super) fn read_history<'a>(
+    context: &'a Context,
+    name: Spanned<String>,
+    item: &'a Item<'a>,
+) -> Option<HistoryTable> {
     let name = check_name(context, name)?;
     let what = format!("[history.{}]", name.value);
     let table = Table::new(context, item, what.clone(), &["times", "values", "smooth", "expr"], &[])?;
@@ -527,7 +541,8 @@ fn read_history_expression(table: &Table, name: Spanned<String>) -> Option<Histo
             return context.wrong(at..at + 1, format!("in the expression `{}`: {}", text.value, error.message));
         }
     };
-    let tried = expression.evaluate(&mut |name| if name == "t" { Some([0.0, 1.0, 0.0]) } else { context.parameters.get(name) });
+    let tried =
+        expression.evaluate(&mut |name| if name == "t" { Some([0.0, 1.0, 0.0]) } else { context.parameters.get(name) });
     if let Err(error) = tried {
         if context.parameters.is_broken(&text.value) {
             return None;

@@ -400,9 +400,28 @@ mod tests {
     #[test]
     fn derivatives_agree_with_differences() {
         let texts = [
-            "sin(t)", "cos(2*t)", "tan(t)", "asin(t/3)", "acos(t/3)", "atan(t)", "atan2(t, 2-t)", "sinh(t)", "cosh(t)",
-            "tanh(t)", "exp(-t)", "log(t)", "log10(t)", "sqrt(t)", "abs(-t)", "min(t, 3)", "max(t, t^2)", "t^3", "2^t",
-            "t^t", "t/(1+t^2)", "(1-t)*t^2.5",
+            "sin(t)",
+            "cos(2*t)",
+            "tan(t)",
+            "asin(t/3)",
+            "acos(t/3)",
+            "atan(t)",
+            "atan2(t, 2-t)",
+            "sinh(t)",
+            "cosh(t)",
+            "tanh(t)",
+            "exp(-t)",
+            "log(t)",
+            "log10(t)",
+            "sqrt(t)",
+            "abs(-t)",
+            "min(t, 3)",
+            "max(t, t^2)",
+            "t^3",
+            "2^t",
+            "t^t",
+            "t/(1+t^2)",
+            "(1-t)*t^2.5",
         ];
         for text in texts {
             let parsed = Expression::parse(text).unwrap();

@@ -127,7 +127,10 @@ pub const MOST_ELEMENTS: usize = 2_000_000;
 pub(super) fn read_points(top: &Table) -> Vec<(Spanned<String>, [f64; 3])> {
     let Some(item) = top.get("point") else { return Vec::new() };
     let Some(table) = Table::of_names(top.context, item, "[point]") else { return Vec::new() };
-    table.entries().filter_map(|(name, item)| Some((check_name(table.context, name)?, table.context.vector(item)?.value))).collect()
+    table
+        .entries()
+        .filter_map(|(name, item)| Some((check_name(table.context, name)?, table.context.vector(item)?.value)))
+        .collect()
 }
 
 /// Names of points and beams stand in node names and column names, so they keep clear of their punctuation.
@@ -137,7 +140,8 @@ pub(super) fn check_name(context: &Context, name: Spanned<String>) -> Option<Spa
         return context.wrong(name.span, "a name must not be empty");
     }
     match bad {
-        Some(c) => context.wrong(name.span, format!("a name must not contain {c:?}: it would be ambiguous in node and column names")),
+        Some(c) => context
+            .wrong(name.span, format!("a name must not contain {c:?}: it would be ambiguous in node and column names")),
         None => Some(name),
     }
 }
@@ -290,7 +294,9 @@ fn read_shaped(table: &Table) -> Option<SectionBody> {
         "tube" => &["radius", "thickness"],
         _ => &["width", "height"],
     };
-    for key in ["radius", "thickness", "width", "height"].into_iter().filter(|key| table.has(key) && !wanted.contains(key)) {
+    for key in
+        ["radius", "thickness", "width", "height"].into_iter().filter(|key| table.has(key) && !wanted.contains(key))
+    {
         context.report(Diagnostic::error(format!("a {kind} has no `{key}`"), table.key_span(key)));
     }
     wanted.iter().for_each(|key| {
@@ -396,7 +402,9 @@ fn read_point_list(context: &Context, item: &Item) -> Option<Vec<Spanned<PointRe
 
 fn read_counts(context: &Context, item: &Item) -> Option<Spanned<Vec<usize>>> {
     let counts: Vec<Option<usize>> = match item.get_ref() {
-        DeValue::Array(array) => array.iter().map(|entry| context.whole(entry, 1, MOST_ELEMENTS).map(|n| n.value)).collect(),
+        DeValue::Array(array) => {
+            array.iter().map(|entry| context.whole(entry, 1, MOST_ELEMENTS).map(|n| n.value)).collect()
+        }
         _ => vec![context.whole(item, 1, MOST_ELEMENTS).map(|n| n.value)],
     };
     let value: Vec<usize> = counts.into_iter().collect::<Option<_>>()?;

@@ -13,15 +13,15 @@ mod reader;
 mod resolved;
 
 pub use action::{
-    Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, Load, LoadTarget, LoadVector,
-    Motion, MotionWhat, Spring, Support,
+    Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, Load, LoadTarget,
+    LoadVector, Motion, MotionWhat, Spring, Support,
 };
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
 pub use expression::{Expression, Jet};
 pub use geometry::{Beam, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape};
 pub use overrides::apply;
 pub use parameters::Parameters;
-pub use procedure::{FAILURES, Effects, Expect, ExpectBody, Instant, Output, Reduce, Stage, StageBody, Until};
+pub use procedure::{Effects, Expect, ExpectBody, FAILURES, Instant, Output, Reduce, Stage, StageBody, Until};
 
 use reader::{Context, Table};
 use std::cell::RefCell;
@@ -103,7 +103,8 @@ pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
         Some(DeValue::Array(stages)) => stages.len(),
         _ => 0,
     };
-    let context = Context { parameters, stage_count, diagnostics: RefCell::new(diagnostics), resolved: RefCell::default() };
+    let context =
+        Context { parameters, stage_count, diagnostics: RefCell::new(diagnostics), resolved: RefCell::default() };
     let deck = read_tables(&context, document.get_ref());
     let resolved = resolved::to_json(document.get_ref(), &context.resolved.borrow(), &context.parameters);
     let deck = Deck { parameters: context.parameters.clone(), resolved, stage_count, ..deck };
@@ -161,11 +162,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
 }
 
 /// Reads `[[key]]` tables.
-fn listed<'a, T>(
-    top: &Table<'a>,
-    key: &str,
-    read: impl Fn(&'a Context, &'a reader::Item<'a>) -> Option<T>,
-) -> Vec<T> {
+fn listed<'a, T>(top: &Table<'a>, key: &str, read: impl Fn(&'a Context, &'a reader::Item<'a>) -> Option<T>) -> Vec<T> {
     top.list(key).into_iter().filter_map(|item| read(top.context, item)).collect()
 }
 

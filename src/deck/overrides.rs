@@ -17,7 +17,8 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
             return Err(format!("--set {setting}: expected KEY=VALUE"));
         };
         let keys = Key::parse(path.trim()).map_err(|_| format!("--set {setting}: `{path}` is no key"))?;
-        set(document.as_item_mut(), &keys, read_value(value.trim())).map_err(|why| format!("--set {setting}: {why}"))?;
+        set(document.as_item_mut(), &keys, read_value(value.trim()))
+            .map_err(|why| format!("--set {setting}: {why}"))?;
     }
     Ok(document.to_string())
 }
@@ -62,13 +63,15 @@ fn set(root: &mut Item, keys: &[Key], value: Value) -> Result<(), String> {
 fn descend<'a>(item: &'a mut Item, key: &str) -> Result<&'a mut Item, String> {
     if let Some(tables) = item.as_array_of_tables() {
         let count = tables.len();
-        let index: usize = key.parse().map_err(|_| format!("`{key}` must be a number from 0 to {}", count.max(1) - 1))?;
+        let index: usize =
+            key.parse().map_err(|_| format!("`{key}` must be a number from 0 to {}", count.max(1) - 1))?;
         if index >= count {
             return Err(format!("there is no entry {index}: there are {count}"));
         }
         return Ok(&mut item[index]);
     }
-    match item.get_mut(key) {
+    // A key that is missing comes as an empty item.
+    match item.get_mut(key).filter(|found| !found.is_none()) {
         Some(found) => Ok(found),
         None => Err(format!("the deck has no `{key}`")),
     }

@@ -133,7 +133,9 @@ fn unusable(name: &str) -> Option<String> {
     if starts && characters.all(|c| c.is_ascii_alphanumeric() || c == '_') {
         return None;
     }
-    Some(format!("`{name}` cannot stand in an expression: a parameter is letters, digits and _, beginning with a letter"))
+    Some(format!(
+        "`{name}` cannot stand in an expression: a parameter is letters, digits and _, beginning with a letter"
+    ))
 }
 
 fn read_entry(item: &toml::Spanned<DeValue>, diagnostics: &mut Vec<Diagnostic>) -> Option<Expression> {

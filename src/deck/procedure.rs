@@ -134,7 +134,15 @@ pub enum Instant {
 
 /// Names of failures that a run can end with.
 pub const FAILURES: [&str; 9] = [
-    "deck", "mesh_too_coarse", "not_converged", "singular", "non_finite", "energy_growth", "limit", "io", "interrupted",
+    "deck",
+    "mesh_too_coarse",
+    "not_converged",
+    "singular",
+    "non_finite",
+    "energy_growth",
+    "limit",
+    "io",
+    "interrupted",
 ];
 
 /// Most load levels or time steps of a stage.
@@ -200,7 +208,8 @@ fn read_static(table: &Table) -> Option<StageBody> {
         return context.wrong(word.span, "control = \"arc_length\" is not supported yet");
     }
     if table.has("max_steps") {
-        context.report(Diagnostic::error("`max_steps` belongs to control = \"arc_length\"", table.key_span("max_steps")));
+        context
+            .report(Diagnostic::error("`max_steps` belongs to control = \"arc_length\"", table.key_span("max_steps")));
     }
     let steps = table.required("steps").and_then(|item| context.whole(item, 1, MOST_STEPS));
     let adaptive = if table.has("adaptive") { table.flag("adaptive") } else { Some(true) };
@@ -230,7 +239,8 @@ fn read_dynamic(table: &Table) -> Option<StageBody> {
     table.required("end");
     table.required("step");
     let (end, step) = (table.positive("end"), table.positive("step"));
-    let or = |key: &str, default: f64| if table.has(key) { table.positive(key).map(|v| v.value) } else { Some(default) };
+    let or =
+        |key: &str, default: f64| if table.has(key) { table.positive(key).map(|v| v.value) } else { Some(default) };
     let (beta, gamma) = (or("beta", 0.25), or("gamma", 0.5));
     let (end, step) = (end?, step?);
     if end.value / step.value > MOST_STEPS as f64 {
@@ -364,18 +374,15 @@ fn read_reduce(table: &Table) -> Option<Reduce> {
     match (table.get("at"), table.get("reduce")) {
         (None, None) => Some(Reduce::At(Instant::End)),
         (Some(item), None) => read_instant(context, item).map(Reduce::At),
-        (None, Some(_)) => {
-            Some(match table.word("reduce", &["max", "min", "absmax", "mean", "drift"])?.value {
-                "max" => Reduce::Max,
-                "min" => Reduce::Min,
-                "absmax" => Reduce::AbsMax,
-                "mean" => Reduce::Mean,
-                _ => Reduce::Drift,
-            })
-        }
-        (Some(_), Some(item)) => {
-            context.wrong(item.span(), "an expectation looks `at` one instant or takes a `reduce` over all rows, not both")
-        }
+        (None, Some(_)) => Some(match table.word("reduce", &["max", "min", "absmax", "mean", "drift"])?.value {
+            "max" => Reduce::Max,
+            "min" => Reduce::Min,
+            "absmax" => Reduce::AbsMax,
+            "mean" => Reduce::Mean,
+            _ => Reduce::Drift,
+        }),
+        (Some(_), Some(item)) => context
+            .wrong(item.span(), "an expectation looks `at` one instant or takes a `reduce` over all rows, not both"),
     }
 }
 
@@ -386,7 +393,11 @@ fn read_instant<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Instant>
             let table = Table::new(context, item, "`at`", &["load"], &[])?;
             context.number(table.required("load")?).map(|v| Instant::Load(v.value))
         }
-        DeValue::Integer(_) | DeValue::Float(_) | DeValue::String(_) => context.number(item).map(|v| Instant::Time(v.value)),
-        other => context.wrong(item.span(), format!("`at` is \"end\", a time or {{ load = … }}, found {}", kind_of(other))),
+        DeValue::Integer(_) | DeValue::Float(_) | DeValue::String(_) => {
+            context.number(item).map(|v| Instant::Time(v.value))
+        }
+        other => {
+            context.wrong(item.span(), format!("`at` is \"end\", a time or {{ load = … }}, found {}", kind_of(other)))
+        }
     }
 }

@@ -307,7 +307,12 @@ impl<'a> Table<'a> {
 }
 
 /// The word that a text is, out of a few.
-pub fn choose(context: &Context, text: &Spanned<String>, key: &str, words: &[&'static str]) -> Option<Spanned<&'static str>> {
+pub fn choose(
+    context: &Context,
+    text: &Spanned<String>,
+    key: &str,
+    words: &[&'static str],
+) -> Option<Spanned<&'static str>> {
     if let Some(word) = words.iter().find(|w| **w == text.value) {
         return Some(Spanned { value: word, span: text.span.clone() });
     }

@@ -107,7 +107,9 @@ impl Failure {
                  buckling load may lie just ahead",
             ),
             Self::NotConverged { .. } => Some("try a smaller `step`, or a finer mesh where it turns most"),
-            Self::Singular { .. } => Some("add a support, a spring or a joint that holds this direction, or give it mass"),
+            Self::Singular { .. } => {
+                Some("add a support, a spring or a joint that holds this direction, or give it mass")
+            }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there"),
             Self::NonFinite { .. } => Some("look for values near the limits of floating-point numbers in the deck"),
             Self::Deck(_) | Self::Limit(_) | Self::Io(_) | Self::Interrupted { .. } => None,

@@ -191,7 +191,9 @@ impl<'o> Run<'o> {
             let mut workshop = self.open_stage(stage)?;
             let result = match stage.work {
                 StageWork::Static { steps, adaptive } => self.run_static(&mut workshop, steps, adaptive),
-                StageWork::Dynamic { end, step, beta, gamma } => self.run_dynamic(&mut workshop, end, step, beta, gamma),
+                StageWork::Dynamic { end, step, beta, gamma } => {
+                    self.run_dynamic(&mut workshop, end, step, beta, gamma)
+                }
             };
             self.count_evaluations(&workshop.assembly);
             result?;

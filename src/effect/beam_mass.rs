@@ -35,9 +35,8 @@ impl<const N: usize> MassElement<N> {
         let mut sum = Momentum::ZERO;
         for point in &self.points {
             let mass = point.weight * point.quantity;
-            let x = interpolate(&point.shape, |i| {
-                self.connection.places[i] + at.q[self.connection.nodes[i].u as usize]
-            });
+            let x =
+                interpolate(&point.shape, |i| self.connection.places[i] + at.q[self.connection.nodes[i].u as usize]);
             let linear = interpolate(&point.shape, |i| at.v[self.connection.nodes[i].u as usize]) * mass;
             sum.add(Momentum { mass, moment: x * mass, linear, angular: x.cross(linear) });
         }
@@ -106,4 +105,3 @@ fn add_batch<const N: usize>(batch: &[MassElement<N>], first: usize, at: &State,
         out.add(first + k, &system);
     }
 }
-

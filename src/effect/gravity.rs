@@ -1,8 +1,8 @@
 //! Weight of beams and bodies: forces fixed in space at the mass centres.
 
-use super::{ByOrder, Effect, after_displacement, for_each_batch};
 use super::rigid_body::Body;
 use super::section_inertia::EccentricElement;
+use super::{ByOrder, Effect, after_displacement, for_each_batch};
 use crate::kernel::load::offset_force;
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;

@@ -47,7 +47,8 @@ impl Effect for RotaryInertia {
         let mut kinetic = 0.0;
         for_each_batch!(self.elements, |_first, batch| for element in batch {
             let nodes = element.connection.motions_in_one_chart(at);
-            kinetic += element.points.iter().map(|p| p.weight * quadratic(p.quantity, p.spin(&nodes).omega)).sum::<f64>();
+            kinetic +=
+                element.points.iter().map(|p| p.weight * quadratic(p.quantity, p.spin(&nodes).omega)).sum::<f64>();
         });
         Energy { kinetic, strain: 0.0 }
     }
@@ -68,11 +69,18 @@ impl Effect for RotaryInertia {
 fn add_batch<const N: usize>(batch: &[RotaryElement<N>], first: usize, at: &State, weights: Weights, out: &mut Sink) {
     let mut system = ElementSystem::new(N);
     for (k, element) in batch.iter().enumerate() {
-        element.connection.evaluate(at, weights, true, |j| j, &mut system, |nodes, weights, system| {
-            for point in &element.points {
-                point.add_rotary(nodes, weights, system);
-            }
-        });
+        element.connection.evaluate(
+            at,
+            weights,
+            true,
+            |j| j,
+            &mut system,
+            |nodes, weights, system| {
+                for point in &element.points {
+                    point.add_rotary(nodes, weights, system);
+                }
+            },
+        );
         out.add(first + k, &system);
     }
 }

@@ -67,7 +67,13 @@ impl Effect for SectionInertia {
     }
 }
 
-fn add_batch<const N: usize>(batch: &[EccentricElement<N>], first: usize, at: &State, weights: Weights, out: &mut Sink) {
+fn add_batch<const N: usize>(
+    batch: &[EccentricElement<N>],
+    first: usize,
+    at: &State,
+    weights: Weights,
+    out: &mut Sink,
+) {
     let mut system = ElementSystem::new(2 * N);
     for (k, element) in batch.iter().enumerate() {
         element.connection.evaluate(at, weights, true, after_displacement, &mut system, |nodes, weights, system| {

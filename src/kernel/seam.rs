@@ -46,8 +46,11 @@ pub struct Converted<T = f64> {
 impl<T: Real> Converted<T> {
     /// Converts the nodes that `mask` names.
     pub fn new(nodes: &[NodeMotion<T>], mask: Conversion) -> Self {
-        let mut out =
-            Self { nodes: [NodeMotion::rest(); MAX_NODES], original: [Vec3::zero(); MAX_NODES], change: [None; MAX_NODES] };
+        let mut out = Self {
+            nodes: [NodeMotion::rest(); MAX_NODES],
+            original: [Vec3::zero(); MAX_NODES],
+            change: [None; MAX_NODES],
+        };
         for (j, node) in nodes.iter().enumerate() {
             out.nodes[j] = *node;
             out.original[j] = node.p;

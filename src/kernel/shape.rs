@@ -14,7 +14,8 @@ pub fn derivatives<const N: usize>(xi: f64) -> [f64; N] {
         let term = |left_out: usize| -> f64 {
             let slope = 1.0 / (node_coordinate(i, N) - node_coordinate(left_out, N));
             let others = (0..N).filter(|&k| k != i && k != left_out);
-            others.fold(slope, |p, k| p * (xi - node_coordinate(k, N)) / (node_coordinate(i, N) - node_coordinate(k, N)))
+            others
+                .fold(slope, |p, k| p * (xi - node_coordinate(k, N)) / (node_coordinate(i, N) - node_coordinate(k, N)))
         };
         (0..N).filter(|&k| k != i).map(term).sum()
     })
@@ -29,11 +30,8 @@ pub fn node_coordinate(i: usize, n: usize) -> f64 {
 pub fn gauss(count: usize) -> &'static [(f64, f64)] {
     const ONE: [(f64, f64); 1] = [(0.0, 2.0)];
     const TWO: [(f64, f64); 2] = [(-0.577_350_269_189_625_8, 1.0), (0.577_350_269_189_625_8, 1.0)];
-    const THREE: [(f64, f64); 3] = [
-        (-0.774_596_669_241_483_4, 5.0 / 9.0),
-        (0.0, 8.0 / 9.0),
-        (0.774_596_669_241_483_4, 5.0 / 9.0),
-    ];
+    const THREE: [(f64, f64); 3] =
+        [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
     const FOUR: [(f64, f64); 4] = [
         (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
         (-0.339_981_043_584_856_3, 0.652_145_154_862_546_2),

@@ -80,4 +80,3 @@ pub fn coarsest(state: &State, elements: &[Vec<Node>], limit: f64) -> Option<(us
     }
     worst
 }
-

@@ -204,7 +204,12 @@ impl Assembly {
     pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
         for (number, effect) in self.effects.iter().enumerate() {
             self.system.clear(None);
-            effect.add(state, &self.memories[number], Weights::NONE, &mut self.system.sink(number, effect.category(), false));
+            effect.add(
+                state,
+                &self.memories[number],
+                Weights::NONE,
+                &mut self.system.sink(number, effect.category(), false),
+            );
             let forces = &self.system.force[effect.category() as usize];
             if let Some(slot) = forces.iter().position(|f| !f.is_finite()) {
                 return Some((effect.name(), slot));

@@ -94,11 +94,8 @@ impl HistoryWriter {
             self.writer.write_byte_record(&record).map_err(io::Error::from)?;
         }
         let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
-        let (name, other) = if finished {
-            ("history.csv", "history.partial.csv")
-        } else {
-            ("history.partial.csv", "history.csv")
-        };
+        let (name, other) =
+            if finished { ("history.csv", "history.partial.csv") } else { ("history.partial.csv", "history.csv") };
         self.part.finish(&file, name)?;
         remove_if_there(&self.folder, other)
     }

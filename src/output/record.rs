@@ -16,11 +16,8 @@ pub struct Outcome<'a> {
 
 /// The content of run.json.
 pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
-    let effects: Vec<Value> = scene
-        .reasons
-        .iter()
-        .map(|r| json!({ "name": r.name, "active": r.active, "reason": r.reason }))
-        .collect();
+    let effects: Vec<Value> =
+        scene.reasons.iter().map(|r| json!({ "name": r.name, "active": r.active, "reason": r.reason })).collect();
     let status = outcome.result.as_ref().map_or_else(Failure::name, |()| "finished");
     let mut record = json!({
         "version": env!("CARGO_PKG_VERSION"),
@@ -41,7 +38,8 @@ pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
 }
 
 fn counters(counters: &Counters) -> Value {
-    let evaluations: Map<String, Value> = counters.evaluations.iter().map(|&(name, n)| (name.into(), json!(n))).collect();
+    let evaluations: Map<String, Value> =
+        counters.evaluations.iter().map(|&(name, n)| (name.into(), json!(n))).collect();
     json!({
         "steps": counters.steps,
         "cutbacks": counters.cutbacks,

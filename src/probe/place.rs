@@ -1,10 +1,10 @@
 //! Places that can be looked at: nodes, and points within elements.
 
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement};
+use crate::kernel::NodeMotion;
 use crate::kernel::element::MAX_NODES;
 use crate::kernel::seam::{Converted, conversion};
 use crate::kernel::shape::gauss;
-use crate::kernel::NodeMotion;
 use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
@@ -88,9 +88,12 @@ impl BeamPoint {
 
     fn one_side(&self, element: u32, xi: f64, state: &State) -> [[f64; 6]; 2] {
         let elements = &self.elasticity.elements;
-        let two = elements.two.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
-        let three = || elements.three.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
-        let four = || elements.four.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
+        let two =
+            elements.two.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
+        let three =
+            || elements.three.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
+        let four =
+            || elements.four.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
         two.or_else(three).or_else(four).unwrap_or([[0.0; 6]; 2])
     }
 

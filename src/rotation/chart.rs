@@ -45,7 +45,8 @@ impl<T: Real> Complement<T> {
 /// Bd(W) = (2 pi / psi^2) [(n.W) I + W(x)n + n(x)W - 3 (n.W) n(x)n]
 fn derivative<T: Real>(psi: T, n: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
     let nw = n.dot(w);
-    (Mat3::diagonal([nw; 3]) + w.outer(n) + n.outer(w) - n.outer(n) * (nw * 3.0)) * (T::constant(2.0 * PI) / (psi * psi))
+    (Mat3::diagonal([nw; 3]) + w.outer(n) + n.outer(w) - n.outer(n) * (nw * 3.0))
+        * (T::constant(2.0 * PI) / (psi * psi))
 }
 
 /// Bdd, (83), with nd = (W - n (n.W))/psi and s = n.A + nd.W.

@@ -21,11 +21,7 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     warn_of_idle_initials(deck, diagnostics);
 }
 
-fn refuse_twins<'a>(
-    kind: &str,
-    names: impl Iterator<Item = &'a Spanned<String>>,
-    diagnostics: &mut Vec<Diagnostic>,
-) {
+fn refuse_twins<'a>(kind: &str, names: impl Iterator<Item = &'a Spanned<String>>, diagnostics: &mut Vec<Diagnostic>) {
     let mut known: Vec<&Spanned<String>> = Vec::new();
     for name in names {
         if let Some(first) = known.iter().find(|k| k.value == name.value) {
@@ -79,14 +75,17 @@ fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Points at one place are not joined.
 fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let used = |name: &str| deck.beams.iter().any(|beam| match &beam.path {
-        deck::Path::Through(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
-        deck::Path::Arc(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
-    });
+    let used = |name: &str| {
+        deck.beams.iter().any(|beam| match &beam.path {
+            deck::Path::Through(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
+            deck::Path::Arc(points) => points.iter().any(|p| p.value == deck::PointRef::Name(name.into())),
+        })
+    };
     for (k, (name, place)) in deck.points.iter().enumerate() {
         for (other, there) in &deck.points[..k] {
             if place == there && used(&name.value) && used(&other.value) {
-                let message = format!("the points `{}` and `{}` lie at the same place and stay apart", other.value, name.value);
+                let message =
+                    format!("the points `{}` and `{}` lie at the same place and stay apart", other.value, name.value);
                 let diagnostic = Diagnostic::warning(message, name.span.clone());
                 diagnostics.push(diagnostic.help("beams are joined where they name the same point"));
             }
@@ -109,7 +108,8 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh) -> Vec<Support> {
         let Some(&node) = mesh.points.get(&body.at.value) else { continue };
         let turned = |name: &str| name == body.at.value;
         let has_beam = mesh.beams.iter().any(|beam| beam.nodes.contains(&node));
-        let has_inertia = deck.bodies.iter().any(|b| turned(&b.at.value) && (b.inertia.is_some() || b.offset != [0.0; 3]));
+        let has_inertia =
+            deck.bodies.iter().any(|b| turned(&b.at.value) && (b.inertia.is_some() || b.offset != [0.0; 3]));
         let has_spring = deck.springs.iter().any(|s| turned(&s.at.value) && s.stiffness[3..] != [0.0; 3]);
         let is_moved = deck.motions.iter().any(|m| turned(&m.at.value));
         if !(has_beam || has_inertia || has_spring || is_moved) {

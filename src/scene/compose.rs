@@ -25,9 +25,15 @@ use std::sync::Arc;
 macro_rules! push_volume {
     ($batches:expr, $kind:ident, $mesh:expr, $number:expr, $element:expr, $quantity:expr) => {
         match $element.nodes.len() {
-            2 => $batches.two.push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
-            3 => $batches.three.push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
-            _ => $batches.four.push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
+            2 => $batches
+                .two
+                .push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
+            3 => $batches
+                .three
+                .push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
+            _ => $batches
+                .four
+                .push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
         }
     };
 }
@@ -75,9 +81,14 @@ pub fn compose(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Composition {
     let dynamic = deck.stages.iter().any(|stage| matches!(stage.body, deck::StageBody::Dynamic { .. }));
-    let out = Composition { effects: Vec::new(), reasons: Vec::new(), amplitudes: Vec::new(), elasticity: None, bodies: Vec::new() };
-    let mut composer =
-        Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
+    let out = Composition {
+        effects: Vec::new(),
+        reasons: Vec::new(),
+        amplitudes: Vec::new(),
+        elasticity: None,
+        bodies: Vec::new(),
+    };
+    let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
     composer.elasticity();
     composer.springs();
     composer.beam_inertia();
@@ -168,16 +179,23 @@ impl Composer<'_> {
             }
             if found.iter().any(|m| m.mass != 0.0) {
                 match element.nodes.len() {
-                    2 => mass.two.push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
-                    3 => mass.three.push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
-                    _ => mass.four.push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
+                    2 => mass
+                        .two
+                        .push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
+                    3 => mass
+                        .three
+                        .push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
+                    _ => mass
+                        .four
+                        .push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
                 }
             }
             if found.iter().any(|m| m.about_line != Mat3::ZERO) && wanted != Some(false) {
                 push_volume!(rotary, RotaryElement, mesh, number, element, |k, s| found[k].turned(s.axes).about_node);
             }
         });
-        let (mass, rotary, eccentric) = (BeamMass { elements: mass }, RotaryInertia { elements: rotary }, SectionInertia { elements: eccentric });
+        let (mass, rotary, eccentric) =
+            (BeamMass { elements: mass }, RotaryInertia { elements: rotary }, SectionInertia { elements: eccentric });
         if mass.elements.is_empty() {
             self.reason(names[0], false, "no section has mass on its centre line");
         } else {
@@ -289,7 +307,9 @@ impl Composer<'_> {
             let Some(frame) = self.load_axes(load, at, node, on) else { continue };
             let node = self.mesh.nodes[node].node;
             let spatial = load.frame == Frame::Space;
-            for (vector, kind) in [(load.force, if spatial { 0 } else { 2 }), (load.moment, if spatial { 1 } else { 3 })] {
+            for (vector, kind) in
+                [(load.force, if spatial { 0 } else { 2 }), (load.moment, if spatial { 1 } else { 3 })]
+            {
                 if let Some(vector) = vector {
                     loads[kind].push(node_load::Instance { node, vector: frame * Vec3(vector.start), amplitude });
                 }

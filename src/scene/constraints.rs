@@ -1,8 +1,8 @@
 //! Supports and motions: from tables to held directions, and the clashes between them.
 
+use super::compose::stage_set;
 use super::mesh::Mesh;
 use super::names;
-use super::compose::stage_set;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, MotionWhat, Span};
 use crate::model::{History, Motion, MotionKind, StageSet, Support, Table};
 use crate::system::{Direction, Slot};
@@ -120,12 +120,13 @@ fn read_motion(
 ) -> Result<Motion, Diagnostic> {
     let (node, _) = mesh.find_node(deck, &motion.at)?;
     let node = mesh.nodes[node].node;
-    let history = match &motion.history {
-        None => None,
-        Some(name) => Some(histories.get(&name.value).cloned().ok_or_else(|| {
-            names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()))
-        })?),
-    };
+    let history =
+        match &motion.history {
+            None => None,
+            Some(name) => Some(histories.get(&name.value).cloned().ok_or_else(|| {
+                names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()))
+            })?),
+        };
     let stages = stage_set(motion.stages.as_ref());
     Ok(match motion.what {
         MotionWhat::Displacement { direction, value } => {
@@ -158,7 +159,8 @@ fn refuse_early_jump(deck: &Deck, motion: &deck::Motion, found: &Motion, diagnos
 /// A kink of the velocity excites the stiff axial vibrations of a beam.
 fn warn_of_kinks(deck: &Deck, motion: &deck::Motion, diagnostics: &mut Vec<Diagnostic>) {
     let dynamic = |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Dynamic { .. });
-    let named = |history: &&deck::HistoryTable| motion.history.as_ref().is_some_and(|name| name.value == history.name.value);
+    let named =
+        |history: &&deck::HistoryTable| motion.history.as_ref().is_some_and(|name| name.value == history.name.value);
     let Some(history) = deck.histories.iter().find(named) else { return };
     if let HistoryBody::Table { values, smooth: false, .. } = &history.body
         && deck.stages.iter().any(dynamic)
@@ -185,10 +187,13 @@ fn refuse_clashes(deck: &Deck, mesh: &Mesh, held: &[Held], diagnostics: &mut Vec
             }
             reported.push(pair);
             let slot = b.direction.slot;
-            let node = mesh.nodes.iter().find(|n| n.node.u == slot || n.node.p == slot).map_or("?", |n| n.name.as_str());
+            let node =
+                mesh.nodes.iter().find(|n| n.node.u == slot || n.node.p == slot).map_or("?", |n| n.name.as_str());
             let how = if same { "the same direction" } else { "directions that are neither the same nor orthogonal" };
             let message = format!("this {} and another {} hold {how} of node `{node}`", b.what, a.what);
-            diagnostics.push(Diagnostic::error(message, b.span.clone()).context(a.span.clone(), format!("the other {}", a.what)));
+            diagnostics.push(
+                Diagnostic::error(message, b.span.clone()).context(a.span.clone(), format!("the other {}", a.what)),
+            );
         }
     }
 }

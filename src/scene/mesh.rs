@@ -1,8 +1,8 @@
 //! From centre lines to nodes and elements.
 
+use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use super::names;
 use crate::deck::{self, Deck, Diagnostic, PointRef, Spanned};
 use crate::kernel::shape;
 use crate::system::Node;
@@ -129,7 +129,8 @@ impl Mesh {
                 diagnostics.push(names::unknown("point", &joint.at, names::points(deck)));
                 continue;
             };
-            let known: Vec<_> = joint.beams.iter().filter(|b| deck.beams.iter().any(|beam| beam.name.value == b.value)).collect();
+            let known: Vec<_> =
+                joint.beams.iter().filter(|b| deck.beams.iter().any(|beam| beam.name.value == b.value)).collect();
             if known.len() < joint.beams.len() {
                 for beam in joint.beams.iter().filter(|b| !known.iter().any(|k| k.value == b.value)) {
                     diagnostics.push(names::unknown("beam", beam, deck.beams.iter().map(|b| b.name.value.as_str())));
@@ -216,7 +217,8 @@ impl Mesh {
         let counts = &beam.elements.value;
         let count = |piece: usize| counts[piece.min(counts.len() - 1)];
         let corners: Vec<Option<&str>> = corner_names(&beam.path);
-        let between = named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
+        let between =
+            named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
         let first_element = self.elements.len();
         let (mut nodes, mut fractions) = (Vec::new(), Vec::new());
         for piece in 0..line.pieces.len() {
@@ -240,7 +242,8 @@ impl Mesh {
                 let range = [element as f64 / count(piece) as f64, (element + 1) as f64 / count(piece) as f64];
                 if own.iter().enumerate().any(|(i, a)| own[..i].contains(a)) {
                     let message = format!("an element of beam `{}` starts and ends at the same node", beam.name.value);
-                    diagnostics.push(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
+                    diagnostics
+                        .push(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
                     return;
                 }
                 self.elements.push(self.element(own, &line, piece, range));

@@ -14,8 +14,8 @@ pub use mesh::{Mesh, MeshBeam};
 pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Spanned, StageBody};
-use crate::effect::rigid_body::Body;
 use crate::drive::{InitialMotion, Plan, Stage, StageWork, Until};
+use crate::effect::rigid_body::Body;
 use crate::model::{Model, SlotInfo, SlotKind};
 use crate::probe::{Probe, Quantity};
 use crate::system::Node;
@@ -133,7 +133,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     // Names on beams that could not be meshed are not unknown.
     diagnostics.extend(found.into_iter().filter(|_| complete));
     let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
-    let expected = expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
+    let expected =
+        expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
     let model = Model {
         slots: slots(&mesh),
@@ -248,7 +249,12 @@ fn expected_column(
     Ok(ExpectationKind::Column { probe, component, reduce, bounds })
 }
 
-fn initial(deck: &Deck, mesh: &Mesh, initial: &deck::Initial, diagnostics: &mut Vec<Diagnostic>) -> Option<InitialMotion> {
+fn initial(
+    deck: &Deck,
+    mesh: &Mesh,
+    initial: &deck::Initial,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<InitialMotion> {
     let mut report = |diagnostic: Diagnostic| diagnostics.push(diagnostic);
     let nodes: Vec<usize> = match &initial.target {
         deck::InitialTarget::All => (0..mesh.nodes.len()).collect(),

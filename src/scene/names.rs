@@ -115,7 +115,9 @@ impl Mesh {
         let diagnostic = Diagnostic::error(message, name.span.clone());
         let on = self.beams.iter().find_map(|beam| beam.line.find(place).map(|fraction| (beam, fraction)));
         match on {
-            Some((beam, fraction)) => diagnostic.help(format!("it lies on beam `{}`; {}", beam.name, propose(beam, fraction))),
+            Some((beam, fraction)) => {
+                diagnostic.help(format!("it lies on beam `{}`; {}", beam.name, propose(beam, fraction)))
+            }
             None => diagnostic.help("no beam goes through it and no body sits there"),
         }
     }
@@ -131,7 +133,8 @@ impl Mesh {
                 let (element, xi) = self.beams[beam].element_at(fraction);
                 let nodes = &self.elements[element].nodes;
                 let (shape, _) = shape_at(nodes.len(), xi);
-                let parts = nodes.iter().zip(shape).map(|(&n, weight)| (self.nodes[n].node, self.nodes[n].place, weight));
+                let parts =
+                    nodes.iter().zip(shape).map(|(&n, weight)| (self.nodes[n].node, self.nodes[n].place, weight));
                 Place { nodes: parts.collect(), frame: self.beams[beam].frame(fraction) }
             }
         }

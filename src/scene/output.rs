@@ -149,7 +149,8 @@ impl Columns<'_> {
         let known = NODE_GROUPS.iter().chain(&WHOLE_GROUPS).flat_map(|(_, suffixes)| suffixes.iter().copied());
         match nearest(suffix, known) {
             Some(meant) if name.value.contains('.') => diagnostic.help(format!("did you mean `.{meant}`?")),
-            _ => diagnostic.help("a column is a node and a component, such as `tip.ux`, or `energy.total`, `momentum.px`"),
+            _ => diagnostic
+                .help("a column is a node and a component, such as `tip.ux`, or `energy.total`, `momentum.px`"),
         }
     }
 }
@@ -162,4 +163,3 @@ fn whole_probe(group: &str) -> Probe {
 fn group_names() -> impl Iterator<Item = &'static str> {
     NODE_GROUPS.iter().chain(&WHOLE_GROUPS).map(|(name, _)| *name)
 }
-

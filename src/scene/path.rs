@@ -22,7 +22,13 @@ pub struct Piece {
 enum Curve {
     Line,
     /// x = centre + radius (cos a e + sin a f), a from 0 to `angle`
-    Arc { centre: Vec3, radius: f64, e: Vec3, f: Vec3, angle: f64 },
+    Arc {
+        centre: Vec3,
+        radius: f64,
+        e: Vec3,
+        f: Vec3,
+        angle: f64,
+    },
 }
 
 /// The centre line of a beam with its section axes.
@@ -153,7 +159,8 @@ fn line(
     let length = (end - start).norm();
     let size = start.norm().max(end.norm());
     if !length.is_finite() || length <= 1e-12 * size || length == 0.0 {
-        let message = format!("a piece of beam `{}` has no length: it starts and ends at the same place", beam.name.value);
+        let message =
+            format!("a piece of beam `{}` has no length: it starts and ends at the same place", beam.name.value);
         return Err(Diagnostic::error(message, span.clone()));
     }
     let tangent = (end - start) * (1.0 / length);
@@ -187,11 +194,17 @@ fn arc(
     let f = normal.cross(e);
     let angle = libm::atan2((c - centre).dot(f), (c - centre).dot(e)).rem_euclid(2.0 * PI);
     let axis = axis3.map_or(normal, |axis| axis.value);
-    let piece =
-        Piece { start: a, end: c, curve: Curve::Arc { centre, radius, e, f, angle }, length: radius * angle, axis3: axis };
+    let piece = Piece {
+        start: a,
+        end: c,
+        curve: Curve::Arc { centre, radius, e, f, angle },
+        length: radius * angle,
+        axis3: axis,
+    };
     if let Some(axis) = axis3 {
         // It must leave a normal part everywhere: look closely enough for any arc.
-        let parallel = |k: i32| piece.tangent(f64::from(k) / 720.0).cross(axis.value).norm() <= 1e-2 * axis.value.norm();
+        let parallel =
+            |k: i32| piece.tangent(f64::from(k) / 720.0).cross(axis.value).norm() <= 1e-2 * axis.value.norm();
         if (0..=720).any(parallel) {
             let message = format!("`axis3` is parallel to the arc of beam `{}` somewhere", beam.name.value);
             return Err(Diagnostic::error(message, axis.span.clone()));

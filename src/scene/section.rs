@@ -102,7 +102,9 @@ pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result
             let diagonal = Mat3::diagonal(rotary.unwrap_or([0.0; 3]));
             let mass = match (mass, rotary) {
                 (None, None) => None,
-                (mass, _) => Some(MassPerLength { mass: mass.unwrap_or(0.0), offset: Vec3::ZERO, about_line: diagonal }),
+                (mass, _) => {
+                    Some(MassPerLength { mass: mass.unwrap_or(0.0), offset: Vec3::ZERO, about_line: diagonal })
+                }
             };
             let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { stiffness[i] } else { 0.0 }));
             Ok(SectionMatrices { stiffness, mass })
@@ -115,10 +117,7 @@ pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result
 }
 
 /// The course of a taper between two sections.
-pub fn taper(
-    ends: [&deck::Section; 2],
-    materials: &[deck::Material],
-) -> Result<SectionCourse, Diagnostic> {
+pub fn taper(ends: [&deck::Section; 2], materials: &[deck::Material]) -> Result<SectionCourse, Diagnostic> {
     if let [
         SectionBody::Shaped { shape: a, material: ma, shear_factor: fa },
         SectionBody::Shaped { shape: b, material: mb, shear_factor: fb },
@@ -133,10 +132,14 @@ pub fn taper(
     Ok(SectionCourse::Blended([matrices(ends[0], materials)?, matrices(ends[1], materials)?]))
 }
 
-fn find_material<'a>(name: &Spanned<String>, materials: &'a [deck::Material]) -> Result<&'a deck::Material, Diagnostic> {
-    materials.iter().find(|m| m.name.value == name.value).ok_or_else(|| {
-        super::names::unknown("material", name, materials.iter().map(|m| m.name.value.as_str()))
-    })
+fn find_material<'a>(
+    name: &Spanned<String>,
+    materials: &'a [deck::Material],
+) -> Result<&'a deck::Material, Diagnostic> {
+    materials
+        .iter()
+        .find(|m| m.name.value == name.value)
+        .ok_or_else(|| super::names::unknown("material", name, materials.iter().map(|m| m.name.value.as_str())))
 }
 
 fn full(
@@ -296,10 +299,8 @@ mod tests {
 
     #[test]
     fn a_tube_without_a_hole_is_a_circle() {
-        let (tube, circle) = (
-            geometry(Shape::Tube { radius: 2.0, thickness: 2.0 }, 0.3),
-            geometry(Shape::Circle { radius: 2.0 }, 0.3),
-        );
+        let (tube, circle) =
+            (geometry(Shape::Tube { radius: 2.0, thickness: 2.0 }, 0.3), geometry(Shape::Circle { radius: 2.0 }, 0.3));
         assert!((tube.area - circle.area).abs() < 1e-14 && (tube.shear[0] - circle.shear[0]).abs() < 1e-15);
     }
 

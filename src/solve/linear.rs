@@ -1,12 +1,12 @@
 //! Sparse linear systems by faer: one symbolic analysis a stage, one numeric factorisation an iteration.
 
 use crate::system::{Pattern, System};
-use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::Conj;
+use faer::Par;
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::mat::MatMut;
 use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::Par;
 
 /// LU with partial pivoting and a fill-reducing column order.
 ///
@@ -60,7 +60,12 @@ impl LinearSolver {
         let n = right_hand_side.len();
         let lu = LuRef::new_unchecked(&self.symbolic, &self.numeric);
         let stack = MemStack::new(&mut self.memory);
-        lu.solve_in_place_with_conj(Conj::No, MatMut::from_column_major_slice_mut(right_hand_side, n, 1), Par::Seq, stack);
+        lu.solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(right_hand_side, n, 1),
+            Par::Seq,
+            stack,
+        );
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
