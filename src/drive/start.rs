@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
 use crate::kernel::Weights;
 use crate::rotation::Rotation;
+use crate::solve::NewtonFailure;
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -32,6 +33,10 @@ impl Run<'_> {
         let Workshop { assembly, solver, .. } = workshop;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::MASS, None);
+        if (0..self.state.q.len()).any(|slot| !assembly.system.total(slot).is_finite()) {
+            let failure = NewtonFailure::not_finite(assembly, &self.state);
+            return Err(self.name_failure(failure, &workshop.assembly.system));
+        }
         let system = &mut assembly.system;
         let mut right_hand_side = vec![0.0; system.pattern.equations.count()];
         system.right_hand_side(&mut right_hand_side);

@@ -25,7 +25,7 @@ impl Rows {
                 (turns - turns.round()).abs() < 1e-9 * turns.abs().max(1.0)
             }
             Some(_) => true,
-            None => number % self.every as u64 == 0,
+            None => number.is_multiple_of(self.every as u64),
         }
     }
 }

@@ -52,6 +52,16 @@ pub enum NewtonFailure {
     },
 }
 
+impl NewtonFailure {
+    /// Names the effect whose forces are not finite; of a sum that overflows nobody alone is to blame.
+    pub fn not_finite(assembly: &mut Assembly, state: &State) -> Self {
+        match assembly.culprit(state) {
+            Some((effect, slot)) => Self::NotFinite { effect: Some(effect), slot },
+            None => Self::NotFinite { effect: None, slot: 0 },
+        }
+    }
+}
+
 /// The iteration with its scratch.
 pub struct Newton {
     /// When to stop
@@ -95,7 +105,7 @@ impl Newton {
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
             match verdict {
                 Verdict::Converged if lift.is_none() => return Ok(()),
-                Verdict::NotFinite => return Err(not_finite(assembly, state, residual)),
+                Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
                 _ if iterations >= self.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, iterations });
                 }
@@ -145,12 +155,5 @@ impl Newton {
             // What was a correction before is none in the new chart: it may not end the iteration.
             self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }
-    }
-}
-
-fn not_finite(assembly: &mut Assembly, state: &State, residual: Residual) -> NewtonFailure {
-    match assembly.culprit(state) {
-        Some((effect, slot)) => NewtonFailure::NotFinite { effect: Some(effect), slot },
-        None => NewtonFailure::NotFinite { effect: None, slot: residual.slot as usize },
     }
 }

@@ -1,5 +1,8 @@
 //! Dual numbers: a value with its derivatives over N variables, through the same kernels that a run uses.
 
+// The product and quotient rules add and subtract.
+#![allow(clippy::suspicious_arithmetic_impl)]
+
 use beamsim::real::Real;
 use beamsim::tensor::{Mat3, Vec3};
 use std::array::from_fn;

@@ -1,8 +1,15 @@
 //! The tests of the whole, in one binary.
 
+mod bad_decks;
 mod coefficients;
+mod command;
+mod convergence;
+mod decks;
 mod dual;
+mod failures;
+mod invariance;
 mod layers;
 mod random;
 mod rotations;
+mod scenes;
 mod tangents;

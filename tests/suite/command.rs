@@ -1,0 +1,248 @@
+//! The binary as a user meets it: files, exit statuses, last lines.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A folder of its own for a test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.0.join(name);
+        fs::write(&path, text).unwrap();
+        path
+    }
+
+    fn beamsim(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_beamsim")).args(arguments).current_dir(&self.0).output().unwrap()
+    }
+
+    fn names(&self, folder: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.0.join(folder)).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+fn status(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn last_line(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).trim_end().lines().last().unwrap_or_default().to_string()
+}
+
+const GOOD: &str = r#"
+title = "cantilever"
+[param]
+f = 5
+[point]
+root = [0, 0, 0]
+tip = [1, 0, 0]
+[section.s]
+EA = 1e3
+GA = 1e3
+GJ = 10
+EI = 10
+rhoA = 1
+[[beam]]
+name = "arm"
+section = "s"
+through = ["root", "tip"]
+elements = 4
+[[support]]
+at = "root"
+fix = "all"
+[[load]]
+at = "tip"
+force = [0, 0, "f"]
+[[stage]]
+kind = "static"
+steps = 4
+[[expect]]
+column = "tip.uz"
+value = 0.16
+atol = 0.02
+"#;
+
+#[test]
+fn a_run_leaves_a_history_and_a_record() {
+    let folder = Folder::new("run");
+    folder.write("good.toml", GOOD);
+    let output = folder.beamsim(&["run", "good.toml"]);
+    assert_eq!(status(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(folder.names("results/good"), ["history.csv", "run.json"]);
+    let history = fs::read_to_string(folder.0.join("results/good/history.csv")).unwrap();
+    let mut lines = history.lines();
+    let header =
+        "stage,time,load,root.ux,root.uy,root.uz,root.rx,root.ry,root.rz,tip.ux,tip.uy,tip.uz,tip.rx,tip.ry,tip.rz";
+    assert_eq!(lines.next(), Some(header));
+    assert_eq!(lines.clone().count(), 5);
+    assert!(lines.next().unwrap().starts_with("1,0.0,0.0,0.0"));
+    let record: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.0.join("results/good/run.json")).unwrap()).unwrap();
+    assert_eq!(record["status"], "finished");
+    assert_eq!(record["deck"]["load"][0]["force"][2], 5.0);
+    assert_eq!(record["counters"]["steps"], 4);
+    assert!(
+        record["effects"].as_array().unwrap().iter().any(|e| e["name"] == "beam elasticity" && e["active"] == true)
+    );
+}
+
+#[test]
+fn equal_runs_give_equal_bytes() {
+    let folder = Folder::new("bytes");
+    folder.write("good.toml", GOOD);
+    for out in ["a", "b"] {
+        assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--out", out])), 0);
+    }
+    let read = |out: &str| fs::read(folder.0.join(out).join("history.csv")).unwrap();
+    assert_eq!(read("a"), read("b"));
+    assert_eq!(
+        status(&folder.beamsim(&["compare", "a/history.csv", "b/history.csv", "--rtol", "0", "--atol", "0"])),
+        0
+    );
+}
+
+#[test]
+fn several_decks_get_folders_of_their_own() {
+    let folder = Folder::new("several");
+    folder.write("one.toml", GOOD);
+    folder.write("two.toml", GOOD);
+    assert_eq!(status(&folder.beamsim(&["run", "one.toml", "two.toml", "--out", "all"])), 0);
+    assert_eq!(folder.names("all"), ["one", "two"]);
+}
+
+#[test]
+fn set_changes_a_deck() {
+    let folder = Folder::new("set");
+    folder.write("good.toml", GOOD);
+    let arguments = ["run", "good.toml", "--out", "b", "--set", "param.f=0.5", "--set", "stage.0.steps=2"];
+    assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--out", "a"])), 0);
+    assert_eq!(status(&folder.beamsim(&arguments)), 0);
+    let compared = folder.beamsim(&["compare", "a/history.csv", "b/history.csv"]);
+    assert_eq!(status(&compared), 1);
+    assert!(last_line(&compared).starts_with("error[unexpected]: 3 rows") || last_line(&compared).contains("rows"));
+    let wrong = folder.beamsim(&["run", "good.toml", "--set", "beam.0.elments=2"]);
+    assert_eq!(status(&wrong), 2);
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("did you mean `elements`?"));
+    assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--set", "beam.7.order=2"])), 2);
+}
+
+#[test]
+fn verify_tells_what_came_and_leaves_nothing() {
+    let folder = Folder::new("verify");
+    folder.write("good.toml", GOOD);
+    let fine = folder.beamsim(&["verify", "good.toml"]);
+    assert_eq!(status(&fine), 0);
+    assert!(String::from_utf8_lossy(&fine.stdout).contains("1 of 1 expectations hold"));
+    let broken = folder.beamsim(&["verify", "good.toml", "--set", "param.f=9"]);
+    assert_eq!(status(&broken), 1);
+    assert_eq!(folder.names("."), ["good.toml"]);
+}
+
+#[test]
+fn a_failed_run_keeps_what_it_reached() {
+    let folder = Folder::new("failed");
+    folder.write("good.toml", GOOD);
+    assert_eq!(status(&folder.beamsim(&["run", "good.toml"])), 0);
+    let tight = ["run", "good.toml", "--set", "stage.0.max_iterations=1", "--set", "stage.0.adaptive=false"];
+    let failed = folder.beamsim(&tight);
+    assert_eq!(status(&failed), 3);
+    assert!(last_line(&failed).starts_with("error[not_converged]: "), "{}", last_line(&failed));
+    assert_eq!(folder.names("results/good"), ["history.partial.csv", "run.json"]);
+    let record = fs::read_to_string(folder.0.join("results/good/run.json")).unwrap();
+    assert!(record.contains("\"status\": \"not_converged\""));
+}
+
+#[test]
+fn wrong_decks_and_missing_files_have_their_status() {
+    let folder = Folder::new("status");
+    folder.write("bad.toml", "[[beam]]\nname = 3\n");
+    let wrong = folder.beamsim(&["run", "bad.toml"]);
+    assert_eq!((status(&wrong), folder.names(".")), (2, vec!["bad.toml".to_string()]));
+    assert!(last_line(&wrong).starts_with("error[deck]: "), "{}", last_line(&wrong));
+    let missing = folder.beamsim(&["run", "missing.toml"]);
+    assert_eq!(status(&missing), 4);
+    assert!(last_line(&missing).starts_with("error[io]: missing.toml"));
+    folder.write("huge.toml", &GOOD.replace("elements = 4", "elements = 1e12"));
+    let huge = folder.beamsim(&["check", "huge.toml"]);
+    assert_eq!(status(&huge), 2);
+    assert!(last_line(&huge).starts_with("error[limit]: "));
+    assert_eq!(status(&folder.beamsim(&["frobnicate"])), 2);
+    for command in ["cost", "effects", "sweep", "schema"] {
+        let refused = folder.beamsim(&[command, "bad.toml"]);
+        assert_eq!(status(&refused), 2);
+        assert!(last_line(&refused).contains("not supported yet"));
+    }
+    folder.write("file", "");
+    folder.write("good.toml", GOOD);
+    assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--out", "file"])), 4);
+}
+
+#[test]
+fn check_tells_what_would_be_simulated() {
+    let folder = Folder::new("check");
+    folder.write("good.toml", GOOD);
+    let output = folder.beamsim(&["check", "good.toml"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(status(&output), 0);
+    for words in ["5 nodes, 4 elements, 24 free unknowns", "mass 1,", "on  beam elasticity", "off gravity on beams"] {
+        assert!(text.contains(words), "{words:?} is missing in\n{text}");
+    }
+}
+
+/// A run of a billion steps, stopped by a signal after its first rows.
+fn interrupted(name: &str, signal: &str) -> (i32, Vec<String>) {
+    let folder = Folder::new(name);
+    let stage = "kind = \"dynamic\"\nend = 1e6\nstep = 0.01";
+    folder.write("long.toml", &GOOD.replace("kind = \"static\"\nsteps = 4", stage));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_beamsim"))
+        .args(["run", "long.toml"])
+        .current_dir(&folder.0)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let part = folder.0.join("results/long/history.csv.part");
+    let start = Instant::now();
+    while fs::metadata(&part).map_or(true, |m| m.len() == 0) && start.elapsed() < Duration::from_secs(30) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    (child.wait().unwrap().code().unwrap_or(-1), folder.names("results/long"))
+}
+
+#[test]
+fn an_interrupted_run_keeps_what_it_reached() {
+    let left = vec!["history.partial.csv".to_string(), "run.json".to_string()];
+    assert_eq!(interrupted("interrupted", "-INT"), (130, left.clone()));
+    assert_eq!(interrupted("terminated", "-TERM"), (143, left));
+}
+
+#[test]
+fn a_closed_pipe_is_a_quiet_end() {
+    let folder = Folder::new("pipe");
+    folder.write("good.toml", GOOD);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_beamsim"))
+        .args(["run", "good.toml"])
+        .current_dir(&folder.0)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(folder.names("results/good"), ["history.csv", "run.json"]);
+}

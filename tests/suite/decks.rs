@@ -1,0 +1,67 @@
+//! Every deck in `decks/` holds its own expectations.
+
+use beamsim::drive::{Failure, Observer, Run, Snapshot};
+use beamsim::scene;
+use beamsim::study::{Recorder, judge};
+use std::path::{Path, PathBuf};
+
+struct Watcher(Recorder);
+
+impl Observer for Watcher {
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
+        self.0.row(snapshot);
+        Ok(())
+    }
+}
+
+/// The decks of a folder, without subfolders.
+pub fn decks(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut decks: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    decks.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    decks.sort();
+    decks
+}
+
+fn verify(path: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let name = path.display();
+    let scene = match scene::from_text(&text) {
+        Ok((scene, _)) => scene,
+        Err(diagnostics) => {
+            let all: Vec<String> = diagnostics.iter().map(|d| d.render(&name.to_string(), &text, false)).collect();
+            return vec![all.join("\n")];
+        }
+    };
+    let mut watcher = Watcher(Recorder::new(&scene));
+    let (result, counters) = Run::new(scene.plan, &mut watcher).finish();
+    let judgements = judge(&watcher.0, &result, &counters);
+    if judgements.is_empty() {
+        return vec![format!("{name} expects nothing")];
+    }
+    let broken = judgements.iter().filter(|j| !j.holds);
+    broken.map(|j| format!("{name}: {} expected {}, came {}", j.what, j.expected, j.came)).collect()
+}
+
+fn all_hold(folder: &str, at_least: usize) {
+    let decks = decks(folder);
+    assert!(decks.len() >= at_least, "{folder} has only {} decks", decks.len());
+    let broken: Vec<String> = decks.iter().flat_map(|path| verify(path)).collect();
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+#[test]
+fn scenes_of_the_paper_hold() {
+    all_hold("decks", 18);
+}
+
+#[test]
+fn cases_of_other_programs_hold() {
+    all_hold("decks/peers", 30);
+}
+
+#[test]
+fn minimal_decks_hold() {
+    all_hold("decks/minimal", 55);
+}

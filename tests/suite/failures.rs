@@ -1,0 +1,115 @@
+//! Runs that must end in a named failure, with the right node and direction.
+
+use crate::scenes::attempt;
+use beamsim::drive::Failure;
+
+const ARM: &str = r#"
+[point]
+root = [0, 0, 0]
+tip = [1, 0, 0]
+[section.s]
+EA = 1e3
+GA = 1e3
+GJ = 10
+EI = 10
+rhoA = 1
+[[beam]]
+name = "arm"
+section = "s"
+through = ["root", "tip"]
+elements = 2
+"#;
+
+fn failure(text: &str) -> Failure {
+    attempt(&format!("{ARM}{text}")).result.expect_err("the run must fail")
+}
+
+fn singular_place(text: &str) -> String {
+    match failure(text) {
+        Failure::Singular { place: Some(place), .. } => place.to_string(),
+        other => panic!("expected a named mechanism, found {other}"),
+    }
+}
+
+#[test]
+fn a_beam_that_can_spin_is_a_mechanism() {
+    let place = singular_place(
+        "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[support]]\nat = \"tip\"\nfix = [\"uy\", \"uz\"]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 1\n",
+    );
+    assert!(place.ends_with("rotation about x"), "{place}");
+}
+
+#[test]
+fn a_loose_part_is_named() {
+    let place = singular_place(
+        "[[support]]\nat = \"root\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+    );
+    assert!(place.ends_with("displacement along x"), "{place}");
+}
+
+#[test]
+fn a_hinge_in_statics_is_a_mechanism() {
+    let place = singular_place(
+        "[[support]]\nat = \"root\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"ry\"]\n\
+         [[load]]\nat = \"tip\"\nforce = [0, 1, 0]\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+    );
+    assert!(place.contains("rotation about z") || place.contains("displacement along y"), "{place}");
+}
+
+#[test]
+fn a_history_without_a_value_is_not_finite() {
+    let failure = failure(
+        "[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, 1]\nhistory = \"h\"\n\
+         [history.h]\nexpr = \"1/t\"\n[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.1\n",
+    );
+    assert!(matches!(&failure, Failure::NonFinite { node, .. } if node == "tip"), "{failure}");
+}
+
+#[test]
+fn a_mesh_that_turns_too_far_from_node_to_node_is_refused() {
+    let failure = failure(
+        "[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nmoment = [0, 0, \"10*5.8\"]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 10\n",
+    );
+    match failure {
+        Failure::MeshTooCoarse { relative_rotation, .. } => assert!((relative_rotation - 2.9).abs() < 0.3),
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn too_few_iterations_are_told_with_the_residual() {
+    let failure = failure(
+        "[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, 20]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 1\nadaptive = false\nmax_iterations = 2\n",
+    );
+    match failure {
+        Failure::NotConverged { at, residual, iterations, .. } => {
+            assert_eq!((at.stage, iterations), (1, 2));
+            assert!(residual > 0.0 && residual.is_finite());
+        }
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn a_motion_that_would_jump_is_an_error_of_the_deck() {
+    let failure = failure(
+        "[[support]]\nat = \"root\"\nfix = \"all\"\n[[motion]]\nat = \"tip\"\nuy = 0.1\nstages = [2]\n\
+         [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.1\n[[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.1\n",
+    );
+    assert_eq!(failure.name(), "deck");
+    assert!(failure.to_string().contains("jump from 0 to 0.1"), "{failure}");
+}
+
+#[test]
+fn rows_before_a_failure_are_kept() {
+    let text = format!(
+        "{ARM}[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nmoment = [0, 0, \"10*5.8\"]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 10\n"
+    );
+    let simulation = attempt(&text);
+    assert!(simulation.result.is_err());
+    assert!(simulation.rows.len() > 5, "{} rows", simulation.rows.len());
+}

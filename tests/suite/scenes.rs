@@ -1,0 +1,71 @@
+//! Runs decks through the library and keeps every converged row.
+
+use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot};
+use beamsim::probe::Probe;
+use beamsim::scene;
+
+/// A run with all its rows.
+pub struct Simulation {
+    pub names: Vec<String>,
+    pub rows: Vec<Vec<f64>>,
+    pub result: Result<(), Failure>,
+    pub counters: Counters,
+}
+
+struct Collector {
+    probes: Vec<Probe>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Observer for Collector {
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
+        let mut row = Vec::new();
+        self.probes.iter().for_each(|probe| probe.read(snapshot, &mut row));
+        self.rows.push(row);
+        Ok(())
+    }
+}
+
+/// Runs a deck, however it ends.
+pub fn attempt(text: &str) -> Simulation {
+    let (scene, _) = scene::from_text(text).unwrap_or_else(|diagnostics| {
+        let all: Vec<String> = diagnostics.iter().map(|d| d.render("deck", text, false)).collect();
+        panic!("{}", all.join("\n"))
+    });
+    let mut collector = Collector { probes: scene.probes.clone(), rows: Vec::new() };
+    let (result, counters) = Run::new(scene.plan, &mut collector).finish();
+    let names = collector.probes.iter().flat_map(|probe| probe.names.clone()).collect();
+    Simulation { names, rows: collector.rows, result, counters }
+}
+
+/// Runs a deck that must finish.
+pub fn simulate(text: &str) -> Simulation {
+    let simulation = attempt(text);
+    if let Err(failure) = &simulation.result {
+        panic!("{failure}\n{text}");
+    }
+    simulation
+}
+
+impl Simulation {
+    /// The last value of a column.
+    pub fn end(&self, column: &str) -> f64 {
+        self.column(column).last().copied().expect("a run has rows")
+    }
+
+    /// All values of a column.
+    pub fn column(&self, column: &str) -> Vec<f64> {
+        let k = self.names.iter().position(|name| name == column).unwrap_or_else(|| panic!("no column {column}"));
+        self.rows.iter().map(|row| row[k]).collect()
+    }
+
+    /// The last values of three columns: `tip.u` with x, y, z.
+    pub fn vector(&self, prefix: &str) -> [f64; 3] {
+        ["x", "y", "z"].map(|axis| self.end(&format!("{prefix}{axis}")))
+    }
+}
+
+/// The largest difference of two vectors.
+pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
+}
