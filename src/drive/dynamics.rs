@@ -34,7 +34,7 @@ impl Run<'_> {
 
     /// Predict, prescribe, iterate, account.
     fn advance(&mut self, workshop: &mut Workshop, method: Newmark, next: f64) -> Result<(), Failure> {
-        let good = self.state.clone();
+        self.good.copy_from(&self.state);
         method.predict(&mut self.state);
         self.model.set_clock(&mut self.state, next, 1.0);
         let Workshop { assembly, solver, newton, .. } = workshop;
@@ -43,7 +43,7 @@ impl Run<'_> {
         let solved = newton.solve(&self.model, assembly, solver, &mut self.state, &method, kind, None, work);
         if let Err(failure) = solved {
             let named = self.name_failure(failure, &workshop.assembly.system);
-            self.state.copy_from(&good);
+            self.state.copy_from(&self.good);
             return Err(named);
         }
         self.accept(workshop)

@@ -142,6 +142,8 @@ pub struct Counters {
 pub struct Run<'o> {
     pub(super) model: Model,
     pub(super) state: State,
+    /// The last converged state, to go back to
+    pub(super) good: State,
     pub(super) counters: Counters,
     pub(super) observer: &'o mut dyn Observer,
     pub(super) plan: Plan,
@@ -157,6 +159,8 @@ pub(super) struct Workshop {
     pub assembly: Assembly,
     pub solver: LinearSolver,
     pub newton: Newton,
+    /// Increments of prescribed directions in a load step
+    pub lift: Vec<Vec3>,
     pub until: Option<Until>,
 }
 
@@ -166,6 +170,7 @@ impl<'o> Run<'o> {
         let model = plan.model.clone();
         Self {
             state: model.rest(),
+            good: model.rest(),
             bookkeeper: Bookkeeper::new(model.slots.len()),
             model,
             plan,
@@ -215,7 +220,7 @@ impl<'o> Run<'o> {
         };
         let convergence = Convergence { tolerance: stage.tolerance };
         let newton = Newton::new(convergence, stage.max_iterations, count, slots);
-        Ok(Workshop { assembly, solver, newton, until: stage.until.clone() })
+        Ok(Workshop { assembly, solver, newton, lift: vec![Vec3::ZERO; slots], until: stage.until.clone() })
     }
 
     /// The first dynamic stage gives the initial velocities.

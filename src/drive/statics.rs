@@ -56,49 +56,48 @@ impl Run<'_> {
         level: f64,
         adaptive: bool,
     ) -> Result<f64, Failure> {
-        let mut good = self.state.clone();
-        while good.load < target {
-            let rest = target - good.load;
-            let next = if increment >= rest * (1.0 - 1e-9) { target } else { good.load + increment };
+        self.good.copy_from(&self.state);
+        while self.good.load < target {
+            let rest = target - self.good.load;
+            let next = if increment >= rest * (1.0 - 1e-9) { target } else { self.good.load + increment };
             self.observer.progress(self.moment(), self.static_progress(next))?;
             match self.attempt(workshop, next) {
                 Ok(()) => {
                     self.accept(workshop)?;
-                    good.copy_from(&self.state);
+                    self.good.copy_from(&self.state);
                     increment = (2.0 * increment).min(level);
                 }
                 Err(failure) => {
                     let smaller = 0.5 * increment.min(rest);
                     if !adaptive || smaller < SMALLEST_PART * level {
-                        return Err(self.give_up(workshop, failure, &good));
+                        let named = self.name_failure(failure, &workshop.assembly.system);
+                        self.state.copy_from(&self.good);
+                        return Err(named);
                     }
                     self.counters.cutbacks += 1;
                     increment = smaller;
-                    self.state.copy_from(&good);
+                    self.state.copy_from(&self.good);
                 }
             }
         }
         Ok(increment)
     }
 
-    /// One attempt at a load factor. Prescribed motions enter with the first correction.
+    /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the
+    /// state and handed to Newton as increments.
     fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
-        let before = self.state.q.clone();
+        let Workshop { assembly, solver, newton, lift, .. } = workshop;
+        lift.copy_from_slice(&self.state.q);
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, load);
-        let lift: Vec<Vec3> = self.state.q.iter().zip(&before).map(|(&after, &before)| after - before).collect();
-        self.state.q = before;
+        for (lift, q) in lift.iter_mut().zip(&mut self.state.q) {
+            let before = *lift;
+            *lift = *q - before;
+            *q = before;
+        }
         let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
-        let Workshop { assembly, solver, newton, .. } = workshop;
         let work = &mut self.counters.work;
         newton.solve(&self.model, assembly, solver, &mut self.state, &Equilibrium, StageKind::Static, moved, work)
-    }
-
-    /// Goes back to the last good state, and says whether the tangent there has become singular.
-    fn give_up(&mut self, workshop: &mut Workshop, failure: NewtonFailure, good: &crate::system::State) -> Failure {
-        let named = self.name_failure(failure, &workshop.assembly.system);
-        self.state.copy_from(good);
-        named
     }
 
     fn static_progress(&self, load: f64) -> f64 {

@@ -40,7 +40,8 @@ pub struct HistoryWriter {
     values: Vec<f64>,
     text: String,
     seen: u64,
-    pending: Option<csv::ByteRecord>,
+    record: csv::ByteRecord,
+    pending: bool,
 }
 
 impl HistoryWriter {
@@ -59,7 +60,8 @@ impl HistoryWriter {
             values: Vec::new(),
             text: String::new(),
             seen: 0,
-            pending: None,
+            record: csv::ByteRecord::new(),
+            pending: false,
         })
     }
 
@@ -70,28 +72,23 @@ impl HistoryWriter {
         for probe in &self.probes {
             probe.read(at, &mut self.values);
         }
-        let mut record = csv::ByteRecord::new();
-        record.push_field(at.stage.to_string().as_bytes());
+        self.record.clear();
+        self.record.push_field(at.stage.to_string().as_bytes());
         for value in &self.values {
             self.text.clear();
             // Debug formatting is the shortest text that reads back to the same float, with an exponent where shorter.
             let _ = write!(self.text, "{value:?}");
-            record.push_field(self.text.as_bytes());
+            self.record.push_field(self.text.as_bytes());
         }
-        let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
+        self.pending = !self.rows.contains(self.seen, dynamic, at.state.time);
         self.seen += 1;
-        if wanted {
-            self.pending = None;
-            return self.writer.write_byte_record(&record).map_err(io::Error::from);
-        }
-        self.pending = Some(record);
-        Ok(())
+        if self.pending { Ok(()) } else { self.writer.write_byte_record(&self.record).map_err(io::Error::from) }
     }
 
     /// Ends the history: `history.csv` if the run finished, else `history.partial.csv`.
     pub fn finish(mut self, finished: bool) -> io::Result<()> {
-        if let Some(record) = self.pending.take() {
-            self.writer.write_byte_record(&record).map_err(io::Error::from)?;
+        if self.pending {
+            self.writer.write_byte_record(&self.record).map_err(io::Error::from)?;
         }
         let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
         let (name, other) =

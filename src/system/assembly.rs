@@ -3,7 +3,7 @@
 use super::equations::Equations;
 use super::pattern::{Pattern, Places};
 use super::state::Slot;
-use crate::kernel::ElementSystem;
+use crate::kernel::{ElementSystem, MAX_NODES};
 use crate::tensor::{Mat3, Vec3};
 
 /// What a force is; the stop test of Newton and the energy account look at them apart.
@@ -34,7 +34,8 @@ pub struct System {
     /// The values of the tangent; one more than the pattern has entries, the last is rubbish.
     pub values: Vec<f64>,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
-    lift: Option<Vec<Vec3>>,
+    lift: Vec<Vec3>,
+    lifts: bool,
     lifted: Vec<f64>,
 }
 
@@ -45,9 +46,10 @@ impl System {
         let (entries, equations) = (pattern.nonzeros() + 1, pattern.equations.count());
         Self {
             pattern,
-            force: [zero.clone(), zero.clone(), zero],
+            force: [zero.clone(), zero.clone(), zero.clone()],
             values: vec![0.0; entries],
-            lift: None,
+            lift: zero,
+            lifts: false,
             lifted: vec![0.0; equations],
         }
     }
@@ -58,7 +60,10 @@ impl System {
         self.force.iter_mut().for_each(|f| f.fill(Vec3::ZERO));
         self.values.fill(0.0);
         self.lifted.fill(0.0);
-        self.lift = lift.map(<[Vec3]>::to_vec);
+        self.lifts = lift.is_some();
+        if let Some(lift) = lift {
+            self.lift.copy_from_slice(lift);
+        }
     }
 
     /// The sum of the forces at a slot.
@@ -87,7 +92,7 @@ impl System {
             equations: &self.pattern.equations,
             force: &mut self.force[category as usize],
             values: &mut self.values,
-            lift: self.lift.as_deref(),
+            lift: self.lifts.then_some(&self.lift[..]),
             lifted: &mut self.lifted,
             with_tangent,
         }
@@ -128,7 +133,10 @@ impl Sink<'_> {
     fn add_special(&mut self, k: usize, element: &ElementSystem) {
         let slots = self.places.cliques.get(k);
         let mut local = element.clone();
-        let frames: Vec<Option<Mat3>> = slots.iter().map(|&slot| self.equations.frame(slot)).collect();
+        let mut frames: [Option<Mat3>; 2 * MAX_NODES] = [None; 2 * MAX_NODES];
+        for (frame, &slot) in frames.iter_mut().zip(slots) {
+            *frame = self.equations.frame(slot);
+        }
         for row in 0..slots.len() {
             for column in 0..slots.len() {
                 let mut block = element.tangent_block(row, column);
