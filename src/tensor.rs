@@ -13,6 +13,11 @@ fn three<A>(f: impl Fn(usize) -> A) -> [A; 3] {
     [f(0), f(1), f(2)]
 }
 
+/// The largest magnitude; unlike `f64::max` it does not pass over NaN.
+fn largest(components: &[f64]) -> f64 {
+    components.iter().fold(0.0, |largest, c| if c.abs() > largest || c.is_nan() { c.abs() } else { largest })
+}
+
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vec3<T = f64>(pub [T; 3]);
@@ -33,9 +38,15 @@ impl Vec3<f64> {
         (length > 0.0 && length.is_finite()).then(|| self * (1.0 / length))
     }
 
-    /// The largest magnitude among the components.
+    /// The largest magnitude among the components; NaN if one is.
     pub fn max_abs(self) -> f64 {
-        self.0.iter().fold(0.0, |largest, c| largest.max(c.abs()))
+        largest(&self.0)
+    }
+
+    /// |a| without underflow or overflow of squares.
+    pub fn size(self) -> f64 {
+        let scale = self.max_abs();
+        if scale == 0.0 || !scale.is_finite() { scale } else { self.scale(1.0 / scale).norm() * scale }
     }
 
     /// Whether every component is finite.
@@ -114,9 +125,9 @@ impl Mat3<f64> {
         self.0.iter().flatten().all(|c| c.is_finite())
     }
 
-    /// The largest magnitude among the components.
+    /// The largest magnitude among the components; NaN if one is.
     pub fn max_abs(self) -> f64 {
-        self.0.iter().flatten().fold(0.0, |largest, c| largest.max(c.abs()))
+        largest(self.0.as_flattened())
     }
 }
 

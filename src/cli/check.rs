@@ -1,6 +1,6 @@
 //! `beamsim check`
 
-use super::{Status, load, say};
+use super::{Status, Verdict, load, say};
 use crate::model::Assembly;
 use crate::scene::{Mesh, Scene};
 use crate::tensor::{Mat3, Vec3};
@@ -8,30 +8,32 @@ use std::path::PathBuf;
 
 /// Reads decks and tells what would be simulated.
 pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
-    let mut worst = Status::Fine;
+    let mut verdict = Verdict::default();
     for path in decks {
         match load::scene(path, settings) {
             Ok(scene) => {
                 say::line(&format!("{}: {}", path.display(), scene.title.as_deref().unwrap_or("(no title)")));
-                worst = worst.max(tell(&scene));
+                if let Err(message) = tell(&scene) {
+                    verdict.fail(Status::Wrong, "deck", message);
+                }
             }
-            Err(status) => worst = worst.max(status),
+            Err(refusal) => verdict.refuse(refusal),
         }
     }
-    worst
+    verdict.finish(decks.len())
 }
 
-fn tell(scene: &Scene) -> Status {
+fn tell(scene: &Scene) -> Result<(), String> {
     tell_beams(&scene.mesh);
     tell_mass(scene);
-    let status = tell_size(scene);
+    let size = tell_size(scene);
     say::line("effects");
     let width = scene.reasons.iter().map(|r| r.name.len()).max().unwrap_or(0);
     for reason in &scene.reasons {
         let mark = if reason.active { "on " } else { "off" };
         say::line(&format!("  {mark} {:<width$}  {}", reason.name, reason.reason));
     }
-    status
+    size
 }
 
 fn tell_beams(mesh: &Mesh) {
@@ -107,17 +109,12 @@ fn tell_mass(scene: &Scene) {
 }
 
 /// Unknowns, entries of the tangent, memory; and whether the first stage can begin.
-fn tell_size(scene: &Scene) -> Status {
+fn tell_size(scene: &Scene) -> Result<(), String> {
     let mut model = scene.plan.model.clone();
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
-    let equations = match model.begin_stage(0, kind, &state) {
-        Ok(equations) => equations,
-        Err(error) => {
-            say::error("deck", &format!("the first stage cannot begin: {error:?}"));
-            return Status::Wrong;
-        }
-    };
+    let begun = model.begin_stage(0, kind, &state);
+    let equations = begun.map_err(|error| format!("the first stage cannot begin: {error:?}"))?;
     let (free, slots) = (equations.count(), model.slots.len());
     let assembly = Assembly::new(model.acting(kind), equations, slots);
     let entries = assembly.system.pattern.nonzeros();
@@ -130,5 +127,5 @@ fn tell_size(scene: &Scene) -> Status {
         3 * slots,
         bytes as f64 / 1e6
     ));
-    Status::Fine
+    Ok(())
 }

@@ -1,66 +1,93 @@
 //! From the path of a deck to a scene, with every message on the way.
 
 use super::{Status, say};
-use crate::deck::{self, Diagnostic, Severity};
+use crate::deck::{self, Diagnostic, ExpectBody, Severity};
 use crate::scene::{self, Scene};
-use std::fs;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Largest deck that is read, in bytes.
 const LARGEST_DECK: u64 = 64 << 20;
 
-/// Reads a deck and builds its scene; all that is wrong is said at once.
-pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Status> {
-    let text = text(path)?;
-    let text = deck::apply(&text, settings).map_err(|message| {
-        say::error("deck", &message);
-        Status::Wrong
-    })?;
+/// Why there is no scene.
+pub struct Refusal {
+    /// The exit status that belongs to it
+    pub status: Status,
+    /// The name of the failure
+    pub name: &'static str,
+    /// The last line
+    pub message: String,
+    /// What is wrong, with the lines of the deck
+    pub details: String,
+    /// Failures that the deck itself expects
+    pub expected: Vec<String>,
+}
+
+impl Refusal {
+    fn new(status: Status, name: &'static str, message: String) -> Self {
+        Self { status, name, message, details: String::new(), expected: Vec::new() }
+    }
+}
+
+/// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
+pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Refusal> {
+    let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::new(Status::Wrong, "deck", why))?;
     match scene::from_text(&text) {
         Ok((scene, warnings)) => {
-            show(path, &text, &warnings);
+            if !warnings.is_empty() {
+                say::note(&render(path, &text, &warnings));
+            }
             Ok(scene)
         }
         Err(diagnostics) => {
-            show(path, &text, &diagnostics);
             let errors: Vec<_> = diagnostics.iter().filter(|d| !d.is_warning()).collect();
             let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
             let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
-            say::error(name, &format!("{count} in {}", path.display()));
-            Err(Status::Wrong)
+            Err(Refusal {
+                details: render(path, &text, &diagnostics),
+                expected: expected_failures(&text),
+                ..Refusal::new(Status::Wrong, name, format!("{count} in {}", path.display()))
+            })
         }
     }
 }
 
-fn text(path: &Path) -> Result<String, Status> {
-    let refuse = |why: String| {
-        say::error("io", &format!("{}: {why}", path.display()));
-        Status::Io
-    };
-    let size = fs::metadata(path).map_err(|e| refuse(e.to_string()))?.len();
-    if size > LARGEST_DECK {
-        say::error(
-            "limit",
-            &format!("{}: {size} bytes are more than the largest supported {LARGEST_DECK}", path.display()),
-        );
-        return Err(Status::Wrong);
+fn text(path: &Path) -> Result<String, Refusal> {
+    let refuse = |why: String| Refusal::new(Status::Io, "io", format!("{}: {why}", path.display()));
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|e| refuse(e.to_string()))?;
+    file.take(LARGEST_DECK + 1).read_to_end(&mut bytes).map_err(|e| refuse(e.to_string()))?;
+    if bytes.len() as u64 > LARGEST_DECK {
+        let message = format!("{}: more than the largest supported {LARGEST_DECK} bytes", path.display());
+        return Err(Refusal::new(Status::Wrong, "limit", message));
     }
-    let bytes = fs::read(path).map_err(|e| refuse(e.to_string()))?;
     String::from_utf8(bytes).map_err(|e| {
-        say::error("deck", &format!("{}: not UTF-8 text at byte {}", path.display(), e.utf8_error().valid_up_to()));
-        Status::Wrong
+        let message = format!("{}: not UTF-8 text at byte {}", path.display(), e.utf8_error().valid_up_to());
+        Refusal::new(Status::Wrong, "deck", message)
     })
 }
 
-fn show(path: &Path, text: &str, diagnostics: &[Diagnostic]) {
+/// A deck may expect to be wrong.
+fn expected_failures(text: &str) -> Vec<String> {
+    let Ok((deck, _)) = deck::read(text) else { return Vec::new() };
+    let name = |expect: deck::Expect| match expect.body {
+        ExpectBody::Fails(name) => Some(name.value),
+        ExpectBody::Column { .. } => None,
+    };
+    deck.expects.into_iter().filter_map(name).collect()
+}
+
+fn render(path: &Path, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));
-    for diagnostic in sorted {
-        say::note(&format!("{}\n", diagnostic.render(&path.display().to_string(), text, say::styled())));
-    }
+    let path = path.display().to_string();
+    sorted.iter().map(|d| d.render(&path, text, say::styled()) + "\n").collect::<Vec<_>>().join("\n")
 }
 
 /// The name of a deck: its file without the extension.
 pub fn name(path: &Path) -> String {
-    path.file_stem().map_or("deck".into(), |stem| stem.to_string_lossy().into_owned())
+    let stem = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    // Names become folders, never paths that lead elsewhere.
+    if stem.chars().all(|c| c == '.') { "deck".into() } else { stem }
 }

@@ -96,9 +96,10 @@ struct Rest {
 }
 
 /// How a command ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     /// Fine
+    #[default]
     Fine = 0,
     /// An expectation or comparison failed
     Unexpected = 1,
@@ -114,9 +115,46 @@ pub enum Status {
     Terminated = 143,
 }
 
+/// The outcome of a command over several decks: its status is the worst, and its last line names it.
+#[derive(Default)]
+pub struct Verdict {
+    status: Status,
+    worst: Option<(&'static str, String)>,
+}
+
+impl Verdict {
+    /// Something failed: it is said at once.
+    pub fn fail(&mut self, status: Status, name: &'static str, message: String) {
+        say::error(name, &message);
+        if status > self.status {
+            self.status = status;
+            self.worst = Some((name, message));
+        }
+    }
+
+    /// A deck that could not be read.
+    pub fn refuse(&mut self, refusal: load::Refusal) {
+        if !refusal.details.is_empty() {
+            say::note(&refusal.details);
+        }
+        self.fail(refusal.status, refusal.name, refusal.message);
+    }
+
+    /// The status; where other words may have followed, the worst failure is said once more.
+    pub fn finish(self, decks: usize) -> Status {
+        if let Some((name, message)) = self.worst.filter(|_| decks > 1) {
+            say::error(name, &message);
+        }
+        self.status
+    }
+}
+
 /// Parses the command line and runs the command.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return ExitCode::from(explain(&error) as u8),
+    };
     let status = match arguments.command {
         Command::Run { input, out } => run::run(&input.decks, &input.set, out.as_deref()),
         Command::Check { input } => check::check(&input.decks, &input.set),
@@ -131,8 +169,22 @@ pub fn main() -> ExitCode {
     ExitCode::from(status as u8)
 }
 
+/// Help and version are answers; anything else is a wrong command line.
+fn explain(error: &clap::Error) -> Status {
+    let text = error.render();
+    if error.exit_code() == 0 {
+        say::line(text.to_string().trim_end());
+        return Status::Fine;
+    }
+    let text = text.to_string();
+    say::note(text.trim_end());
+    let first = text.lines().next().unwrap_or_default();
+    say::error("usage", first.trim_start_matches("error: "));
+    Status::Wrong
+}
+
 fn not_yet(command: &str, rest: &Rest) -> Status {
     let _ = &rest.words;
-    say::error("deck", &format!("`beamsim {command}` is not supported yet"));
+    say::error("usage", &format!("`beamsim {command}` is not supported yet"));
     Status::Wrong
 }

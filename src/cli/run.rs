@@ -1,7 +1,7 @@
 //! `beamsim run`
 
 use super::progress::Progress;
-use super::{Status, load, say, signals};
+use super::{Status, Verdict, load, say, signals};
 use crate::drive::{Counters, Failure, Moment, Observer, Run, Snapshot};
 use crate::output::{HistoryWriter, Outcome, PartFile, Rows, run_record};
 use crate::scene::Scene;
@@ -11,24 +11,39 @@ use std::time::Instant;
 
 /// Runs decks one after the other.
 pub fn run(decks: &[PathBuf], settings: &[String], out: Option<&Path>) -> Status {
-    let mut worst = Status::Fine;
+    let mut verdict = Verdict::default();
+    if let Some(twin) = twin(decks) {
+        verdict.fail(
+            Status::Wrong,
+            "usage",
+            format!("two decks are called `{twin}`: their results would overwrite each other"),
+        );
+        return verdict.finish(1);
+    }
     for path in decks {
-        let status = match load::scene(path, settings) {
+        match load::scene(path, settings) {
             Ok(scene) => {
                 let name = load::name(path);
                 let folder = folder(out, &name, decks.len() > 1);
                 let finished = simulate(&scene, &name, Some(&folder));
                 summarise(&name, &scene, &finished, &folder);
-                finished.status()
+                if let Err(failure) = &finished.result {
+                    verdict.fail(finished.status(), failure.name(), failure.to_string());
+                }
             }
-            Err(status) => status,
-        };
-        worst = worst.max(status);
+            Err(refusal) => verdict.refuse(refusal),
+        }
         if signals::caught().is_some() {
             break;
         }
     }
-    worst
+    verdict.finish(decks.len())
+}
+
+/// A name that two decks share.
+pub fn twin(decks: &[PathBuf]) -> Option<String> {
+    let names: Vec<String> = decks.iter().map(|deck| load::name(deck)).collect();
+    names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)).map(|(_, name)| name.clone())
 }
 
 /// Where the results of a deck go.
@@ -124,14 +139,19 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
     let seconds = start.elapsed().as_secs_f64();
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
         let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds });
-        let text = format!("{record:#}\n");
-        let written =
-            history.finish(result.is_ok()).and_then(|()| PartFile::write(folder, "run.json", text.as_bytes()));
+        let written = write_results(history, folder, result.is_ok(), &format!("{record:#}\n"));
         if let Err(error) = written {
             result = Err(io_failure(error));
         }
     }
     Finished { result, counters, recorder: watcher.recorder, seconds }
+}
+
+/// Both files are whole before either gets its name.
+fn write_results(history: HistoryWriter, folder: &Path, finished: bool, record: &str) -> std::io::Result<()> {
+    let (part, file) = PartFile::written(folder, "run.json", record.as_bytes())?;
+    history.finish(finished)?;
+    part.finish(&file, "run.json")
 }
 
 /// A few lines after a run.
@@ -157,7 +177,6 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
             if let Some(hint) = failure.hint() {
                 say::note(&format!("hint: {hint}"));
             }
-            say::error(failure.name(), &failure.to_string());
         }
     }
 }

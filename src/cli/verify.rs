@@ -1,8 +1,8 @@
 //! `beamsim verify`
 
 use super::run::{folder, simulate};
-use super::{Status, load, say, signals};
-use crate::study::{Judgement, judge};
+use super::{Status, Verdict, load, say, signals};
+use crate::study::{Judgement, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
 /// Runs decks and prints what was expected, what came, the error, the time. A folder stands for the decks in it.
@@ -14,33 +14,40 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
             return Status::Io;
         }
     };
-    let mut worst = Status::Fine;
+    let mut verdict = Verdict::default();
     let (mut held, mut total) = (0, 0);
     for path in &decks {
         let name = load::name(path);
-        let status = match load::scene(path, settings) {
+        let judgements = match load::scene(path, settings) {
             Ok(scene) => {
                 let folder = out.map(|out| folder(Some(out), &name, decks.len() > 1));
                 let finished = simulate(&scene, &name, folder.as_deref());
-                if signals::caught().is_some() {
-                    say::error("interrupted", "stopped by a signal");
-                    return finished.status();
+                if let Some(signal) = signals::caught() {
+                    say::error("interrupted", &format!("stopped by signal {signal}"));
+                    return if signal == 15 { Status::Terminated } else { Status::Interrupted };
                 }
                 let judgements = judge(&finished.recorder, &finished.result, &finished.counters);
-                held += judgements.iter().filter(|j| j.holds).count();
-                total += judgements.len();
                 report(path, &judgements, finished.seconds);
-                if judgements.iter().all(|j| j.holds) { Status::Fine } else { Status::Unexpected }
+                judgements
             }
-            Err(status) => status,
+            Err(refusal) if !refusal.expected.is_empty() => {
+                let judgements: Vec<_> = refusal.expected.iter().map(|e| expected_failure(e, refusal.name)).collect();
+                report(path, &judgements, 0.0);
+                judgements
+            }
+            Err(refusal) => {
+                verdict.refuse(refusal);
+                continue;
+            }
         };
-        worst = worst.max(status);
+        held += judgements.iter().filter(|j| j.holds).count();
+        total += judgements.len();
     }
     say::line(&format!("{held} of {total} expectations hold in {} deck(s)", decks.len()));
-    if worst == Status::Unexpected {
-        say::error("unexpected", &format!("{} expectation(s) do not hold", total - held));
+    if held < total {
+        verdict.fail(Status::Unexpected, "unexpected", format!("{} expectation(s) do not hold", total - held));
     }
-    worst
+    verdict.finish(decks.len())
 }
 
 /// Folders are replaced by the decks in them, in the order of their names, subfolders last.

@@ -335,10 +335,6 @@ fn read_motion_what(table: &Table) -> Option<MotionWhat> {
             if axis.value == [0.0; 3] {
                 return context.wrong(axis.span, "`rotate` is an axis and must not be zero");
             }
-            if table.has("axes") {
-                return context
-                    .wrong(table.key_span("axes"), "`rotate` is given in global axes; `axes` has no meaning here");
-            }
             Some(MotionWhat::Rotation { axis: axis.value, angle: angle?.value })
         }
         ([], None) => {

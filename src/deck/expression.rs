@@ -55,12 +55,19 @@ pub const FUNCTIONS: [(&str, usize); 17] = [
 /// Names with a fixed meaning.
 pub const CONSTANTS: [(&str, f64); 2] = [("pi", PI), ("deg", PI / 180.0)];
 
+/// Longest expression, in bytes: it is evaluated recursively.
+const LONGEST: usize = 2_000;
+
 /// Deepest nesting of an expression.
 const MAX_DEPTH: usize = 100;
 
 impl Expression {
     /// Parses `text`.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
+        if text.len() > LONGEST {
+            let message = format!("an expression has at most {LONGEST} characters");
+            return Err(ExpressionError { message, offset: 0 });
+        }
         let mut parser = Parser { text, at: 0, depth: 0 };
         let expression = parser.sum()?;
         parser.skip_space();

@@ -21,7 +21,9 @@ pub use expression::{Expression, Jet};
 pub use geometry::{Beam, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape};
 pub use overrides::apply;
 pub use parameters::Parameters;
-pub use procedure::{Effects, Expect, ExpectBody, FAILURES, Instant, Output, Reduce, Stage, StageBody, Until};
+pub use procedure::{
+    Effects, Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, Stage, StageBody, Until,
+};
 
 use reader::{Context, Table};
 use std::cell::RefCell;

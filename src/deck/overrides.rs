@@ -1,6 +1,6 @@
 //! `--set key=value`: changes a deck before it is read.
 
-use toml_edit::{DocumentMut, Item, Key, Value};
+use toml_edit::{DocumentMut, Item, Key, Table, Value};
 
 /// Applies `key=value` pairs to the text of a deck and gives the changed text.
 ///
@@ -27,54 +27,90 @@ fn read_value(text: &str) -> Value {
     text.parse().unwrap_or_else(|_| Value::from(text))
 }
 
-fn set(root: &mut Item, keys: &[Key], value: Value) -> Result<(), String> {
-    let (last, parents) = keys.split_last().ok_or("an empty key")?;
-    let mut item = root;
-    for (depth, key) in parents.iter().enumerate() {
-        // `param` may be wanted where the deck has none.
-        if depth == 0 && key.get() == "param" && item.get("param").is_none() {
-            item["param"] = toml_edit::table();
-        }
-        item = descend(item, key.get())?;
+/// Tables that may be wanted where the deck has none.
+const MADE: [&str; 8] = ["param", "output", "effects", "units", "point", "history", "section", "material"];
+
+fn set(item: &mut Item, keys: &[Key], new: Value) -> Result<(), String> {
+    set_below(item, keys, new, keys.first().is_some_and(|key| MADE.contains(&key.get())))
+}
+
+/// Goes down one key; `make` says whether tables that are missing on the way are made.
+fn set_below(item: &mut Item, keys: &[Key], new: Value, make: bool) -> Result<(), String> {
+    let (key, rest) = keys.split_first().ok_or("an empty key")?;
+    let key = key.get();
+    if let Item::Value(value) = item {
+        return set_in_value(value, keys, new);
     }
-    if let Ok(index) = last.get().parse::<usize>()
-        && let Some(array) = item.as_array_mut()
-    {
-        let length = array.len();
-        let entry = array.get_mut(index).ok_or(format!("there is no entry {index}: the list has {length}"))?;
-        *entry = value;
-        return Ok(());
+    if let Item::ArrayOfTables(tables) = item {
+        let count = tables.len();
+        let table = tables.get_mut(index(key, count)?).ok_or_else(|| no_entry(key, count))?;
+        return set_in_table(table, rest, new, make);
     }
-    let table = item.as_table_like_mut().ok_or(format!("`{}` has no keys", last.get()))?;
-    match table.get_mut(last.get()) {
-        Some(Item::Value(old)) => {
-            let decor = old.decor().clone();
-            *old = value;
-            *old.decor_mut() = decor;
+    match item.as_table_mut() {
+        Some(table) => set_in_table(table, keys, new, make),
+        None => Err(format!("`{key}` has no keys")),
+    }
+}
+
+fn set_in_table(table: &mut Table, keys: &[Key], new: Value, make: bool) -> Result<(), String> {
+    let (key, rest) = keys.split_first().ok_or("a table cannot be replaced")?;
+    let name = key.get();
+    if !rest.is_empty() {
+        if !table.contains_key(name) {
+            if !make {
+                return Err(format!("the deck has no `{name}`"));
+            }
+            table.insert(name, toml_edit::table());
         }
-        Some(_) => return Err(format!("`{}` is a table", last.get())),
-        None => {
-            table.insert(last.get(), Item::Value(value));
+        return set_below(&mut table[name], rest, new, make);
+    }
+    match table.get_mut(name) {
+        Some(Item::Value(old)) => replace(old, new),
+        Some(Item::None) | None => {
+            table.insert(name, Item::Value(new));
         }
+        Some(_) => return Err(format!("`{name}` is a table")),
     }
     Ok(())
 }
 
-fn descend<'a>(item: &'a mut Item, key: &str) -> Result<&'a mut Item, String> {
-    if let Some(tables) = item.as_array_of_tables() {
-        let count = tables.len();
-        let index: usize =
-            key.parse().map_err(|_| format!("`{key}` must be a number from 0 to {}", count.max(1) - 1))?;
-        if index >= count {
-            return Err(format!("there is no entry {index}: there are {count}"));
+fn set_in_value(value: &mut Value, keys: &[Key], new: Value) -> Result<(), String> {
+    let Some((key, rest)) = keys.split_first() else {
+        replace(value, new);
+        return Ok(());
+    };
+    let key = key.get();
+    match value {
+        Value::Array(array) => {
+            let count = array.len();
+            let entry = array.get_mut(index(key, count)?).ok_or_else(|| no_entry(key, count))?;
+            set_in_value(entry, rest, new)
         }
-        return Ok(&mut item[index]);
+        Value::InlineTable(table) => match table.get_mut(key) {
+            Some(entry) => set_in_value(entry, rest, new),
+            None if rest.is_empty() => {
+                table.insert(key, new);
+                Ok(())
+            }
+            None => Err(format!("the deck has no `{key}`")),
+        },
+        _ => Err(format!("there is nothing below `{key}`")),
     }
-    // A key that is missing comes as an empty item.
-    match item.get_mut(key).filter(|found| !found.is_none()) {
-        Some(found) => Ok(found),
-        None => Err(format!("the deck has no `{key}`")),
-    }
+}
+
+/// A new value in the place of the old one, with its spaces and comments.
+fn replace(old: &mut Value, new: Value) {
+    let decor = old.decor().clone();
+    *old = new;
+    *old.decor_mut() = decor;
+}
+
+fn index(key: &str, count: usize) -> Result<usize, String> {
+    key.parse().map_err(|_| format!("`{key}` must be a number from 0 to {}", count.max(1) - 1))
+}
+
+fn no_entry(key: &str, count: usize) -> String {
+    format!("there is no entry {key}: there are {count}")
 }
 
 #[cfg(test)]
@@ -92,6 +128,17 @@ mod tests {
         assert_eq!(with("param.L=12").unwrap(), DECK.replace("10", "12"));
         assert_eq!(with("stage.1.step=0.01").unwrap(), DECK.replace("0.1", "0.01"));
         assert_eq!(with("param.L=2*pi").unwrap(), DECK.replace("10", "\"2*pi\""));
+    }
+
+    #[test]
+    fn nested_lists_inline_tables_and_missing_tables_are_reached() {
+        let deck = "through = [[0, 0], [1, 0]]\nstage = [{ step = 1 }]\nat = { load = 0.5 }\n";
+        let with = |setting: &str| apply(deck, &[setting.to_string()]).unwrap();
+        assert!(with("through.1.0=5").contains("[[0, 0], [5, 0]]"));
+        assert!(with("stage.0.step=2").contains("{ step = 2 }"));
+        assert!(with("at.load=1").contains("{ load = 1 }"));
+        assert!(with("output.every=2").contains("[output]\nevery = 2"));
+        assert!(with("history.h.expr=t").contains("expr = \"t\""));
     }
 
     #[test]

@@ -2,16 +2,19 @@
 
 use super::diagnostic::{Diagnostic, Span};
 use super::expression::{CONSTANTS, Expression, Jet};
-use super::reader::kind_of;
-use std::collections::BTreeMap;
+use super::reader::{kind_of, literal};
+use std::collections::{BTreeMap, BTreeSet};
 use toml::de::{DeTable, DeValue};
 
 /// The values of the parameters.
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
     values: BTreeMap<String, f64>,
-    broken: Vec<String>,
+    broken: BTreeSet<String>,
 }
+
+/// Longest chain of parameters that refer to each other.
+const MOST_LINKS: usize = 256;
 
 struct Entry {
     span: Span,
@@ -52,7 +55,7 @@ impl Parameters {
     pub fn is_broken(&self, text: &str) -> bool {
         let mut broken = false;
         if let Ok(expression) = Expression::parse(text) {
-            expression.names(&mut |name, _| broken |= self.broken.iter().any(|b| b == name));
+            expression.names(&mut |name, _| broken |= self.broken.contains(name));
         }
         broken
     }
@@ -68,13 +71,19 @@ impl Parameters {
             return Some(value);
         }
         let entry = entries.get(name)?;
-        if self.broken.iter().any(|b| b == name) {
+        if self.broken.contains(name) {
             return None;
         }
         if let Some(start) = path.iter().position(|p| p == name) {
             let circle = [&path[start..], &[name.to_string()]].concat().join(" -> ");
             diagnostics.push(Diagnostic::error(format!("parameters go in a circle: {circle}"), entry.span.clone()));
             self.broken.extend(path[start..].iter().cloned());
+            return None;
+        }
+        if path.len() >= MOST_LINKS {
+            let message = format!("more than {MOST_LINKS} parameters refer to each other in a chain");
+            diagnostics.push(Diagnostic::limit(message, entry.span.clone()));
+            self.broken.extend(path.drain(..));
             return None;
         }
         path.push(name.into());
@@ -84,8 +93,9 @@ impl Parameters {
             Some(value) => {
                 self.values.insert(name.into(), value);
             }
-            None if !self.broken.iter().any(|b| b == name) => self.broken.push(name.into()),
-            None => {}
+            None => {
+                self.broken.insert(name.into());
+            }
         }
         value
     }
@@ -140,12 +150,12 @@ fn unusable(name: &str) -> Option<String> {
 
 fn read_entry(item: &toml::Spanned<DeValue>, diagnostics: &mut Vec<Diagnostic>) -> Option<Expression> {
     let text = match item.get_ref() {
-        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().to_string(),
-        DeValue::Integer(integer) => {
-            return i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|v| Expression::Number(v as f64));
-        }
-        DeValue::Float(float) => {
-            return float.as_str().replace('_', "").parse().ok().map(Expression::Number);
+        DeValue::Integer(_) | DeValue::Float(_) => {
+            let number = literal(item.get_ref());
+            if number.is_none() {
+                diagnostics.push(Diagnostic::error("this number is too large", item.span()));
+            }
+            return number.map(Expression::Number);
         }
         DeValue::String(text) => text.to_string(),
         other => {

@@ -160,7 +160,7 @@ const DYNAMIC: [&str; 9] = ["end", "step", "scheme", "beta", "gamma", "alpha", "
 
 pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Stage> {
     let known = [&COMMON[..], &STATIC, &DYNAMIC, &["modes"]].concat();
-    let table = Table::new(context, item, "[[stage]]", &known, &[])?;
+    let table = Table::new(context, item, "[[stage]]", &known, &["energy_limit"])?;
     table.required("kind")?;
     let kind = table.word("kind", &["static", "dynamic", "modal", "buckling"])?;
     let body = match kind.value {

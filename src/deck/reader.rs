@@ -43,11 +43,7 @@ impl Context {
     pub fn number(&self, item: &Item) -> Option<Spanned<f64>> {
         let span = item.span();
         let value = match item.get_ref() {
-            DeValue::Integer(integer) => {
-                let text = integer.as_str().replace('_', "");
-                i64::from_str_radix(&text, integer.radix()).ok().map(|v| v as f64).or_else(|| text.parse().ok())
-            }
-            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(_) | DeValue::Float(_) => literal(item.get_ref()),
             DeValue::String(text) => {
                 let value = self.expression_value(text, &span)?;
                 self.resolved.borrow_mut().insert(span.start, value);
@@ -113,6 +109,8 @@ impl Context {
     /// A whole number in a range.
     pub fn whole(&self, item: &Item, least: usize, most: usize) -> Option<Spanned<usize>> {
         let Spanned { value, span } = self.number(item)?;
+        // Whole numbers may be the outcome of an expression: 0.3/0.1.
+        let value = if (value - value.round()).abs() <= 1e-9 * value.abs() { value.round() } else { value };
         if value.fract() != 0.0 {
             return self.wrong(span, format!("expected a whole number, found {value}"));
         }
@@ -141,6 +139,19 @@ impl Context {
             DeValue::Array(array) => array.iter().map(|entry| self.text(entry)).collect(),
             other => self.wrong(item.span(), format!("expected a list of texts, found {}", kind_of(other))),
         }
+    }
+}
+
+/// The number that stands in the text as one.
+pub fn literal(value: &DeValue) -> Option<f64> {
+    match value {
+        DeValue::Integer(integer) => {
+            let digits = integer.as_str().trim_start_matches('+').replace('_', "");
+            let whole = i128::from_str_radix(&digits, integer.radix()).ok().map(|v| v as f64);
+            whole.or_else(|| (integer.radix() == 10).then(|| digits.parse().ok()).flatten())
+        }
+        DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+        _ => None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! The deck as JSON, with expressions replaced by the numbers they stood for.
 
 use super::parameters::Parameters;
+use super::reader::literal;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use toml::de::{DeTable, DeValue};
@@ -27,11 +28,10 @@ fn object(table: &DeTable, numbers: &BTreeMap<usize, f64>) -> Map<String, Value>
 fn value(item: &toml::Spanned<DeValue>, numbers: &BTreeMap<usize, f64>) -> Value {
     match item.get_ref() {
         DeValue::String(text) => numbers.get(&item.span().start).map_or_else(|| json!(text), |number| json!(number)),
-        DeValue::Integer(integer) => {
-            let text = integer.as_str().replace('_', "");
-            i64::from_str_radix(&text, integer.radix()).map_or(Value::Null, |v| json!(v))
+        DeValue::Integer(integer) if integer.radix() == 10 && integer.as_str().parse::<i64>().is_ok() => {
+            json!(integer.as_str().parse::<i64>().unwrap_or_default())
         }
-        DeValue::Float(float) => float.as_str().replace('_', "").parse::<f64>().map_or(Value::Null, |v| json!(v)),
+        DeValue::Integer(_) | DeValue::Float(_) => json!(literal(item.get_ref())),
         DeValue::Boolean(flag) => json!(flag),
         DeValue::Datetime(date) => json!(date.to_string()),
         DeValue::Array(array) => array.iter().map(|entry| value(entry, numbers)).collect(),

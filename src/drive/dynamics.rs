@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::integrate::Newmark;
 use crate::model::{StageKind, charts};
+use crate::solve::NewtonFailure;
 
 impl Run<'_> {
     /// All steps of a dynamic stage: rows at start + k step, the last one at `end`.
@@ -16,7 +17,8 @@ impl Run<'_> {
         gamma: f64,
     ) -> Result<(), Failure> {
         self.start_dynamic(workshop)?;
-        for grid in self.grids(end, step) {
+        while self.state.time < end {
+            let grid = self.next_grid(end, step);
             for number in 1..=grid.steps {
                 let (next, h) = grid.step(number);
                 self.observer.progress(self.moment(), self.dynamic_progress(next, end))?;
@@ -36,11 +38,14 @@ impl Run<'_> {
     fn advance(&mut self, workshop: &mut Workshop, method: Newmark, next: f64) -> Result<(), Failure> {
         self.good.copy_from(&self.state);
         method.predict(&mut self.state);
-        self.model.set_clock(&mut self.state, next, 1.0);
-        let Workshop { assembly, solver, newton, .. } = workshop;
-        let work = &mut self.counters.work;
-        let kind = StageKind::Dynamic;
-        let solved = newton.solve(&self.model, assembly, solver, &mut self.state, &method, kind, None, work);
+        let solved = match self.model.set_clock(&mut self.state, next, 1.0) {
+            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
+            None => {
+                let Workshop { assembly, solver, newton, .. } = &mut *workshop;
+                let (work, kind) = (&mut self.counters.work, StageKind::Dynamic);
+                newton.solve(&self.model, assembly, solver, &mut self.state, &method, kind, None, work)
+            }
+        };
         if let Err(failure) = solved {
             let named = self.name_failure(failure, &workshop.assembly.system);
             self.state.copy_from(&self.good);
@@ -56,16 +61,13 @@ impl Run<'_> {
         charts::freeze(&mut self.state, &self.model.elements);
     }
 
-    /// Equal steps to the end; where rows are wanted at multiples of an interval, equal steps between those.
-    fn grids(&self, end: f64, step: f64) -> Vec<Grid> {
+    /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the next of those.
+    fn next_grid(&self, end: f64, step: f64) -> Grid {
         let start = self.state.time;
-        let Some(interval) = self.plan.interval else { return Grid::over(start, end, step).into_iter().collect() };
-        let first = (start / interval + 1e-9).floor() as i64 + 1;
-        let mut stops: Vec<f64> =
-            (first..).map(|k| k as f64 * interval).take_while(|&t| t < end - 1e-9 * interval).collect();
-        stops.push(end);
-        let starts = std::iter::once(start).chain(stops.clone());
-        starts.zip(stops).filter_map(|(from, to)| Grid::equal(from, to, step)).collect()
+        let Some(interval) = self.plan.interval else { return Grid::over(start, end, step) };
+        let next = ((start / interval + 1e-9).floor() + 1.0) * interval;
+        let last = next >= end - 1e-9 * interval;
+        Grid::equal(start, if last { end } else { next }, step)
     }
 
     fn dynamic_progress(&self, time: f64, end: f64) -> f64 {
@@ -85,15 +87,15 @@ struct Grid {
 
 impl Grid {
     /// Steps of length `step`, the last shortened to hit `end`.
-    fn over(start: f64, end: f64, step: f64) -> Option<Self> {
-        let steps = ((end - start) / step - 1e-9).ceil();
-        (steps >= 1.0).then_some(Self { start, end, step, steps: steps as u64 })
+    fn over(start: f64, end: f64, step: f64) -> Self {
+        let steps = ((end - start) / step - 1e-9).ceil().max(1.0);
+        Self { start, end, step, steps: steps as u64 }
     }
 
     /// Equal steps not longer than `step`.
-    fn equal(start: f64, end: f64, step: f64) -> Option<Self> {
-        let steps = ((end - start) / step - 1e-9).ceil();
-        (steps >= 1.0).then(|| Self { start, end, step: (end - start) / steps, steps: steps as u64 })
+    fn equal(start: f64, end: f64, step: f64) -> Self {
+        let steps = ((end - start) / step - 1e-9).ceil().max(1.0);
+        Self { start, end, step: (end - start) / steps, steps: steps as u64 }
     }
 
     /// The end and the length of step `number`, from 1. Times are multiples, not sums, so that they do not drift; steps
@@ -114,7 +116,7 @@ mod tests {
 
     #[test]
     fn the_last_step_hits_the_end() {
-        let grid = Grid::over(0.0, 1.0, 0.3).unwrap();
+        let grid = Grid::over(0.0, 1.0, 0.3);
         assert_eq!(grid.steps, 4);
         assert_eq!(grid.step(3), (0.3 * 3.0, 0.3));
         let (end, h) = grid.step(4);
@@ -124,13 +126,8 @@ mod tests {
 
     #[test]
     fn a_whole_number_of_steps_keeps_its_step() {
-        let grid = Grid::over(0.0, 3.0, 0.01).unwrap();
+        let grid = Grid::over(0.0, 3.0, 0.01);
         assert_eq!(grid.steps, 300);
         assert_eq!(grid.step(300), (3.0, 0.01));
-    }
-
-    #[test]
-    fn nothing_is_left_to_do_at_the_end() {
-        assert_eq!(Grid::over(2.0, 2.0, 0.1), None);
     }
 }

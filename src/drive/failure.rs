@@ -45,6 +45,8 @@ pub enum Failure {
         iterations: usize,
         /// Cut-backs tried before giving up
         cutbacks: u64,
+        /// Whether it was a time step
+        dynamic: bool,
     },
     /// A mechanism or a loose part
     Singular {
@@ -102,11 +104,14 @@ impl Failure {
     /// What to try.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
-            Self::NotConverged { at, .. } if at.time == 0.0 && at.load < 1.0 => Some(
-                "smaller load levels were tried; a limit point (the load cannot grow further on this path) or a \
-                 buckling load may lie just ahead",
+            Self::NotConverged { dynamic: false, cutbacks: 1.., .. } => Some(
+                "smaller load levels were tried: a limit point (the load cannot grow further on this path) or a buckling \
+                 load may lie just ahead, or the mesh is too coarse where it turns most",
             ),
-            Self::NotConverged { .. } => Some("try a smaller `step`, or a finer mesh where it turns most"),
+            Self::NotConverged { dynamic: false, .. } => {
+                Some("let the stage take smaller levels: `adaptive`, or more `steps`")
+            }
+            Self::NotConverged { .. } => Some("try a finer mesh where it turns most, or a smaller `step`"),
             Self::Singular { .. } => {
                 Some("add a support, a spring or a joint that holds this direction, or give it mass")
             }
@@ -140,7 +145,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Deck(message) | Self::Limit(message) | Self::Io(message) => f.write_str(message),
-            Self::NotConverged { at, place, residual, force, iterations, cutbacks } => write!(
+            Self::NotConverged { at, place, residual, force, iterations, cutbacks, .. } => write!(
                 f,
                 "no balance at {at}: after {iterations} iterations and {cutbacks} cut-backs the residual at {place} is \
                  {residual:.3e}, the largest force {force:.3e}"

@@ -257,15 +257,11 @@ impl<'o> Run<'o> {
 
     /// Shows a row to the observer.
     pub(super) fn show(&mut self, workshop: &Workshop) -> Result<(), Failure> {
-        let snapshot = Snapshot {
-            stage: self.stage + 1,
-            state: &self.state,
-            system: &workshop.assembly.system,
-            model: &self.model,
-            ledger: self.bookkeeper.ledger(),
-            counters: &self.counters,
-        };
-        self.observer.row(&snapshot)
+        // The observer is borrowed beside what it looks at.
+        let Self { observer, state, model, counters, bookkeeper, stage, .. } = self;
+        let ledger = bookkeeper.ledger();
+        let system = &workshop.assembly.system;
+        observer.row(&Snapshot { stage: *stage + 1, state, system, model, ledger, counters })
     }
 
     fn snapshot<'a>(&'a self, workshop: &'a Workshop) -> Snapshot<'a> {
@@ -320,8 +316,14 @@ impl<'o> Run<'o> {
                 force: residual.force,
                 iterations,
                 cutbacks: self.counters.cutbacks,
+                dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
             },
             NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
+            NewtonFailure::TurnsTooFar { slot, angle } => Failure::Deck(format!(
+                "a motion turns node \"{}\" by {angle:.3} rad at once ({at}), so that its direction cannot be told: use \
+                 smaller steps",
+                self.model.slots[slot].node
+            )),
             NewtonFailure::NotFinite { effect, slot } => {
                 Failure::NonFinite { at, effect, node: self.model.slots[slot].node.clone() }
             }
@@ -347,8 +349,8 @@ impl<'o> Run<'o> {
                 node(conflict.slot)
             ),
             StageError::Jump(Jump { motion, from, to }) => format!(
-                "stage {stage}: motion {} of node \"{}\" would have to jump from {from} to {to}; give it a `history` that \
-                 starts where the node is",
+                "stage {stage}: motion {} of node \"{}\" would have to jump from {from} to {to}, or from another axis; give it \
+                 a `history` that starts where the node is",
                 motion + 1,
                 node(self.model.motions[motion].slot)
             ),

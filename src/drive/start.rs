@@ -97,25 +97,12 @@ fn ignore_massless(system: &mut System, slots: usize, right_hand_side: &mut [f64
 }
 
 fn diagonal_block(system: &System, numbers: [u32; 3]) -> Mat3 {
-    let entry = |row: u32, column: u32| match place(system, row, column) {
-        Some(place) => system.values[place],
-        None => 0.0,
-    };
+    let entry = |row: u32, column: u32| system.pattern.find(row, column).map_or(0.0, |place| system.values[place]);
     Mat3(numbers.map(|row| numbers.map(|column| entry(row, column))))
 }
 
 fn add_entry(system: &mut System, row: u32, column: u32, value: f64) {
-    if let Some(place) = place(system, row, column) {
+    if let Some(place) = system.pattern.find(row, column) {
         system.values[place] += value;
     }
-}
-
-/// Where an entry is stored, if both directions are free.
-fn place(system: &System, row: u32, column: u32) -> Option<usize> {
-    if row == Equations::HELD || column == Equations::HELD {
-        return None;
-    }
-    let starts = &system.pattern.column_starts;
-    let (start, end) = (starts[column as usize] as usize, starts[column as usize + 1] as usize);
-    system.pattern.rows[start..end].binary_search(&row).ok().map(|k| start + k)
 }

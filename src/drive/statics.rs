@@ -89,7 +89,9 @@ impl Run<'_> {
         let Workshop { assembly, solver, newton, lift, .. } = workshop;
         lift.copy_from_slice(&self.state.q);
         let time = self.state.time;
-        self.model.set_clock(&mut self.state, time, load);
+        if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
+            return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
+        }
         for (lift, q) in lift.iter_mut().zip(&mut self.state.q) {
             let before = *lift;
             *lift = *q - before;

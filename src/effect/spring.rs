@@ -7,10 +7,13 @@
 use super::{Effect, Energy};
 use crate::kernel::{ElementSystem, Weights};
 use crate::real::Real;
-use crate::rotation::{Complement, nearest_turn};
+use crate::rotation::{Complement, nearest_turn, unwound};
 use crate::system::{Category, Cliques, Memory, Node, Sink, State};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
+
+/// Rotation vectors shorter than this have come to a whole turn.
+const WHOLE_TURN: f64 = 1e-9;
 
 /// One spring.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +55,7 @@ impl Effect for Spring {
         for (k, spring) in self.springs.iter().enumerate() {
             let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
             let on = at.amplitude[spring.amplitude];
-            let turns = nearest_turn(p, at.wound[spring.node.p as usize]);
-            let (moment, tangent) = rotational(spring.rotation * on, turns, p);
+            let (moment, tangent) = wound_up(spring.rotation * on, p, at.wound[spring.node.p as usize]);
             system.clear();
             system.add_force(0, spring.translation * u * on);
             system.add_force(1, moment);
@@ -66,10 +68,20 @@ impl Effect for Spring {
     fn energy(&self, at: &State) -> Energy {
         let one = |spring: &Instance| {
             let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
-            let wound = wind(nearest_turn(p, at.wound[spring.node.p as usize]), p);
+            let wound = unwound(p, at.wound[spring.node.p as usize]);
             0.5 * at.amplitude[spring.amplitude] * (u.dot(spring.translation * u) + wound.dot(spring.rotation * wound))
         };
         Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
+    }
+}
+
+/// Force and tangent of a rotational spring whose node was last wound by `wound`. At a whole turn P has no axis of its own
+/// and keeps the one of before.
+fn wound_up(stiffness: Mat3, p: Vec3, wound: Vec3) -> (Vec3, Mat3) {
+    if p.norm() < WHOLE_TURN {
+        (stiffness * unwound(p, wound), stiffness)
+    } else {
+        rotational(stiffness, nearest_turn(p, wound), p)
     }
 }
 

@@ -40,14 +40,13 @@ pub struct Amplitude {
     switched: bool,
     course: Course,
     reached: f64,
-    has_acted: bool,
 }
 
 impl Amplitude {
     /// Of a load with this history, or the default one: up with the load factor of the first static stage in which it
     /// acts, then in full; in full from the start of a dynamic stage.
     pub fn of_load(history: Option<Arc<dyn History>>, stages: StageSet) -> Self {
-        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0, has_acted: false }
+        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0 }
     }
 
     /// Of something that is there or not.
@@ -61,13 +60,11 @@ impl Amplitude {
         self.course = match (acts, kind, &self.history) {
             (true, ..) if self.switched => Course::Hold(1.0),
             (true, kind, Some(_)) => Course::History(kind),
-            (true, ..) if self.has_acted => Course::Hold(self.reached),
-            (true, StageKind::Static, None) => Course::Ramp { from: 0.0, to: 1.0 },
+            (true, StageKind::Static, None) => Course::Ramp { from: self.reached, to: 1.0 },
             (true, StageKind::Dynamic, None) => Course::Hold(1.0),
             (false, StageKind::Static, _) if !self.switched => Course::Ramp { from: self.reached, to: 0.0 },
             (false, ..) => Course::Hold(0.0),
         };
-        self.has_acted |= acts;
     }
 
     /// Remembers where the stage ended.
@@ -109,6 +106,22 @@ mod tests {
         let load = || Amplitude::of_load(None, StageSet::default());
         assert_eq!(halves(load(), &[Static, Static, Dynamic]), [0.5, 1.0, 1.0]);
         assert_eq!(halves(load(), &[Dynamic, Static]), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_load_that_rests_a_stage_comes_back() {
+        let load = || Amplitude::of_load(None, StageSet(Some(vec![0, 2])));
+        assert_eq!(halves(load(), &[Static, Static, Static]), [0.5, 0.5, 0.5]);
+        assert_eq!(halves(load(), &[Static, Static, Dynamic]), [0.5, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn a_load_whose_stage_ended_early_goes_on_from_there() {
+        let mut load = Amplitude::of_load(None, StageSet::default());
+        load.begin_stage(0, Static);
+        load.end_stage(0.0, 0.4);
+        load.begin_stage(1, Static);
+        assert_eq!([load.at(0.0, 0.0), load.at(0.0, 1.0)], [0.4, 1.0]);
     }
 
     #[test]

@@ -86,8 +86,8 @@ impl Motion {
         }
         self.course = match (kind, &self.history) {
             (kind, Some(_)) => Course::History(kind),
-            (_, None) if self.has_acted => Course::Hold(from),
             (StageKind::Static, None) => Course::Ramp { from },
+            (StageKind::Dynamic, None) if self.has_acted => Course::Hold(from),
             (StageKind::Dynamic, None) => Course::Hold(self.value),
         };
         self.has_acted = true;
@@ -139,9 +139,12 @@ impl Motion {
 
     /// Sets position, velocity and acceleration in the state at its time and load. A rotation about n is P = theta n,
     /// Pd = theta' n, Pdd = theta'' n, with theta at the representative nearest to the present chart.
-    pub fn impose(&self, state: &mut State) {
+    ///
+    /// Returns how far it turns the node from the last converged state: beyond half a turn nobody could tell in which
+    /// direction it went.
+    pub fn impose(&self, state: &mut State) -> f64 {
         if !self.acts() {
-            return;
+            return 0.0;
         }
         let [value, rate, rate2] = self.at(state.time, state.load);
         let (slot, n) = (self.slot as usize, self.axis);
@@ -151,13 +154,16 @@ impl Motion {
                 replace(&mut state.q[slot], value);
                 replace(&mut state.v[slot], rate);
                 replace(&mut state.a[slot], rate2);
+                0.0
             }
             MotionKind::Rotation => {
+                let turned = (value - state.wound[slot].dot(n)).abs();
                 let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();
                 state.q[slot] = n * (value + 2.0 * PI * turns);
                 state.v[slot] = n * rate;
                 state.a[slot] = n * rate2;
                 state.wound[slot] = n * value;
+                turned
             }
         }
     }

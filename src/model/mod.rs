@@ -15,6 +15,9 @@ use crate::system::{Category, Direction, Equations, FrameConflict, Memory, Node,
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
+/// A prescribed rotation may go this far in one step or load increment.
+const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
+
 /// What a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotKind {
@@ -99,22 +102,31 @@ impl Model {
     /// One or two held components of a rotation vector survive a change of chart only where they are zero.
     fn refuse_turned_hinges(&self, held: &[Direction], state: &State) -> Result<(), StageError> {
         for &slot in &self.rotations {
-            let here: Vec<_> = held.iter().filter(|d| d.slot == slot).collect();
-            let turned = here.iter().any(|d| state.q[slot as usize].dot(d.axis).abs() > 1e-9);
-            if turned && here.len() < 3 {
+            let here = || held.iter().filter(|d| d.slot == slot);
+            let turned = here().any(|d| state.q[slot as usize].dot(d.axis).abs() > 1e-9);
+            let spans = |axis: &Vec3| here().any(|d| d.axis.dot(*axis).abs() > 1e-9);
+            if turned && !Vec3::UNIT.iter().all(spans) {
                 return Err(StageError::TurnedHinge(slot));
             }
         }
         Ok(())
     }
 
-    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions.
-    pub fn set_clock(&self, state: &mut State, time: f64, load: f64) {
+    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions. Where a motion turns
+    /// its node too far at once, its slot and the angle are returned.
+    pub fn set_clock(&self, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
         (state.time, state.load) = (time, load);
         for (value, amplitude) in state.amplitude.iter_mut().zip(&self.amplitudes) {
             *value = amplitude.at(time, load);
         }
-        self.motions.iter().for_each(|motion| motion.impose(state));
+        let mut too_far = None;
+        for motion in &self.motions {
+            let turned = motion.impose(state);
+            if turned > LARGEST_TURN {
+                too_far = Some((motion.slot, turned));
+            }
+        }
+        too_far
     }
 
     /// The effects that act in a stage of this kind, with their numbers.

@@ -20,11 +20,11 @@ impl PartFile {
         Ok((Self { folder: folder.into(), part }, file))
     }
 
-    /// Writes a whole file at once.
-    pub fn write(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
+    /// A part with all its content, still without its name.
+    pub fn written(folder: &Path, name: &str, content: &[u8]) -> io::Result<(Self, File)> {
         let (part, mut file) = Self::create(folder, name)?;
         io::Write::write_all(&mut file, content).map_err(|e| about(&part.part, &e))?;
-        part.finish(&file, name)
+        Ok((part, file))
     }
 
     /// Gives the part, which must be flushed, its final name.

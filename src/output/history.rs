@@ -22,7 +22,7 @@ impl Rows {
         match self.interval {
             Some(interval) if dynamic => {
                 let turns = time / interval;
-                (turns - turns.round()).abs() < 1e-9 * turns.abs().max(1.0)
+                (turns - turns.round()).abs() < 1e-9 + 1e-13 * turns.abs()
             }
             Some(_) => true,
             None => number.is_multiple_of(self.every as u64),

@@ -68,7 +68,7 @@ fn numbers(failure: &Failure) -> Value {
         record["unknown"] = json!(format!("{:?}", place.kind).to_lowercase());
     };
     match failure {
-        Failure::NotConverged { at, place: node, residual, force, iterations, cutbacks } => {
+        Failure::NotConverged { at, place: node, residual, force, iterations, cutbacks, dynamic: _ } => {
             when(at, &mut record);
             place(node, &mut record);
             record["residual"] = json!(residual);

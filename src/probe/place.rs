@@ -88,13 +88,13 @@ impl BeamPoint {
 
     fn one_side(&self, element: u32, xi: f64, state: &State) -> [[f64; 6]; 2] {
         let elements = &self.elasticity.elements;
-        let two =
-            elements.two.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
-        let three =
-            || elements.three.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
-        let four =
-            || elements.four.iter().find(|e| e.connection.element == element).map(|e| self.extrapolated(e, xi, state));
-        two.or_else(three).or_else(four).unwrap_or([[0.0; 6]; 2])
+        if let Some(two) = find(&elements.two, element) {
+            return self.extrapolated(two, xi, state);
+        }
+        if let Some(three) = find(&elements.three, element) {
+            return self.extrapolated(three, xi, state);
+        }
+        find(&elements.four, element).map_or([[0.0; 6]; 2], |four| self.extrapolated(four, xi, state))
     }
 
     fn extrapolated<const N: usize, const G: usize>(
@@ -118,4 +118,9 @@ impl BeamPoint {
         }
         out
     }
+}
+
+/// The element of this number: batches are in the order of the scene.
+fn find<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], element: u32) -> Option<&ElasticElement<N, G>> {
+    batch.binary_search_by_key(&element, |e| e.connection.element).ok().map(|k| &batch[k])
 }

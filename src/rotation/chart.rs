@@ -77,7 +77,7 @@ pub fn nearest_turn(p: Vec3, reference: Vec3) -> f64 {
 /// The representative of the rotation of `p` that continues `previous` without a jump (ten turns read 20 pi).
 pub fn unwound(p: Vec3, previous: Vec3) -> Vec3 {
     let psi = p.norm();
-    if psi < 1e-12 {
+    if psi < 1e-9 {
         // No axis of its own: it keeps the axis of before, at the whole turn that is nearest.
         let turns = (previous.norm() / (2.0 * PI)).round();
         return previous.normalized().map_or(p, |axis| axis * (2.0 * PI * turns) + p);

@@ -1,10 +1,14 @@
 //! What can be said of a deck before its mechanics is built.
 
 use super::mesh::Mesh;
-use crate::deck::{self, Deck, Diagnostic, SectionBody, Spanned, StageBody};
+use crate::deck::{self, Deck, Diagnostic, MotionWhat, SectionBody, Spanned, StageBody};
+use crate::effect::rigid_body::Body;
+use crate::effect::spring;
 use crate::model::{StageSet, Support};
 use crate::system::Direction;
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
+use nalgebra::{Matrix3, SymmetricEigen};
+use std::collections::HashSet;
 
 /// Checks names, stages, and what a stage needs.
 pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
@@ -39,6 +43,11 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             if end <= clock {
                 let message = format!("`end` is {end} on the run's clock, but the stage starts at {clock}");
                 diagnostics.push(Diagnostic::error(message, stage.span.clone()));
+            }
+            let interval = deck.output.interval.unwrap_or(f64::INFINITY);
+            if (end - clock) / interval > deck::MOST_STEPS as f64 {
+                let message = format!("`interval` asks for more than the largest supported {} rows", deck::MOST_STEPS);
+                diagnostics.push(Diagnostic::limit(message, stage.span.clone()));
             }
             clock = end;
         }
@@ -101,24 +110,47 @@ fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// A point mass on no beam has no rotation to speak of: it is held, so that the tangent stays regular.
-pub fn loose_rotations(deck: &Deck, mesh: &Mesh) -> Vec<Support> {
+/// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
+/// constraint touches are held, so that the tangent stays regular.
+pub fn loose_rotations(
+    deck: &Deck,
+    mesh: &Mesh,
+    bodies: &[Body],
+    springs: &[spring::Instance],
+    held: &[Support],
+) -> Vec<Support> {
+    let on_beams: HashSet<usize> = mesh.beams.iter().flat_map(|beam| beam.nodes.iter().copied()).collect();
     let mut supports = Vec::new();
-    for body in &deck.bodies {
-        let Some(&node) = mesh.points.get(&body.at.value) else { continue };
-        let turned = |name: &str| name == body.at.value;
-        let has_beam = mesh.beams.iter().any(|beam| beam.nodes.contains(&node));
-        let has_inertia =
-            deck.bodies.iter().any(|b| turned(&b.at.value) && (b.inertia.is_some() || b.offset != [0.0; 3]));
-        let has_spring = deck.springs.iter().any(|s| turned(&s.at.value) && s.stiffness[3..] != [0.0; 3]);
-        let is_moved = deck.motions.iter().any(|m| turned(&m.at.value));
-        if !(has_beam || has_inertia || has_spring || is_moved) {
-            let slot = mesh.nodes[node].node.p;
-            let directions = Vec3::UNIT.map(|axis| Direction { slot, axis }).to_vec();
-            supports.push(Support { directions, stages: StageSet::default() });
+    for &node in deck.bodies.iter().filter_map(|body| mesh.points.get(&body.at.value)) {
+        let slot = mesh.nodes[node].node.p;
+        let mut touched = Mat3::ZERO;
+        let mut touch = |m: Mat3| {
+            if m.max_abs() > 0.0 {
+                touched += m * (1.0 / m.max_abs());
+            }
+        };
+        bodies.iter().filter(|b| b.node.p == slot).for_each(|b| touch(b.inertia.about_node));
+        springs.iter().filter(|s| s.node.p == slot).for_each(|s| touch(s.rotation));
+        held.iter().flat_map(|s| &s.directions).filter(|d| d.slot == slot).for_each(|d| touch(d.axis.outer(d.axis)));
+        let moved =
+            |m: &deck::Motion| m.at.value == mesh.nodes[node].name && matches!(m.what, MotionWhat::Rotation { .. });
+        if on_beams.contains(&node) || deck.motions.iter().any(moved) {
+            continue;
         }
+        let directions = untouched(touched).into_iter().map(|axis| Direction { slot, axis }).collect();
+        supports.push(Support { directions, stages: StageSet::default() });
     }
     supports
+}
+
+/// The directions without an eigenvalue.
+fn untouched(m: Mat3) -> Vec<Vec3> {
+    if m == Mat3::ZERO {
+        return Vec3::UNIT.to_vec();
+    }
+    let eigen = SymmetricEigen::new(Matrix3::from_fn(|i, j| m.0[i][j]));
+    let empty = (0..3).filter(|&k| eigen.eigenvalues[k].abs() < 1e-12);
+    empty.map(|k| Vec3([0, 1, 2].map(|i| eigen.eigenvectors[(i, k)]))).collect()
 }
 
 /// The diagonal of the box around the scene, or 1.

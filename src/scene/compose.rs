@@ -60,6 +60,8 @@ pub struct Composition {
     pub elasticity: Option<Arc<BeamElasticity>>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
+    /// Springs to ground
+    pub springs: Vec<spring::Instance>,
 }
 
 /// Collects effects while the tables of the deck are walked through.
@@ -80,13 +82,14 @@ pub fn compose(
     histories: &HashMap<String, Arc<dyn History>>,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Composition {
-    let dynamic = deck.stages.iter().any(|stage| matches!(stage.body, deck::StageBody::Dynamic { .. }));
+    let dynamic = needs_mass(deck);
     let out = Composition {
         effects: Vec::new(),
         reasons: Vec::new(),
         amplitudes: Vec::new(),
         elasticity: None,
         bodies: Vec::new(),
+        springs: Vec::new(),
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
     composer.elasticity();
@@ -292,6 +295,7 @@ impl Composer<'_> {
             self.reason("springs to ground", false, "no [[spring]]");
         } else {
             let reason = format!("{} [[spring]] table(s)", springs.len());
+            self.out.springs = springs.clone();
             self.push(Spring { springs }, reason);
         }
     }
@@ -396,6 +400,18 @@ impl Composer<'_> {
         self.reason("damping", false, "not supported yet");
         self.reason("planar", false, "not supported yet: every scene is simulated in three dimensions");
     }
+}
+
+/// Inertia is there for dynamic stages, and where momenta are looked at.
+fn needs_mass(deck: &Deck) -> bool {
+    let dynamic = deck.stages.iter().any(|stage| matches!(stage.body, deck::StageBody::Dynamic { .. }));
+    let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
+    let expected = deck.expects.iter().any(|expect| match &expect.body {
+        deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
+        deck::ExpectBody::Fails(_) => false,
+    });
+    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
+    dynamic || written || expected || watched
 }
 
 /// The stages of the deck count from 1, those of a run from 0.

@@ -134,7 +134,7 @@ fn read_motion(
             Motion::new(MotionKind::Translation, node.u, axis, value, history, stages)
         }
         MotionWhat::Rotation { axis, angle } => {
-            let Some(axis) = Vec3(axis).normalized() else {
+            let Some(axis) = (axes(motion.axes) * Vec3(axis)).normalized() else {
                 return Err(Diagnostic::error("`rotate` is an axis and must not be zero", motion.span.clone()));
             };
             Motion::new(MotionKind::Rotation, node.p, axis, angle, history, stages)
@@ -172,6 +172,13 @@ fn warn_of_kinks(deck: &Deck, motion: &deck::Motion, diagnostics: &mut Vec<Diagn
     }
 }
 
+/// Whether earlier tables hold all three directions of the slot, whenever this one holds its own.
+fn spanned(earlier: &[Held], b: &Held) -> bool {
+    let always = |a: &&Held| a.direction.slot == b.direction.slot && (a.stages.0.is_none() || a.stages == b.stages);
+    let axes: Vec<Vec3> = earlier.iter().filter(always).map(|a| a.direction.axis).collect();
+    axes.iter().any(|x| axes.iter().any(|y| axes.iter().any(|z| x.cross(*y).dot(*z).abs() > 1e-6)))
+}
+
 /// Directions at one node must be the same or orthogonal, and a motion needs its own.
 fn refuse_clashes(deck: &Deck, mesh: &Mesh, held: &[Held], diagnostics: &mut Vec<Diagnostic>) {
     let meet = |a: &Held, b: &Held| (0..deck.stages.len().max(1)).any(|s| a.stages.contains(s) && b.stages.contains(s));
@@ -180,7 +187,9 @@ fn refuse_clashes(deck: &Deck, mesh: &Mesh, held: &[Held], diagnostics: &mut Vec
         for a in held[..k].iter().filter(|a| a.direction.slot == b.direction.slot && a.span != b.span) {
             let cosine = a.direction.axis.dot(b.direction.axis).abs();
             let same = cosine > 1.0 - 1e-9;
-            let harmless = cosine <= 1e-9 || (same && a.what != "motion" && b.what != "motion");
+            let moves = a.what == "motion" || b.what == "motion";
+            // A skew direction says nothing new of a slot that is held altogether.
+            let harmless = cosine <= 1e-9 || (!moves && (same || spanned(&held[..k], b)));
             let pair = (a.span.start, b.span.start);
             if harmless || !meet(a, b) || reported.contains(&pair) {
                 continue;

@@ -102,6 +102,7 @@ impl Mesh {
         for body in &deck.bodies {
             mesh.add_body_point(&body.at, deck, diagnostics);
         }
+        mesh.refuse_joints_off_nodes(deck, diagnostics);
         mesh
     }
 
@@ -156,6 +157,23 @@ impl Mesh {
                 }
                 let node = self.add_node(place, format!("{point} ({})", second.value), Some(main));
                 self.parted.insert(key, node);
+            }
+        }
+    }
+
+    /// The middle of an arc may be named without being a node.
+    fn refuse_joints_off_nodes(&self, deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+        for joint in &deck.joints {
+            let Some(&main) = self.points.get(&joint.at.value) else { continue };
+            for name in &joint.beams {
+                let Some(beam) = self.beams.iter().find(|beam| beam.name == name.value) else { continue };
+                let own = self.parted.get(&(name.value.clone(), joint.at.value.clone())).unwrap_or(&main);
+                if passes(deck, &name.value, &joint.at.value) && !beam.nodes.contains(own) {
+                    let message = format!("beam `{}` has no node at the point `{}`", name.value, joint.at.value);
+                    let diagnostic = Diagnostic::error(message, joint.at.span.clone());
+                    let fraction = beam.line.find(self.nodes[main].place).unwrap_or(0.5);
+                    diagnostics.push(diagnostic.help(names::propose(beam, fraction)));
+                }
             }
         }
     }
@@ -332,10 +350,13 @@ fn named_between<'a>(
     ((at - at.round()).abs() < 1e-9).then(|| (name.as_str(), at.round() as usize))
 }
 
-/// Whether a beam names a point where the mesh puts a node.
+/// Whether the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     let found = deck.beams.iter().find(|b| b.name.value == beam);
-    found.is_some_and(|b| corner_names(&b.path).contains(&Some(point)))
+    found.is_some_and(|b| match &b.path {
+        deck::Path::Arc([_, Spanned { value: PointRef::Name(middle), .. }, _]) if middle == point => true,
+        path => corner_names(path).contains(&Some(point)),
+    })
 }
 
 /// Counts nodes before any memory is taken.

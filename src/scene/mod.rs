@@ -95,13 +95,17 @@ pub struct Bounds {
 /// Counters that an expectation can look at.
 pub const RUN_COUNTERS: [&str; 5] = ["steps", "iterations", "cutbacks", "chart_switches", "mixed_elements"];
 
+/// Messages beyond this many help nobody.
+const MOST_DIAGNOSTICS: usize = 200;
+
 /// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
 pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (deck, mut diagnostics) = deck::read(text)?;
     let scene = if deck.names_complete { build(&deck, &mut diagnostics) } else { None };
+    diagnostics.sort_by_key(Diagnostic::is_warning);
     let mut told: Vec<Diagnostic> = Vec::new();
     for diagnostic in diagnostics {
-        if !told.contains(&diagnostic) {
+        if told.len() < MOST_DIAGNOSTICS && !told.contains(&diagnostic) {
             told.push(diagnostic);
         }
     }
@@ -136,13 +140,14 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let expected =
         expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
+    let loose = check::loose_rotations(deck, &mesh, &composition.bodies, &composition.springs, &supports);
     let model = Model {
         slots: slots(&mesh),
         rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
         elements: mesh.elements.iter().map(|e| e.nodes.iter().map(|&n| mesh.nodes[n].node).collect()).collect(),
         effects: composition.effects,
         amplitudes: composition.amplitudes,
-        supports: supports.into_iter().chain(check::loose_rotations(deck, &mesh)).collect(),
+        supports: [supports, loose].concat(),
         motions,
         length: check::diagonal(&mesh),
     };

@@ -91,7 +91,7 @@ impl Mesh {
         let mesh_beam = &self.beams[number];
         let at_node = mesh_beam.fractions.iter().position(|f| (f - fraction).abs() < 1e-9);
         Ok(match at_node {
-            Some(k) => Found::Node(mesh_beam.nodes[k], Some((number, fraction))),
+            Some(k) => Found::Node(mesh_beam.nodes[k], Some((number, mesh_beam.fractions[k]))),
             None => Found::Between(number, fraction),
         })
     }
@@ -115,9 +115,11 @@ impl Mesh {
         let diagnostic = Diagnostic::error(message, name.span.clone());
         let on = self.beams.iter().find_map(|beam| beam.line.find(place).map(|fraction| (beam, fraction)));
         match on {
-            Some((beam, fraction)) => {
-                diagnostic.help(format!("it lies on beam `{}`; {}", beam.name, propose(beam, fraction)))
-            }
+            Some((beam, fraction)) => diagnostic.help(format!(
+                "it lies on beam `{0}`, at `{0}@{fraction}`; {1}, or name the point in `through`",
+                beam.name,
+                propose(beam, fraction)
+            )),
             None => diagnostic.help("no beam goes through it and no body sits there"),
         }
     }
@@ -179,7 +181,7 @@ impl MeshBeam {
 }
 
 /// How many elements would put a node at a fraction of the length.
-fn propose(beam: &MeshBeam, fraction: f64) -> String {
+pub fn propose(beam: &MeshBeam, fraction: f64) -> String {
     let (piece, t) = beam.line.locate(fraction);
     let whole = |n: &usize| {
         let place = t * (n * beam.order) as f64;
@@ -189,7 +191,7 @@ fn propose(beam: &MeshBeam, fraction: f64) -> String {
     match (now.max(1)..=10_000).find(whole) {
         Some(n) if beam.line.pieces.len() == 1 => format!("`elements = {n}` puts a node there"),
         Some(n) => format!("{n} `elements` on piece {} put a node there", piece + 1),
-        None => "split the beam there: name the point in `through`".into(),
+        None => "no element count puts a node there".into(),
     }
 }
 

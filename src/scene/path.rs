@@ -38,6 +38,8 @@ pub struct CentreLine {
     pub pieces: Vec<Piece>,
     /// Arc length of all
     pub length: f64,
+    /// Arc length before each piece
+    before: Vec<f64>,
     twist: [f64; 2],
 }
 
@@ -79,6 +81,17 @@ impl Piece {
 }
 
 impl CentreLine {
+    /// The line through these pieces.
+    fn new(pieces: Vec<Piece>, twist: [f64; 2]) -> Self {
+        let mut length = 0.0;
+        let mut before = Vec::with_capacity(pieces.len());
+        for piece in &pieces {
+            before.push(length);
+            length += piece.length;
+        }
+        Self { pieces, length, before, twist }
+    }
+
     /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the beam's length.
     pub fn axes(&self, piece: usize, e1: Vec3, s: f64) -> Mat3 {
         let axes = self.pieces[piece].untwisted_axes(e1);
@@ -93,20 +106,14 @@ impl CentreLine {
 
     /// The fraction of the beam's length at the fraction `t` of a piece.
     pub fn fraction(&self, piece: usize, t: f64) -> f64 {
-        let before: f64 = self.pieces[..piece].iter().map(|p| p.length).sum();
-        (before + t * self.pieces[piece].length) / self.length
+        (self.before[piece] + t * self.pieces[piece].length) / self.length
     }
 
     /// The piece and the fraction in it at the fraction `s` of the beam's length.
     pub fn locate(&self, s: f64) -> (usize, f64) {
-        let mut along = s * self.length;
-        for (number, piece) in self.pieces.iter().enumerate() {
-            if along <= piece.length * (1.0 + 1e-12) || number + 1 == self.pieces.len() {
-                return (number, (along / piece.length).clamp(0.0, 1.0));
-            }
-            along -= piece.length;
-        }
-        (0, 0.0)
+        let along = s * self.length;
+        let number = self.before.partition_point(|&before| before * (1.0 + 1e-12) < along).max(1) - 1;
+        (number, ((along - self.before[number]) / self.pieces[number].length).clamp(0.0, 1.0))
     }
 
     /// The fraction of the length at which a place lies on the line, if it does.
@@ -145,8 +152,7 @@ pub fn centre_line(
             vec![arc(beam, [a, b, c], given.as_ref(), &points[1].span)?]
         }
     };
-    let length = pieces.iter().map(|p| p.length).sum();
-    Ok(CentreLine { pieces, length, twist: beam.twist.unwrap_or([0.0; 2]) })
+    Ok(CentreLine::new(pieces, beam.twist.unwrap_or([0.0; 2])))
 }
 
 fn line(
@@ -237,7 +243,7 @@ mod tests {
     #[test]
     fn axes_are_right_handed_and_twist_about_the_tangent() {
         let quarter = piece([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]]);
-        let line = CentreLine { length: quarter.length, pieces: vec![quarter], twist: [0.0, PI / 2.0] };
+        let line = CentreLine::new(vec![quarter], [0.0, PI / 2.0]);
         let e1 = line.pieces[0].tangent(1.0);
         let (plain, turned) = (line.pieces[0].untwisted_axes(e1), line.axes(0, e1, 1.0));
         assert!((plain.column(0).cross(plain.column(1)) - plain.column(2)).norm() < 1e-15);

@@ -68,7 +68,7 @@ impl Convergence {
                 SlotKind::Rotation => (model.length, noise.moment),
             };
             let allowed = (self.tolerance * force * arm).max(NOISE_FACTOR * noise);
-            let size = value.norm();
+            let size = value.size();
             let ratio = if size == 0.0 { 0.0 } else { size / allowed };
             // NaN compares with nothing, so it is let in by hand.
             if ratio > worst.ratio || ratio.is_nan() {
@@ -87,8 +87,8 @@ fn largest_force(model: &Model, system: &System) -> f64 {
         let total = system.total(slot);
         let held = total - free_part(&system.pattern.equations, slot as Slot, total);
         let parts = [system.force[0][slot], system.force[1][slot], system.force[2][slot], held];
-        let squared = parts.iter().map(|f| f.squared()).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
-        let force = squared.sqrt() / arm;
+        let size = parts.iter().map(|f| f.size()).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
+        let force = size / arm;
         if force > largest || force.is_nan() {
             largest = force;
         }

@@ -26,8 +26,8 @@ pub struct NullVector {
     pub entries: Vec<f64>,
 }
 
-/// x.Jx over sum |x_i J_ij x_j| below which a direction has no stiffness but round-off.
-const NO_STIFFNESS: f64 = 4.0 * f64::EPSILON;
+/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
+const NO_STIFFNESS: f64 = 8.0;
 
 impl LinearSolver {
     /// Analyses a pattern. `None` where memory for it cannot be had.
@@ -72,6 +72,9 @@ impl LinearSolver {
     /// Looks for a direction in which the tangent has no stiffness, by inverse iteration with the last factorisation.
     /// Unknowns are scaled by their diagonal, so that forces and moments compare.
     pub fn null_vector(&mut self, system: &System) -> Option<NullVector> {
+        if system.pattern.equations.count() == 0 {
+            return None;
+        }
         if let Some(empty) = empty_column(system) {
             let mut entries = vec![0.0; system.pattern.equations.count()];
             entries[empty] = 1.0;
@@ -120,11 +123,7 @@ fn structure(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
 /// Where the diagonal entry of each column is stored.
 fn diagonal_places(system: &System) -> Vec<Option<usize>> {
     let pattern = &system.pattern;
-    let place = |column: usize| {
-        let (start, end) = (pattern.column_starts[column] as usize, pattern.column_starts[column + 1] as usize);
-        pattern.rows[start..end].binary_search(&(column as u32)).ok().map(|k| start + k)
-    };
-    (0..pattern.equations.count()).map(place).collect()
+    (0..pattern.equations.count()).map(|k| pattern.find(k as u32, k as u32)).collect()
 }
 
 fn diagonal(system: &System) -> Vec<f64> {
@@ -138,16 +137,19 @@ fn empty_column(system: &System) -> Option<usize> {
         .find(|&c| system.values[starts[c] as usize..starts[c + 1] as usize].iter().all(|&v| v == 0.0))
 }
 
-/// |x.Jx| over sum |x_i J_ij x_j|
+/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated (Neumaier 1974), so that
+/// fine meshes of slender beams, whose softest motions are nearly free, are not taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     let starts = &system.pattern.column_starts;
-    let (mut sum, mut size) = (0.0, 0.0);
+    let (mut sum, mut lost, mut squares) = (0.0_f64, 0.0, 0.0);
     for column in 0..x.len() {
         for k in starts[column] as usize..starts[column + 1] as usize {
             let term = x[system.pattern.rows[k] as usize] * system.values[k] * x[column];
-            sum += term;
-            size += term.abs();
+            let next = sum + term;
+            lost += if sum.abs() >= term.abs() { (sum - next) + term } else { (term - next) + sum };
+            sum = next;
+            squares += term * term;
         }
     }
-    if size == 0.0 { 0.0 } else { sum.abs() / size }
+    if squares == 0.0 { 0.0 } else { (sum + lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }

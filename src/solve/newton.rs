@@ -41,6 +41,13 @@ pub enum NewtonFailure {
         /// Iterations spent
         iterations: usize,
     },
+    /// A prescribed rotation goes too far at once.
+    TurnsTooFar {
+        /// Of this slot
+        slot: usize,
+        /// Radians
+        angle: f64,
+    },
     /// The tangent cannot be solved with.
     Singular(Option<NullVector>),
     /// A force is not finite.

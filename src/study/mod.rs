@@ -4,4 +4,4 @@ mod compare;
 mod verify;
 
 pub use compare::{Comparison, compare};
-pub use verify::{Judgement, Recorder, judge};
+pub use verify::{Judgement, Recorder, expected_failure, judge};

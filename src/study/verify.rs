@@ -71,14 +71,7 @@ pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Count
     }
     for (expectation, rows) in recorder.expectations.iter().zip(&recorder.rows) {
         judgements.push(match &expectation.kind {
-            ExpectationKind::Fails => Judgement {
-                what: "the run".into(),
-                expected: expectation.name.clone(),
-                came: came.into(),
-                error: None,
-                ratio: None,
-                holds: came == expectation.name,
-            },
+            ExpectationKind::Fails => expected_failure(&expectation.name, came),
             ExpectationKind::Counter { name, bounds } => {
                 hold(expectation.name.clone(), bounds, Some(counter(counters, name) as f64))
             }
@@ -88,6 +81,18 @@ pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Count
         });
     }
     judgements
+}
+
+/// The judgement of an expected failure.
+pub fn expected_failure(expected: &str, came: &str) -> Judgement {
+    Judgement {
+        what: "the run".into(),
+        expected: expected.into(),
+        came: came.into(),
+        error: None,
+        ratio: None,
+        holds: came == expected,
+    }
 }
 
 fn counter(counters: &Counters, name: &str) -> u64 {

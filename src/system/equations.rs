@@ -39,7 +39,8 @@ impl Equations {
         let mut axes: Vec<Vec<Vec3>> = vec![Vec::new(); slots];
         for direction in held {
             let known = &mut axes[direction.slot as usize];
-            if known.iter().any(|a| a.dot(direction.axis).abs() > 1.0 - 1e-9) {
+            let spans = known.len() == 3;
+            if spans || known.iter().any(|a| a.dot(direction.axis).abs() > 1.0 - 1e-9) {
                 continue;
             }
             if known.iter().any(|a| a.dot(direction.axis).abs() > 1e-9) {

@@ -100,7 +100,9 @@ impl Pattern {
             places.starts.push(places.values.len());
             let equations: Vec<u32> = slots.iter().flat_map(|&slot| self.equations.of(slot)).collect();
             for &row in &equations {
-                places.values.extend(equations.iter().map(|&column| self.place(row, column)));
+                places.values.extend(
+                    equations.iter().map(|&column| self.find(row, column).map_or(self.discard(), |k| k as u32)),
+                );
             }
             let turned = slots.iter().any(|&slot| self.equations.frame(slot).is_some());
             places.special.push(turned || equations.contains(&Equations::HELD));
@@ -110,14 +112,14 @@ impl Pattern {
         places
     }
 
-    fn place(&self, row: u32, column: u32) -> u32 {
+    /// Where an entry is stored: `None` for held directions, and for pairs that no effect couples.
+    pub fn find(&self, row: u32, column: u32) -> Option<usize> {
         if row == Equations::HELD || column == Equations::HELD {
-            return self.discard();
+            return None;
         }
         let start = self.column_starts[column as usize] as usize;
         let end = self.column_starts[column as usize + 1] as usize;
-        let found = self.rows[start..end].binary_search(&row).expect("every coupled pair is in the pattern");
-        (start + found) as u32
+        self.rows[start..end].binary_search(&row).ok().map(|k| start + k)
     }
 }
 

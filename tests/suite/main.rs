@@ -4,6 +4,7 @@ mod bad_decks;
 mod coefficients;
 mod command;
 mod convergence;
+mod corners;
 mod decks;
 mod dual;
 mod failures;
