@@ -46,7 +46,13 @@ impl Vec3<f64> {
     /// |a| without underflow or overflow of squares.
     pub fn size(self) -> f64 {
         let scale = self.max_abs();
-        if scale == 0.0 || !scale.is_finite() { scale } else { self.scale(1.0 / scale).norm() * scale }
+        match scale {
+            // Squares are safe.
+            1e-140..=1e140 => self.norm(),
+            // So are reciprocals.
+            1e-300..=1e300 => self.scale(1.0 / scale).norm() * scale,
+            _ => scale,
+        }
     }
 
     /// Whether every component is finite.
@@ -314,5 +320,21 @@ impl<T: Real> Mul for Mat3<T> {
     fn mul(self, other: Self) -> Self {
         let b = other.0;
         Self(three(|i| three(|j| self.0[i][0] * b[0][j] + self.0[i][1] * b[1][j] + self.0[i][2] * b[2][j])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_neither_underflow_nor_overflow() {
+        for scale in [1e-310, 1e-200, 1e-50, 1.0, 1e100, 1e200, 1e305] {
+            let size = Vec3([3.0 * scale, 0.0, 4.0 * scale]).size();
+            assert!(size >= 4.0 * scale && size <= 5.1 * scale, "{scale:e}: {size:e}");
+        }
+        assert_eq!(Vec3::ZERO.size(), 0.0);
+        assert!(Vec3([1.0, f64::NAN, 2.0]).size().is_nan());
+        assert!(Vec3([f64::INFINITY, 0.0, 0.0]).size().is_infinite());
     }
 }

@@ -157,3 +157,12 @@ fn a_number_that_is_too_large_is_an_error_and_not_dropped() {
     let huge = format!("[param]\nF = 0x{}\n{}", "f".repeat(40), arm(2, SECTION, &format!("{CLAMP}{load}{STATIC}")));
     assert!(scene::from_text(&huge).is_err());
 }
+
+/// Forces that die out along a fine mesh pass through the smallest numbers there are.
+#[test]
+fn the_smallest_forces_do_no_harm() {
+    let stage = "[[stage]]\nkind = \"dynamic\"\nend = 0.05\nstep = 0.01\n";
+    let rest = format!("{CLAMP}[[load]]\nat = \"tip\"\nforce = [0, 0, 5]\n{stage}");
+    let simulation = simulate(&arm(1000, "EA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [2, 1, 1]", &rest));
+    assert!(simulation.end("tip.uz") > 0.0);
+}
