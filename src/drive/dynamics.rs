@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::integrate::Newmark;
-use crate::model::{StageKind, charts};
+use crate::model::charts;
 use crate::solve::NewtonFailure;
 
 impl Run<'_> {
@@ -41,9 +41,8 @@ impl Run<'_> {
         let solved = match self.model.set_clock(&mut self.state, next, 1.0) {
             Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
             None => {
-                let Workshop { assembly, solver, newton, .. } = &mut *workshop;
-                let (work, kind) = (&mut self.counters.work, StageKind::Dynamic);
-                newton.solve(&self.model, assembly, solver, &mut self.state, &method, kind, None, work)
+                let Workshop { assembly, newton, .. } = &mut *workshop;
+                newton.solve(&self.model, assembly, &mut self.state, &method, None, &mut self.counters.work)
             }
         };
         if let Err(failure) = solved {

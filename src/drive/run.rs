@@ -157,7 +157,6 @@ pub struct Run<'o> {
 /// What one stage works with.
 pub(super) struct Workshop {
     pub assembly: Assembly,
-    pub solver: LinearSolver,
     pub newton: Newton,
     /// Increments of prescribed directions in a load step
     pub lift: Vec<Vec3>,
@@ -212,15 +211,14 @@ impl<'o> Run<'o> {
         let kind = stage.work.kind();
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
-        let count = equations.count();
         let slots = self.model.slots.len();
         let assembly = Assembly::new(self.model.acting(kind), equations, slots);
         let Some(solver) = LinearSolver::new(&assembly.system.pattern) else {
             return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
         };
         let convergence = Convergence { tolerance: stage.tolerance };
-        let newton = Newton::new(convergence, stage.max_iterations, count, slots);
-        Ok(Workshop { assembly, solver, newton, lift: vec![Vec3::ZERO; slots], until: stage.until.clone() })
+        let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
+        Ok(Workshop { assembly, newton, lift: vec![Vec3::ZERO; slots], until: stage.until.clone() })
     }
 
     /// The first dynamic stage gives the initial velocities.

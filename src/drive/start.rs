@@ -30,7 +30,8 @@ impl Run<'_> {
     }
 
     fn solve_accelerations(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
-        let Workshop { assembly, solver, .. } = workshop;
+        let Workshop { assembly, newton, .. } = workshop;
+        let solver = &mut newton.solver;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::MASS, None);
         if (0..self.state.q.len()).any(|slot| !assembly.system.total(slot).is_finite()) {

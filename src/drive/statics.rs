@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
-use crate::model::{StageKind, charts};
+use crate::model::charts;
 use crate::solve::NewtonFailure;
 use crate::tensor::Vec3;
 
@@ -39,10 +39,11 @@ impl Run<'_> {
         charts::switch(&mut self.state, &self.model.rotations, 0.0);
         charts::freeze(&mut self.state, &self.model.elements);
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        if workshop.solver.factorise(&workshop.assembly.system)
-            && let Some(vector) = workshop.solver.null_vector(&workshop.assembly.system)
+        let Workshop { assembly, newton, .. } = &mut *workshop;
+        if newton.solver.factorise(&assembly.system)
+            && let Some(vector) = newton.solver.null_vector(&assembly.system)
         {
-            return Err(self.name_mechanism(Some(vector), &workshop.assembly.system));
+            return Err(self.name_mechanism(Some(vector), &assembly.system));
         }
         self.open_account(workshop)
     }
@@ -86,7 +87,7 @@ impl Run<'_> {
     /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the
     /// state and handed to Newton as increments.
     fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
-        let Workshop { assembly, solver, newton, lift, .. } = workshop;
+        let Workshop { assembly, newton, lift, .. } = workshop;
         lift.copy_from_slice(&self.state.q);
         let time = self.state.time;
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
@@ -99,7 +100,7 @@ impl Run<'_> {
         }
         let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
         let work = &mut self.counters.work;
-        newton.solve(&self.model, assembly, solver, &mut self.state, &Equilibrium, StageKind::Static, moved, work)
+        newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)
     }
 
     fn static_progress(&self, load: f64) -> f64 {

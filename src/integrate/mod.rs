@@ -16,6 +16,11 @@ pub trait Method {
 
     /// Adds a correction of the unknowns.
     fn correct(&self, state: &mut State, dq: &[Vec3]);
+
+    /// Whether nodes change their charts while the step is iterated; else between steps.
+    fn changes_charts(&self) -> bool {
+        false
+    }
 }
 
 /// Statics: the unknowns alone.
@@ -29,5 +34,9 @@ impl Method for Equilibrium {
 
     fn correct(&self, state: &mut State, dq: &[Vec3]) {
         state.q.iter_mut().zip(dq).for_each(|(q, &dq)| *q += dq);
+    }
+
+    fn changes_charts(&self) -> bool {
+        true
     }
 }

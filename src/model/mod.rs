@@ -38,6 +38,13 @@ pub struct SlotInfo {
     pub place: Vec3,
 }
 
+impl SlotInfo {
+    /// What turns the forces of this slot into forces that compare: a length for moments, 1 for forces.
+    pub fn arm(&self, length: f64) -> f64 {
+        if self.kind == SlotKind::Rotation { length } else { 1.0 }
+    }
+}
+
 /// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
 #[derive(Clone)]
 pub struct Model {

@@ -51,7 +51,8 @@ pub const NODE_GROUPS: [(&str, &[&str]); 12] = [
     ("u", &["ux", "uy", "uz"]),
     ("x", &["x", "y", "z"]),
     ("r", &["rx", "ry", "rz"]),
-    ("rc", &["rcx", "rcy", "rcz"]),
+    // A history holds one of the two: they have the same columns.
+    ("rc", &["rx", "ry", "rz"]),
     ("d", &["d1x", "d1y", "d1z", "d2x", "d2y", "d2z", "d3x", "d3y", "d3z"]),
     ("v", &["vx", "vy", "vz"]),
     ("w", &["wx", "wy", "wz"]),

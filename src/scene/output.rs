@@ -84,9 +84,7 @@ impl Columns<'_> {
             "resultant" => Quantity::Resultant(self.beam_point(node, &found)?),
             _ => Quantity::Strain(self.beam_point(node, &found)?),
         };
-        // The continued rotation vector has the columns of the rotation vector: a history holds one of the two.
-        let columns = if group == "rc" { "r" } else { group };
-        let names = suffixes(columns).unwrap_or_default().iter().map(|suffix| format!("{}.{suffix}", node.value));
+        let names = suffixes(group).unwrap_or_default().iter().map(|suffix| format!("{}.{suffix}", node.value));
         Ok(Probe { names: names.collect(), quantity })
     }
 

@@ -1,7 +1,7 @@
 //! The stop test of Newton's iteration, in terms that do not depend on units.
 
 use crate::effect::Noise;
-use crate::model::{Model, SlotKind};
+use crate::model::{Model, SlotInfo, SlotKind};
 use crate::system::{Equations, Slot, System};
 use crate::tensor::Vec3;
 
@@ -63,11 +63,8 @@ impl Convergence {
         let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force };
         for (slot, info) in model.slots.iter().enumerate() {
             let value = free_part(&system.pattern.equations, slot as Slot, system.total(slot));
-            let (arm, noise) = match info.kind {
-                SlotKind::Displacement => (1.0, noise.force),
-                SlotKind::Rotation => (model.length, noise.moment),
-            };
-            let allowed = (self.tolerance * force * arm).max(NOISE_FACTOR * noise);
+            let noise = if info.kind == SlotKind::Rotation { noise.moment } else { noise.force };
+            let allowed = (self.tolerance * force * info.arm(model.length)).max(NOISE_FACTOR * noise);
             let size = value.size();
             let ratio = if size == 0.0 { 0.0 } else { size / allowed };
             // NaN compares with nothing, so it is let in by hand.
@@ -83,12 +80,11 @@ impl Convergence {
 fn largest_force(model: &Model, system: &System) -> f64 {
     let mut largest = 0.0_f64;
     for (slot, info) in model.slots.iter().enumerate() {
-        let arm = if info.kind == SlotKind::Rotation { model.length } else { 1.0 };
         let total = system.total(slot);
         let held = total - free_part(&system.pattern.equations, slot as Slot, total);
         let parts = [system.force[0][slot], system.force[1][slot], system.force[2][slot], held];
         let size = parts.iter().map(|f| f.size()).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
-        let force = size / arm;
+        let force = size / info.arm(model.length);
         if force > largest || force.is_nan() {
             largest = force;
         }
@@ -104,9 +100,6 @@ fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
 
 /// The largest correction, displacements over the length of the scene.
 pub(super) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
-    let size = |(info, dq): (&crate::model::SlotInfo, &Vec3)| match info.kind {
-        SlotKind::Displacement => dq.norm() / model.length,
-        SlotKind::Rotation => dq.norm(),
-    };
+    let size = |(info, dq): (&SlotInfo, &Vec3)| dq.norm() * info.arm(model.length) / model.length;
     model.slots.iter().zip(dq).map(size).fold(0.0, f64::max)
 }

@@ -3,8 +3,8 @@
 use super::convergence::{Convergence, Residual, Verdict, correction};
 use super::linear::{LinearSolver, NullVector};
 use crate::integrate::Method;
-use crate::model::{Assembly, Model, StageKind, charts};
-use crate::system::State;
+use crate::model::{Assembly, Model, charts};
+use crate::system::{State, System};
 use crate::tensor::Vec3;
 use std::time::Instant;
 
@@ -69,12 +69,14 @@ impl NewtonFailure {
     }
 }
 
-/// The iteration with its scratch.
+/// The iteration with its linear solver and its scratch.
 pub struct Newton {
     /// When to stop
     pub convergence: Convergence,
     /// Linear solves allowed
     pub max_iterations: usize,
+    /// Solves with the tangent
+    pub solver: LinearSolver,
     right_hand_side: Vec<f64>,
     dq: Vec<Vec3>,
 }
@@ -84,27 +86,25 @@ const RUNAWAY: f64 = 1e6;
 
 impl Newton {
     /// For a stage with these unknowns.
-    pub fn new(convergence: Convergence, max_iterations: usize, equations: usize, slots: usize) -> Self {
-        Self { convergence, max_iterations, right_hand_side: vec![0.0; equations], dq: vec![Vec3::ZERO; slots] }
+    pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
+        let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
+        let (right_hand_side, dq) = (vec![0.0; equations], vec![Vec3::ZERO; slots]);
+        Self { convergence, max_iterations, solver, right_hand_side, dq }
     }
 
     /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
     /// in with the first correction, so that the rest of the structure follows them linearly.
-    #[allow(clippy::too_many_arguments)]
     pub fn solve(
         &mut self,
         model: &Model,
         assembly: &mut Assembly,
-        solver: &mut LinearSolver,
         state: &mut State,
         method: &dyn Method,
-        kind: StageKind,
-        lift: Option<&[Vec3]>,
+        mut lift: Option<&[Vec3]>,
         work: &mut Work,
     ) -> Result<(), NewtonFailure> {
         assembly.forget();
         let noise = assembly.noise(state);
-        let mut lift = lift;
         let mut iterations = 0;
         loop {
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), lift));
@@ -118,15 +118,14 @@ impl Newton {
                 }
                 _ => {}
             }
-            self.find_correction(assembly, solver, lift, work)?;
+            self.find_correction(&assembly.system, lift.take(), work)?;
             iterations += 1;
             if correction(model, &self.dq) > RUNAWAY {
                 return Err(NewtonFailure::NotConverged { residual, iterations });
             }
             assembly.extrapolate(state, &self.dq);
             method.correct(state, &self.dq);
-            lift = None;
-            if kind == StageKind::Static {
+            if method.changes_charts() {
                 self.change_charts(model, state, work);
             }
         }
@@ -135,21 +134,19 @@ impl Newton {
     /// Solves J dq = -g; held directions take their part of `lift`.
     fn find_correction(
         &mut self,
-        assembly: &Assembly,
-        solver: &mut LinearSolver,
+        system: &System,
         lift: Option<&[Vec3]>,
         work: &mut Work,
     ) -> Result<(), NewtonFailure> {
-        let system = &assembly.system;
-        system.right_hand_side(&mut self.right_hand_side);
+        let Self { solver, right_hand_side, .. } = self;
+        system.right_hand_side(right_hand_side);
         work.factorisations += 1;
         work.iterations += 1;
-        let right_hand_side = &mut self.right_hand_side;
         let solved = timed(&mut work.solve_seconds, || solver.factorise(system) && solver.solve(right_hand_side));
         if !solved {
             return Err(NewtonFailure::Singular(solver.null_vector(system)));
         }
-        system.pattern.equations.scatter(&self.right_hand_side, lift, &mut self.dq);
+        system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
         Ok(())
     }
 
