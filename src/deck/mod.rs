@@ -22,7 +22,7 @@ pub use geometry::{Beam, MOST_ELEMENTS, Material, Path, PointRef, Section, Secti
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use procedure::{
-    Effects, Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, Stage, StageBody, Until,
+    Effects, Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, SchemeWord, Stage, StageBody, Until,
 };
 
 use reader::{Context, Table};

@@ -29,17 +29,28 @@ pub enum StageBody {
         /// Smaller steps where one fails
         adaptive: bool,
     },
-    /// Newmark
+    /// Time steps
     Dynamic {
         /// On the run's clock
         end: f64,
-        /// Step
+        /// Step, or the first one
         step: f64,
-        /// beta
-        beta: f64,
-        /// gamma
-        gamma: f64,
+        /// The method
+        scheme: SchemeWord,
+        /// Tolerance of the local error, where steps adapt to it
+        step_tolerance: Option<f64>,
     },
+}
+
+/// `scheme = …` with its coefficients.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SchemeWord {
+    /// beta, gamma
+    Newmark(f64, f64),
+    /// alpha
+    Hht(f64),
+    /// rho_inf
+    GeneralizedAlpha(f64),
 }
 
 /// `until = { column = …, below = …, above = … }`
@@ -218,37 +229,67 @@ fn read_static(table: &Table) -> Option<StageBody> {
 
 fn read_dynamic(table: &Table) -> Option<StageBody> {
     let context = table.context;
-    let scheme = table.word("scheme", &["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"]);
-    if let Some(word) = scheme.as_ref().filter(|word| word.value != "newmark") {
-        return context.wrong(word.span.clone(), format!("scheme = \"{}\" is not supported yet", word.value));
-    }
-    for (key, owner) in [("alpha", "hht"), ("rho_inf", "generalized_alpha")] {
-        if table.has(key) {
-            let message = format!("`{key}` belongs to scheme = \"{owner}\"");
-            context.report(Diagnostic::error(message, table.key_span(key)));
-        }
-    }
-    if table.flag("adaptive") == Some(true) {
-        let message = "adaptive = true in a dynamic stage is not supported yet";
-        context.report(Diagnostic::error(message, table.key_span("adaptive")));
-    }
-    if table.has("step_tolerance") {
-        let message = "`step_tolerance` belongs to adaptive = true, which is not supported yet in a dynamic stage";
-        context.report(Diagnostic::error(message, table.key_span("step_tolerance")));
-    }
+    let scheme = read_scheme(table);
+    let step_tolerance = read_step_tolerance(table);
     table.required("end");
     table.required("step");
     let (end, step) = (table.positive("end"), table.positive("step"));
-    let or =
-        |key: &str, default: f64| if table.has(key) { table.positive(key).map(|v| v.value) } else { Some(default) };
-    let (beta, gamma) = (or("beta", 0.25), or("gamma", 0.5));
     let (end, step) = (end?, step?);
     if end.value / step.value > MOST_STEPS as f64 {
         let message = format!("{:.3e} steps are more than the largest supported {MOST_STEPS}", end.value / step.value);
         context.report(Diagnostic::limit(message, step.span));
         return None;
     }
-    Some(StageBody::Dynamic { end: end.value, step: step.value, beta: beta?, gamma: gamma? })
+    Some(StageBody::Dynamic { end: end.value, step: step.value, scheme: scheme?, step_tolerance: step_tolerance? })
+}
+
+/// The coefficients that each scheme has.
+const COEFFICIENTS: [(&str, &str); 4] =
+    [("beta", "newmark"), ("gamma", "newmark"), ("alpha", "hht"), ("rho_inf", "generalized_alpha")];
+
+fn read_scheme(table: &Table) -> Option<SchemeWord> {
+    let context = table.context;
+    let words = ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"];
+    let scheme = if table.has("scheme") { table.word("scheme", &words)?.value } else { "newmark" };
+    for (key, owner) in COEFFICIENTS.into_iter().filter(|(key, owner)| table.has(key) && !scheme.ends_with(owner)) {
+        let message = format!("`{key}` belongs to scheme = \"{owner}\"");
+        context.report(Diagnostic::error(message, table.key_span(key)));
+    }
+    let within = |key: &str, default: f64, most: f64| {
+        if !table.has(key) {
+            return Some(default);
+        }
+        let number = table.number(key)?;
+        if (0.0..=most).contains(&number.value) {
+            return Some(number.value);
+        }
+        context.wrong(number.span, format!("`{key}` lies from 0 to {most}, found {}", number.value))
+    };
+    let positive =
+        |key: &str, default: f64| if table.has(key) { table.positive(key).map(|v| v.value) } else { Some(default) };
+    match scheme {
+        "newmark" => {
+            let (beta, gamma) = (positive("beta", 0.25), positive("gamma", 0.5));
+            Some(SchemeWord::Newmark(beta?, gamma?))
+        }
+        "hht" => within("alpha", 0.05, 1.0 / 3.0).map(SchemeWord::Hht),
+        "generalized_alpha" => within("rho_inf", 0.9, 1.0).map(SchemeWord::GeneralizedAlpha),
+        other => context.wrong(table.key_span("scheme"), format!("scheme = \"{other}\" is not supported yet")),
+    }
+}
+
+/// `Some(None)` where steps are fixed.
+fn read_step_tolerance(table: &Table) -> Option<Option<f64>> {
+    let adaptive = if table.has("adaptive") { table.flag("adaptive")? } else { false };
+    let tolerance = if table.has("step_tolerance") { table.positive("step_tolerance")?.value } else { 1e-4 };
+    if adaptive {
+        return Some(Some(tolerance));
+    }
+    if table.has("step_tolerance") {
+        let message = "`step_tolerance` belongs to adaptive = true";
+        table.context.report(Diagnostic::error(message, table.key_span("step_tolerance")));
+    }
+    Some(None)
 }
 
 fn read_tolerance(table: &Table) -> Option<f64> {

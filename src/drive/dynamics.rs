@@ -1,132 +1,142 @@
-//! Time stepping.
+//! Time stepping: with fixed steps, or with steps that adapt to their local error.
 
+use super::control::Control;
 use super::failure::Failure;
+use super::grid::Grid;
 use super::run::{Run, Workshop};
-use crate::integrate::Newmark;
+use crate::integrate::{Scheme, Step};
 use crate::model::charts;
 use crate::solve::NewtonFailure;
 
 impl Run<'_> {
-    /// All steps of a dynamic stage: rows at start + k step, the last one at `end`.
+    /// All steps of a dynamic stage, up to `end` on the run's clock.
     pub(super) fn run_dynamic(
         &mut self,
         workshop: &mut Workshop,
         end: f64,
         step: f64,
-        beta: f64,
-        gamma: f64,
+        scheme: Scheme,
+        adaptive: Option<f64>,
     ) -> Result<(), Failure> {
         self.start_dynamic(workshop)?;
+        let mut before = step;
+        match adaptive {
+            None => self.run_fixed(workshop, end, step, scheme, &mut before),
+            Some(tolerance) => self.run_adaptive(workshop, end, Control::new(tolerance, step, scheme), &mut before),
+        }
+    }
+
+    /// Rows at start + k step, the last one at `end`; a step that fails ends the run.
+    fn run_fixed(
+        &mut self,
+        workshop: &mut Workshop,
+        end: f64,
+        step: f64,
+        scheme: Scheme,
+        before: &mut f64,
+    ) -> Result<(), Failure> {
         while self.state.time < end {
             let grid = self.next_grid(end, step);
             for number in 1..=grid.steps {
-                let (next, h) = grid.step(number);
+                let (next, length) = grid.step(number);
                 self.observer.progress(self.moment(), self.dynamic_progress(next, end))?;
-                self.advance(workshop, Newmark { beta, gamma, step: h }, next)?;
-                self.counters.steps += 1;
-                self.show(workshop)?;
-                if self.is_over(workshop) {
+                let step = Step { scheme, length };
+                if let Err(failure) = self.advance(workshop, step, *before, next) {
+                    return Err(self.give_up(workshop, failure));
+                }
+                *before = length;
+                if self.complete(workshop, &step)? {
                     return Ok(());
                 }
-                self.change_charts();
             }
         }
         Ok(())
     }
 
-    /// Predict, prescribe, iterate, account.
-    fn advance(&mut self, workshop: &mut Workshop, method: Newmark, next: f64) -> Result<(), Failure> {
-        self.good.copy_from(&self.state);
-        method.predict(&mut self.state);
-        let solved = match self.model.set_clock(&mut self.state, next, 1.0) {
-            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
-            None => {
-                let Workshop { assembly, newton, .. } = &mut *workshop;
-                newton.solve(&self.model, assembly, &mut self.state, &method, None, &mut self.counters.work)
+    /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller one.
+    fn run_adaptive(
+        &mut self,
+        workshop: &mut Workshop,
+        end: f64,
+        mut control: Control,
+        before: &mut f64,
+    ) -> Result<(), Failure> {
+        while self.state.time < end {
+            let (next, length) = control.propose(self.state.time, self.next_stop(end));
+            self.observer.progress(self.moment(), self.dynamic_progress(next, end))?;
+            let step = Step { scheme: control.scheme, length };
+            let tried = self.advance(workshop, step, *before, next);
+            let taken = match tried {
+                Ok(()) => control.judge(length, control.error(&self.model, &self.good, &self.state, length)),
+                Err(failure) if control.is_smallest() => return Err(self.give_up(workshop, failure)),
+                Err(_) => control.fail(length),
+            };
+            if taken {
+                *before = length;
+                if self.complete(workshop, &step)? {
+                    return Ok(());
+                }
+            } else {
+                self.state.copy_from(&self.good);
+                self.counters.cutbacks += 1;
             }
-        };
-        if let Err(failure) = solved {
-            let named = self.name_failure(failure, &workshop.assembly.system);
-            self.state.copy_from(&self.good);
-            return Err(named);
         }
-        self.accept(workshop)
+        Ok(())
     }
 
-    /// Between steps, nodes beyond pi change their chart, and elements settle theirs.
-    pub(super) fn change_charts(&mut self) {
-        let switched = charts::switch(&mut self.state, &self.model.rotations, charts::DYNAMIC_BAND);
+    /// One attempt at a step: predict, prescribe, iterate.
+    fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
+        self.good.copy_from(&self.state);
+        step.predict(&mut self.state, before);
+        if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
+            return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
+        }
+        let Workshop { assembly, newton, .. } = workshop;
+        newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)
+    }
+
+    /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.
+    fn complete(&mut self, workshop: &mut Workshop, step: &Step) -> Result<bool, Failure> {
+        self.accept(workshop)?;
+        self.counters.steps += 1;
+        self.show(workshop)?;
+        if self.is_over(workshop) {
+            return Ok(true);
+        }
+        self.change_charts(step.scheme.lag() * step.length);
+        Ok(false)
+    }
+
+    /// Names the failure and goes back to the last good state.
+    fn give_up(&mut self, workshop: &Workshop, failure: NewtonFailure) -> Failure {
+        let named = self.name_failure(failure, &workshop.assembly.system);
+        self.state.copy_from(&self.good);
+        named
+    }
+
+    /// Between steps, nodes beyond pi change their chart, and elements settle theirs. `lag`: see [`charts::switch`].
+    pub(super) fn change_charts(&mut self, lag: f64) {
+        let switched = charts::switch(&mut self.state, &self.model.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
         charts::freeze(&mut self.state, &self.model.elements);
     }
 
     /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the next of those.
     fn next_grid(&self, end: f64, step: f64) -> Grid {
-        let start = self.state.time;
-        let Some(interval) = self.plan.interval else { return Grid::over(start, end, step) };
-        let next = ((start / interval + 1e-9).floor() + 1.0) * interval;
-        let last = next >= end - 1e-9 * interval;
-        Grid::equal(start, if last { end } else { next }, step)
+        let stop = self.next_stop(end);
+        let over = if self.plan.interval.is_some() { Grid::equal } else { Grid::over };
+        over(self.state.time, stop, step)
+    }
+
+    /// The next instant that must be hit.
+    fn next_stop(&self, end: f64) -> f64 {
+        let Some(interval) = self.plan.interval else { return end };
+        let next = ((self.state.time / interval + 1e-9).floor() + 1.0) * interval;
+        if next >= end - 1e-9 * interval { end } else { next }
     }
 
     fn dynamic_progress(&self, time: f64, end: f64) -> f64 {
         let done = if end > 0.0 { (time / end).clamp(0.0, 1.0) } else { 1.0 };
         (self.stage as f64 + done) / self.plan.stages.len() as f64
-    }
-}
-
-/// Steps of one length, the last perhaps shorter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Grid {
-    start: f64,
-    end: f64,
-    step: f64,
-    steps: u64,
-}
-
-impl Grid {
-    /// Steps of length `step`, the last shortened to hit `end`.
-    fn over(start: f64, end: f64, step: f64) -> Self {
-        let steps = ((end - start) / step - 1e-9).ceil().max(1.0);
-        Self { start, end, step, steps: steps as u64 }
-    }
-
-    /// Equal steps not longer than `step`.
-    fn equal(start: f64, end: f64, step: f64) -> Self {
-        let steps = ((end - start) / step - 1e-9).ceil().max(1.0);
-        Self { start, end, step: (end - start) / steps, steps: steps as u64 }
-    }
-
-    /// The end and the length of step `number`, from 1. Times are multiples, not sums, so that they do not drift; steps
-    /// that are equal but for the round-off of times have one length to the last bit.
-    fn step(&self, number: u64) -> (f64, f64) {
-        if number < self.steps {
-            return (self.start + number as f64 * self.step, self.step);
-        }
-        let h = self.end - (self.start + (number - 1) as f64 * self.step);
-        let full = (h - self.step).abs() <= 1e-9 * self.step;
-        (self.end, if full { self.step } else { h })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_last_step_hits_the_end() {
-        let grid = Grid::over(0.0, 1.0, 0.3);
-        assert_eq!(grid.steps, 4);
-        assert_eq!(grid.step(3), (0.3 * 3.0, 0.3));
-        let (end, h) = grid.step(4);
-        assert_eq!(end, 1.0);
-        assert!((h - 0.1).abs() < 1e-15);
-    }
-
-    #[test]
-    fn a_whole_number_of_steps_keeps_its_step() {
-        let grid = Grid::over(0.0, 3.0, 0.01);
-        assert_eq!(grid.steps, 300);
-        assert_eq!(grid.step(300), (3.0, 0.01));
     }
 }

@@ -1,7 +1,9 @@
 //! Runs: stages in sequence, each a loop over levels or steps, and what watches them.
 
+mod control;
 mod dynamics;
 mod failure;
+mod grid;
 mod ledger;
 mod run;
 mod start;

@@ -2,6 +2,7 @@
 
 use super::failure::{Failure, Moment, place};
 use super::ledger::{Bookkeeper, Ledger};
+use crate::integrate::Scheme;
 use crate::model::{Assembly, Jump, Model, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, State, System};
@@ -59,16 +60,16 @@ pub enum StageWork {
         /// Whether a level that fails is approached in smaller steps
         adaptive: bool,
     },
-    /// Newmark's steps
+    /// Time steps
     Dynamic {
         /// Time on the run's clock at which it ends
         end: f64,
-        /// Step
+        /// Step, or the first one
         step: f64,
-        /// beta
-        beta: f64,
-        /// gamma
-        gamma: f64,
+        /// The method
+        scheme: Scheme,
+        /// Tolerance of the local error, where steps adapt to it
+        adaptive: Option<f64>,
     },
 }
 
@@ -128,7 +129,7 @@ pub trait Observer {
 pub struct Counters {
     /// Converged levels and time steps
     pub steps: u64,
-    /// Attempts that were taken back
+    /// Attempts that were taken back: a level or step whose Newton failed, or whose error was too large
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
@@ -195,8 +196,8 @@ impl<'o> Run<'o> {
             let mut workshop = self.open_stage(stage)?;
             let result = match stage.work {
                 StageWork::Static { steps, adaptive } => self.run_static(&mut workshop, steps, adaptive),
-                StageWork::Dynamic { end, step, beta, gamma } => {
-                    self.run_dynamic(&mut workshop, end, step, beta, gamma)
+                StageWork::Dynamic { end, step, scheme, adaptive } => {
+                    self.run_dynamic(&mut workshop, end, step, scheme, adaptive)
                 }
             };
             self.count_evaluations(&workshop.assembly);

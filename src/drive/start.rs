@@ -24,8 +24,9 @@ impl Run<'_> {
         }
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);
-        self.change_charts();
+        self.change_charts(0.0);
         self.solve_accelerations(workshop)?;
+        self.state.algorithmic.copy_from_slice(&self.state.a);
         self.open_account(workshop)
     }
 

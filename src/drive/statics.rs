@@ -32,11 +32,12 @@ impl Run<'_> {
     fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
         self.state.v.fill(Vec3::ZERO);
         self.state.a.fill(Vec3::ZERO);
+        self.state.algorithmic.fill(Vec3::ZERO);
         let time = self.state.time;
         let held = self.state.q.clone();
         self.model.set_clock(&mut self.state, time, 0.0);
         self.state.q = held;
-        charts::switch(&mut self.state, &self.model.rotations, 0.0);
+        charts::switch(&mut self.state, &self.model.rotations, 0.0, 0.0);
         charts::freeze(&mut self.state, &self.model.elements);
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;

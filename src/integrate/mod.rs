@@ -1,9 +1,9 @@
 //! Time integration as coefficients: how a correction of the unknowns changes velocities and accelerations, and with
 //! which weights stiffness, damping and mass enter the tangent.
 
-mod newmark;
+mod alpha;
 
-pub use newmark::Newmark;
+pub use alpha::{Scheme, Step};
 
 use crate::kernel::Weights;
 use crate::system::State;

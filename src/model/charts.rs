@@ -18,8 +18,9 @@ pub const COARSE: f64 = 2.8;
 /// From here on a warning.
 pub const COARSE_WARNING: f64 = PI / 2.0;
 
-/// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left.
-pub fn switch(state: &mut State, rotations: &[Slot], band: f64) -> usize {
+/// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left. `lag` is
+/// the time by which the algorithmic acceleration lies ahead of the state.
+pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: f64) -> usize {
     let mut switched = 0;
     for &slot in rotations {
         let slot = slot as usize;
@@ -29,7 +30,10 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64) -> usize {
             if p.squared() <= (PI + band) * (PI + band) || !p.is_finite() {
                 break;
             }
-            let change = Complement::new(p, state.v[slot], state.a[slot]);
+            let (velocity, acceleration) = (state.v[slot], state.a[slot]);
+            let change = Complement::new(p, velocity, acceleration);
+            let drift = (change.b_rate * acceleration) * 2.0 + change.b_rate2 * velocity;
+            state.algorithmic[slot] = change.b * state.algorithmic[slot] + change.b_rate * velocity + drift * lag;
             state.q[slot] = change.p;
             state.v[slot] = change.velocity;
             state.a[slot] = change.acceleration;

@@ -13,9 +13,10 @@ pub use compose::Reason;
 pub use mesh::{Mesh, MeshBeam};
 pub use section::{MassPerLength, SectionMatrices};
 
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, Spanned, StageBody};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Spanned, StageBody};
 use crate::drive::{InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::rigid_body::Body;
+use crate::integrate::Scheme;
 use crate::model::{Model, SlotInfo, SlotKind};
 use crate::probe::{Probe, Quantity};
 use crate::system::Node;
@@ -201,11 +202,21 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
         });
         let work = match stage.body {
             StageBody::Static { steps, adaptive } => StageWork::Static { steps, adaptive },
-            StageBody::Dynamic { end, step, beta, gamma } => StageWork::Dynamic { end, step, beta, gamma },
+            StageBody::Dynamic { end, step, scheme, step_tolerance } => {
+                StageWork::Dynamic { end, step, scheme: coefficients(scheme), adaptive: step_tolerance }
+            }
         };
         stages.push(Stage { work, tolerance: stage.tolerance, max_iterations: stage.max_iterations, until });
     }
     stages
+}
+
+fn coefficients(scheme: SchemeWord) -> Scheme {
+    match scheme {
+        SchemeWord::Newmark(beta, gamma) => Scheme::newmark(beta, gamma),
+        SchemeWord::Hht(alpha) => Scheme::hht(alpha),
+        SchemeWord::GeneralizedAlpha(rho) => Scheme::generalized_alpha(rho),
+    }
 }
 
 fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Expectation> {

@@ -29,6 +29,8 @@ pub struct State {
     pub v: Vec<Vec3>,
     /// d2q/dt2; zero in static stages.
     pub a: Vec<Vec3>,
+    /// The algorithmic acceleration of generalised-alpha methods; equal to `a` where a method has none of its own.
+    pub algorithmic: Vec<Vec3>,
     /// The factor of each load, valid at `time` and `load`.
     pub amplitude: Vec<f64>,
     /// For each beam element the nodes that are converted into the chart of the first; frozen while Newton iterates.
@@ -48,6 +50,7 @@ impl State {
             q: zero.clone(),
             v: zero.clone(),
             a: zero.clone(),
+            algorithmic: zero.clone(),
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
             wound: zero,
@@ -61,6 +64,7 @@ impl State {
         self.q.copy_from_slice(&other.q);
         self.v.copy_from_slice(&other.v);
         self.a.copy_from_slice(&other.a);
+        self.algorithmic.copy_from_slice(&other.algorithmic);
         self.amplitude.copy_from_slice(&other.amplitude);
         self.mixed.copy_from_slice(&other.mixed);
         self.wound.copy_from_slice(&other.wound);

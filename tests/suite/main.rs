@@ -13,4 +13,5 @@ mod layers;
 mod random;
 mod rotations;
 mod scenes;
+mod schemes;
 mod tangents;

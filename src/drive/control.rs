@@ -1,0 +1,116 @@
+//! Steps that adapt to their local error.
+
+use crate::integrate::Scheme;
+use crate::model::{Model, SlotKind};
+use crate::rotation::Rotation;
+use crate::system::State;
+
+/// Chooses the length of steps.
+///
+/// The local error of a step of a second-order method is e = h^2 (beta - 1/6 + (alpha_m - alpha_f)/2)(a1 - a0), translations
+/// over the length of the scene and rotations as spins T e; a step whose largest error is above the tolerance is rejected,
+/// and the next is chosen so that it should be a little below.
+#[derive(Clone, Debug)]
+pub(super) struct Control {
+    /// The method
+    pub scheme: Scheme,
+    tolerance: f64,
+    length: f64,
+    smallest: f64,
+}
+
+/// Part of the step that the tolerance would allow.
+const SAFETY: f64 = 0.9;
+/// A step grows at most by this, and shrinks at most by its reciprocal squared.
+const GROWTH: f64 = 2.0;
+/// A step may shrink to this part of the first one.
+const SMALLEST: f64 = 1e-8;
+
+impl Control {
+    /// Begins with steps of this length.
+    pub fn new(tolerance: f64, length: f64, scheme: Scheme) -> Self {
+        Self { scheme, tolerance, length, smallest: SMALLEST * length }
+    }
+
+    /// The end and the length of the next step. What remains to the next stop is not left as a sliver.
+    pub fn propose(&self, time: f64, stop: f64) -> (f64, f64) {
+        let rest = stop - time;
+        if self.length >= rest * (1.0 - 1e-9) {
+            (stop, rest)
+        } else if 2.0 * self.length > rest {
+            (time + 0.5 * rest, 0.5 * rest)
+        } else {
+            (time + self.length, self.length)
+        }
+    }
+
+    /// Whether steps cannot become smaller.
+    pub fn is_smallest(&self) -> bool {
+        self.length <= self.smallest
+    }
+
+    /// Newton failed: the next attempt takes a quarter.
+    pub fn fail(&mut self, length: f64) -> bool {
+        self.length = (0.25 * length).max(self.smallest);
+        false
+    }
+
+    /// Takes or rejects a step with this error, and chooses the next length.
+    pub fn judge(&mut self, length: f64, error: f64) -> bool {
+        let ratio = (error / self.tolerance).max(1e-9);
+        // The error of a step falls with the third power of its length.
+        let factor = SAFETY / libm::cbrt(ratio);
+        let taken = error <= self.tolerance || length <= self.smallest;
+        let most = if taken { GROWTH } else { SAFETY };
+        self.length = (length * factor.clamp(1.0 / (GROWTH * GROWTH), most)).max(self.smallest);
+        taken
+    }
+
+    /// The largest local error of a step, from the accelerations at its ends; both states in one chart.
+    pub fn error(&self, model: &Model, start: &State, end: &State, length: f64) -> f64 {
+        let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs() * length * length;
+        let mut largest = 0.0_f64;
+        for (slot, info) in model.slots.iter().enumerate() {
+            let e = (end.a[slot] - start.a[slot]) * factor;
+            let size = match info.kind {
+                SlotKind::Displacement => e.norm() / model.length,
+                SlotKind::Rotation => (Rotation::new(end.q[slot]).t * e).norm(),
+            };
+            largest = largest.max(size);
+        }
+        largest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn control() -> Control {
+        Control::new(1e-4, 0.1, Scheme::newmark(0.25, 0.5))
+    }
+
+    #[test]
+    fn a_step_too_far_is_rejected_and_comes_back_smaller() {
+        let mut control = control();
+        assert!(!control.judge(0.1, 8e-4));
+        assert!((control.length - 0.045).abs() < 1e-12);
+        assert!(control.judge(0.045, 0.9e-4));
+    }
+
+    #[test]
+    fn an_easy_step_lets_the_next_one_grow() {
+        let mut control = control();
+        assert!(control.judge(0.1, 0.0));
+        assert_eq!(control.length, 0.2);
+    }
+
+    #[test]
+    fn stops_are_hit_without_slivers() {
+        let control = control();
+        assert_eq!(control.propose(0.0, 1.0), (0.1, 0.1));
+        assert_eq!(control.propose(0.95, 1.0).0, 1.0);
+        let (next, length) = control.propose(0.0, 0.11);
+        assert_eq!((next, length), (0.055, 0.055));
+    }
+}

@@ -1,0 +1,110 @@
+//! The family of generalised-alpha methods in displacements and total rotation vectors, as coefficients.
+//!
+//! Equilibrium is kept at the end of each step with the true acceleration a = q''; beside it an algorithmic acceleration A is
+//! carried, which approximates q'' at t + (alpha_m - alpha_f) h:
+//!
+//! ```text
+//! (1 - alpha_m) A1 + alpha_m A0 = (1 - alpha_f) a1 + alpha_f a0
+//! q1 = q0 + h v0 + h^2 [(1/2 - beta) A0 + beta A1]        v1 = v0 + h [(1 - gamma) A0 + gamma A1]
+//! ```
+//!
+//! Newmark (1959, doi:10.1061/JMCEA3.0000098): alpha_m = alpha_f = 0, A = a. Hilber, Hughes & Taylor
+//! (1977, doi:10.1002/eqe.4290050306): alpha_m = 0. Chung & Hulbert (1993, doi:10.1115/1.2900803): both from the spectral
+//! radius at infinite frequency.
+
+use super::Method;
+use crate::kernel::Weights;
+use crate::system::State;
+use crate::tensor::Vec3;
+
+/// The coefficients of a method.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scheme {
+    /// beta
+    pub beta: f64,
+    /// gamma
+    pub gamma: f64,
+    /// alpha_m
+    pub alpha_m: f64,
+    /// alpha_f
+    pub alpha_f: f64,
+}
+
+impl Scheme {
+    /// Newmark's family; beta = 1/4, gamma = 1/2 is the trapezoidal rule: second order, without dissipation.
+    pub fn newmark(beta: f64, gamma: f64) -> Self {
+        Self { beta, gamma, alpha_m: 0.0, alpha_f: 0.0 }
+    }
+
+    /// HHT-alpha with alpha in [0, 1/3]: second order, dissipates high frequencies.
+    pub fn hht(alpha: f64) -> Self {
+        let beta = 0.25 * (1.0 + alpha) * (1.0 + alpha);
+        Self { beta, gamma: 0.5 + alpha, alpha_m: 0.0, alpha_f: alpha }
+    }
+
+    /// Generalised-alpha with the spectral radius rho in [0, 1] at infinite frequency: second order, with the least
+    /// dissipation of low frequencies for that of high ones.
+    pub fn generalized_alpha(rho: f64) -> Self {
+        let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
+        let gamma = 0.5 + alpha_f - alpha_m;
+        Self { beta: 0.25 * (gamma + 0.5) * (gamma + 0.5), gamma, alpha_m, alpha_f }
+    }
+
+    /// How far, in steps, the algorithmic acceleration lags: it belongs to t + lag h.
+    pub fn lag(&self) -> f64 {
+        self.alpha_m - self.alpha_f
+    }
+
+    /// The factor of h^2 (a1 - a0) in the local error of a step: beta - 1/6 + (alpha_m - alpha_f)/2. `None` where it is
+    /// zero, so that this difference tells nothing.
+    pub fn error_factor(&self) -> Option<f64> {
+        let factor = self.beta - 1.0 / 6.0 + 0.5 * self.lag();
+        (factor.abs() > 1e-6).then_some(factor)
+    }
+}
+
+/// One step of a scheme.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The coefficients
+    pub scheme: Scheme,
+    /// Its length h
+    pub length: f64,
+}
+
+impl Step {
+    /// Predicts the end of the step with the acceleration of its start. `before` is the length of the step that the
+    /// algorithmic acceleration comes from: on a change of step its lag changes with it.
+    pub fn predict(&self, state: &mut State, before: f64) {
+        let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
+        let stretch = h / before;
+        for slot in 0..state.q.len() {
+            let (v, a) = (state.v[slot], state.a[slot]);
+            let old =
+                if stretch == 1.0 { state.algorithmic[slot] } else { a + (state.algorithmic[slot] - a) * stretch };
+            let new = if alpha_m == 0.0 { a } else { (a - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
+            state.q[slot] += v * h + (old * (0.5 - beta) + new * beta) * (h * h);
+            state.v[slot] += (old * (1.0 - gamma) + new * gamma) * h;
+            state.algorithmic[slot] = new;
+        }
+    }
+}
+
+impl Method for Step {
+    fn weights(&self) -> Weights {
+        let (Scheme { beta, gamma, alpha_m, alpha_f }, h) = (self.scheme, self.length);
+        let mass = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * h * h);
+        Weights { stiffness: 1.0, damping: gamma / (beta * h), mass }
+    }
+
+    fn correct(&self, state: &mut State, dq: &[Vec3]) {
+        let Weights { damping, mass, .. } = self.weights();
+        let algorithmic = 1.0 / (self.scheme.beta * self.length * self.length);
+        for (slot, &dq) in dq.iter().enumerate() {
+            state.q[slot] += dq;
+            state.v[slot] += dq * damping;
+            state.a[slot] += dq * mass;
+            state.algorithmic[slot] += dq * algorithmic;
+        }
+    }
+}
