@@ -7,8 +7,9 @@ use std::path::Path;
 
 /// Prints the worst cell of each column.
 pub fn compare(a: &Path, b: &Path, rtol: f64, atol: f64) -> Status {
-    if !(rtol >= 0.0 && atol >= 0.0) {
-        say::error("deck", "--rtol and --atol must not be negative");
+    let usable = |tolerance: f64| tolerance.is_finite() && tolerance >= 0.0;
+    if !(usable(rtol) && usable(atol)) {
+        say::error("usage", "--rtol and --atol must be finite and not negative");
         return Status::Wrong;
     }
     let (came, stored) = match (HistoryReader::read(a), HistoryReader::read(b)) {

@@ -33,10 +33,13 @@ impl Refusal {
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
 pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Refusal> {
     let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::new(Status::Wrong, "deck", why))?;
+    // Settings may have moved lines.
+    let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
+    let label = format!("{}{changed}", path.display());
     match scene::from_text(&text) {
         Ok((scene, warnings)) => {
             if !warnings.is_empty() {
-                say::note(&render(path, &text, &warnings));
+                say::note(&render(&label, &text, &warnings));
             }
             Ok(scene)
         }
@@ -45,7 +48,7 @@ pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Refusal> {
             let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
             let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
             Err(Refusal {
-                details: render(path, &text, &diagnostics),
+                details: render(&label, &text, &diagnostics),
                 expected: expected_failures(&text),
                 ..Refusal::new(Status::Wrong, name, format!("{count} in {}", path.display()))
             })
@@ -78,11 +81,10 @@ fn expected_failures(text: &str) -> Vec<String> {
     deck.expects.into_iter().filter_map(name).collect()
 }
 
-fn render(path: &Path, text: &str, diagnostics: &[Diagnostic]) -> String {
+fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));
-    let path = path.display().to_string();
-    sorted.iter().map(|d| d.render(&path, text, say::styled()) + "\n").collect::<Vec<_>>().join("\n")
+    sorted.iter().map(|d| d.render(path, text, say::styled()) + "\n").collect::<Vec<_>>().join("\n")
 }
 
 /// The name of a deck: its file without the extension.

@@ -177,8 +177,15 @@ fn explain(error: &clap::Error) -> Status {
         return Status::Fine;
     }
     let text = text.to_string();
-    say::note(text.trim_end());
-    let first = text.lines().next().unwrap_or_default();
+    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        say::note(text.trim_end());
+        say::error("usage", "a command is needed");
+        return Status::Wrong;
+    }
+    let (first, rest) = text.split_once('\n').unwrap_or((&text, ""));
+    if !rest.trim().is_empty() {
+        say::note(rest.trim());
+    }
     say::error("usage", first.trim_start_matches("error: "));
     Status::Wrong
 }

@@ -15,6 +15,10 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
         }
     };
     let mut verdict = Verdict::default();
+    if decks.is_empty() {
+        verdict.fail(Status::Wrong, "usage", "there are no decks here".into());
+        return verdict.finish(0);
+    }
     let (mut held, mut total) = (0, 0);
     for path in &decks {
         let name = load::name(path);
@@ -70,7 +74,8 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
 
 fn report(path: &Path, judgements: &[Judgement], seconds: f64) {
     let verdict = if judgements.iter().all(|j| j.holds) { "ok" } else { "FAILED" };
-    say::line(&format!("{verdict:<6} {} ({seconds:.3} s)", path.display()));
+    let nothing = if judgements.is_empty() { ", expects nothing" } else { "" };
+    say::line(&format!("{verdict:<6} {} ({seconds:.3} s{nothing})", path.display()));
     let width =
         |pick: fn(&Judgement) -> &str| judgements.iter().map(|j| pick(j).chars().count()).max().unwrap_or(0).min(48);
     let (what, expected, came) = (width(|j| &j.what), width(|j| &j.expected), width(|j| &j.came));

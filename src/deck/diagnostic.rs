@@ -37,6 +37,8 @@ pub struct Diagnostic {
     pub help: Option<String>,
     /// How bad it is
     pub severity: Severity,
+    /// The name that is not known, where that is what is wrong
+    pub unknown: Option<String>,
 }
 
 /// How bad a diagnostic is.
@@ -60,6 +62,7 @@ impl Diagnostic {
             context: None,
             help: None,
             severity: Severity::Error,
+            unknown: None,
         }
     }
 

@@ -74,8 +74,8 @@ pub struct Deck {
     pub parameters: Parameters,
     /// How many stages stand in the text
     pub stage_count: usize,
-    /// Whether every table that defines a name could be read: else names may seem unknown that are not
-    pub names_complete: bool,
+    /// Names of tables that could not be read: they are not unknown
+    pub broken: Vec<String>,
     /// The deck with expressions replaced by numbers, for run.json
     pub resolved: serde_json::Value,
 }
@@ -127,7 +127,6 @@ fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
 fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let keys: Vec<&str> = KEYS.into_iter().chain(["expect"]).collect();
     let top = Table::top(context, document, &keys, &["damping"]);
-    let before = context.errors();
     let points = geometry::read_points(&top);
     let materials = named(&top, "material", geometry::read_material);
     let sections = named(&top, "section", geometry::read_section);
@@ -135,9 +134,17 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let joints = listed(&top, "joint", action::read_joint);
     let bodies = listed(&top, "body", action::read_body);
     let histories = named(&top, "history", action::read_history);
-    let names_complete = context.errors() == before;
+    let read: Vec<&str> = [
+        points.iter().map(|(name, _)| name.value.as_str()).collect::<Vec<_>>(),
+        materials.iter().map(|m| m.name.value.as_str()).collect(),
+        sections.iter().map(|s| s.name.value.as_str()).collect(),
+        beams.iter().map(|b| b.name.value.as_str()).collect(),
+        histories.iter().map(|h| h.name.value.as_str()).collect(),
+    ]
+    .concat();
+    let broken = defined_names(document).into_iter().filter(|name| !read.contains(&name.as_str())).collect();
     Deck {
-        names_complete,
+        broken,
         stage_count: 0,
         title: top.text("title").map(|t| t.value),
         units: procedure::read_units(&top),
@@ -161,6 +168,18 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         parameters: Parameters::default(),
         resolved: serde_json::Value::Null,
     }
+}
+
+/// Every name that the text defines, whether its table can be read or not.
+fn defined_names(document: &DeTable) -> Vec<String> {
+    let table = |key: &str| document.get(key).and_then(|item| item.get_ref().as_table());
+    let named = ["point", "material", "section", "history"].into_iter().filter_map(table);
+    let mut names: Vec<String> = named.flat_map(|t| t.keys().map(|k| k.get_ref().to_string())).collect();
+    if let Some(DeValue::Array(beams)) = document.get("beam").map(|item| item.get_ref()) {
+        let name = |beam: &reader::Item| Some(beam.get_ref().as_table()?.get("name")?.get_ref().as_str()?.to_string());
+        names.extend(beams.iter().filter_map(name));
+    }
+    names
 }
 
 /// Reads `[[key]]` tables.

@@ -28,11 +28,6 @@ impl Context {
         self.diagnostics.borrow_mut().push(diagnostic);
     }
 
-    /// How many errors there are so far.
-    pub fn errors(&self) -> usize {
-        self.diagnostics.borrow().iter().filter(|d| !d.is_warning()).count()
-    }
-
     /// Reports an error at a place; returns nothing, for use in a tail position.
     pub fn wrong<T>(&self, span: Span, message: impl Into<String>) -> Option<T> {
         self.report(Diagnostic::error(message, span));

@@ -245,7 +245,7 @@ impl<'o> Run<'o> {
 
     /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
     pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
-        charts::wind(&mut self.state, &self.model.rotations);
+        self.wind()?;
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
         if self.plan.energy {
@@ -279,6 +279,17 @@ impl<'o> Run<'o> {
         let Some(until) = &workshop.until else { return false };
         let value = (until.column)(&self.snapshot(workshop));
         until.below.is_some_and(|bound| value < bound) || until.above.is_some_and(|bound| value > bound)
+    }
+
+    /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
+    fn wind(&mut self) -> Result<(), Failure> {
+        let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.rotations);
+        let Some(slot) = ambiguous.into_iter().find(|slot| self.model.sprung.contains(slot)) else { return Ok(()) };
+        let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
+        Err(Failure::Deck(format!(
+            "the rotational spring at node \"{node}\" has been wound by more than a turn and its node left the axis ({at}): how \
+             far it is wound is not defined there; hold the other rotations of the node, or use a joint"
+        )))
     }
 
     fn judge_mesh(&mut self) -> Result<(), Failure> {

@@ -1,7 +1,7 @@
 //! Changes of chart at nodes, and the choice of charts in elements.
 
 use crate::kernel::seam;
-use crate::rotation::{Complement, Rotation, relative_angle, unwound};
+use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
 use crate::system::{Node, Slot, State};
 use crate::tensor::Vec3;
 use std::f64::consts::PI;
@@ -17,6 +17,12 @@ pub const COARSE: f64 = 2.8;
 
 /// From here on a warning.
 pub const COARSE_WARNING: f64 = PI / 2.0;
+
+/// A representative that lies farther than this from where it should be is not the right one.
+const FAR: f64 = PI / 2.0;
+
+/// Within this angle of a whole turn the direction of P tells nothing of the axis.
+const NEAR_TURN: f64 = 0.5;
 
 /// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left. `lag` is
 /// the time by which the algorithmic acceleration lies ahead of the state.
@@ -58,12 +64,32 @@ pub fn freeze(state: &mut State, elements: &[Vec<Node>]) -> usize {
     mixed
 }
 
-/// Continues the wound rotation vectors to the present state.
-pub fn wind(state: &mut State, rotations: &[Slot]) {
+/// Continues the wound rotation vectors from the state `before`, and returns the slots where that is ambiguous.
+///
+/// The wound vector is the one of P + 2 pi k n that lies nearest to the old one carried on by the rotation since. Close to a
+/// whole turn n is no guide: a node that passes it a little aside sees n swing to the other side, and P + 2 pi k n with it.
+/// There the carried one is kept until both come together again; it is ambiguous where they lie far apart.
+pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> {
+    let mut ambiguous = Vec::new();
     for &slot in rotations {
-        let slot = slot as usize;
-        state.wound[slot] = unwound(state.q[slot], state.wound[slot]);
+        let k = slot as usize;
+        let (p, old, wound) = (state.q[k], before.q[k], before.wound[k]);
+        let plain = wound == old && (p - old).squared() < 1.0;
+        if plain {
+            state.wound[k] = p;
+            continue;
+        }
+        let turned = log(Rotation::new(p).r * Rotation::new(old).r.transpose());
+        let carried = wound + turned;
+        let candidate = unwound(p, carried);
+        let together = (candidate - carried).norm() < FAR;
+        let near_whole_turn = p.norm() < NEAR_TURN && carried.norm() > PI;
+        state.wound[k] = if together && !near_whole_turn { candidate } else { carried };
+        if !together {
+            ambiguous.push(slot);
+        }
     }
+    ambiguous
 }
 
 /// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle).

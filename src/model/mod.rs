@@ -52,6 +52,8 @@ pub struct Model {
     pub slots: Vec<SlotInfo>,
     /// The slots with rotation vectors
     pub rotations: Vec<Slot>,
+    /// The slots on which rotational springs act: how they are wound must be known
+    pub sprung: Vec<Slot>,
     /// The nodes of each beam element
     pub elements: Vec<Vec<Node>>,
     /// What acts

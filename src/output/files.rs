@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file in the making: `name.part` beside its final place.
+/// A file in the making: `name.<process>.part` beside its final place.
 #[derive(Debug)]
 pub struct PartFile {
     folder: PathBuf,
@@ -15,7 +15,8 @@ impl PartFile {
     /// Creates the folder, and in it the part.
     pub fn create(folder: &Path, name: &str) -> io::Result<(Self, File)> {
         fs::create_dir_all(folder).map_err(|e| about(folder, &e))?;
-        let part = folder.join(format!("{name}.part"));
+        // Two runs at once must not write into each other's parts.
+        let part = folder.join(format!("{name}.{}.part", std::process::id()));
         let file = File::create(&part).map_err(|e| about(&part, &e))?;
         Ok((Self { folder: folder.into(), part }, file))
     }

@@ -47,10 +47,9 @@ impl Place {
         self.nodes.iter().fold(Vec3::ZERO, |sum, &(_, place, weight)| sum + place * weight)
     }
 
-    /// The wound rotation vector of the nearest node.
+    /// The rotation vector continued since the start, interpolated like the rotation vectors themselves.
     pub fn wound(&self, state: &State) -> Vec3 {
-        let nearest = self.nodes.iter().max_by(|a, b| a.2.total_cmp(&b.2)).map(|&(node, ..)| node);
-        nearest.map_or(Vec3::ZERO, |node| state.wound[node.p as usize])
+        self.nodes.iter().fold(Vec3::ZERO, |sum, &(node, _, weight)| sum + state.wound[node.p as usize] * weight)
     }
 
     /// The node, where the place is one.

@@ -3,7 +3,7 @@
 use super::place::{BeamPoint, Place};
 use crate::drive::Snapshot;
 use crate::kernel::inertia::Spin;
-use crate::rotation::{Rotation, principal, unwound};
+use crate::rotation::{Rotation, principal};
 use crate::system::Node;
 use crate::tensor::Vec3;
 
@@ -92,7 +92,7 @@ impl Probe {
             Quantity::Displacement(place) => vector(place.motion(state).u),
             Quantity::Position(place) => vector(place.initial() + place.motion(state).u),
             Quantity::Rotation(place) => vector(principal(place.motion(state).p)),
-            Quantity::Wound(place) => vector(unwound(place.motion(state).p, place.wound(state))),
+            Quantity::Wound(place) => vector(place.wound(state)),
             Quantity::Axes(place) => {
                 let axes = Rotation::new(place.motion(state).p).r * place.frame;
                 (0..3).for_each(|k| vector(axes.column(k)));

@@ -148,7 +148,18 @@ fn refuse_early_jump(deck: &Deck, motion: &deck::Motion, found: &Motion, diagnos
     if !dynamic || !found.stages.contains(0) {
         return;
     }
-    let start = found.value * found.history.as_ref().map_or(1.0, |history| history.at(0.0)[0]);
+    let course = found.history.as_ref().map_or([1.0, 0.0, 0.0], |history| history.at(0.0));
+    if course.iter().any(|value| !value.is_finite()) {
+        let message = "the history of this motion has no finite value, velocity or acceleration at time 0";
+        diagnostics.push(Diagnostic::error(message, motion.span.clone()));
+        return;
+    }
+    if course[1] != 0.0 {
+        let message = "this motion begins with a velocity, while its node is at rest: velocities jump there";
+        let help = "a history that begins with a slope of zero does not excite vibrations";
+        diagnostics.push(Diagnostic::warning(message, motion.span.clone()).help(help));
+    }
+    let start = found.value * course[0];
     if start.abs() > 1e-12 * found.value.abs() || start.is_nan() {
         let message = format!("this motion begins with a jump from 0 to {start}");
         let help = "a dynamic stage starts where the scene is; give the motion a `history` that begins with 0";

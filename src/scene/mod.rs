@@ -20,7 +20,7 @@ use crate::integrate::Scheme;
 use crate::model::{Model, SlotInfo, SlotKind};
 use crate::probe::{Probe, Quantity};
 use crate::system::Node;
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 use output::Columns;
 use std::sync::Arc;
 
@@ -102,11 +102,19 @@ const MOST_DIAGNOSTICS: usize = 200;
 /// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
 pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (deck, mut diagnostics) = deck::read(text)?;
-    let scene = if deck.names_complete { build(&deck, &mut diagnostics) } else { None };
+    let mut found = Vec::new();
+    let scene = build(&deck, &mut found);
+    if !diagnostics.iter().all(Diagnostic::is_warning) {
+        // Of a deck that could be read in part only what is said about names is no consequence of that.
+        found.retain(|d| d.unknown.as_ref().is_some_and(|name| !deck.broken.iter().any(|b| about(name, b))));
+    }
+    diagnostics.append(&mut found);
     diagnostics.sort_by_key(Diagnostic::is_warning);
     let mut told: Vec<Diagnostic> = Vec::new();
     for diagnostic in diagnostics {
-        if told.len() < MOST_DIAGNOSTICS && !told.contains(&diagnostic) {
+        let again =
+            |known: &Diagnostic| known == &diagnostic || (known.unknown.is_some() && known.span == diagnostic.span);
+        if told.len() < MOST_DIAGNOSTICS && !told.iter().any(again) {
             told.push(diagnostic);
         }
     }
@@ -116,12 +124,16 @@ pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>
     }
 }
 
+/// Whether a name speaks of a table: `arm`, `arm@end`, `arm:3`.
+fn about(name: &str, table: &str) -> bool {
+    name.split(['@', ':']).next() == Some(table)
+}
+
 /// Builds a scene; what is wrong goes to `diagnostics`.
 fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
     let mesh = Mesh::new(deck, diagnostics);
-    // Where no beam could be meshed, what follows would only complain about its consequences.
-    if mesh.nodes.is_empty() { None } else { build_on(deck, mesh, diagnostics) }
+    build_on(deck, mesh, diagnostics)
 }
 
 fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
@@ -135,8 +147,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
-    // Names on beams that could not be meshed are not unknown.
-    diagnostics.extend(found.into_iter().filter(|_| complete));
+    // Where a beam could not be meshed, points may seem to be no nodes; names that are unknown are so all the same.
+    diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
     let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
     let expected =
         expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
@@ -145,6 +157,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let model = Model {
         slots: slots(&mesh),
         rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
+        sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
         elements: mesh.elements.iter().map(|e| e.nodes.iter().map(|&n| mesh.nodes[n].node).collect()).collect(),
         effects: composition.effects,
         amplitudes: composition.amplitudes,

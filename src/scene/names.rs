@@ -27,7 +27,8 @@ pub fn points(deck: &Deck) -> impl Iterator<Item = &str> {
 /// "there is no section `x`", with what was probably meant.
 pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item = &'a str>) -> Diagnostic {
     let known: Vec<&str> = known.collect();
-    let diagnostic = Diagnostic::error(format!("there is no {kind} `{}`", name.value), name.span.clone());
+    let mut diagnostic = Diagnostic::error(format!("there is no {kind} `{}`", name.value), name.span.clone());
+    diagnostic.unknown = Some(name.value.clone());
     match nearest(&name.value, known.iter().copied()) {
         Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
         None if known.is_empty() => diagnostic.help(format!("the deck defines no {kind}")),

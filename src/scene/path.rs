@@ -164,7 +164,11 @@ fn line(
 ) -> Result<Piece, Diagnostic> {
     let length = (end - start).norm();
     let size = start.norm().max(end.norm());
-    if !length.is_finite() || length <= 1e-12 * size || length == 0.0 {
+    if !length.is_finite() {
+        let message = format!("a piece of beam `{}` is too long to be measured", beam.name.value);
+        return Err(Diagnostic::error(message, span.clone()));
+    }
+    if length <= 1e-12 * size || length == 0.0 {
         let message =
             format!("a piece of beam `{}` has no length: it starts and ends at the same place", beam.name.value);
         return Err(Diagnostic::error(message, span.clone()));

@@ -29,6 +29,9 @@ pub fn compare(
     if came.rows.len() != stored.rows.len() {
         return Err(format!("{} rows against {} stored ones", came.rows.len(), stored.rows.len()));
     }
+    if stored.rows.is_empty() || stored.names.is_empty() {
+        return Err("the stored history has no rows: nothing would be compared".into());
+    }
     let mut table = Vec::new();
     for (k, column) in stored.names.iter().enumerate() {
         let Some(other) = came.names.iter().position(|name| name == column) else {

@@ -127,8 +127,8 @@ fn hold(what: String, bounds: &Bounds, came: Option<f64>) -> Judgement {
         let departure = (value - wanted).abs();
         let allowed = atol + rtol * wanted.abs();
         holds &= departure <= allowed;
-        error = Some(departure);
-        ratio = Some(if departure == 0.0 { 0.0 } else { departure / allowed });
+        error = came.map(|_| departure);
+        ratio = came.map(|_| if departure == 0.0 { 0.0 } else { departure / allowed });
     }
     if let Some(bound) = bounds.below {
         expected.push(format!("< {bound}"));

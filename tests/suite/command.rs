@@ -214,9 +214,13 @@ fn interrupted(name: &str, signal: &str) -> (i32, Vec<String>) {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let part = folder.0.join("results/long/history.csv.part");
+    let results = folder.0.join("results/long");
+    let has_rows = || {
+        let parts = fs::read_dir(&results).into_iter().flatten().flatten();
+        parts.filter_map(|part| part.metadata().ok()).any(|part| part.len() > 0)
+    };
     let start = Instant::now();
-    while fs::metadata(&part).map_or(true, |m| m.len() == 0) && start.elapsed() < Duration::from_secs(30) {
+    while !has_rows() && start.elapsed() < Duration::from_secs(30) {
         std::thread::sleep(Duration::from_millis(20));
     }
     Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();

@@ -166,3 +166,51 @@ fn the_smallest_forces_do_no_harm() {
     let simulation = simulate(&arm(1000, "EA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [2, 1, 1]", &rest));
     assert!(simulation.end("tip.uz") > 0.0);
 }
+
+/// A wheel on a torsion spring that wobbles a little: its turns are counted, or the run says that they cannot be.
+#[test]
+fn turns_of_a_wobbling_wheel_are_not_lost() {
+    let wheel = |wobble: f64| {
+        format!(
+            "[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\ninertia = [1, 1, 1.5]\n\
+             [[support]]\nat = \"p\"\nfix = \"pin\"\n[[spring]]\nat = \"p\"\nstiffness = [0, 0, 0, 0, 0, 0.5]\n\
+             [[initial]]\nspin = [{wobble}, 0, 10]\n[[stage]]\nkind = \"dynamic\"\nend = 2.72\nstep = 0.001\n\
+             [output]\ncolumns = [\"rc\", \"energy\"]\n"
+        )
+    };
+    let quiet = simulate(&wheel(0.0));
+    // The quarter period of sqrt(k/J), where the wheel has turned by spin sqrt(J/k).
+    assert!((quiet.end("p.rz") - 10.0 * 3.0_f64.sqrt()).abs() < 1e-3, "{}", quiet.end("p.rz"));
+    for wobble in [1e-4, 1e-3, 1e-2, 0.1] {
+        let simulation = attempt(&wheel(wobble));
+        match &simulation.result {
+            Ok(()) => assert!((simulation.end("p.rz") - 17.32).abs() < 0.2, "{wobble}: {}", simulation.end("p.rz")),
+            Err(failure) => assert!(failure.to_string().contains("left the axis"), "{wobble}: {failure}"),
+        }
+    }
+}
+
+/// A body that spins about an axis that is not quite its own: ten turns read 20 pi.
+#[test]
+fn continued_rotation_vectors_do_not_lose_turns_to_a_wobble() {
+    let text = "[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\ninertia = [1, 1, 1.5]\n\
+                [[support]]\nat = \"p\"\nfix = \"pin\"\n[[initial]]\nspin = [0.05, 0, 10]\n\
+                [[stage]]\nkind = \"dynamic\"\nend = 6.283185307179586\nstep = 0.002\n[output]\ncolumns = [\"rc\"]\n";
+    let rz = simulate(text).column("p.rz");
+    assert!((rz.last().unwrap() - 62.83).abs() < 1.0, "{}", rz.last().unwrap());
+    let jump = rz.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    assert!(jump < 2.0, "{jump}");
+}
+
+#[test]
+fn unknown_names_are_told_beside_other_errors() {
+    let text = arm(0, "EA = -1\nGA = 1\nGJ = 1\nEI = 1", &format!("{CLAMP}{STATIC}"))
+        .replace("elements = 0", "elements = 2\norder = 7")
+        + "[[load]]\nat = \"tpp\"\nforce = [0, 0, 1]\nhistory = \"hh\"\n";
+    let errors = scene::from_text(&text).err().expect("it is wrong in four places");
+    let messages: Vec<&str> = errors.iter().map(|e| e.message.as_str()).collect();
+    for words in ["`EA` must be positive", "`order` is 1, 2 or 3", "no node `tpp`"] {
+        assert!(messages.iter().any(|m| m.contains(words)), "{words}: {messages:?}");
+    }
+    assert!(!messages.iter().any(|m| m.contains("`s`") || m.contains("`tip`")), "{messages:?}");
+}

@@ -90,11 +90,11 @@ fn alternating(scheme: Scheme, h: f64) -> [f64; 3] {
             break;
         }
         time += length;
-        let step = Step { scheme, length };
+        let (step, good) = (Step { scheme, length }, state.clone());
         step.predict(&mut state, before);
         assert_eq!(model.set_clock(&mut state, time, 1.0), None);
         newton.solve(&model, &mut assembly, &mut state, &step, None, &mut work).unwrap();
-        charts::wind(&mut state, &model.rotations);
+        charts::wind(&mut state, &good, &model.rotations);
         charts::switch(&mut state, &model.rotations, charts::DYNAMIC_BAND, scheme.lag() * length);
         charts::freeze(&mut state, &model.elements);
         before = length;
