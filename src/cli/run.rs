@@ -93,9 +93,13 @@ impl Observer for Watcher {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
         self.recorder.row(snapshot);
 
-        match &mut self.history {
-            Some(history) => history.row(snapshot, self.dynamic[snapshot.stage - 1]).map_err(io_failure),
+        let Some(history) = &mut self.history else { return Ok(()) };
+        match history.row(snapshot, self.dynamic[snapshot.stage - 1]).map_err(io_failure)? {
             None => Ok(()),
+            Some(column) => {
+                let at = Moment { stage: snapshot.stage, time: snapshot.state.time, load: snapshot.state.load };
+                Err(Failure::NonFinite { at, effect: Some("a column of the history"), node: column })
+            }
         }
     }
 

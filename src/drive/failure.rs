@@ -55,11 +55,11 @@ pub enum Failure {
         /// What moves freely
         place: Option<Place>,
     },
-    /// A force that is not finite
+    /// A force, a motion or a result that is not finite
     NonFinite {
         /// When
         at: Moment,
-        /// The effect that gave it
+        /// The effect that gave it, or what else is not finite
         effect: Option<&'static str>,
         /// The node
         node: String,
@@ -156,7 +156,7 @@ impl fmt::Display for Failure {
             Self::Singular { at, place: None } => write!(f, "the tangent cannot be solved with at {at}"),
             Self::NonFinite { at, effect, node } => {
                 let effect = effect.unwrap_or("the sum of forces");
-                write!(f, "{effect} is not finite at node \"{node}\" ({at})")
+                write!(f, "{effect} is not finite at \"{node}\" ({at})")
             }
             Self::MeshTooCoarse { at, nodes: [a, b], relative_rotation } => write!(
                 f,

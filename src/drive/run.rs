@@ -245,6 +245,7 @@ impl<'o> Run<'o> {
 
     /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
     pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+        self.refuse_infinities()?;
         self.wind()?;
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
@@ -279,6 +280,18 @@ impl<'o> Run<'o> {
         let Some(until) = &workshop.until else { return false };
         let value = (until.column)(&self.snapshot(workshop));
         until.below.is_some_and(|bound| value < bound) || until.above.is_some_and(|bound| value > bound)
+    }
+
+    /// Motions that overflow leave no force behind that would tell.
+    fn refuse_infinities(&self) -> Result<(), Failure> {
+        let State { q, v, a, .. } = &self.state;
+        let wrong = (0..q.len()).find(|&slot| !(q[slot].is_finite() && v[slot].is_finite() && a[slot].is_finite()));
+        let Some(slot) = wrong else { return Ok(()) };
+        Err(Failure::NonFinite {
+            at: self.moment(),
+            effect: Some("the motion"),
+            node: self.model.slots[slot].node.clone(),
+        })
     }
 
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.

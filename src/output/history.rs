@@ -65,12 +65,17 @@ impl HistoryWriter {
         })
     }
 
-    /// Takes a converged state; writes it if its row is wanted.
-    pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
+    /// Takes a converged state; writes it if its row is wanted. Gives the name of a column that is not finite, if one is.
+    pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<Option<String>> {
         self.values.clear();
         self.values.extend([at.state.time, at.state.load]);
         for probe in &self.probes {
             probe.read(at, &mut self.values);
+        }
+        if let Some(k) = self.values.iter().position(|value| !value.is_finite()) {
+            // Time and load come before the probes.
+            let mut names = self.probes.iter().flat_map(|probe| &probe.names);
+            return Ok(names.nth(k.saturating_sub(2)).cloned().or(Some("time".into())));
         }
         self.record.clear();
         self.record.push_field(at.stage.to_string().as_bytes());
@@ -82,7 +87,10 @@ impl HistoryWriter {
         }
         self.pending = !self.rows.contains(self.seen, dynamic, at.state.time);
         self.seen += 1;
-        if self.pending { Ok(()) } else { self.writer.write_byte_record(&self.record).map_err(io::Error::from) }
+        if !self.pending {
+            self.writer.write_byte_record(&self.record)?;
+        }
+        Ok(None)
     }
 
     /// Ends the history: `history.csv` if the run finished, else `history.partial.csv`.

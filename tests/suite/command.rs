@@ -165,6 +165,24 @@ fn a_failed_run_keeps_what_it_reached() {
     assert!(record.contains("\"status\": \"not_converged\""));
 }
 
+/// A history never holds NaN or infinity.
+#[test]
+fn results_that_overflow_are_named() {
+    let folder = Folder::new("overflow");
+    let stage = "kind = \"dynamic\"\nend = 1\nstep = 0.1\n[[initial]]\nvelocity = [1e200, 0, 0]\n[output]\ncolumns = [\"energy\"]";
+    let free = GOOD.replace("at = \"root\"\nfix = \"all\"", "at = \"root\"\nfix = [\"uy\"]");
+    folder.write(
+        "far.toml",
+        &free
+            .replace("kind = \"static\"\nsteps = 4", stage)
+            .replace("[[expect]]\ncolumn = \"tip.uz\"\nvalue = 0.16\natol = 0.02\n", ""),
+    );
+    let output = folder.beamsim(&["run", "far.toml"]);
+    assert_eq!(status(&output), 3, "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(last_line(&output).starts_with("error[non_finite]: a column of the history"), "{}", last_line(&output));
+    assert_eq!(folder.names("results/far"), ["history.partial.csv", "run.json"]);
+}
+
 #[test]
 fn wrong_decks_and_missing_files_have_their_status() {
     let folder = Folder::new("status");
