@@ -2,8 +2,10 @@
 //!
 //! `cargo bench --bench kernels`; compare figures of one run only.
 
-use beamsim::kernel::beam::{StiffnessPoint, VolumePoint};
+use beamsim::kernel::beam::StiffnessPoint;
 use beamsim::kernel::elastic::Stiffness;
+use beamsim::kernel::inertia::Rotary;
+use beamsim::kernel::volume::VolumePoint;
 use beamsim::kernel::{ElementSystem, NodeMotion, Weights, shape};
 use beamsim::rotation::Rotation;
 use beamsim::tensor::{Mat3, Vec3};
@@ -68,7 +70,7 @@ fn element<const N: usize, const G: usize>(criterion: &mut Criterion) {
     criterion.bench_function(&format!("rotary inertia with tangents, {N} nodes"), |bencher| {
         let fill = |mut out: ElementSystem| {
             for point in &volume {
-                point.add_rotary(black_box(&nodes), weights, &mut out);
+                point.add(&Rotary, black_box(&nodes), weights, &mut out);
             }
             out
         };

@@ -11,6 +11,9 @@ pub mod rigid_body;
 pub mod rotary_inertia;
 pub mod section_inertia;
 pub mod spring;
+mod volume;
+
+pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};

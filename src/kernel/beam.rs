@@ -1,10 +1,9 @@
 //! Beam elements of N nodes: interpolation, and the sums over Gauss points.
 
 use super::elastic::{Point, PointTangent, Stiffness, Strain, Stress};
-use super::element::{ElementSystem, NodeMotion, Weights};
-use super::inertia::{self, Inertia, Spin};
+use super::element::{ElementSystem, NodeMotion};
 use crate::real::Real;
-use crate::tensor::{Mat3, Vec3};
+use crate::tensor::Vec3;
 
 /// An integration point for internal forces.
 #[derive(Clone, Copy, Debug)]
@@ -19,17 +18,6 @@ pub struct StiffnessPoint<const N: usize> {
     pub tangent: Vec3,
     /// The section in global components
     pub stiffness: Stiffness,
-}
-
-/// An integration point for quantities without derivatives: inertia and line loads.
-#[derive(Clone, Copy, Debug)]
-pub struct VolumePoint<const N: usize, Q> {
-    /// Shape functions
-    pub shape: [f64; N],
-    /// Gauss weight times ds/dxi
-    pub weight: f64,
-    /// What is integrated, per initial length
-    pub quantity: Q,
 }
 
 /// sum_i N_i v_i
@@ -128,73 +116,6 @@ impl<const N: usize> StiffnessPoint<N> {
                     out.add_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
                 }
             }
-        }
-    }
-}
-
-impl<const N: usize> VolumePoint<N, Mat3> {
-    /// Adds rotary inertia to a system of rotation blocks P1, P2, ….
-    #[inline(always)]
-    pub fn add_rotary<T: Real>(&self, nodes: &[NodeMotion<T>; N], weights: Weights, out: &mut ElementSystem<T>) {
-        let spin = self.spin(nodes);
-        let (force, tangent) = inertia::rotary(self.quantity, &spin, weights);
-        for i in 0..N {
-            let w = self.weight * self.shape[i];
-            out.add_force(i, force.scale(w));
-            if weights == Weights::NONE {
-                continue;
-            }
-            for j in 0..N {
-                out.add_tangent(i, j, tangent.scale(w * self.shape[j]));
-            }
-        }
-    }
-}
-
-impl<const N: usize> VolumePoint<N, Inertia> {
-    /// Adds the inertia of a section with eccentric mass.
-    #[inline(always)]
-    pub fn add_body<T: Real>(&self, nodes: &[NodeMotion<T>; N], weights: Weights, out: &mut ElementSystem<T>) {
-        let force = inertia::body(&self.quantity, &self.motion(nodes), weights);
-        for i in 0..N {
-            let w = self.weight * self.shape[i];
-            out.add_force(2 * i, force.u.scale(w));
-            out.add_force(2 * i + 1, force.p.scale(w));
-            if weights == Weights::NONE {
-                continue;
-            }
-            for j in 0..N {
-                let w = w * self.shape[j];
-                out.add_tangent(2 * i, 2 * j, force.uu.scale(w));
-                out.add_tangent(2 * i, 2 * j + 1, force.up.scale(w));
-                out.add_tangent(2 * i + 1, 2 * j, force.pu.scale(w));
-                out.add_tangent(2 * i + 1, 2 * j + 1, force.pp.scale(w));
-            }
-        }
-    }
-}
-
-impl<const N: usize, Q> VolumePoint<N, Q> {
-    /// The spin at this point.
-    #[inline(always)]
-    pub fn spin<T: Real>(&self, nodes: &[NodeMotion<T>; N]) -> Spin<T> {
-        Spin::new(
-            interpolate(&self.shape, |i| nodes[i].p),
-            interpolate(&self.shape, |i| nodes[i].p_rate),
-            interpolate(&self.shape, |i| nodes[i].p_rate2),
-        )
-    }
-
-    /// The motion at this point.
-    #[inline(always)]
-    pub fn motion<T: Real>(&self, nodes: &[NodeMotion<T>; N]) -> NodeMotion<T> {
-        NodeMotion {
-            u: interpolate(&self.shape, |i| nodes[i].u),
-            u_rate: interpolate(&self.shape, |i| nodes[i].u_rate),
-            u_rate2: interpolate(&self.shape, |i| nodes[i].u_rate2),
-            p: interpolate(&self.shape, |i| nodes[i].p),
-            p_rate: interpolate(&self.shape, |i| nodes[i].p_rate),
-            p_rate2: interpolate(&self.shape, |i| nodes[i].p_rate2),
         }
     }
 }

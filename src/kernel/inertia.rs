@@ -1,6 +1,7 @@
 //! Inertia at a point: of a cross-section or of a rigid body (equations (51), (52), (68)–(71), and their form with an offset).
 
 use super::element::{NodeMotion, Weights};
+use super::volume::{Blocks, VolumeForce, VolumeKernel};
 use crate::real::Real;
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
@@ -86,25 +87,13 @@ pub fn rotary<T: Real>(j: Mat3, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, M
     (force, tangent)
 }
 
-/// Force and tangent of a rigid body or an eccentric section, conjugate to u and P.
-#[derive(Clone, Copy, Debug)]
-#[allow(missing_docs)]
-pub struct BodyForce<T = f64> {
-    pub u: Vec3<T>,
-    pub p: Vec3<T>,
-    pub uu: Mat3<T>,
-    pub up: Mat3<T>,
-    pub pu: Mat3<T>,
-    pub pp: Mat3<T>,
-}
-
 /// With s = Acc x d + Omega x (Omega x d) and h = J0 Acc + Omega x J0 Omega + m d x R^T u'':
 ///
 /// ```text
 /// f_u = m (u'' + R s),  f_P = T^T h
 /// ```
 #[inline(always)]
-pub fn body<T: Real>(inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> BodyForce<T> {
+pub fn body<T: Real>(inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
     let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
     let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
     let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
@@ -113,14 +102,9 @@ pub fn body<T: Real>(inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights
     let omega_d = omega.cross(d);
     let s = spin.acceleration.cross(d) + omega.cross(omega_d);
     let h = j0 * spin.acceleration + omega.cross(momentum) + d.cross(pull).scale(m);
-    let mut out = BodyForce {
-        u: (motion.u_rate2 + r * s).scale(m),
-        p: t.transpose_mul(h),
-        uu: Mat3::zero(),
-        up: Mat3::zero(),
-        pu: Mat3::zero(),
-        pp: Mat3::zero(),
-    };
+    let mut out = VolumeForce::zero();
+    out.u = (motion.u_rate2 + r * s).scale(m);
+    out.p = t.transpose_mul(h);
     if weights == Weights::NONE {
         return out;
     }
@@ -141,4 +125,48 @@ pub fn body<T: Real>(inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights
         out.pp += spin.rotation.c2(h).scale(weights.stiffness);
     }
     out
+}
+
+/// Mass per length on the centre line: f_u = rhoA u''.
+pub struct Translation;
+
+impl VolumeKernel for Translation {
+    type Quantity = f64;
+    const BLOCKS: Blocks = Blocks::Displacements;
+    const RATES: bool = false;
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, mass: &f64, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let u = motion.u_rate2.scale(*mass);
+        VolumeForce { u, uu: Mat3::identity().scale(mass * weights.mass), ..VolumeForce::zero() }
+    }
+}
+
+/// Rotary inertia per length, see [`rotary`].
+pub struct Rotary;
+
+impl VolumeKernel for Rotary {
+    type Quantity = Mat3;
+    const BLOCKS: Blocks = Blocks::Rotations;
+    const RATES: bool = true;
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, j: &Mat3, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let (p, pp) = rotary(*j, &Spin::new(motion.p, motion.p_rate, motion.p_rate2), weights);
+        VolumeForce { p, pp, ..VolumeForce::zero() }
+    }
+}
+
+/// Eccentric mass per length, see [`body`].
+pub struct Eccentric;
+
+impl VolumeKernel for Eccentric {
+    type Quantity = Inertia;
+    const BLOCKS: Blocks = Blocks::Both;
+    const RATES: bool = true;
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        body(inertia, motion, weights)
+    }
 }

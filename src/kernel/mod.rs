@@ -10,5 +10,6 @@ pub mod inertia;
 pub mod load;
 pub mod seam;
 pub mod shape;
+pub mod volume;
 
 pub use element::{ElementSystem, MAX_NODES, NodeMotion, Weights};

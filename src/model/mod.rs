@@ -194,6 +194,7 @@ impl Assembly {
         for (number, effect) in self.effects.iter().enumerate() {
             let with_tangent = weights != Weights::NONE && effect.has_tangent();
             let mut sink = self.system.sink(number, effect.category(), with_tangent);
+            let weights = if with_tangent { weights } else { Weights::NONE };
             effect.add(state, &self.memories[number], weights, &mut sink);
             self.evaluations[number].1 += self.sizes[number];
         }

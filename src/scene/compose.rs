@@ -5,38 +5,24 @@ use super::names;
 use super::section::MassPerLength;
 use crate::deck::{self, Deck, Diagnostic, Frame, LoadTarget, LoadVector};
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement};
-use crate::effect::beam_mass::{BeamMass, MassElement};
+use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
-use crate::effect::line_load::{Intensity, LineLoad, LineLoadKind, LoadedElement};
+use crate::effect::line_load::{LineLoad, LineLoadKind};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::rigid_body::{Body, RigidBody};
-use crate::effect::rotary_inertia::{RotaryElement, RotaryInertia};
-use crate::effect::section_inertia::{EccentricElement, SectionInertia};
+use crate::effect::rotary_inertia::RotaryInertia;
+use crate::effect::section_inertia::SectionInertia;
 use crate::effect::spring::{self, Spring};
-use crate::effect::{ByOrder, Connection, Effect};
-use crate::kernel::beam::{StiffnessPoint, VolumePoint};
+use crate::effect::{ByOrder, Connection, Effect, VolumeElement, VolumeElements};
+use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::inertia::Inertia;
+use crate::kernel::load::Intensity;
+use crate::kernel::volume::VolumePoint;
 use crate::model::{Amplitude, History, StageSet};
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Pushes an element with volume points into the batch of its order.
-macro_rules! push_volume {
-    ($batches:expr, $kind:ident, $mesh:expr, $number:expr, $element:expr, $quantity:expr) => {
-        match $element.nodes.len() {
-            2 => $batches
-                .two
-                .push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
-            3 => $batches
-                .three
-                .push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
-            _ => $batches
-                .four
-                .push($kind { connection: connect($mesh, $number, $element), points: volume($element, $quantity) }),
-        }
-    };
-}
 /// An effect that a scene may have: acting or not, and why.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
@@ -177,24 +163,14 @@ impl Composer<'_> {
         self.each_element(|beam, number, element, mesh| {
             let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
             if found.iter().any(|m| m.offset != Vec3::ZERO) {
-                push_volume!(eccentric, EccentricElement, mesh, number, element, |k, s| found[k].turned(s.axes));
+                push_volume(&mut eccentric, mesh, number, element, |k, s| found[k].turned(s.axes));
                 return;
             }
             if found.iter().any(|m| m.mass != 0.0) {
-                match element.nodes.len() {
-                    2 => mass
-                        .two
-                        .push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
-                    3 => mass
-                        .three
-                        .push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
-                    _ => mass
-                        .four
-                        .push(MassElement::new(connect(mesh, number, element), volume(element, |k, _| found[k].mass))),
-                }
+                push_volume(&mut mass, mesh, number, element, |k, _| found[k].mass);
             }
             if found.iter().any(|m| m.about_line != Mat3::ZERO) && wanted != Some(false) {
-                push_volume!(rotary, RotaryElement, mesh, number, element, |k, s| found[k].turned(s.axes).about_node);
+                push_volume(&mut rotary, mesh, number, element, |k, s| found[k].turned(s.axes).about_node);
             }
         });
         let (mass, rotary, eccentric) =
@@ -265,7 +241,7 @@ impl Composer<'_> {
             let mut elements = ByOrder::default();
             self.each_element(|beam, number, element, mesh| {
                 let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
-                push_volume!(elements, EccentricElement, mesh, number, element, |k, s| found[k].turned(s.axes));
+                push_volume(&mut elements, mesh, number, element, |k, s| found[k].turned(s.axes));
             });
             self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
         }
@@ -375,11 +351,7 @@ impl Composer<'_> {
             let out = if load.frame == Frame::Space { &mut spatial } else { &mut material };
             for number in beam.elements.clone() {
                 let element = &self.mesh.elements[number];
-                match element.nodes.len() {
-                    2 => out.two.push(loaded(self.mesh, number, element, load, amplitude)),
-                    3 => out.three.push(loaded(self.mesh, number, element, load, amplitude)),
-                    _ => out.four.push(loaded(self.mesh, number, element, load, amplitude)),
-                }
+                push_volume(out, self.mesh, number, element, |_, station| intensity(load, station, amplitude));
             }
         }
         for (kind, elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
@@ -427,15 +399,36 @@ fn connect<const N: usize>(mesh: &Mesh, number: usize, element: &MeshElement) ->
     }
 }
 
-fn volume<const N: usize, Q>(element: &MeshElement, quantity: impl Fn(usize, &Station) -> Q) -> [VolumePoint<N, Q>; N] {
-    std::array::from_fn(|k| {
+/// Pushes an element with volume points into the batch of its order.
+fn push_volume<Q: Copy>(
+    batches: &mut VolumeElements<Q>,
+    mesh: &Mesh,
+    number: usize,
+    element: &MeshElement,
+    quantity: impl Fn(usize, &Station) -> Q,
+) {
+    match element.nodes.len() {
+        2 => batches.two.push(volume(mesh, number, element, quantity)),
+        3 => batches.three.push(volume(mesh, number, element, quantity)),
+        _ => batches.four.push(volume(mesh, number, element, quantity)),
+    }
+}
+
+fn volume<const N: usize, Q: Copy>(
+    mesh: &Mesh,
+    number: usize,
+    element: &MeshElement,
+    quantity: impl Fn(usize, &Station) -> Q,
+) -> VolumeElement<N, Q> {
+    let point = |k: usize| {
         let station = &element.volume[k];
         VolumePoint {
             shape: std::array::from_fn(|i| station.shape[i]),
             weight: station.weight,
             quantity: quantity(k, station),
         }
-    })
+    };
+    VolumeElement { connection: connect(mesh, number, element), points: std::array::from_fn(point) }
 }
 
 fn elastic<const N: usize, const G: usize>(
@@ -457,22 +450,13 @@ fn elastic<const N: usize, const G: usize>(
     ElasticElement { connection: connect(mesh, number, element), points: std::array::from_fn(point) }
 }
 
-fn loaded<const N: usize>(
-    mesh: &Mesh,
-    number: usize,
-    element: &MeshElement,
-    load: &deck::Load,
-    amplitude: usize,
-) -> LoadedElement<N> {
-    let points = volume(element, |_, station| {
-        let axes = if load.frame == Frame::Section { station.exact_axes } else { Mat3::IDENTITY };
-        let at = |vector: Option<LoadVector>| {
-            let [start, end] = vector.map_or([[0.0; 3]; 2], |v| [v.start, v.end]).map(Vec3);
-            axes * (start + (end - start) * station.fraction)
-        };
-        Intensity { force: at(load.force), moment: at(load.moment) }
-    });
-    LoadedElement { connection: connect(mesh, number, element), points, amplitude }
+fn intensity(load: &deck::Load, station: &Station, amplitude: usize) -> Intensity {
+    let axes = if load.frame == Frame::Section { station.exact_axes } else { Mat3::IDENTITY };
+    let at = |vector: Option<LoadVector>| {
+        let [start, end] = vector.map_or([[0.0; 3]; 2], |v| [v.start, v.end]).map(Vec3);
+        axes * (start + (end - start) * station.fraction)
+    };
+    Intensity { force: at(load.force), moment: at(load.moment), amplitude }
 }
 
 fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {

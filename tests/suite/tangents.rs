@@ -5,11 +5,12 @@
 use crate::dual::{Dual, along, jacobian, values, variables, vector_rate, with_room};
 use crate::random::Random;
 use beamsim::effect::spring::rotational;
-use beamsim::kernel::beam::{StiffnessPoint, VolumePoint};
+use beamsim::kernel::beam::StiffnessPoint;
 use beamsim::kernel::elastic::Stiffness;
-use beamsim::kernel::inertia::Inertia;
+use beamsim::kernel::inertia::{Eccentric, Inertia, Rotary, Spin};
 use beamsim::kernel::load::{material_force, material_moment, offset_force, spatial_moment};
 use beamsim::kernel::seam::{Conversion, Converted, conversion};
+use beamsim::kernel::volume::VolumePoint;
 use beamsim::kernel::{ElementSystem, NodeMotion, Weights, shape};
 use beamsim::real::Real;
 use beamsim::rotation::{Complement, Rotation, complement};
@@ -159,7 +160,7 @@ fn stiffness_points<const N: usize>(random: &mut Random, coupled: bool) -> Vec<S
     points
 }
 
-fn volume_points<const N: usize, Q>(quantity: impl Fn() -> Q) -> Vec<VolumePoint<N, Q>> {
+fn volume_points<const N: usize, Q: Copy>(quantity: impl Fn() -> Q) -> Vec<VolumePoint<N, Q>> {
     let mut points = Vec::new();
     for &(xi, weight) in shape::gauss(N) {
         points.push(VolumePoint { shape: shape::values::<N>(xi), weight: weight * HALF, quantity: quantity() });
@@ -186,7 +187,7 @@ fn rotary<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(N);
     for point in points {
-        point.add_rotary(nodes, weights, &mut out);
+        point.add(&Rotary, nodes, weights, &mut out);
     }
     out
 }
@@ -198,7 +199,7 @@ fn body<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(2 * N);
     for point in points {
-        point.add_body(nodes, weights, &mut out);
+        point.add(&Eccentric, nodes, weights, &mut out);
     }
     out
 }
@@ -217,7 +218,8 @@ fn strain_energy<const N: usize>(points: &[StiffnessPoint<N>], nodes: &[NodeMoti
 fn kinetic_energy<const N: usize>(points: &[VolumePoint<N, Inertia>], nodes: &[NodeMotion<Wide>; N]) -> Wide {
     let mut sum = Wide::zero();
     for point in points {
-        let (motion, spin) = (point.motion(nodes), point.spin(nodes));
+        let motion = point.motion(nodes);
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
         let d: Vec3<Wide> = Vec3::constant(point.quantity.offset);
         let j: Mat3<Wide> = Mat3::constant(point.quantity.about_node);
         let (velocity, omega) = (motion.u_rate, spin.omega);
@@ -233,7 +235,8 @@ fn kinetic_energy<const N: usize>(points: &[VolumePoint<N, Inertia>], nodes: &[N
 fn momenta<T: Real, const N: usize>(points: &[VolumePoint<N, Inertia>], nodes: &[NodeMotion<T>; N]) -> Vec<Vec3<T>> {
     let mut sum = vec![Vec3::<T>::zero(); 2 * N];
     for point in points {
-        let (motion, spin) = (point.motion(nodes), point.spin(nodes));
+        let motion = point.motion(nodes);
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
         let d: Vec3<T> = Vec3::constant(point.quantity.offset);
         let j: Mat3<T> = Mat3::constant(point.quantity.about_node);
         let (r, t) = (spin.rotation.r, spin.rotation.t);
@@ -615,7 +618,7 @@ fn rotary_seam_holds<const N: usize>() {
                 |nodes, weights, out| {
                     out.clear();
                     for point in &points {
-                        point.add_rotary(nodes, weights, out);
+                        point.add(&Rotary, nodes, weights, out);
                     }
                 },
                 |nodes| rotary(&points, nodes, Weights::NONE),
@@ -650,7 +653,7 @@ fn body_seam_holds<const N: usize>() {
                 |nodes, weights, out| {
                     out.clear();
                     for point in &points {
-                        point.add_body(nodes, weights, out);
+                        point.add(&Eccentric, nodes, weights, out);
                     }
                 },
                 |nodes| body(&points, nodes, Weights::NONE),

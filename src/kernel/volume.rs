@@ -1,0 +1,129 @@
+//! What acts per initial length without derivatives of the unknowns: inertia, weight, line loads.
+
+use super::beam::interpolate;
+use super::element::{ElementSystem, NodeMotion, Weights};
+use crate::real::Real;
+use crate::tensor::{Mat3, Vec3};
+
+/// An integration point for such a quantity.
+#[derive(Clone, Copy, Debug)]
+pub struct VolumePoint<const N: usize, Q> {
+    /// Shape functions
+    pub shape: [f64; N],
+    /// Gauss weight times ds/dxi
+    pub weight: f64,
+    /// What is integrated, per initial length
+    pub quantity: Q,
+}
+
+/// Force and tangent at a point, conjugate to u and P.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct VolumeForce<T = f64> {
+    pub u: Vec3<T>,
+    pub p: Vec3<T>,
+    pub uu: Mat3<T>,
+    pub up: Mat3<T>,
+    pub pu: Mat3<T>,
+    pub pp: Mat3<T>,
+}
+
+impl<T: Real> VolumeForce<T> {
+    /// No force.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let (v, m) = (Vec3::zero(), Mat3::zero());
+        Self { u: v, p: v, uu: m, up: m, pu: m, pp: m }
+    }
+}
+
+/// Which unknowns of its nodes a kernel couples, and so the blocks of its element: u1, u2, … or P1, P2, … or u1, P1, u2, ….
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blocks {
+    /// Displacements alone
+    Displacements,
+    /// Rotation vectors alone
+    Rotations,
+    /// Both
+    Both,
+}
+
+impl Blocks {
+    /// The blocks of an element of `nodes` nodes.
+    pub fn count(self, nodes: usize) -> usize {
+        if self == Self::Both { 2 * nodes } else { nodes }
+    }
+
+    /// The block of the rotation of node j.
+    #[inline(always)]
+    pub fn rotation(self, j: usize) -> usize {
+        if self == Self::Both { 2 * j + 1 } else { j }
+    }
+}
+
+/// A physical law at a point.
+pub trait VolumeKernel {
+    /// What it needs to know of the point.
+    type Quantity: Copy;
+    /// The unknowns it couples
+    const BLOCKS: Blocks;
+    /// Whether it depends on rates of P
+    const RATES: bool;
+
+    /// Force per length, and the tangent of the weights that are not zero.
+    fn evaluate<T: Real>(&self, quantity: &Self::Quantity, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T>;
+}
+
+impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
+    /// The motion at this point.
+    #[inline(always)]
+    pub fn motion<T: Real>(&self, nodes: &[NodeMotion<T>; N]) -> NodeMotion<T> {
+        NodeMotion {
+            u: interpolate(&self.shape, |i| nodes[i].u),
+            u_rate: interpolate(&self.shape, |i| nodes[i].u_rate),
+            u_rate2: interpolate(&self.shape, |i| nodes[i].u_rate2),
+            p: interpolate(&self.shape, |i| nodes[i].p),
+            p_rate: interpolate(&self.shape, |i| nodes[i].p_rate),
+            p_rate2: interpolate(&self.shape, |i| nodes[i].p_rate2),
+        }
+    }
+
+    /// Adds the force of `kernel`, and its tangent where a weight is not zero.
+    #[inline(always)]
+    pub fn add<T: Real, K: VolumeKernel<Quantity = Q>>(
+        &self,
+        kernel: &K,
+        nodes: &[NodeMotion<T>; N],
+        weights: Weights,
+        out: &mut ElementSystem<T>,
+    ) {
+        let force = kernel.evaluate(&self.quantity, &self.motion(nodes), weights);
+        for i in 0..N {
+            let w = self.weight * self.shape[i];
+            match K::BLOCKS {
+                Blocks::Displacements => out.add_force(i, force.u.scale(w)),
+                Blocks::Rotations => out.add_force(i, force.p.scale(w)),
+                Blocks::Both => {
+                    out.add_force(2 * i, force.u.scale(w));
+                    out.add_force(2 * i + 1, force.p.scale(w));
+                }
+            }
+            if weights == Weights::NONE {
+                continue;
+            }
+            for j in 0..N {
+                let w = w * self.shape[j];
+                match K::BLOCKS {
+                    Blocks::Displacements => out.add_tangent(i, j, force.uu.scale(w)),
+                    Blocks::Rotations => out.add_tangent(i, j, force.pp.scale(w)),
+                    Blocks::Both => {
+                        out.add_tangent(2 * i, 2 * j, force.uu.scale(w));
+                        out.add_tangent(2 * i, 2 * j + 1, force.up.scale(w));
+                        out.add_tangent(2 * i + 1, 2 * j, force.pu.scale(w));
+                        out.add_tangent(2 * i + 1, 2 * j + 1, force.pp.scale(w));
+                    }
+                }
+            }
+        }
+    }
+}
