@@ -201,12 +201,6 @@ impl<T: Real> Mat3<T> {
         Self::from_columns(a.cross(b.column(0)), a.cross(b.column(1)), a.cross(b.column(2)))
     }
 
-    /// B a~, the product with a skew tensor from the right.
-    #[inline(always)]
-    pub fn mul_skew(self, a: Vec3<T>) -> Self {
-        Self(three(|i| Vec3(self.0[i]).cross(a).0))
-    }
-
     /// The tensor times a constant.
     #[inline(always)]
     pub fn scale(self, factor: f64) -> Self {

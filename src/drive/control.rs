@@ -68,6 +68,7 @@ impl Control {
 
     /// The largest local error of a step, from the accelerations at its ends; both states in one chart.
     pub fn error(&self, model: &Model, start: &State, end: &State, length: f64) -> f64 {
+        // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps sensible.
         let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs() * length * length;
         let mut largest = 0.0_f64;
         for (slot, info) in model.slots.iter().enumerate() {

@@ -11,7 +11,7 @@ pub use history::{History, Table};
 
 use crate::effect::{Effect, Energy, Momentum, Noise};
 use crate::kernel::Weights;
-use crate::system::{Category, Direction, Equations, FrameConflict, Memory, Node, Pattern, Slot, State, System};
+use crate::system::{Direction, Equations, FrameConflict, Memory, Node, Pattern, Slot, State, System};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -238,10 +238,5 @@ impl Assembly {
             }
         }
         None
-    }
-
-    /// Whether any force belongs to this category.
-    pub fn has(&self, category: Category) -> bool {
-        self.effects.iter().any(|effect| effect.category() == category)
     }
 }

@@ -24,7 +24,6 @@ pub struct Rotation<T = f64> {
     pub r: Mat3<T>,
     /// T, from the rate of P to the material spin: Omega = T dP/dt, K = T dP/ds.
     pub t: Mat3<T>,
-    series: Series<T>,
     c: Coefficients<T>,
 }
 
@@ -43,7 +42,6 @@ impl<T: Real> Rotation<T> {
             p,
             r: Mat3::diagonal([f0; 3]) + skew * f1 + dyad * f2,
             t: Mat3::diagonal([f1; 3]) - skew * f2 + dyad * f3,
-            series,
             c: series.coefficients(),
         }
     }
@@ -154,10 +152,5 @@ impl<T: Real> Rotation<T> {
     pub fn potential_hessian(&self, v: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
         let material = self.r.transpose_mul(w);
         self.c2(v.cross(material)) + self.t.transpose_matmul(Mat3::skew_mul(v, Mat3::skew_mul(material, self.t)))
-    }
-
-    /// The functions f0 … f7 of |P|^2.
-    pub fn series(&self) -> &Series<T> {
-        &self.series
     }
 }

@@ -17,11 +17,6 @@ pub enum Category {
     External,
 }
 
-impl Category {
-    /// All of them, in the order of [`System::force`].
-    pub const ALL: [Self; 3] = [Self::Internal, Self::Inertia, Self::External];
-}
-
 /// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
 ///
 /// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).

@@ -1,38 +1,10 @@
 //! Orders of convergence in element size and time step, against theory.
 
-use crate::scenes::{distance, simulate};
+use crate::scenes::{bend45, distance, simulate};
 
-/// The 45-degree bend (Bathe & Bolourchi 1979, doi:10.1002/nme.1620140703) with GJ = 0.141 G.
+/// The 45-degree bend drawn from root to tip.
 fn bend(order: usize, elements: usize) -> [f64; 3] {
-    let text = format!(
-        r#"
-[point]
-root = [0, 0, 0]
-tip = ["100*sin(45*deg)", "100*(1-cos(45*deg))", 0]
-[section.s]
-EA = 1e7
-GA = 5e6
-GJ = 7.05e5
-EI = "1e7/12"
-[[beam]]
-name = "b"
-section = "s"
-arc = ["root", ["100*sin(22.5*deg)", "100*(1-cos(22.5*deg))", 0], "tip"]
-elements = {elements}
-order = {order}
-[[support]]
-at = "root"
-fix = "all"
-[[load]]
-at = "tip"
-force = [0, 0, 600]
-[[stage]]
-kind = "static"
-steps = 2
-tolerance = 1e-11
-"#
-    );
-    simulate(&text).vector("tip.u")
+    bend45(order, elements, ["root", "tip"])
 }
 
 /// The limit of fine meshes, from an independent boundary-value solution.

@@ -2,7 +2,7 @@
 //! the mesh, the direction in which a beam is drawn.
 
 use crate::random::Random;
-use crate::scenes::{Simulation, distance, simulate};
+use crate::scenes::{Simulation, bend45, distance, simulate};
 use beamsim::rotation::Rotation;
 use beamsim::tensor::{Mat3, Vec3};
 
@@ -258,45 +258,10 @@ fn load_order_and_step_count_do_not_matter_in_statics() {
     }
 }
 
-/// The bend drawn from root to tip, or from tip to root.
-fn drawn(elements: usize, arc: &str) -> [f64; 3] {
-    let deck = format!(
-        r#"
-[point]
-root = [0, 0, 0]
-tip = [70.71067811865476, 29.289321881345254, 0]
-[section.s]
-EA = 1e7
-GA = 5e6
-GJ = 7.05e5
-EI = 833333
-[[beam]]
-name = "b"
-section = "s"
-arc = {arc}
-elements = {elements}
-axis3 = [0, 0, 1]
-[[support]]
-at = "root"
-fix = "all"
-[[load]]
-at = "tip"
-force = [0, 0, 600]
-[[stage]]
-kind = "static"
-steps = 2
-tolerance = 1e-11
-"#
-    );
-    simulate(&deck).vector("tip.u")
-}
-
 /// Interpolated rotation vectors of one chart know no direction, so that only elements across a seam could tell.
 #[test]
 fn reversing_a_beam_changes_nothing_within_one_chart() {
-    let middle = "[38.26834323650898, 7.61204674887132, 0]";
-    let forth = drawn(8, &format!("[\"root\", {middle}, \"tip\"]"));
-    let back = drawn(8, &format!("[\"tip\", {middle}, \"root\"]"));
+    let (forth, back) = (bend45(1, 8, ["root", "tip"]), bend45(1, 8, ["tip", "root"]));
     assert!(distance(forth, back) < 1e-9 * 76.5, "{forth:?} against {back:?}");
 }
 

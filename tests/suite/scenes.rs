@@ -69,3 +69,39 @@ impl Simulation {
 pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
 }
+
+/// The tip of the 45-degree bend (Bathe & Bolourchi 1979, doi:10.1002/nme.1620140703) with GJ = 0.141 G, drawn from the
+/// first of its `ends` to the second.
+pub fn bend45(order: usize, elements: usize, ends: [&str; 2]) -> [f64; 3] {
+    let [start, end] = ends;
+    let text = format!(
+        r#"
+[point]
+root = [0, 0, 0]
+tip = ["100*sin(45*deg)", "100*(1-cos(45*deg))", 0]
+[section.s]
+EA = 1e7
+GA = 5e6
+GJ = 7.05e5
+EI = "1e7/12"
+[[beam]]
+name = "b"
+section = "s"
+arc = ["{start}", ["100*sin(22.5*deg)", "100*(1-cos(22.5*deg))", 0], "{end}"]
+elements = {elements}
+order = {order}
+axis3 = [0, 0, 1]
+[[support]]
+at = "root"
+fix = "all"
+[[load]]
+at = "tip"
+force = [0, 0, 600]
+[[stage]]
+kind = "static"
+steps = 2
+tolerance = 1e-11
+"#
+    );
+    simulate(&text).vector("tip.u")
+}
