@@ -40,6 +40,7 @@ fn stiffness_points<const N: usize, const G: usize>() -> [StiffnessPoint<N>; G] 
                 cm: Mat3::diagonal([80.0, 100.0, 120.0]),
                 cc: None,
             },
+            free: None,
         }
     })
 }
@@ -57,7 +58,7 @@ fn element<const N: usize, const G: usize>(criterion: &mut Criterion) {
         criterion.bench_function(&format!("{name}, {N} nodes"), |bencher| {
             let fill = |mut out: ElementSystem| {
                 for point in &points {
-                    point.add_elastic(black_box(&nodes), None, weight, &mut out);
+                    point.add_elastic(black_box(&nodes), 0.0, None, weight, &mut out);
                 }
                 out
             };

@@ -100,6 +100,24 @@ pub enum Path {
     Arc([Spanned<PointRef>; 3]),
 }
 
+/// `interpolation = …`
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InterpolationWord {
+    /// Of total rotation vectors
+    Total,
+    /// Of rotations relative to the element
+    Relative,
+}
+
+/// `free_strain = […]` with its history
+#[derive(Clone, Debug)]
+pub struct FreeStrain {
+    /// Gamma1 Gamma2 Gamma3 K1 K2 K3 in section axes
+    pub strain: [f64; 6],
+    /// How it goes; without one it ramps like a load
+    pub history: Option<Spanned<String>>,
+}
+
 /// `[[beam]]`
 #[derive(Clone, Debug)]
 pub struct Beam {
@@ -117,6 +135,10 @@ pub struct Beam {
     pub axis3: Option<Spanned<[f64; 3]>>,
     /// Angle of the section about axis 1 at start and end
     pub twist: Option<[f64; 2]>,
+    /// How rotations are interpolated
+    pub interpolation: InterpolationWord,
+    /// Strain without stress
+    pub free_strain: Option<FreeStrain>,
     /// Where the table stands
     pub span: Span,
 }
@@ -318,8 +340,19 @@ fn read_shaped(table: &Table) -> Option<SectionBody> {
     Some(SectionBody::Shaped { shape, material, shear_factor })
 }
 
-const BEAM_KEYS: [&str; 9] =
-    ["name", "section", "through", "arc", "elements", "order", "axis3", "twist", "interpolation"];
+const BEAM_KEYS: [&str; 11] = [
+    "name",
+    "section",
+    "through",
+    "arc",
+    "elements",
+    "order",
+    "axis3",
+    "twist",
+    "interpolation",
+    "free_strain",
+    "history",
+];
 
 pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Beam> {
     let table = Table::new(context, item, "[[beam]]", &BEAM_KEYS, &[])?;
@@ -337,7 +370,8 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
         None => Some(1),
     };
     let (axis3, twist) = (table.vector("axis3"), table.vector("twist").map(|t| t.value));
-    read_interpolation(&table);
+    let interpolation = read_interpolation(&table);
+    let free_strain = read_free_strain(&table);
     Some(Beam {
         name: name?,
         sections: sections?,
@@ -346,8 +380,23 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
         order: order?,
         axis3,
         twist,
+        interpolation: interpolation?,
+        free_strain: free_strain?,
         span: table.span.clone(),
     })
+}
+
+/// `Some(None)` where there is no key.
+fn read_free_strain(table: &Table) -> Option<Option<FreeStrain>> {
+    let Some(item) = table.get("free_strain") else {
+        if table.has("history") {
+            let message = "`history` of a beam belongs to its `free_strain`";
+            table.context.report(Diagnostic::error(message, table.key_span("history")));
+        }
+        return Some(None);
+    };
+    let strain = table.context.vector::<6>(item)?;
+    Some(Some(FreeStrain { strain: strain.value, history: table.text("history") }))
 }
 
 fn read_sections(context: &Context, item: &Item) -> Option<Vec<Spanned<String>>> {
@@ -414,11 +463,10 @@ fn read_counts(context: &Context, item: &Item) -> Option<Spanned<Vec<usize>>> {
     Some(Spanned { value, span: item.span() })
 }
 
-fn read_interpolation(table: &Table) {
-    if let Some(word) = table.word("interpolation", &["total", "relative"])
-        && word.value == "relative"
-    {
-        let message = "interpolation = \"relative\" is not supported yet";
-        table.context.report(Diagnostic::error(message, word.span).help("\"total\" is the paper's element"));
+fn read_interpolation(table: &Table) -> Option<InterpolationWord> {
+    if !table.has("interpolation") {
+        return Some(InterpolationWord::Total);
     }
+    let word = table.word("interpolation", &["total", "relative"])?;
+    Some(if word.value == "total" { InterpolationWord::Total } else { InterpolationWord::Relative })
 }

@@ -18,7 +18,9 @@ pub use action::{
 };
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
 pub use expression::{Expression, Jet};
-pub use geometry::{Beam, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape};
+pub use geometry::{
+    Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape,
+};
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use procedure::{

@@ -308,7 +308,7 @@ impl<'o> Run<'o> {
     fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.warned_coarse { charts::COARSE } else { charts::COARSE_WARNING };
         let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
-        let nodes = &self.model.elements[element];
+        let nodes = &self.model.elements[element].nodes;
         let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
         let failure = Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle };
         if angle > charts::COARSE {

@@ -1,12 +1,13 @@
-//! Elasticity of beams: the total Lagrangian element with interpolated rotation vectors (sections 3.2–3.4).
+//! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
-use super::{ByOrder, Connection, Effect, Energy, Noise, after_displacement, for_each_batch};
+use super::interpolation::{Interpolation, Scratch};
+use super::{ByOrder, Connection, Effect, Energy, Noise, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
-use crate::kernel::seam::Converted;
-use crate::kernel::{ElementSystem, Weights};
+use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::system::{Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
+use std::marker::PhantomData;
 
 /// An element of N nodes with G = N - 1 points for internal forces.
 #[derive(Clone, Debug)]
@@ -15,18 +16,50 @@ pub struct ElasticElement<const N: usize, const G: usize> {
     pub connection: Connection<N>,
     /// Its integration points
     pub points: [StiffnessPoint<N>; G],
+    /// The number of the amplitude of its free strain
+    pub free: Option<usize>,
 }
 
-/// All beam elements with stiffness.
-#[derive(Clone, Debug, Default)]
-pub struct BeamElasticity {
+/// Elastic elements of all orders.
+pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, ElasticElement<4, 3>>;
+
+/// All beam elements that interpolate in one way.
+#[derive(Clone, Debug)]
+pub struct BeamElasticity<I> {
     /// The elements
-    pub elements: ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, ElasticElement<4, 3>>,
+    pub elements: ElasticElements,
+    way: PhantomData<I>,
 }
 
-impl Effect for BeamElasticity {
+impl<I> BeamElasticity<I> {
+    /// Of these elements.
+    pub fn new(elements: ElasticElements) -> Self {
+        Self { elements, way: PhantomData }
+    }
+}
+
+/// Strain and stress in beam elements, however they interpolate.
+pub trait StressField: Send + Sync {
+    /// Strain and stress (material, global components) at the integration points of an element; `None` where it is not
+    /// one of these.
+    fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>>;
+}
+
+impl<I: Interpolation> StressField for BeamElasticity<I> {
+    fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>> {
+        for_each_batch!(self.elements, |_first, batch| {
+            // Batches are in the order of the scene.
+            if let Ok(k) = batch.binary_search_by_key(&element, |e| e.connection.element) {
+                return Some(batch[k].strains_and_stresses::<I>(at).to_vec());
+            }
+        });
+        None
+    }
+}
+
+impl<I: Interpolation> Effect for BeamElasticity<I> {
     fn name(&self) -> &'static str {
-        "beam elasticity"
+        I::NAME
     }
 
     fn category(&self) -> Category {
@@ -50,14 +83,14 @@ impl Effect for BeamElasticity {
         let (two, three) = (self.elements.two.len(), 2 * self.elements.three.len());
         let mut parts = [0, two, two + three].map(|start| remembered.get(start..).unwrap_or_default()).into_iter();
         for_each_batch!(self.elements, |first, batch| {
-            add_batch(batch, first, parts.next().unwrap_or_default(), at, weights, out);
+            add_batch::<I, _, _>(batch, first, parts.next().unwrap_or_default(), at, weights, out);
         });
     }
 
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
         let mut points = memory.points.iter_mut();
         for_each_batch!(self.elements, |_first, batch| for element in batch {
-            element.extrapolate(at, dq, &mut points);
+            element.extrapolate::<I>(at, dq, &mut points);
         });
         memory.valid = true;
     }
@@ -65,7 +98,7 @@ impl Effect for BeamElasticity {
     fn energy(&self, at: &State) -> Energy {
         let mut strain = 0.0;
         for_each_batch!(self.elements, |_first, batch| for element in batch {
-            strain += element.energy(at);
+            strain += element.energy::<I>(at);
         });
         Energy { kinetic: 0.0, strain }
     }
@@ -82,7 +115,7 @@ impl Effect for BeamElasticity {
 }
 
 /// Adds the elements of one order, `first` instances after the first one of the effect.
-fn add_batch<const N: usize, const G: usize>(
+fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
     first: usize,
     remembered: &[[f64; 6]],
@@ -90,15 +123,24 @@ fn add_batch<const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Sink,
 ) {
-    let mut system = ElementSystem::new(2 * N);
+    let (mut system, mut scratch) = (ElementSystem::new(2 * N), Scratch::new(N));
     for (k, element) in batch.iter().enumerate() {
+        let free = element.free_amplitude(at);
         let stresses = remembered.get(k * G..(k + 1) * G);
-        element.connection.evaluate(at, weights, false, after_displacement, &mut system, |nodes, weights, system| {
+        let kernel = |nodes: &[NodeMotion; N], stiffness: f64, out: &mut ElementSystem| {
             for (g, point) in element.points.iter().enumerate() {
                 let geometric = stresses.map(|s| unpack(&s[g]));
-                point.add_elastic(nodes, geometric.as_ref(), weights.stiffness, system);
+                point.add_elastic(nodes, free, geometric.as_ref(), stiffness, out);
+            }
+        };
+        let geometric = stresses.map(|stresses| {
+            move |nodes: &[NodeMotion; N], out: &mut ElementSystem| {
+                for (point, stress) in element.points.iter().zip(stresses) {
+                    point.add_force(&point.configuration(nodes), &unpack(stress), out);
+                }
             }
         });
+        I::evaluate(&element.connection, at, weights.stiffness, &mut scratch, &mut system, kernel, geometric);
         out.add(first + k, &system);
     }
 }
@@ -108,27 +150,36 @@ fn unpack(s: &[f64; 6]) -> Stress {
 }
 
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
-    /// Strain and stress at each integration point (material, global components).
-    pub fn strains_and_stresses(&self, at: &State) -> [(Strain, Stress); G] {
-        let nodes = self.connection.motions_in_one_chart(at);
-        self.points.map(|point| point.strain_and_stress(&nodes))
+    fn free_amplitude(&self, at: &State) -> f64 {
+        self.free.map_or(0.0, |number| at.amplitude[number])
     }
 
-    fn energy(&self, at: &State) -> f64 {
-        let density = |(strain, stress): &(Strain, Stress)| strain.gamma.dot(stress.n) + strain.kappa.dot(stress.m);
-        let values = self.strains_and_stresses(at);
-        values.iter().zip(&self.points).map(|(value, point)| 0.5 * point.weight * density(value)).sum()
+    /// Strain and stress at each integration point (material, global components).
+    pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
+        let (nodes, free) = (I::nodes(&self.connection, at), self.free_amplitude(at));
+        self.points.map(|point| point.strain_and_stress(&nodes, free))
+    }
+
+    fn energy<I: Interpolation>(&self, at: &State) -> f64 {
+        let free = self.free_amplitude(at);
+        let density = |(point, (strain, stress)): (&StiffnessPoint<N>, &(Strain, Stress))| {
+            let elastic = point.elastic_part(strain, free);
+            0.5 * point.weight * (elastic.gamma.dot(stress.n) + elastic.kappa.dot(stress.m))
+        };
+        self.points.iter().zip(&self.strains_and_stresses::<I>(at)).map(density).sum()
     }
 
     /// The stress that each point is expected to have after the correction `dq`.
-    fn extrapolate<'a>(&self, at: &State, dq: &[Vec3], points: &mut impl Iterator<Item = &'a mut [f64; 6]>) {
-        let converted = Converted::new(&self.connection.motions(at), at.mixed[self.connection.element as usize]);
-        let nodes = std::array::from_fn(|i| converted.nodes[i]);
-        let slots = self.connection.nodes;
-        let du: [Vec3; N] = std::array::from_fn(|i| dq[slots[i].u as usize]);
-        let dp: [Vec3; N] = std::array::from_fn(|i| converted.variation(i, dq[slots[i].p as usize]));
+    fn extrapolate<'a, I: Interpolation>(
+        &self,
+        at: &State,
+        dq: &[Vec3],
+        points: &mut impl Iterator<Item = &'a mut [f64; 6]>,
+    ) {
+        let (nodes, free) = (I::nodes(&self.connection, at), self.free_amplitude(at));
+        let change = I::variation(&self.connection, at, dq);
         for (point, remembered) in self.points.iter().zip(points) {
-            let Stress { n, m } = point.extrapolated_stress(&nodes, |i| du[i], |i| dp[i]);
+            let Stress { n, m } = point.extrapolated_stress(&nodes, free, |i| change[i].0, |i| change[i].1);
             *remembered = [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]];
         }
     }

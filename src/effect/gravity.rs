@@ -7,7 +7,6 @@ use crate::kernel::inertia::Inertia;
 use crate::kernel::load::{Weight, offset_force};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::rotation::Rotation;
 use crate::system::{Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
 
@@ -82,7 +81,7 @@ impl Effect for BodyGravity {
             system.clear();
             system.add_force(0, -weight);
             if body.inertia.offset != Vec3::ZERO {
-                let rotation = Rotation::new(at.q[body.node.p as usize]);
+                let rotation = at.rotation(body.node.p);
                 let (moment, tangent) = offset_force(&rotation, body.inertia.offset, weight);
                 system.add_force(1, moment);
                 system.add_tangent(1, 1, tangent * weights.stiffness);

@@ -5,6 +5,7 @@
 pub mod beam_elasticity;
 pub mod beam_mass;
 pub mod gravity;
+pub mod interpolation;
 pub mod line_load;
 pub mod node_load;
 pub mod rigid_body;

@@ -3,7 +3,6 @@
 use super::Effect;
 use crate::kernel::load::{material_force, material_moment, spatial_moment};
 use crate::kernel::{ElementSystem, Weights};
-use crate::rotation::Rotation;
 use crate::system::{Category, Cliques, Memory, Node, Sink, State};
 use crate::tensor::Vec3;
 
@@ -74,7 +73,7 @@ impl Effect for NodeLoad {
         let mut system = ElementSystem::new(if self.kind == NodeLoadKind::MaterialForce { 2 } else { 1 });
         for (k, load) in self.loads.iter().enumerate() {
             let vector = load.vector * at.amplitude[load.amplitude];
-            let rotation = || Rotation::new(at.q[load.node.p as usize]);
+            let rotation = || at.rotation(load.node.p);
             system.clear();
             match self.kind {
                 NodeLoadKind::SpatialForce => system.add_force(0, -vector),

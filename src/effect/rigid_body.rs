@@ -17,16 +17,18 @@ pub struct Body {
     pub inertia: Inertia,
 }
 
-/// The inertia of all bodies.
-#[derive(Clone, Debug, Default)]
+/// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at their nodes.
+#[derive(Clone, Debug)]
 pub struct RigidBody {
+    /// What they are
+    pub name: &'static str,
     /// The bodies
     pub bodies: Vec<Body>,
 }
 
 impl Effect for RigidBody {
     fn name(&self) -> &'static str {
-        "rigid body inertia"
+        self.name
     }
 
     fn category(&self) -> Category {
@@ -42,7 +44,7 @@ impl Effect for RigidBody {
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
         for (k, body) in self.bodies.iter().enumerate() {
-            let force = inertia::body(&body.inertia, &at.motion(body.node), weights);
+            let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &at.spin(body.node.p), weights);
             system.clear();
             system.add_force(0, force.u);
             system.add_force(1, force.p);

@@ -18,6 +18,8 @@ pub struct StiffnessPoint<const N: usize> {
     pub tangent: Vec3,
     /// The section in global components
     pub stiffness: Stiffness,
+    /// The strain that makes no stress, where there is one (natural curvature, thermal strain), for an amplitude of one
+    pub free: Option<Strain>,
 }
 
 /// sum_i N_i v_i
@@ -40,10 +42,40 @@ impl<const N: usize> StiffnessPoint<N> {
         Point::new(p, p_slope, x_slope)
     }
 
-    /// Strain and stress at this point.
-    pub fn strain_and_stress<T: Real>(&self, nodes: &[NodeMotion<T>; N]) -> (Strain<T>, Stress<T>) {
+    /// Strain and stress at this point; `free` is the amplitude of the free strain.
+    pub fn strain_and_stress<T: Real>(&self, nodes: &[NodeMotion<T>; N], free: f64) -> (Strain<T>, Stress<T>) {
         let strain = self.configuration(nodes).strain(self.tangent);
-        (strain, self.stiffness.stress(&strain))
+        (strain, self.stress(&strain, free))
+    }
+
+    /// The stress of a strain, less its free part.
+    #[inline(always)]
+    pub fn stress<T: Real>(&self, strain: &Strain<T>, free: f64) -> Stress<T> {
+        self.stiffness.stress(&self.elastic_part(strain, free))
+    }
+
+    /// The strain less its free part.
+    #[inline(always)]
+    pub fn elastic_part<T: Real>(&self, strain: &Strain<T>, free: f64) -> Strain<T> {
+        match &self.free {
+            None => *strain,
+            Some(own) => Strain {
+                gamma: strain.gamma - Vec3::constant(own.gamma * free),
+                kappa: strain.kappa - Vec3::constant(own.kappa * free),
+            },
+        }
+    }
+
+    /// How the strain varies with the nodes.
+    #[inline(always)]
+    pub fn strain_variation<T: Real>(
+        &self,
+        at: &Point<T>,
+        du: impl Fn(usize) -> Vec3<T>,
+        dp: impl Fn(usize) -> Vec3<T>,
+    ) -> Strain<T> {
+        let slopes = (interpolate(&self.slope, du), interpolate(&self.slope, &dp));
+        at.strain_variation(slopes.0, slopes.1, interpolate(&self.shape, &dp))
     }
 
     /// The stress that a correction of the nodes is expected to lead to: C (strain + B dq).
@@ -51,17 +83,15 @@ impl<const N: usize> StiffnessPoint<N> {
     pub fn extrapolated_stress<T: Real>(
         &self,
         nodes: &[NodeMotion<T>; N],
+        free: f64,
         du: impl Fn(usize) -> Vec3<T>,
         dp: impl Fn(usize) -> Vec3<T>,
     ) -> Stress<T> {
         let at = self.configuration(nodes);
         let strain = at.strain(self.tangent);
-        let change = at.strain_variation(
-            interpolate(&self.slope, &du),
-            interpolate(&self.slope, &dp),
-            interpolate(&self.shape, &dp),
-        );
-        self.stiffness.stress(&Strain { gamma: strain.gamma + change.gamma, kappa: strain.kappa + change.kappa })
+        let change = self.strain_variation(&at, du, dp);
+        let next = Strain { gamma: strain.gamma + change.gamma, kappa: strain.kappa + change.kappa };
+        self.stress(&next, free)
     }
 
     /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the
@@ -70,23 +100,41 @@ impl<const N: usize> StiffnessPoint<N> {
     pub fn add_elastic<T: Real>(
         &self,
         nodes: &[NodeMotion<T>; N],
+        free: f64,
         geometric: Option<&Stress<T>>,
         weight: f64,
         out: &mut ElementSystem<T>,
     ) {
         let at = self.configuration(nodes);
-        let stress = self.stiffness.stress(&at.strain(self.tangent));
-        let force = at.force(&stress);
-        let w = self.weight;
+        let stress = self.stress(&at.strain(self.tangent), free);
+        self.add_force(&at, &stress, out);
+        if weight != 0.0 {
+            self.add_tangent(&at, &self.stiffness, geometric.unwrap_or(&stress), weight, out);
+        }
+    }
+
+    /// Adds the force of a stress.
+    #[inline(always)]
+    pub fn add_force<T: Real>(&self, at: &Point<T>, stress: &Stress<T>, out: &mut ElementSystem<T>) {
+        let (force, w) = (at.force(stress), self.weight);
         for i in 0..N {
             let (n, s) = (self.shape[i] * w, self.slope[i] * w);
             out.add_force(2 * i, force.x_slope.scale(s));
             out.add_force(2 * i + 1, force.p.scale(n) + force.p_slope.scale(s));
         }
-        if weight != 0.0 {
-            let tangent = at.tangent(&self.stiffness, geometric.unwrap_or(&stress));
-            self.add_stiffness(&tangent, w * weight, out);
-        }
+    }
+
+    /// Adds `weight` times the tangent of a stiffness and of the geometric part of a stress.
+    #[inline(always)]
+    pub fn add_tangent<T: Real>(
+        &self,
+        at: &Point<T>,
+        stiffness: &Stiffness,
+        stress: &Stress<T>,
+        weight: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        self.add_stiffness(&at.tangent(stiffness, stress), self.weight * weight, out);
     }
 
     /// Adds w times the blocks of every pair of nodes, using the symmetry of the stiffness.

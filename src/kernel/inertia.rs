@@ -26,8 +26,16 @@ pub struct Spin<T = f64> {
     pub omega: Vec3<T>,
     /// Acc, material angular acceleration
     pub acceleration: Vec3<T>,
-    p_rate: Vec3<T>,
-    p_rate2: Vec3<T>,
+    rates: Rates<T>,
+}
+
+/// What the unknown rates of a spin are.
+#[derive(Clone, Copy, Debug)]
+enum Rates<T> {
+    /// Those of the rotation vector
+    OfVector(Vec3<T>, Vec3<T>),
+    /// Omega and Acc themselves
+    OfSpin,
 }
 
 impl<T: Real> Spin<T> {
@@ -37,7 +45,13 @@ impl<T: Real> Spin<T> {
         let rotation = Rotation::new(p);
         let omega = rotation.t * p_rate;
         let acceleration = rotation.t * p_rate2 + rotation.t_rate(p_rate) * p_rate;
-        Self { rotation, omega, acceleration, p_rate, p_rate2 }
+        Self { rotation, omega, acceleration, rates: Rates::OfVector(p_rate, p_rate2) }
+    }
+
+    /// A spin whose unknown rates are Omega and Acc themselves.
+    #[inline]
+    pub fn direct(rotation: Rotation<T>, omega: Vec3<T>, acceleration: Vec3<T>) -> Self {
+        Self { rotation, omega, acceleration, rates: Rates::OfSpin }
     }
 
     /// The weighted derivatives of Acc and of Omega with respect to the rotation unknowns:
@@ -45,18 +59,23 @@ impl<T: Real> Spin<T> {
     /// ```text
     /// dAcc   = s (C5 + C1(Pdd)) + d C4 + m T          dOmega = s C1(Pd) + d T
     /// ```
+    ///
+    /// Where Omega and Acc are the unknown rates themselves: dAcc = m I, dOmega = d I.
     #[inline(always)]
     fn derivatives(&self, w: Weights) -> (Mat3<T>, Mat3<T>) {
         let rotation = &self.rotation;
+        let Rates::OfVector(p_rate, p_rate2) = self.rates else {
+            return (Mat3::identity().scale(w.mass), Mat3::identity().scale(w.damping));
+        };
         let mut acceleration = rotation.t.scale(w.mass);
         let mut omega = Mat3::zero();
         if w.damping != 0.0 {
-            acceleration += rotation.c4(self.p_rate).scale(w.damping);
+            acceleration += rotation.c4(p_rate).scale(w.damping);
             omega += rotation.t.scale(w.damping);
         }
         if w.stiffness != 0.0 {
-            acceleration += (rotation.c5(self.p_rate) + rotation.c1(self.p_rate2)).scale(w.stiffness);
-            omega += rotation.c1(self.p_rate).scale(w.stiffness);
+            acceleration += (rotation.c5(p_rate) + rotation.c1(p_rate2)).scale(w.stiffness);
+            omega += rotation.c1(p_rate).scale(w.stiffness);
         }
         (acceleration, omega)
     }
@@ -93,17 +112,16 @@ pub fn rotary<T: Real>(j: Mat3, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, M
 /// f_u = m (u'' + R s),  f_P = T^T h
 /// ```
 #[inline(always)]
-pub fn body<T: Real>(inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-    let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
+pub fn body<T: Real>(inertia: &Inertia, u_rate2: Vec3<T>, spin: &Spin<T>, weights: Weights) -> VolumeForce<T> {
     let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
     let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
     let momentum = j0 * omega;
-    let pull = r.transpose_mul(motion.u_rate2);
+    let pull = r.transpose_mul(u_rate2);
     let omega_d = omega.cross(d);
     let s = spin.acceleration.cross(d) + omega.cross(omega_d);
     let h = j0 * spin.acceleration + omega.cross(momentum) + d.cross(pull).scale(m);
     let mut out = VolumeForce::zero();
-    out.u = (motion.u_rate2 + r * s).scale(m);
+    out.u = (u_rate2 + r * s).scale(m);
     out.p = t.transpose_mul(h);
     if weights == Weights::NONE {
         return out;
@@ -167,6 +185,6 @@ impl VolumeKernel for Eccentric {
 
     #[inline(always)]
     fn evaluate<T: Real>(&self, inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        body(inertia, motion, weights)
+        body(inertia, motion.u_rate2, &Spin::new(motion.p, motion.p_rate, motion.p_rate2), weights)
     }
 }

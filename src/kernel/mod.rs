@@ -8,6 +8,7 @@ pub mod elastic;
 pub mod element;
 pub mod inertia;
 pub mod load;
+pub mod relative;
 pub mod seam;
 pub mod shape;
 pub mod volume;

@@ -47,6 +47,19 @@ pub fn gauss(count: usize) -> &'static [(f64, f64)] {
     }
 }
 
+/// Abscissas and weights of the closed Newton–Cotes rule on the nodes of an element of `count` nodes (2 to 4) on [-1, 1].
+pub fn newton_cotes(count: usize) -> &'static [(f64, f64)] {
+    const TWO: [(f64, f64); 2] = [(-1.0, 1.0), (1.0, 1.0)];
+    const THREE: [(f64, f64); 3] = [(-1.0, 1.0 / 3.0), (0.0, 4.0 / 3.0), (1.0, 1.0 / 3.0)];
+    const FOUR: [(f64, f64); 4] = [(-1.0, 0.25), (-1.0 / 3.0, 0.75), (1.0 / 3.0, 0.75), (1.0, 0.25)];
+    match count {
+        2 => &TWO,
+        3 => &THREE,
+        4 => &FOUR,
+        _ => panic!("there is no element of {count} nodes"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,8 +1,9 @@
 //! Changes of chart at nodes, and the choice of charts in elements.
 
+use super::ElementInfo;
 use crate::kernel::seam;
 use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
-use crate::system::{Node, Slot, State};
+use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 use std::f64::consts::PI;
 
@@ -50,9 +51,9 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: f64) -> usi
 }
 
 /// Chooses for each element the nodes that are converted into the chart of its first, and counts the mixed elements.
-pub fn freeze(state: &mut State, elements: &[Vec<Node>]) -> usize {
+pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     let mut mixed = 0;
-    for (element, nodes) in elements.iter().enumerate() {
+    for (element, ElementInfo { nodes, .. }) in elements.iter().enumerate().filter(|(_, e)| e.in_one_chart) {
         let mut p = [Vec3::ZERO; crate::kernel::MAX_NODES];
         for (p, node) in p.iter_mut().zip(nodes) {
             *p = state.q[node.p as usize];
@@ -93,9 +94,9 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
 }
 
 /// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle).
-pub fn coarsest(state: &State, elements: &[Vec<Node>], limit: f64) -> Option<(usize, f64)> {
+pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(usize, f64)> {
     let mut worst: Option<(usize, f64)> = None;
-    for (element, nodes) in elements.iter().enumerate() {
+    for (element, ElementInfo { nodes, .. }) in elements.iter().enumerate() {
         for pair in nodes.windows(2) {
             let (a, b) = (state.q[pair[0].p as usize], state.q[pair[1].p as usize]);
             // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.

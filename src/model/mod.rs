@@ -38,6 +38,15 @@ pub struct SlotInfo {
     pub place: Vec3,
 }
 
+/// A beam element as changes of chart and the judgement of the mesh see it.
+#[derive(Clone, Debug)]
+pub struct ElementInfo {
+    /// Its nodes
+    pub nodes: Vec<Node>,
+    /// Whether it interpolates total rotation vectors, so that all of them must be taken in one chart
+    pub in_one_chart: bool,
+}
+
 impl SlotInfo {
     /// What turns the forces of this slot into forces that compare: a length for moments, 1 for forces.
     pub fn arm(&self, length: f64) -> f64 {
@@ -54,8 +63,8 @@ pub struct Model {
     pub rotations: Vec<Slot>,
     /// The slots on which rotational springs act: how they are wound must be known
     pub sprung: Vec<Slot>,
-    /// The nodes of each beam element
-    pub elements: Vec<Vec<Node>>,
+    /// The beam elements
+    pub elements: Vec<ElementInfo>,
     /// What acts
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs

@@ -1,10 +1,13 @@
 //! Places that can be looked at: nodes, and points within elements.
 
-use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement};
+use crate::effect::beam_elasticity::StressField;
 use crate::kernel::NodeMotion;
 use crate::kernel::element::MAX_NODES;
+use crate::kernel::relative::Relative;
 use crate::kernel::seam::{Converted, conversion};
 use crate::kernel::shape::gauss;
+use crate::real::Jet;
+use crate::rotation::{Rotation, log};
 use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
@@ -16,6 +19,8 @@ pub struct Place {
     pub nodes: Vec<(Node, Vec3, f64)>,
     /// The section axes E1, E2, E3 of the initial placement as columns
     pub frame: Mat3,
+    /// Whether rotations are interpolated relative to the element
+    pub relative: bool,
 }
 
 impl Place {
@@ -25,6 +30,9 @@ impl Place {
             return state.motion(node);
         }
         let motions: Vec<NodeMotion> = self.nodes.iter().map(|&(node, _, _)| state.motion(node)).collect();
+        if self.relative {
+            return self.relative_motion(&motions);
+        }
         let mut p = [Vec3::ZERO; MAX_NODES];
         p.iter_mut().zip(&motions).for_each(|(p, motion)| *p = motion.p);
         let converted = Converted::new(&motions, conversion(&p[..motions.len()]));
@@ -40,6 +48,38 @@ impl Place {
             p_rate: sum(|m| m.p_rate),
             p_rate2: sum(|m| m.p_rate2),
         }
+    }
+
+    /// Displacements are interpolated as ever; the rotation relative to the element comes as a jet, with its rates.
+    fn relative_motion(&self, motions: &[NodeMotion]) -> NodeMotion {
+        let sum = |field: fn(&NodeMotion) -> Vec3| {
+            let parts = self.nodes.iter().zip(motions);
+            parts.fold(Vec3::ZERO, |sum, (&(_, _, weight), motion)| sum + field(motion) * weight)
+        };
+        let rotation = match motions.len() {
+            2 => self.relative_rotation::<2>(motions),
+            3 => self.relative_rotation::<3>(motions),
+            _ => self.relative_rotation::<4>(motions),
+        };
+        let p = log(rotation);
+        let pick = |field: fn(&Jet) -> f64| Vec3(p.0.each_ref().map(field));
+        NodeMotion {
+            u: sum(|m| m.u),
+            u_rate: sum(|m| m.u_rate),
+            u_rate2: sum(|m| m.u_rate2),
+            p: pick(|jet| jet.value),
+            p_rate: pick(|jet| jet.rate),
+            p_rate2: pick(|jet| jet.rate2),
+        }
+    }
+
+    fn relative_rotation<const N: usize>(&self, motions: &[NodeMotion]) -> Mat3<Jet> {
+        let jet = |m: &NodeMotion| {
+            Vec3(std::array::from_fn(|k| Jet { value: m.p.0[k], rate: m.p_rate.0[k], rate2: m.p_rate2.0[k] }))
+        };
+        let rotations: [Rotation<Jet>; N] = std::array::from_fn(|i| Rotation::new(jet(&motions[i])));
+        let places = std::array::from_fn(|i| self.nodes[i].1);
+        Relative::new(&places, &[Vec3::zero(); N], &rotations).rotation(|i| self.nodes[i].2)
     }
 
     /// Where it was at the start.
@@ -64,8 +104,8 @@ impl Place {
 /// A point within beam elements: between two elements of a beam it has two sides.
 #[derive(Clone)]
 pub struct BeamPoint {
-    /// The elasticity of the scene
-    pub elasticity: Arc<BeamElasticity>,
+    /// The elasticity of the scene, one a way to interpolate
+    pub elasticity: Vec<Arc<dyn StressField>>,
     /// Number of the element in the scene, and xi in it
     pub sides: Vec<(u32, f64)>,
     /// The section axes as columns
@@ -85,27 +125,13 @@ impl BeamPoint {
         mean
     }
 
+    /// The polynomial through the values at the Gauss points.
     fn one_side(&self, element: u32, xi: f64, state: &State) -> [[f64; 6]; 2] {
-        let elements = &self.elasticity.elements;
-        if let Some(two) = find(&elements.two, element) {
-            return self.extrapolated(two, xi, state);
-        }
-        if let Some(three) = find(&elements.three, element) {
-            return self.extrapolated(three, xi, state);
-        }
-        find(&elements.four, element).map_or([[0.0; 6]; 2], |four| self.extrapolated(four, xi, state))
-    }
-
-    fn extrapolated<const N: usize, const G: usize>(
-        &self,
-        element: &ElasticElement<N, G>,
-        xi: f64,
-        state: &State,
-    ) -> [[f64; 6]; 2] {
-        let abscissas: Vec<f64> = gauss(G).iter().map(|&(x, _)| x).collect();
+        let values = self.elasticity.iter().find_map(|field| field.at_points(element, state)).unwrap_or_default();
+        let abscissas: Vec<f64> = gauss(values.len()).iter().map(|&(x, _)| x).collect();
         let mut out = [[0.0; 6]; 2];
-        for (g, (strain, stress)) in element.strains_and_stresses(state).iter().enumerate() {
-            let others = (0..G).filter(|&k| k != g);
+        for (g, (strain, stress)) in values.iter().enumerate() {
+            let others = (0..values.len()).filter(|&k| k != g);
             let weight: f64 = others.map(|k| (xi - abscissas[k]) / (abscissas[g] - abscissas[k])).product();
             let local = |v: Vec3| self.frame.transpose_mul(v).0;
             let parts = [[local(strain.gamma), local(strain.kappa)], [local(stress.n), local(stress.m)]];
@@ -117,9 +143,4 @@ impl BeamPoint {
         }
         out
     }
-}
-
-/// The element of this number: batches are in the order of the scene.
-fn find<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], element: u32) -> Option<&ElasticElement<N, G>> {
-    batch.binary_search_by_key(&element, |e| e.connection.element).ok().map(|k| &batch[k])
 }

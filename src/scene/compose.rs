@@ -3,10 +3,11 @@
 use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
 use super::names;
 use super::section::MassPerLength;
-use crate::deck::{self, Deck, Diagnostic, Frame, LoadTarget, LoadVector};
-use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement};
+use crate::deck::{self, Deck, Diagnostic, Frame, InterpolationWord, LoadTarget, LoadVector};
+use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
 use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
+use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
 use crate::effect::line_load::{LineLoad, LineLoadKind};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::rigid_body::{Body, RigidBody};
@@ -15,12 +16,13 @@ use crate::effect::section_inertia::SectionInertia;
 use crate::effect::spring::{self, Spring};
 use crate::effect::{ByOrder, Connection, Effect, VolumeElement, VolumeElements};
 use crate::kernel::beam::StiffnessPoint;
+use crate::kernel::elastic::Strain;
 use crate::kernel::inertia::Inertia;
 use crate::kernel::load::Intensity;
 use crate::kernel::volume::VolumePoint;
 use crate::model::{Amplitude, History, StageSet};
 use crate::tensor::{Mat3, Vec3};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 /// An effect that a scene may have: acting or not, and why.
@@ -43,7 +45,7 @@ pub struct Composition {
     /// The factors of loads and springs
     pub amplitudes: Vec<Amplitude>,
     /// The elasticity, for resultants
-    pub elasticity: Option<Arc<BeamElasticity>>,
+    pub elasticity: Vec<Arc<dyn StressField>>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs to ground
@@ -73,7 +75,7 @@ pub fn compose(
         effects: Vec::new(),
         reasons: Vec::new(),
         amplitudes: Vec::new(),
-        elasticity: None,
+        elasticity: Vec::new(),
         bodies: Vec::new(),
         springs: Vec::new(),
     };
@@ -84,8 +86,8 @@ pub fn compose(
     composer.out.bodies = composer.bodies();
     composer.gravity();
     composer.body_inertia();
-    composer.node_loads();
-    composer.line_loads();
+    let along = composer.line_loads();
+    composer.node_loads(along);
     composer.never();
     composer.out
 }
@@ -127,20 +129,45 @@ impl Composer<'_> {
     }
 
     fn elasticity(&mut self) {
-        let count = self.mesh.elements.len();
-        if count == 0 {
-            return self.reason("beam elasticity", false, "no beams");
-        }
-        let mut elements = ByOrder::default();
-        self.each_element(|beam, number, element, mesh| match element.nodes.len() {
-            2 => elements.two.push(elastic::<2, 1>(mesh, beam, number, element)),
-            3 => elements.three.push(elastic::<3, 2>(mesh, beam, number, element)),
-            _ => elements.four.push(elastic::<4, 3>(mesh, beam, number, element)),
+        self.elasticity_of::<TotalVectors>(InterpolationWord::Total);
+        self.elasticity_of::<RelativeVectors>(InterpolationWord::Relative);
+    }
+
+    fn elasticity_of<I: Interpolation>(&mut self, way: InterpolationWord) {
+        let free: HashMap<String, usize> = self.free_strains();
+        let mut elements = ElasticElements::default();
+        self.each_element(|beam, number, element, mesh| {
+            if beam.interpolation != way {
+                return;
+            }
+            let free = free.get(&beam.name).copied();
+            match element.nodes.len() {
+                2 => elements.two.push(elastic::<2, 1>(mesh, beam, number, element, free)),
+                3 => elements.three.push(elastic::<3, 2>(mesh, beam, number, element, free)),
+                _ => elements.four.push(elastic::<4, 3>(mesh, beam, number, element, free)),
+            }
         });
-        let effect = Arc::new(BeamElasticity { elements });
-        self.reason("beam elasticity", true, format!("{count} beam elements"));
-        self.out.elasticity = Some(effect.clone());
+        if elements.is_empty() {
+            return self.reason(
+                I::NAME,
+                false,
+                if self.mesh.elements.is_empty() { "no beams" } else { "no such beams" },
+            );
+        }
+        let count = elements.two.len() + elements.three.len() + elements.four.len();
+        let effect = Arc::new(BeamElasticity::<I>::new(elements));
+        self.reason(I::NAME, true, format!("{count} beam elements"));
+        self.out.elasticity.push(effect.clone());
         self.out.effects.push(effect);
+    }
+
+    /// The amplitudes of free strains, by beam.
+    fn free_strains(&mut self) -> HashMap<String, usize> {
+        let beams: Vec<(String, deck::FreeStrain)> =
+            self.mesh.beams.iter().filter_map(|b| Some((b.name.clone(), b.free_strain.clone()?))).collect();
+        let numbered =
+            |(name, free): (String, deck::FreeStrain)| Some((name, self.amplitude(free.history.as_ref(), None)?));
+        beams.into_iter().filter_map(numbered).collect()
     }
 
     fn each_element(&self, mut visit: impl FnMut(&MeshBeam, usize, &MeshElement, &Mesh)) {
@@ -151,17 +178,26 @@ impl Composer<'_> {
         }
     }
 
-    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
+    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it. Beams whose rotations
+    /// are relative have what turns with the section at their nodes, where no chart matters.
     fn beam_inertia(&mut self) {
-        let names = ["beam mass", "rotary inertia", "eccentric section inertia"];
+        let names = ["beam mass", "rotary inertia", "eccentric section inertia", "section inertia at nodes"];
         if !self.dynamic || self.mesh.elements.is_empty() {
             let why = if self.mesh.elements.is_empty() { "no beams" } else { "no dynamic stage" };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
         let wanted = self.deck.effects.rotary_inertia.as_ref().map(|flag| flag.value);
         let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
+        let mut nodal = NodalInertia::default();
         self.each_element(|beam, number, element, mesh| {
             let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
+            let relative = beam.interpolation == InterpolationWord::Relative;
+            if relative && found.iter().any(|m| m.offset != Vec3::ZERO) {
+                return nodal.add(beam, element, |m| m);
+            }
+            if relative && found.iter().any(|m| m.about_line != Mat3::ZERO) && wanted != Some(false) {
+                nodal.add(beam, element, |m| Inertia { mass: 0.0, ..m });
+            }
             if found.iter().any(|m| m.offset != Vec3::ZERO) {
                 push_volume(&mut eccentric, mesh, number, element, |k, s| found[k].turned(s.axes));
                 return;
@@ -169,7 +205,7 @@ impl Composer<'_> {
             if found.iter().any(|m| m.mass != 0.0) {
                 push_volume(&mut mass, mesh, number, element, |k, _| found[k].mass);
             }
-            if found.iter().any(|m| m.about_line != Mat3::ZERO) && wanted != Some(false) {
+            if found.iter().any(|m| m.about_line != Mat3::ZERO) && wanted != Some(false) && !relative {
                 push_volume(&mut rotary, mesh, number, element, |k, s| found[k].turned(s.axes).about_node);
             }
         });
@@ -184,6 +220,19 @@ impl Composer<'_> {
             (_, Some(false)) => self.reason(names[1], false, "switched off in [effects]"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
             _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
+        }
+        let bodies = nodal.bodies(self.mesh);
+        if bodies.is_empty() {
+            self.reason(
+                names[3],
+                false,
+                "no beam with interpolation = \"relative\" has rotary inertia or eccentric mass",
+            );
+        } else {
+            self.push(
+                RigidBody { name: names[3], bodies },
+                "relative beams with rotary inertia or eccentric mass".into(),
+            );
         }
         if eccentric.elements.is_empty() {
             self.reason(names[2], false, "no section has its mass centre off the centre line");
@@ -221,13 +270,13 @@ impl Composer<'_> {
             (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
             _ => {
                 let reason = format!("{} [[body]] table(s) and a dynamic stage", bodies.len());
-                self.push(RigidBody { bodies }, reason);
+                self.push(RigidBody { name: "rigid body inertia", bodies }, reason);
             }
         }
     }
 
     fn gravity(&mut self) {
-        let bodies = self.out.bodies.clone();
+        let mut bodies = self.out.bodies.clone();
         let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
         let Some(acceleration) = acceleration else {
             let why = if self.deck.gravity.is_some() { "`gravity` is zero" } else { "no `gravity`" };
@@ -239,11 +288,21 @@ impl Composer<'_> {
             self.reason("gravity on beams", false, "no beams");
         } else {
             let mut elements = ByOrder::default();
+            let mut nodal = NodalInertia::default();
             self.each_element(|beam, number, element, mesh| {
                 let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
+                let eccentric = found.iter().any(|m| m.offset != Vec3::ZERO);
+                if eccentric && beam.interpolation == InterpolationWord::Relative {
+                    return nodal.add(beam, element, |m| m);
+                }
                 push_volume(&mut elements, mesh, number, element, |k, s| found[k].turned(s.axes));
             });
-            self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
+            bodies.extend(nodal.bodies(self.mesh));
+            if elements.is_empty() {
+                self.reason("gravity on beams", false, "all masses of beams are eccentric and sit at their nodes");
+            } else {
+                self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
+            }
         }
         if bodies.is_empty() {
             self.reason("gravity on bodies", false, "no [[body]]");
@@ -276,20 +335,17 @@ impl Composer<'_> {
         }
     }
 
-    fn node_loads(&mut self) {
+    /// Loads at nodes, and beside them those that line loads on relative beams leave there.
+    fn node_loads(&mut self, mut loads: NodeLoads) {
         use NodeLoadKind::{MaterialForce, MaterialMoment, SpatialForce, SpatialMoment};
         let kinds = [SpatialForce, SpatialMoment, MaterialForce, MaterialMoment];
-        let mut loads: [Vec<node_load::Instance>; 4] = Default::default();
         for load in &self.deck.loads {
             let LoadTarget::At(at) = &load.target else { continue };
             let Some((node, on)) = self.node(at) else { continue };
             let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
             let Some(frame) = self.load_axes(load, at, node, on) else { continue };
             let node = self.mesh.nodes[node].node;
-            let spatial = load.frame == Frame::Space;
-            for (vector, kind) in
-                [(load.force, if spatial { 0 } else { 2 }), (load.moment, if spatial { 1 } else { 3 })]
-            {
+            for (vector, kind) in [(load.force, force_kind(load)), (load.moment, force_kind(load) + 1)] {
                 if let Some(vector) = vector {
                     loads[kind].push(node_load::Instance { node, vector: frame * Vec3(vector.start), amplitude });
                 }
@@ -336,8 +392,10 @@ impl Composer<'_> {
         }
     }
 
-    fn line_loads(&mut self) {
+    /// Line loads; those that turn with a relative beam are returned as loads at its nodes.
+    fn line_loads(&mut self) -> NodeLoads {
         let (mut spatial, mut material) = (ByOrder::default(), ByOrder::default());
+        let mut nodal = NodeLoads::default();
         for load in &self.deck.loads {
             let LoadTarget::Along(along) = &load.target else { continue };
             let Some(beam) = self.mesh.beams.iter().find(|b| b.name == along.value) else {
@@ -349,8 +407,13 @@ impl Composer<'_> {
             };
             let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
             let out = if load.frame == Frame::Space { &mut spatial } else { &mut material };
+            let turning = load.frame != Frame::Space || load.moment.is_some();
             for number in beam.elements.clone() {
                 let element = &self.mesh.elements[number];
+                if turning && beam.interpolation == InterpolationWord::Relative {
+                    add_nodal_loads(&mut nodal, load, element, self.mesh, amplitude);
+                    continue;
+                }
                 push_volume(out, self.mesh, number, element, |_, station| intensity(load, station, amplitude));
             }
         }
@@ -362,12 +425,17 @@ impl Composer<'_> {
                 self.push(effect, "[[load]] along a beam".into());
             }
         }
+        nodal
     }
 
     /// What is known and never acts yet.
     fn never(&mut self) {
-        let seams = !self.mesh.elements.is_empty();
-        let why = if seams { "as soon as neighbouring nodes sit in different charts" } else { "no beams" };
+        let seams = self.mesh.beams.iter().any(|beam| beam.interpolation == InterpolationWord::Total);
+        let why = if seams {
+            "as soon as neighbouring nodes of beams with interpolation = \"total\" sit in different charts"
+        } else {
+            "no beam with interpolation = \"total\""
+        };
         self.reason("mixed elements", seams, why);
         self.reason("damping", false, "not supported yet");
         self.reason("planar", false, "not supported yet: every scene is simulated in three dimensions");
@@ -436,6 +504,7 @@ fn elastic<const N: usize, const G: usize>(
     beam: &MeshBeam,
     number: usize,
     element: &MeshElement,
+    free: Option<usize>,
 ) -> ElasticElement<N, G> {
     let point = |k: usize| {
         let station = &element.inner[k];
@@ -445,9 +514,65 @@ fn elastic<const N: usize, const G: usize>(
             weight: station.weight,
             tangent: station.axes.column(0),
             stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+            free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
         }
     };
-    ElasticElement { connection: connect(mesh, number, element), points: std::array::from_fn(point) }
+    ElasticElement { connection: connect(mesh, number, element), points: std::array::from_fn(point), free }
+}
+
+/// From section axes to global components.
+fn free_strain(strain: [f64; 6], axes: Mat3) -> Strain {
+    let [g1, g2, g3, k1, k2, k3] = strain;
+    Strain { gamma: axes * Vec3([g1, g2, g3]), kappa: axes * Vec3([k1, k2, k3]) }
+}
+
+/// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the node.
+#[derive(Default)]
+struct NodalInertia {
+    nodes: BTreeMap<usize, (f64, Vec3, Mat3)>,
+}
+
+impl NodalInertia {
+    /// Adds what an element brings to its nodes; `pick` may leave parts out.
+    fn add(&mut self, beam: &MeshBeam, element: &MeshElement, pick: impl Fn(Inertia) -> Inertia) {
+        for (station, &node) in element.nodal.iter().zip(&element.nodes) {
+            let own = pick(mass_at(beam, station).turned(station.axes));
+            let (mass, moment, about) = self.nodes.entry(node).or_insert((0.0, Vec3::ZERO, Mat3::ZERO));
+            *mass += own.mass * station.weight;
+            *moment += own.offset * (own.mass * station.weight);
+            *about += own.about_node * station.weight;
+        }
+    }
+
+    fn bodies(self, mesh: &Mesh) -> Vec<Body> {
+        let body = |(node, (mass, moment, about_node)): (usize, (f64, Vec3, Mat3))| {
+            let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
+            let node = &mesh.nodes[node];
+            Body { node: node.node, place: node.place, inertia: Inertia { mass, offset, about_node } }
+        };
+        self.nodes.into_iter().map(body).collect()
+    }
+}
+
+/// Loads at nodes by kind: forces and moments fixed in space, then those that turn with the section.
+type NodeLoads = [Vec<node_load::Instance>; 4];
+
+/// The place of a load's forces among [`NodeLoads`]; that of its moments is the next.
+fn force_kind(load: &deck::Load) -> usize {
+    if load.frame == Frame::Space { 0 } else { 2 }
+}
+
+/// A load along an element, taken at its nodes.
+fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &MeshElement, mesh: &Mesh, amplitude: usize) {
+    for (station, &node) in element.nodal.iter().zip(&element.nodes) {
+        let Intensity { force, moment, .. } = intensity(load, station, amplitude);
+        for (vector, kind) in [(force, force_kind(load)), (moment, force_kind(load) + 1)] {
+            if vector != Vec3::ZERO {
+                let vector = vector * station.weight;
+                out[kind].push(node_load::Instance { node: mesh.nodes[node].node, vector, amplitude });
+            }
+        }
+    }
 }
 
 fn intensity(load: &deck::Load, station: &Station, amplitude: usize) -> Intensity {

@@ -46,6 +46,8 @@ pub struct MeshElement {
     pub inner: Vec<Station>,
     /// Points for mass and line loads
     pub volume: Vec<Station>,
+    /// Points at the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
+    pub nodal: Vec<Station>,
 }
 
 /// A beam as meshed.
@@ -61,6 +63,10 @@ pub struct MeshBeam {
     pub elements: std::ops::Range<usize>,
     /// Nodes of an element, less one
     pub order: usize,
+    /// How rotations are interpolated
+    pub interpolation: deck::InterpolationWord,
+    /// Strain without stress
+    pub free_strain: Option<deck::FreeStrain>,
     /// Its centre line
     pub line: CentreLine,
     /// Its section along the way
@@ -274,6 +280,8 @@ impl Mesh {
             fractions,
             elements: first_element..self.elements.len(),
             order: beam.order,
+            interpolation: beam.interpolation,
+            free_strain: beam.free_strain.clone(),
             line,
             section,
         });
@@ -291,10 +299,15 @@ impl Mesh {
 
     fn element(&self, nodes: &[usize], line: &CentreLine, piece: usize, range: [f64; 2]) -> MeshElement {
         let places: Vec<Vec3> = nodes.iter().map(|&n| self.nodes[n].place).collect();
-        let stations = |count: usize| -> Vec<Station> {
-            shape::gauss(count).iter().map(|&(xi, w)| station(&places, line, piece, range, xi, w)).collect()
+        let stations = |points: &[(f64, f64)]| -> Vec<Station> {
+            points.iter().map(|&(xi, w)| station(&places, line, piece, range, xi, w)).collect()
         };
-        MeshElement { nodes: nodes.to_vec(), inner: stations(nodes.len() - 1), volume: stations(nodes.len()) }
+        MeshElement {
+            nodes: nodes.to_vec(),
+            inner: stations(shape::gauss(nodes.len() - 1)),
+            volume: stations(shape::gauss(nodes.len())),
+            nodal: stations(shape::newton_cotes(nodes.len())),
+        }
     }
 }
 

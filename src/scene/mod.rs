@@ -17,7 +17,7 @@ use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce,
 use crate::drive::{InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
-use crate::model::{Model, SlotInfo, SlotKind};
+use crate::model::{ElementInfo, Model, SlotInfo, SlotKind};
 use crate::probe::{Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
@@ -142,7 +142,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let mut found = Vec::new();
     let composition = compose::compose(deck, &mesh, &histories, &mut found);
     let (supports, motions) = constraints::constraints(deck, &mesh, &histories, &mut found);
-    let columns = Columns { deck, mesh: &mesh, elasticity: composition.elasticity.as_ref() };
+    let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
     let probes = columns.written(&mut found);
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
@@ -158,7 +158,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         slots: slots(&mesh),
         rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
-        elements: mesh.elements.iter().map(|e| e.nodes.iter().map(|&n| mesh.nodes[n].node).collect()).collect(),
+        elements: elements(&mesh),
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose].concat(),
@@ -182,6 +182,14 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         bodies: composition.bodies,
         resolved: deck.resolved.clone(),
     })
+}
+
+fn elements(mesh: &Mesh) -> Vec<ElementInfo> {
+    let info = |beam: &MeshBeam, number: usize| ElementInfo {
+        nodes: mesh.elements[number].nodes.iter().map(|&n| mesh.nodes[n].node).collect(),
+        in_one_chart: beam.interpolation == deck::InterpolationWord::Total,
+    };
+    mesh.beams.iter().flat_map(|beam| beam.elements.clone().map(move |number| info(beam, number))).collect()
 }
 
 /// What each slot holds, named after its node.

@@ -1,7 +1,7 @@
 //! From names in the deck to nodes and places of the mesh.
 
 use super::mesh::{Mesh, MeshBeam, shape_at};
-use crate::deck::{Deck, Diagnostic, Spanned, nearest, one_of};
+use crate::deck::{Deck, Diagnostic, InterpolationWord, Spanned, nearest, one_of};
 use crate::probe::Place;
 use crate::tensor::{Mat3, Vec3};
 
@@ -130,7 +130,7 @@ impl Mesh {
         match *found {
             Found::Node(node, on) => {
                 let node = &self.nodes[node];
-                Place { nodes: vec![(node.node, node.place, 1.0)], frame: self.frame(found, on) }
+                Place { nodes: vec![(node.node, node.place, 1.0)], frame: self.frame(found, on), relative: false }
             }
             Found::Between(beam, fraction) => {
                 let (element, xi) = self.beams[beam].element_at(fraction);
@@ -138,7 +138,8 @@ impl Mesh {
                 let (shape, _) = shape_at(nodes.len(), xi);
                 let parts =
                     nodes.iter().zip(shape).map(|(&n, weight)| (self.nodes[n].node, self.nodes[n].place, weight));
-                Place { nodes: parts.collect(), frame: self.beams[beam].frame(fraction) }
+                let relative = self.beams[beam].interpolation == InterpolationWord::Relative;
+                Place { nodes: parts.collect(), frame: self.beams[beam].frame(fraction), relative }
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
 use crate::deck::{Deck, Diagnostic, Spanned, nearest};
-use crate::effect::beam_elasticity::BeamElasticity;
+use crate::effect::beam_elasticity::StressField;
 use crate::probe::{BeamPoint, NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ pub struct Columns<'a> {
     /// The mesh
     pub mesh: &'a Mesh,
     /// The elasticity, for resultants
-    pub elasticity: Option<&'a Arc<BeamElasticity>>,
+    pub elasticity: &'a [Arc<dyn StressField>],
 }
 
 impl Columns<'_> {
@@ -92,7 +92,7 @@ impl Columns<'_> {
     fn beam_point(&self, node: &Spanned<String>, found: &Found) -> Result<BeamPoint, Diagnostic> {
         let refuse = |message: String| Diagnostic::error(message, node.span.clone());
         let beams = self.mesh.beams_at(found);
-        let (&[(number, fraction)], Some(elasticity)) = (&beams[..], self.elasticity) else {
+        let &[(number, fraction)] = &beams[..] else {
             return Err(if beams.is_empty() {
                 refuse(format!("no beam meets the node `{}`: it has no resultants", node.value))
             } else {
@@ -108,7 +108,7 @@ impl Columns<'_> {
         if xi > 1.0 - 1e-9 && element + 1 < beam.elements.end {
             sides.push((element as u32 + 1, -1.0));
         }
-        Ok(BeamPoint { elasticity: elasticity.clone(), sides, frame: beam.frame(fraction) })
+        Ok(BeamPoint { elasticity: self.elasticity.to_vec(), sides, frame: beam.frame(fraction) })
     }
 
     /// Any column by its name: the probe and the component.

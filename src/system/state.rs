@@ -1,8 +1,10 @@
 //! The state of a scene: one 3-vector of unknowns a slot, with its rates.
 
 use crate::kernel::NodeMotion;
+use crate::kernel::inertia::Spin;
 use crate::kernel::seam::Conversion;
-use crate::tensor::Vec3;
+use crate::rotation::Rotation;
+use crate::tensor::{Mat3, Vec3};
 
 /// The index of a 3-vector of unknowns: a displacement or a rotation vector.
 pub type Slot = u32;
@@ -38,6 +40,10 @@ pub struct State {
     /// For each rotation slot the rotation vector continued without jumps since the start; valid at the last converged
     /// state. It tells a wound spring, and the columns `rc`, which of the turns they are in.
     pub wound: Vec<Vec3>,
+    /// For each rotation slot the rotation that its vector starts from, while a step is iterated whose unknowns are
+    /// increments. Then `q` holds the increment, and `v`, `a`, `algorithmic` the material spin and its rate. Else `None`:
+    /// rotation vectors are total ones.
+    pub base: Option<Vec<Mat3>>,
 }
 
 impl State {
@@ -54,6 +60,7 @@ impl State {
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
             wound: zero,
+            base: None,
         }
     }
 
@@ -68,9 +75,30 @@ impl State {
         self.amplitude.copy_from_slice(&other.amplitude);
         self.mixed.copy_from_slice(&other.mixed);
         self.wound.copy_from_slice(&other.wound);
+        self.base.clone_from(&other.base);
     }
 
-    /// The motion of a node.
+    /// The rotation at a slot, in the chart of the state.
+    #[inline]
+    pub fn rotation(&self, slot: Slot) -> Rotation {
+        let rotation = Rotation::new(self.q[slot as usize]);
+        match &self.base {
+            None => rotation,
+            Some(base) => rotation.after(base[slot as usize]),
+        }
+    }
+
+    /// The spin at a slot.
+    #[inline]
+    pub fn spin(&self, slot: Slot) -> Spin {
+        let k = slot as usize;
+        match &self.base {
+            None => Spin::new(self.q[k], self.v[k], self.a[k]),
+            Some(_) => Spin::direct(self.rotation(slot), self.v[k], self.a[k]),
+        }
+    }
+
+    /// The motion of a node, for effects that know total rotation vectors only.
     #[inline]
     pub fn motion(&self, node: Node) -> NodeMotion {
         let (u, p) = (node.u as usize, node.p as usize);

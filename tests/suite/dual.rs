@@ -101,6 +101,15 @@ impl<const N: usize> Real for Dual<N> {
         Self { value, partials: from_fn(|k| self.partials[k] / (2.0 * value)) }
     }
 
+    #[inline(never)]
+    fn atan2(self, x: Self) -> Self {
+        let square = self.value * self.value + x.value * x.value;
+        Self {
+            value: libm::atan2(self.value, x.value),
+            partials: from_fn(|k| (x.value * self.partials[k] - self.value * x.partials[k]) / square),
+        }
+    }
+
     fn largest(self) -> f64 {
         self.value
     }

@@ -11,6 +11,7 @@ mod failures;
 mod invariance;
 mod layers;
 mod random;
+mod relative;
 mod rotations;
 mod scenes;
 mod schemes;

@@ -107,7 +107,7 @@ fn entries(m: Mat3) -> Vec<f64> {
 }
 
 /// Holds a list of numbers; errors are relative to the largest of them.
-fn agree(what: &str, got: &[f64], exact: &[f64], tolerance: f64) {
+pub fn agree(what: &str, got: &[f64], exact: &[f64], tolerance: f64) {
     assert_eq!(got.len(), exact.len(), "{what}: the number of entries");
     let scale = exact.iter().fold(0.0_f64, |largest, e| largest.max(e.abs()));
     for (k, (g, e)) in got.iter().zip(exact).enumerate() {
@@ -120,7 +120,7 @@ fn agree(what: &str, got: &[f64], exact: &[f64], tolerance: f64) {
 }
 
 /// Holds the symmetry of a square matrix by rows.
-fn symmetric(what: &str, matrix: &[f64], tolerance: f64) {
+pub fn symmetric(what: &str, matrix: &[f64], tolerance: f64) {
     let size = (0..=matrix.len()).find(|&n| n * n >= matrix.len()).unwrap_or_default();
     let transposed: Vec<f64> = (0..matrix.len()).map(|k| matrix[(k % size) * size + k / size]).collect();
     agree(&format!("{what}: symmetry"), matrix, &transposed, tolerance);
@@ -141,7 +141,7 @@ fn moving_nodes<const N: usize>(random: &mut Random, base: Vec3) -> [NodeMotion;
 /// Half the length of the elements.
 const HALF: f64 = 0.6;
 
-fn stiffness_points<const N: usize>(random: &mut Random, coupled: bool) -> Vec<StiffnessPoint<N>> {
+pub fn stiffness_points<const N: usize>(random: &mut Random, coupled: bool) -> Vec<StiffnessPoint<N>> {
     let mut points = Vec::new();
     for &(xi, weight) in shape::gauss(N - 1) {
         let cc = random.tensor(0.4);
@@ -155,6 +155,7 @@ fn stiffness_points<const N: usize>(random: &mut Random, coupled: bool) -> Vec<S
                 cm: random.positive_definite(),
                 cc: coupled.then_some(cc),
             },
+            free: None,
         });
     }
     points
@@ -175,7 +176,7 @@ fn elastic<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(2 * N);
     for point in points {
-        point.add_elastic(nodes, None, weight, &mut out);
+        point.add_elastic(nodes, 0.0, None, weight, &mut out);
     }
     out
 }
@@ -208,7 +209,7 @@ fn body<T: Real, const N: usize>(
 fn strain_energy<const N: usize>(points: &[StiffnessPoint<N>], nodes: &[NodeMotion<Wide>; N]) -> Wide {
     let mut sum = Wide::zero();
     for point in points {
-        let (strain, stress) = point.strain_and_stress(nodes);
+        let (strain, stress) = point.strain_and_stress(nodes, 0.0);
         sum += (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)) * (0.5 * point.weight);
     }
     sum
@@ -312,8 +313,8 @@ fn the_extrapolated_stress_is_linear_in_the_correction() {
                 node
             });
             for point in &points {
-                let got = point.extrapolated_stress(&nodes, |i| du[i], |i| dp[i]);
-                let (_, stress) = point.strain_and_stress(&moving);
+                let got = point.extrapolated_stress(&nodes, 0.0, |i| du[i], |i| dp[i]);
+                let (_, stress) = point.strain_and_stress(&moving, 0.0);
                 let n = values(stress.n) + vector_rate(stress.n);
                 let m = values(stress.m) + vector_rate(stress.m);
                 let what = format!("extrapolated stress around |P| = {base}, coupled: {coupled}, nodes {nodes:?}");
@@ -567,7 +568,7 @@ fn elastic_seam_holds<const N: usize>() {
                 |nodes, weights, out| {
                     out.clear();
                     for point in &points {
-                        point.add_elastic(nodes, None, weights.stiffness, out);
+                        point.add_elastic(nodes, 0.0, None, weights.stiffness, out);
                     }
                 },
                 |nodes| elastic(&points, nodes, 0.0),

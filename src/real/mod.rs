@@ -1,6 +1,10 @@
 //! The scalar of the kernels: `f64` in a run, dual numbers in the tests that hold every tangent
 //! against automatic differentiation, lanes of several elements where speed asks for it.
 
+mod jet;
+
+pub use jet::Jet;
+
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// What a kernel may ask of a number. Only operations that IEEE 754 rounds exactly, so that a history does
@@ -21,6 +25,9 @@ pub trait Real:
 
     /// The square root.
     fn sqrt(self) -> Self;
+
+    /// The angle in (-pi, pi] whose tangent is `self` / `x`, by the sign of both.
+    fn atan2(self, x: Self) -> Self;
 
     /// The value itself; of several lanes the largest. It may choose an algorithm, never enter a result.
     fn largest(self) -> f64;
@@ -47,6 +54,11 @@ impl Real for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        libm::atan2(self, x)
     }
 
     #[inline(always)]

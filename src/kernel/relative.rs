@@ -1,0 +1,310 @@
+//! Elements seen from a frame that turns with them: the `relative` interpolation.
+//!
+//! Total rotation vectors of two nodes are interpolated in the charts that they happen to sit in, so that strains depend
+//! on a rigid rotation of the element (theory: objectivity). Here the rotations are first measured from a frame R_r that
+//! turns with the element, and only those are interpolated (Crisfield & Jelenic 1999, doi:10.1098/rspa.1999.0352):
+//!
+//! ```text
+//! Theta_i = log(R_r^T R_i),   R(s) = R_r exp(sum N_i Theta_i),   xi_i = R_r^T x_i
+//! ```
+//!
+//! What follows in that frame is the total Lagrangian element itself, with nodes (xi_i, Theta_i); its forces and tangent are
+//! carried back. R_r is the rotation of the middle node, or half way between the two middle ones.
+//!
+//! With material spins t_i of the nodes, t of the frame, A_i = T(Theta_i)^-1 and x~ the skew tensor of x:
+//!
+//! ```text
+//! dxi_i = R_r^T dx_i + xi_i~ t,   dTheta_i = A_i t_i - A_i^T t,   t = sum F_i t_i
+//! ```
+
+use super::element::{ElementSystem, NodeMotion};
+use crate::real::Real;
+use crate::rotation::{Rotation, Series, log};
+use crate::tensor::{Mat3, Vec3};
+
+/// An element of N nodes seen from its own frame.
+pub struct Relative<const N: usize, T = f64> {
+    /// The nodes as the frame sees them: u = xi - X and P = Theta; rates are left at zero.
+    pub nodes: [NodeMotion<T>; N],
+    frame: Mat3<T>,
+    arms: [Vec3<T>; N],
+    turned: [Rotation<T>; N],
+    /// A_i
+    back: [Mat3<T>; N],
+    half: Half<T>,
+}
+
+/// The frame half way between two nodes, with h half the rotation vector from the one to the other.
+#[derive(Clone, Copy)]
+struct Half<T> {
+    rotation: Rotation<T>,
+    /// c = tan(h/2) / (2h)
+    c: T,
+    /// dc/dz over z = h.h
+    c_slope: T,
+}
+
+/// The nodes that carry the frame: of two and four nodes the two in the middle, of three the middle one.
+const fn carriers(nodes: usize) -> (usize, usize) {
+    ((nodes - 1) / 2, nodes / 2)
+}
+
+impl<T: Real> Half<T> {
+    fn new(h: Vec3<T>) -> Self {
+        let [_, f1, f2, f3, f4, ..] = Series::at(h.squared()).0;
+        // 2 df_m/dz = m f_{m+2} - f_{m+1}
+        let (d1, d2) = ((f3 - f2) * 0.5, (f4 * 2.0 - f3) * 0.5);
+        let c = f2 / f1 * 0.5;
+        Self { rotation: Rotation::new(h), c, c_slope: (d2 * f1 - f2 * d1) / (f1 * f1) * 0.5 }
+    }
+}
+
+impl<const N: usize, T: Real> Relative<N, T> {
+    /// The element with nodes that started at `places`, have moved by `u` and turned by `rotations`.
+    #[inline]
+    pub fn new(places: &[Vec3; N], u: &[Vec3<T>; N], rotations: &[Rotation<T>; N]) -> Self {
+        let (first, last) = carriers(N);
+        let (a, b) = (rotations[first].r, rotations[last].r);
+        let h = if first == last { Vec3::zero() } else { log(a.transpose_matmul(b)).scale(0.5) };
+        let half = Half::new(h);
+        let frame = if first == last { a } else { a * half.rotation.r };
+        let theta: [Vec3<T>; N] = std::array::from_fn(|i| {
+            if first == last && i == first {
+                Vec3::zero()
+            } else if i == first {
+                -h
+            } else if i == last {
+                h
+            } else {
+                log(frame.transpose_matmul(rotations[i].r))
+            }
+        });
+        let arms = std::array::from_fn(|i| {
+            let start = Vec3::constant(places[i] - places[first]);
+            frame.transpose_mul(start + (u[i] - u[first]))
+        });
+        let turned = theta.map(Rotation::new);
+        let node = |i: usize| {
+            let start = Vec3::constant(places[i] - places[first]);
+            NodeMotion { u: arms[i] - start, p: theta[i], ..NodeMotion::rest() }
+        };
+        Self { nodes: std::array::from_fn(node), frame, arms, back: turned.map(|r| r.t_inverse()), turned, half }
+    }
+
+    /// F_i: how the frame follows node i.
+    fn follows(&self, i: usize) -> Option<Mat3<T>> {
+        let (first, last) = carriers(N);
+        if i != first && i != last {
+            return None;
+        }
+        if first == last {
+            return Some(Mat3::identity());
+        }
+        let (Rotation { r, p: h, .. }, c) = (self.half.rotation, self.half.c);
+        let even = Mat3::identity().scale(0.5);
+        let odd = h.skew() * c;
+        Some(if i == first { (even + odd) * r.transpose() } else { (even - odd) * r })
+    }
+
+    /// What the frame sees when the nodes move by `du` and spin by `spins` (material): variations of u and Theta.
+    pub fn variation(&self, du: &[Vec3<T>; N], spins: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N] {
+        let (first, _) = carriers(N);
+        let mut frame_spin = Vec3::zero();
+        for (i, &spin) in spins.iter().enumerate() {
+            if let Some(follows) = self.follows(i) {
+                frame_spin += follows * spin;
+            }
+        }
+        std::array::from_fn(|i| {
+            let moved = self.frame.transpose_mul(du[i] - du[first]) + self.arms[i].cross(frame_spin);
+            (moved, self.back[i] * spins[i] - self.back[i].transpose_mul(frame_spin))
+        })
+    }
+
+    /// The rotation at the shape functions `shape`: R_r exp(sum N_i Theta_i).
+    pub fn rotation(&self, shape: impl Fn(usize) -> f64) -> Mat3<T> {
+        let theta = (0..N).fold(Vec3::zero(), |sum, i| sum + self.nodes[i].p.scale(shape(i)));
+        self.frame * Rotation::new(theta).r
+    }
+
+    /// Carries force and tangent of the element in its frame (`local`, whose tangent is symmetric) back to the nodes.
+    ///
+    /// `stiffness` is the weight of the tangent, zero where there is none. `geometric` holds the forces in the frame that
+    /// geometric parts are formed with, if they are not those of `local`.
+    pub fn carry_back(
+        &self,
+        rotations: &[Rotation<T>; N],
+        local: &ElementSystem<T>,
+        geometric: Option<&ElementSystem<T>>,
+        stiffness: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        let forces = self.spin_forces(local);
+        for i in 0..N {
+            out.add_force(2 * i, forces.displacement[i]);
+            out.add_force(2 * i + 1, rotations[i].t.transpose_mul(forces.spin[i]));
+        }
+        if stiffness != 0.0 {
+            let source = geometric.unwrap_or(local);
+            self.carry_tangent_back(rotations, local, source, &self.spin_forces(source), stiffness, out);
+        }
+    }
+
+    /// Forces conjugate to displacements and material spins of the nodes:
+    ///
+    /// ```text
+    /// m_i = A_i^T f_Theta_i,   m = sum f_xi_i x xi_i - A_i f_Theta_i,   f_x_i = R_r f_xi_i,   f_t_i = m_i + F_i^T m
+    /// ```
+    fn spin_forces(&self, local: &ElementSystem<T>) -> SpinForces<N, T> {
+        let mut frame = Vec3::zero();
+        let mut own = [Vec3::zero(); N];
+        for i in 0..N {
+            let (force, moment) = (local.force_block(2 * i), local.force_block(2 * i + 1));
+            own[i] = self.back[i].transpose_mul(moment);
+            frame += force.cross(self.arms[i]) - self.back[i] * moment;
+        }
+        let spin = |i: usize| self.follows(i).map_or(own[i], |follows| own[i] + follows.transpose_mul(frame));
+        SpinForces {
+            displacement: std::array::from_fn(|i| self.frame * local.force_block(2 * i)),
+            spin: std::array::from_fn(spin),
+            own,
+            frame,
+        }
+    }
+
+    /// The second variation, first in displacements and spins of the nodes and of the frame, then with the spin of the frame
+    /// taken from the nodes; at last T_i takes spins to rotation vectors.
+    fn carry_tangent_back(
+        &self,
+        rotations: &[Rotation<T>; N],
+        local: &ElementSystem<T>,
+        source: &ElementSystem<T>,
+        forces: &SpinForces<N, T>,
+        s: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        let over = self.over_frame(local, source, forces, s);
+        let follows: [Option<Mat3<T>>; N] = std::array::from_fn(|i| self.follows(i));
+        let drift = self.drift(forces.frame, s);
+        for i in 0..N {
+            for j in 0..N {
+                let mut xt = self.frame * local.tangent_block(2 * i, 2 * j + 1) * self.back[j];
+                if let Some(follows) = follows[j] {
+                    xt += over.displacement[i] * follows;
+                }
+                let xp = xt * rotations[j].t;
+                out.add_tangent(2 * i, 2 * j + 1, xp);
+                out.add_tangent(2 * j + 1, 2 * i, xp.transpose());
+                if j < i {
+                    continue;
+                }
+                let xx = self.frame * local.tangent_block(2 * i, 2 * j) * self.frame.transpose();
+                let mut tt = self.back[i].transpose_matmul(local.tangent_block(2 * i + 1, 2 * j + 1) * self.back[j]);
+                if i == j {
+                    tt -= over.own[i];
+                }
+                if let Some(column) = follows[j] {
+                    tt += over.spin[i] * column;
+                }
+                if let Some(row) = follows[i] {
+                    tt += row.transpose_matmul(over.row[j]);
+                    if let Some(column) = follows[j] {
+                        tt += row.transpose_matmul(over.frame * column) + drift(i, j);
+                    }
+                }
+                let mut pp = rotations[i].t.transpose_matmul(tt * rotations[j].t);
+                if i == j {
+                    pp += rotations[i].c2(forces.spin[i]).scale(s);
+                }
+                out.add_tangent(2 * i, 2 * j, xx);
+                out.add_tangent(2 * i + 1, 2 * j + 1, pp);
+                if j > i {
+                    out.add_tangent(2 * j, 2 * i, xx.transpose());
+                    out.add_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
+                }
+            }
+        }
+    }
+
+    /// The blocks that involve the spin of the frame. With Z_i the derivatives of the forces in the frame over it,
+    ///
+    /// ```text
+    /// Z_xi = sum K_xi_x ij xi_j~ - K_xi_Theta ij A_j^T,   Z_Theta likewise
+    /// x_i,t: R_r (Z_xi - f_xi~)      t_i,t: A_i^T (Z_Theta + C2(m_i) A_i^T)      t,t_j: Z_Theta^T A_j + A_j C1(A_j f) A_j
+    /// t,t:   sum -xi_i~ Z_xi + f_xi~ xi_i~ - A_i Z_Theta - A_i C1(A_i f) A_i^T   t_i,t_i: - A_i^T C2(m_i) A_i (own)
+    /// ```
+    fn over_frame(
+        &self,
+        local: &ElementSystem<T>,
+        source: &ElementSystem<T>,
+        forces: &SpinForces<N, T>,
+        s: f64,
+    ) -> OverFrame<N, T> {
+        let zero = [Mat3::zero(); N];
+        let mut over = OverFrame { displacement: zero, spin: zero, row: zero, own: zero, frame: Mat3::zero() };
+        for i in 0..N {
+            let (mut zx, mut zt) = (Mat3::zero(), Mat3::zero());
+            for j in 0..N {
+                let (arm, back) = (self.arms[j].skew(), self.back[j].transpose());
+                zx += local.tangent_block(2 * i, 2 * j) * arm - local.tangent_block(2 * i, 2 * j + 1) * back;
+                zt += local.tangent_block(2 * i + 1, 2 * j) * arm - local.tangent_block(2 * i + 1, 2 * j + 1) * back;
+            }
+            let (force, moment) = (source.force_block(2 * i), source.force_block(2 * i + 1));
+            let (a, turned) = (self.back[i], &self.turned[i]);
+            let c1 = a * turned.c1(a * moment).scale(s);
+            let c2 = a.transpose_matmul(turned.c2(forces.own[i]).scale(s));
+            over.displacement[i] = self.frame * (zx - force.skew().scale(s));
+            over.spin[i] = a.transpose_matmul(zt) + c2 * a.transpose();
+            over.row[i] = zt.transpose() * a + c1 * a;
+            over.own[i] = c2 * a;
+            over.frame += Mat3::skew_mul(force, self.arms[i].skew()).scale(s)
+                - Mat3::skew_mul(self.arms[i], zx)
+                - a * zt
+                - c1 * a.transpose();
+        }
+        over
+    }
+
+    /// The derivatives of F_i^T m over the spins t_j of the two nodes that carry the frame, for a fixed m:
+    ///
+    /// ```text
+    /// F_1^T m = exp(h) (m/2 - c h x m),   F_2^T m = exp(h)^T (m/2 + c h x m),   2 dh = T(2h)^-1 t_2 - T(2h)^-T t_1
+    /// ```
+    fn drift(&self, m: Vec3<T>, s: f64) -> impl Fn(usize, usize) -> Mat3<T> + use<N, T> {
+        let (first, last) = carriers(N);
+        let Half { rotation: Rotation { r, t, p: h, .. }, c, c_slope } = self.half;
+        let across = h.cross(m);
+        let bend = across.outer(h) * (c_slope * 2.0) - m.skew() * c;
+        let (g1, g2) = (m.scale(0.5) - across * c, m.scale(0.5) + across * c);
+        let row_first = r * (-Mat3::skew_mul(g1, t) - bend);
+        let row_last = r.transpose_matmul(Mat3::skew_mul(g2, t.transpose()) + bend);
+        let inverse = Rotation::new(h.scale(2.0)).t_inverse().scale(0.5 * s);
+        move |i, j| {
+            if first == last {
+                return Mat3::zero();
+            }
+            let row = if i == first { row_first } else { row_last };
+            if j == first { -(row * inverse.transpose()) } else { row * inverse }
+        }
+    }
+}
+
+/// Forces conjugate to displacements and material spins.
+struct SpinForces<const N: usize, T> {
+    displacement: [Vec3<T>; N],
+    /// f_t_i
+    spin: [Vec3<T>; N],
+    /// m_i, the part that does not come through the frame
+    own: [Vec3<T>; N],
+    /// m
+    frame: Vec3<T>,
+}
+
+/// Blocks of the second variation, see [`Relative::over_frame`].
+struct OverFrame<const N: usize, T> {
+    displacement: [Mat3<T>; N],
+    spin: [Mat3<T>; N],
+    row: [Mat3<T>; N],
+    own: [Mat3<T>; N],
+    frame: Mat3<T>,
+}
