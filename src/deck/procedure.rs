@@ -51,6 +51,8 @@ pub enum SchemeWord {
     Hht(f64),
     /// rho_inf
     GeneralizedAlpha(f64),
+    /// rho_inf
+    LieGeneralizedAlpha(f64),
 }
 
 /// `until = { column = …, below = …, above = … }`
@@ -274,7 +276,7 @@ fn read_scheme(table: &Table) -> Option<SchemeWord> {
         }
         "hht" => within("alpha", 0.05, 1.0 / 3.0).map(SchemeWord::Hht),
         "generalized_alpha" => within("rho_inf", 0.9, 1.0).map(SchemeWord::GeneralizedAlpha),
-        other => context.wrong(table.key_span("scheme"), format!("scheme = \"{other}\" is not supported yet")),
+        _ => within("rho_inf", 0.9, 1.0).map(SchemeWord::LieGeneralizedAlpha),
     }
 }
 

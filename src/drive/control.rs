@@ -1,9 +1,9 @@
 //! Steps that adapt to their local error.
 
-use crate::integrate::Scheme;
-use crate::model::{Model, SlotKind};
+use crate::integrate::{Rotations, Scheme};
+use crate::model::{Model, SlotKind, increments};
 use crate::rotation::Rotation;
-use crate::system::State;
+use crate::system::{Slot, State};
 
 /// Chooses the length of steps.
 ///
@@ -73,8 +73,11 @@ impl Control {
         let mut largest = 0.0_f64;
         for (slot, info) in model.slots.iter().enumerate() {
             let e = (end.a[slot] - start.a[slot]) * factor;
+            let spins = self.scheme.rotations == Rotations::Increments;
+            let spun = |state: &State| increments::spin_acceleration(state, slot as Slot);
             let size = match info.kind {
                 SlotKind::Displacement => e.norm() / model.length,
+                SlotKind::Rotation if spins => ((spun(end) - spun(start)) * factor).norm(),
                 SlotKind::Rotation => (Rotation::new(end.q[slot]).t * e).norm(),
             };
             largest = largest.max(size);

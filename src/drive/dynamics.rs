@@ -4,8 +4,9 @@ use super::control::Control;
 use super::failure::Failure;
 use super::grid::Grid;
 use super::run::{Run, Workshop};
-use crate::integrate::{Scheme, Step};
-use crate::model::charts;
+use crate::integrate::{Rotations, Scheme, Step};
+use crate::kernel::Weights;
+use crate::model::{charts, increments};
 use crate::solve::NewtonFailure;
 
 impl Run<'_> {
@@ -18,7 +19,7 @@ impl Run<'_> {
         scheme: Scheme,
         adaptive: Option<f64>,
     ) -> Result<(), Failure> {
-        self.start_dynamic(workshop)?;
+        self.start_dynamic(workshop, scheme)?;
         let mut before = step;
         match adaptive {
             None => self.run_fixed(workshop, end, step, scheme, &mut before),
@@ -87,12 +88,23 @@ impl Run<'_> {
     /// One attempt at a step: predict, prescribe, iterate.
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
+        let incremental = step.scheme.rotations == Rotations::Increments;
+        if incremental {
+            increments::begin(&mut self.state, &self.model.rotations);
+        }
         step.predict(&mut self.state, before);
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
         let Workshop { assembly, newton, .. } = workshop;
-        newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)
+        newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
+        if incremental {
+            let switched = increments::end(&mut self.state, &self.good, &self.model.rotations);
+            self.counters.work.chart_switches += switched as u64;
+            // Forces conjugate to total vectors, for reactions and the energy account.
+            assembly.evaluate(&self.state, Weights::NONE, None);
+        }
+        Ok(())
     }
 
     /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.
@@ -103,7 +115,8 @@ impl Run<'_> {
         if self.is_over(workshop) {
             return Ok(true);
         }
-        self.change_charts(step.scheme.lag() * step.length);
+        let total = step.scheme.rotations == Rotations::Totals;
+        self.change_charts(total.then_some(step.scheme.lag() * step.length));
         Ok(false)
     }
 
@@ -115,7 +128,7 @@ impl Run<'_> {
     }
 
     /// Between steps, nodes beyond pi change their chart, and elements settle theirs. `lag`: see [`charts::switch`].
-    pub(super) fn change_charts(&mut self, lag: f64) {
+    pub(super) fn change_charts(&mut self, lag: Option<f64>) {
         let switched = charts::switch(&mut self.state, &self.model.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
         charts::freeze(&mut self.state, &self.model.elements);

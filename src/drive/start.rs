@@ -2,7 +2,9 @@
 
 use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
+use crate::integrate::{Rotations, Scheme};
 use crate::kernel::Weights;
+use crate::model::increments;
 use crate::rotation::Rotation;
 use crate::solve::NewtonFailure;
 use crate::system::{Equations, Slot, State, System};
@@ -11,7 +13,7 @@ use nalgebra::{Matrix3, SymmetricEigen};
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
-    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, scheme: Scheme) -> Result<(), Failure> {
         if self.takes_initial_motion() {
             let initial = std::mem::take(&mut self.plan.initial);
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
@@ -24,9 +26,12 @@ impl Run<'_> {
         }
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);
-        self.change_charts(0.0);
+        self.change_charts(None);
         self.solve_accelerations(workshop)?;
         self.state.algorithmic.copy_from_slice(&self.state.a);
+        if scheme.rotations == Rotations::Increments {
+            increments::start(&mut self.state, &self.model.rotations);
+        }
         self.open_account(workshop)
     }
 

@@ -7,8 +7,8 @@
 use super::{Effect, Energy};
 use crate::kernel::{ElementSystem, Weights};
 use crate::real::Real;
-use crate::rotation::{Complement, nearest_turn, unwound};
-use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::rotation::{Complement, Rotation, log, nearest_turn, unwound};
+use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
@@ -53,9 +53,9 @@ impl Effect for Spring {
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
         for (k, spring) in self.springs.iter().enumerate() {
-            let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
+            let u = at.q[spring.node.u as usize];
             let on = at.amplitude[spring.amplitude];
-            let (moment, tangent) = wound_up(spring.rotation * on, p, at.wound[spring.node.p as usize]);
+            let (moment, tangent) = turned(spring.rotation * on, at, spring.node.p);
             system.clear();
             system.add_force(0, spring.translation * u * on);
             system.add_force(1, moment);
@@ -73,6 +73,26 @@ impl Effect for Spring {
         };
         Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
     }
+}
+
+/// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an increment X after which
+/// it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
+fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
+    let wound = at.wound[slot as usize];
+    if at.base.is_none() {
+        return wound_up(stiffness, at.q[slot as usize], wound);
+    }
+    if stiffness == Mat3::ZERO {
+        return (Vec3::ZERO, Mat3::ZERO);
+    }
+    let increment = at.rotation(slot);
+    let total = Rotation::new(log(increment.r));
+    let (force, tangent) = wound_up(stiffness, total.p, wound);
+    let inverse = total.t_inverse();
+    let moment = inverse.transpose_mul(force);
+    let spun = inverse.transpose_matmul(tangent - total.c2(moment)) * inverse;
+    let t = increment.t;
+    (t.transpose_mul(moment), t.transpose_matmul(spun * t) + increment.c2(moment))
 }
 
 /// Force and tangent of a rotational spring whose node was last wound by `wound`. At a whole turn P has no axis of its own

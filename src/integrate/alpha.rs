@@ -28,18 +28,29 @@ pub struct Scheme {
     pub alpha_m: f64,
     /// alpha_f
     pub alpha_f: f64,
+    /// What the unknowns of rotations are
+    pub rotations: Rotations,
+}
+
+/// The unknowns of rotations in a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rotations {
+    /// Total rotation vectors with their rates
+    Totals,
+    /// Increments from the last converged rotation, with material spins as velocities: see [`crate::model::increments`]
+    Increments,
 }
 
 impl Scheme {
     /// Newmark's family; beta = 1/4, gamma = 1/2 is the trapezoidal rule: second order, without dissipation.
     pub fn newmark(beta: f64, gamma: f64) -> Self {
-        Self { beta, gamma, alpha_m: 0.0, alpha_f: 0.0 }
+        Self { beta, gamma, alpha_m: 0.0, alpha_f: 0.0, rotations: Rotations::Totals }
     }
 
     /// HHT-alpha with alpha in [0, 1/3]: second order, dissipates high frequencies.
     pub fn hht(alpha: f64) -> Self {
         let beta = 0.25 * (1.0 + alpha) * (1.0 + alpha);
-        Self { beta, gamma: 0.5 + alpha, alpha_m: 0.0, alpha_f: alpha }
+        Self { beta, gamma: 0.5 + alpha, alpha_m: 0.0, alpha_f: alpha, rotations: Rotations::Totals }
     }
 
     /// Generalised-alpha with the spectral radius rho in [0, 1] at infinite frequency: second order, with the least
@@ -47,7 +58,13 @@ impl Scheme {
     pub fn generalized_alpha(rho: f64) -> Self {
         let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
         let gamma = 0.5 + alpha_f - alpha_m;
-        Self { beta: 0.25 * (gamma + 0.5) * (gamma + 0.5), gamma, alpha_m, alpha_f }
+        let beta = 0.25 * (gamma + 0.5) * (gamma + 0.5);
+        Self { beta, gamma, alpha_m, alpha_f, rotations: Rotations::Totals }
+    }
+
+    /// The same on increments and spins (Bruls, Cardona & Arnold 2012, doi:10.1016/j.mechmachtheory.2011.07.017).
+    pub fn lie_generalized_alpha(rho: f64) -> Self {
+        Self { rotations: Rotations::Increments, ..Self::generalized_alpha(rho) }
     }
 
     /// How far, in steps, the algorithmic acceleration lags: it belongs to t + lag h.
@@ -92,7 +109,7 @@ impl Step {
 
 impl Method for Step {
     fn weights(&self) -> Weights {
-        let (Scheme { beta, gamma, alpha_m, alpha_f }, h) = (self.scheme, self.length);
+        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, h) = (self.scheme, self.length);
         let mass = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * h * h);
         Weights { stiffness: 1.0, damping: gamma / (beta * h), mass }
     }

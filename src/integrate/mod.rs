@@ -3,7 +3,7 @@
 
 mod alpha;
 
-pub use alpha::{Scheme, Step};
+pub use alpha::{Rotations, Scheme, Step};
 
 use crate::kernel::Weights;
 use crate::system::State;

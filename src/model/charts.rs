@@ -26,8 +26,9 @@ const FAR: f64 = PI / 2.0;
 const NEAR_TURN: f64 = 0.5;
 
 /// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left. `lag` is
-/// the time by which the algorithmic acceleration lies ahead of the state.
-pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: f64) -> usize {
+/// the time by which the algorithmic acceleration lies ahead of the state; `None` where it is that of the spin, to which
+/// charts do not matter.
+pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
     let mut switched = 0;
     for &slot in rotations {
         let slot = slot as usize;
@@ -39,8 +40,10 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: f64) -> usi
             }
             let (velocity, acceleration) = (state.v[slot], state.a[slot]);
             let change = Complement::new(p, velocity, acceleration);
-            let drift = (change.b_rate * acceleration) * 2.0 + change.b_rate2 * velocity;
-            state.algorithmic[slot] = change.b * state.algorithmic[slot] + change.b_rate * velocity + drift * lag;
+            if let Some(lag) = lag {
+                let drift = (change.b_rate * acceleration) * 2.0 + change.b_rate2 * velocity;
+                state.algorithmic[slot] = change.b * state.algorithmic[slot] + change.b_rate * velocity + drift * lag;
+            }
             state.q[slot] = change.p;
             state.v[slot] = change.velocity;
             state.a[slot] = change.acceleration;

@@ -138,7 +138,8 @@ impl Motion {
     }
 
     /// Sets position, velocity and acceleration in the state at its time and load. A rotation about n is P = theta n,
-    /// Pd = theta' n, Pdd = theta'' n, with theta at the representative nearest to the present chart.
+    /// Pd = theta' n, Pdd = theta'' n, with theta at the representative nearest to the present chart; an increment is what
+    /// theta has grown by, and the spin theta' n.
     ///
     /// Returns how far it turns the node from the last converged state: beyond half a turn nobody could tell in which
     /// direction it went.
@@ -158,8 +159,12 @@ impl Motion {
             }
             MotionKind::Rotation => {
                 let turned = (value - state.wound[slot].dot(n)).abs();
-                let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();
-                state.q[slot] = n * (value + 2.0 * PI * turns);
+                state.q[slot] = if state.base.is_some() {
+                    n * (value - state.wound[slot].dot(n))
+                } else {
+                    let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();
+                    n * (value + 2.0 * PI * turns)
+                };
                 state.v[slot] = n * rate;
                 state.a[slot] = n * rate2;
                 state.wound[slot] = n * value;

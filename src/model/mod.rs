@@ -4,6 +4,7 @@ mod amplitude;
 pub mod charts;
 mod constraint;
 mod history;
+pub mod increments;
 
 pub use amplitude::{Amplitude, StageKind, StageSet};
 pub use constraint::{Jump, Motion, MotionKind, Support};

@@ -23,6 +23,7 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     mass_where_needed(deck, diagnostics);
     warn_of_equal_places(deck, diagnostics);
     warn_of_idle_initials(deck, diagnostics);
+    refuse_vectors_where_there_are_increments(deck, diagnostics);
 }
 
 fn refuse_twins<'a>(kind: &str, names: impl Iterator<Item = &'a Spanned<String>>, diagnostics: &mut Vec<Diagnostic>) {
@@ -107,6 +108,28 @@ fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     if let (Some(initial), false) = (deck.initials.first(), dynamic || deck.stages.is_empty()) {
         let message = "[[initial]] needs a dynamic stage: this deck has none";
         diagnostics.push(Diagnostic::error(message, initial.span.clone()));
+    }
+}
+
+/// The rotation-aware scheme has no total rotation vectors to interpolate, nor to clamp one component of.
+fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    let incremental = |stage: &deck::Stage| {
+        matches!(stage.body, StageBody::Dynamic { scheme: deck::SchemeWord::LieGeneralizedAlpha(_), .. })
+    };
+    let Some(stage) = deck.stages.iter().find(|stage| incremental(stage)) else { return };
+    let scheme = "scheme = \"lie_generalized_alpha\"";
+    for beam in deck.beams.iter().filter(|beam| beam.interpolation == deck::InterpolationWord::Total) {
+        let name = &beam.name.value;
+        let message = format!("{scheme} needs interpolation = \"relative\", beam `{name}` has \"total\"");
+        let diagnostic = Diagnostic::error(message, beam.name.span.clone());
+        diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
+    }
+    for support in &deck.supports {
+        if support.fix[3..].iter().filter(|&&fixed| fixed).count() == 1 {
+            let message = format!("{scheme} cannot hold a single component of a rotation vector");
+            let diagnostic = Diagnostic::error(message, support.span.clone()).help("use a joint to ground");
+            diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
+        }
     }
 }
 

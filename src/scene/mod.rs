@@ -237,6 +237,7 @@ fn coefficients(scheme: SchemeWord) -> Scheme {
         SchemeWord::Newmark(beta, gamma) => Scheme::newmark(beta, gamma),
         SchemeWord::Hht(alpha) => Scheme::hht(alpha),
         SchemeWord::GeneralizedAlpha(rho) => Scheme::generalized_alpha(rho),
+        SchemeWord::LieGeneralizedAlpha(rho) => Scheme::lie_generalized_alpha(rho),
     }
 }
 

@@ -95,7 +95,7 @@ fn alternating(scheme: Scheme, h: f64) -> [f64; 3] {
         assert_eq!(model.set_clock(&mut state, time, 1.0), None);
         newton.solve(&model, &mut assembly, &mut state, &step, None, &mut work).unwrap();
         charts::wind(&mut state, &good, &model.rotations);
-        charts::switch(&mut state, &model.rotations, charts::DYNAMIC_BAND, scheme.lag() * length);
+        charts::switch(&mut state, &model.rotations, charts::DYNAMIC_BAND, Some(scheme.lag() * length));
         charts::freeze(&mut state, &model.elements);
         before = length;
     }
