@@ -65,12 +65,37 @@ pub enum MotionWhat {
 pub struct Joint {
     /// What it lets move
     pub kind: JointKind,
-    /// The point
-    pub at: Spanned<String>,
-    /// One beam (joined to ground) or two
-    pub beams: Vec<Spanned<String>>,
+    /// What it connects
+    pub parts: JointParts,
+    /// Its axis, or both axes of a universal joint; global, at the start
+    pub axes: Vec<[f64; 3]>,
+    /// About or along the axis
+    pub stiffness: f64,
+    /// About or along the axis
+    pub damping: f64,
+    /// A prescribed angle or displacement, with its history
+    pub motor: Option<(f64, Option<Spanned<String>>)>,
     /// Where the table stands
     pub span: Span,
+}
+
+/// What a joint connects; one part is joined to ground.
+#[derive(Clone, Debug)]
+pub enum JointParts {
+    /// Beams that meet at a point
+    Beams {
+        /// The point
+        at: Spanned<String>,
+        /// One or two
+        beams: Vec<Spanned<String>>,
+    },
+    /// Nodes, which may lie apart
+    Nodes {
+        /// One or two
+        nodes: Vec<Spanned<String>>,
+        /// Where the joint sits; left out: at the last of them
+        at: Option<Spanned<super::PointRef>>,
+    },
 }
 
 /// Kinds of joints.
@@ -78,6 +103,14 @@ pub struct Joint {
 pub enum JointKind {
     /// Rotations are free.
     Spherical,
+    /// Turns about its axis.
+    Revolute,
+    /// Turns about one axis of the first part and one of the second.
+    Universal,
+    /// Slides along its axis.
+    Prismatic,
+    /// Holds everything.
+    Rigid,
 }
 
 /// `[[body]]`
@@ -347,27 +380,131 @@ fn read_motion_what(table: &Table) -> Option<MotionWhat> {
     }
 }
 
+const JOINT_KEYS: [&str; 11] =
+    ["kind", "at", "beams", "nodes", "axis", "axes", "stiffness", "damping", "angle", "displacement", "history"];
+
 pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Joint> {
-    let table = Table::new(context, item, "[[joint]]", &["kind", "at", "beams", "axis"], &[])?;
-    let kind = table.required("kind").and_then(|_| table.word("kind", &["spherical", "revolute"]));
-    if kind.as_ref().is_some_and(|kind| kind.value == "revolute") {
-        let span = kind.as_ref().map_or(table.span.clone(), |kind| kind.span.clone());
-        return context.wrong(span, "kind = \"revolute\" is not supported yet");
-    }
-    if table.has("axis") {
-        context.report(Diagnostic::error("a spherical joint has no `axis`", table.key_span("axis")));
-    }
-    let at = required_text(&table, "at");
-    let beams = table.required("beams").and_then(|item| {
-        let beams = context.texts(item)?;
-        match &beams[..] {
-            [a, b] if a.value == b.value => context.wrong(b.span.clone(), "a joint parts two different beams"),
-            [_] | [_, _] => Some(beams),
-            _ => context.wrong(item.span(), format!("`beams` names one beam or two, found {}", beams.len())),
-        }
+    let table = Table::new(context, item, "[[joint]]", &JOINT_KEYS, &[])?;
+    table.required("kind")?;
+    let kinds = ["spherical", "revolute", "universal", "prismatic", "rigid"];
+    let kind = table.word("kind", &kinds).map(|word| match word.value {
+        "spherical" => JointKind::Spherical,
+        "revolute" => JointKind::Revolute,
+        "universal" => JointKind::Universal,
+        "prismatic" => JointKind::Prismatic,
+        _ => JointKind::Rigid,
     });
-    kind?;
-    Some(Joint { kind: JointKind::Spherical, at: at?, beams: beams?, span: table.span.clone() })
+    let parts = read_joint_parts(&table);
+    let (kind, parts) = (kind?, parts?);
+    let axes = read_joint_axes(&table, kind);
+    refuse_drive_of_others(&table, kind);
+    let number = |key: &str| {
+        if !table.has(key) {
+            return Some(0.0);
+        }
+        let value = table.number(key)?;
+        let message = || format!("`{key}` of a joint must not be negative");
+        if value.value < 0.0 { context.wrong(value.span, message()) } else { Some(value.value) }
+    };
+    let (stiffness, damping) = (number("stiffness"), number("damping"));
+    let motor = ["angle", "displacement"].into_iter().find(|key| table.has(key));
+    let motor = match motor {
+        None => None,
+        Some(key) => Some((table.number(key)?.value, table.text("history"))),
+    };
+    if motor.is_none() && table.has("history") {
+        let message = "`history` of a joint belongs to `angle` or `displacement`";
+        context.report(Diagnostic::error(message, table.key_span("history")));
+    }
+    Some(Joint { kind, parts, axes: axes?, stiffness: stiffness?, damping: damping?, motor, span: table.span.clone() })
+}
+
+fn read_joint_parts(table: &Table) -> Option<JointParts> {
+    let context = table.context;
+    let one_or_two = |key: &str| {
+        let item = table.get(key)?;
+        let names = context.texts(item)?;
+        match &names[..] {
+            [a, b] if a.value == b.value => context.wrong(b.span.clone(), format!("a joint needs two different {key}")),
+            [_] | [_, _] => Some(names),
+            _ => context.wrong(item.span(), format!("`{key}` names one or two, found {}", names.len())),
+        }
+    };
+    match (table.has("beams"), table.has("nodes")) {
+        (true, true) => context.wrong(table.key_span("nodes"), "a joint connects `beams` or `nodes`, not both"),
+        (false, true) => {
+            let nodes = one_or_two("nodes");
+            let at = match table.get("at").map(|item| (item, item.get_ref())) {
+                None => Some(None),
+                Some((item, DeValue::String(name))) => {
+                    Some(Some(Spanned { value: super::PointRef::Name(name.to_string()), span: item.span() }))
+                }
+                Some((item, _)) => context.vector(item).map(|v| Some(v.map(super::PointRef::Coordinates))),
+            };
+            Some(JointParts::Nodes { nodes: nodes?, at: at? })
+        }
+        _ => {
+            let at = required_text(table, "at");
+            table.required("beams")?;
+            let beams = one_or_two("beams");
+            Some(JointParts::Beams { at: at?, beams: beams? })
+        }
+    }
+}
+
+fn read_joint_axes(table: &Table, kind: JointKind) -> Option<Vec<[f64; 3]>> {
+    let context = table.context;
+    let wanted = match kind {
+        JointKind::Revolute | JointKind::Prismatic => Some("axis"),
+        JointKind::Universal => Some("axes"),
+        JointKind::Spherical | JointKind::Rigid => None,
+    };
+    for key in ["axis", "axes"].into_iter().filter(|key| table.has(key) && Some(*key) != wanted) {
+        let message = match wanted {
+            Some(wanted) => format!("this joint has `{wanted}`, not `{key}`"),
+            None => format!("this joint has no `{key}`"),
+        };
+        context.report(Diagnostic::error(message, table.key_span(key)));
+    }
+    let unit = |v: Spanned<[f64; 3]>| {
+        let length = v.value.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if length > 0.0 {
+            return Some(v.value.map(|c| c / length));
+        }
+        context.wrong(v.span, "an axis must not be zero")
+    };
+    match wanted {
+        None => Some(Vec::new()),
+        Some("axis") => {
+            table.required("axis")?;
+            Some(vec![unit(table.vector::<3>("axis")?)?])
+        }
+        Some(key) => {
+            let item = table.required(key)?;
+            let DeValue::Array(rows) = item.get_ref() else {
+                return context.wrong(item.span(), "`axes` is two vectors");
+            };
+            let axes: Option<Vec<[f64; 3]>> = rows.iter().map(|row| unit(context.vector(row)?)).collect();
+            match &axes?[..] {
+                &[a, b] if (0..3).map(|k| a[k] * b[k]).sum::<f64>().abs() < 1e-9 => Some(vec![a, b]),
+                _ => context.wrong(item.span(), "`axes` is two vectors normal to each other"),
+            }
+        }
+    }
+}
+
+/// Springs, dampers and motors act on the one free direction of a revolute or prismatic joint.
+fn refuse_drive_of_others(table: &Table, kind: JointKind) {
+    let own: &[&str] = match kind {
+        JointKind::Revolute => &["stiffness", "damping", "angle", "history"],
+        JointKind::Prismatic => &["stiffness", "damping", "displacement", "history"],
+        _ => &[],
+    };
+    let keys = ["stiffness", "damping", "angle", "displacement", "history"];
+    for key in keys.into_iter().filter(|key| table.has(key) && !own.contains(key)) {
+        let message = format!("this kind of joint has no `{key}`");
+        table.context.report(Diagnostic::error(message, table.key_span(key)));
+    }
 }
 
 pub(super) fn read_body<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Body> {

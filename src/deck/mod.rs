@@ -13,8 +13,8 @@ mod reader;
 mod resolved;
 
 pub use action::{
-    Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, Load, LoadTarget,
-    LoadVector, Motion, MotionWhat, Spring, Support,
+    Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, JointParts, Load,
+    LoadTarget, LoadVector, Motion, MotionWhat, Spring, Support,
 };
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
 pub use expression::{Expression, Jet};

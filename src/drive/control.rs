@@ -79,6 +79,7 @@ impl Control {
                 SlotKind::Displacement => e.norm() / model.length,
                 SlotKind::Rotation if spins => ((spun(end) - spun(start)) * factor).norm(),
                 SlotKind::Rotation => (Rotation::new(end.q[slot]).t * e).norm(),
+                SlotKind::Force | SlotKind::Moment => 0.0,
             };
             largest = largest.max(size);
         }

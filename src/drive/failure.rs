@@ -130,7 +130,13 @@ impl fmt::Display for Moment {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let what = if self.kind == SlotKind::Displacement { "displacement" } else { "rotation" };
+        let what = match self.kind {
+            SlotKind::Displacement => "displacement",
+            SlotKind::Rotation => "rotation",
+            SlotKind::Force | SlotKind::Moment => {
+                return write!(f, "{}: what it holds is held already, or by nothing that could give way", self.node);
+            }
+        };
         let [x, y, z] = self.direction.0;
         let axis = ["x", "y", "z"].into_iter().zip(self.direction.0).find(|(_, c)| c.abs() > 0.999_999);
         match (axis, what) {

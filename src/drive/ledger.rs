@@ -31,15 +31,18 @@ pub(super) struct Bookkeeper {
     ledger: Ledger,
     q: Vec<Vec3>,
     force: Vec<Vec3>,
+    drives: Vec<(f64, f64)>,
 }
 
 impl Bookkeeper {
     pub fn new(slots: usize) -> Self {
-        Self { ledger: Ledger::default(), q: vec![Vec3::ZERO; slots], force: vec![Vec3::ZERO; slots] }
+        let zero = vec![Vec3::ZERO; slots];
+        Self { ledger: Ledger::default(), q: zero.clone(), force: zero, drives: Vec::new() }
     }
 
     /// Opens a stage: energies are taken, no work is added.
     pub fn open(&mut self, model: &Model, state: &State, system: &System) {
+        self.drives = model.drives(state);
         self.remember(state, system);
         self.take_energies(model, state);
     }
@@ -55,8 +58,14 @@ impl Bookkeeper {
             self.ledger.external += match info.kind {
                 SlotKind::Displacement => 0.5 * (before + after).dot(q1 - q0),
                 SlotKind::Rotation => turning_work(q0, before, q1, after),
+                SlotKind::Force | SlotKind::Moment => 0.0,
             };
         }
+        let drives = model.drives(state);
+        for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
+            self.ledger.external += 0.5 * (f0 + f1) * (x1 - x0);
+        }
+        self.drives = drives;
         self.remember(state, system);
         self.take_energies(model, state);
     }

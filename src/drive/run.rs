@@ -247,6 +247,7 @@ impl<'o> Run<'o> {
     pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
         self.refuse_infinities()?;
         self.wind()?;
+        self.model.remember(&mut self.state);
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
         if self.plan.energy {

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
 use crate::integrate::{Rotations, Scheme};
 use crate::kernel::Weights;
-use crate::model::increments;
+use crate::model::{Model, increments};
 use crate::rotation::Rotation;
 use crate::solve::NewtonFailure;
 use crate::system::{Equations, Slot, State, System};
@@ -27,6 +27,7 @@ impl Run<'_> {
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);
         self.change_charts(None);
+        self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
         self.state.algorithmic.copy_from_slice(&self.state.a);
         if scheme.rotations == Rotations::Increments {
@@ -35,31 +36,59 @@ impl Run<'_> {
         self.open_account(workshop)
     }
 
+    /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing the joints takes,
+    /// [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
+    fn close_joints(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        if self.model.multipliers.is_empty() {
+            return Ok(());
+        }
+        let [rates, _] = workshop.assembly.drift(&self.state);
+        workshop.assembly.evaluate(&self.state, Weights::MASS, None);
+        workshop.assembly.system.forget_forces();
+        let impulse = self.solve_with_mass(workshop, &rates)?;
+        for (slot, _) in self.model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
+            self.state.v[slot] += impulse[slot];
+        }
+        Ok(())
+    }
+
     fn solve_accelerations(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
-        let Workshop { assembly, newton, .. } = workshop;
-        let solver = &mut newton.solver;
+        let assembly = &mut workshop.assembly;
         assembly.forget();
+        let [_, rates2] = assembly.drift(&self.state);
         assembly.evaluate(&self.state, Weights::MASS, None);
         if (0..self.state.q.len()).any(|slot| !assembly.system.total(slot).is_finite()) {
             let failure = NewtonFailure::not_finite(assembly, &self.state);
             return Err(self.name_failure(failure, &workshop.assembly.system));
         }
-        let system = &mut assembly.system;
+        let solved = self.solve_with_mass(workshop, &rates2)?;
+        for (slot, info) in self.model.slots.iter().enumerate() {
+            let field = if info.is_multiplier() { &mut self.state.q } else { &mut self.state.a };
+            field[slot] += solved[slot];
+        }
+        // The forces of the start, for reactions and the energy account.
+        workshop.assembly.evaluate(&self.state, Weights::NONE, None);
+        Ok(())
+    }
+
+    /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`.
+    fn solve_with_mass(&mut self, workshop: &mut Workshop, gaps: &[Vec3]) -> Result<Vec<Vec3>, Failure> {
+        let Workshop { assembly, newton, .. } = workshop;
+        let (solver, system) = (&mut newton.solver, &mut assembly.system);
+        for &slot in &self.model.multipliers {
+            system.replace_force(slot, gaps[slot as usize]);
+        }
         let mut right_hand_side = vec![0.0; system.pattern.equations.count()];
         system.right_hand_side(&mut right_hand_side);
-        let slots = self.state.q.len();
-        ignore_massless(system, slots, &mut right_hand_side);
+        ignore_massless(system, &self.model, &mut right_hand_side);
         self.counters.work.factorisations += 1;
         if !(solver.factorise(system) && solver.solve(&mut right_hand_side)) {
             let vector = solver.null_vector(system);
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
-        let mut accelerations = vec![Vec3::ZERO; slots];
-        system.pattern.equations.scatter(&right_hand_side, None, &mut accelerations);
-        self.state.a.iter_mut().zip(accelerations).for_each(|(a, solved)| *a += solved);
-        // The forces of the start, for reactions and the energy account.
-        workshop.assembly.evaluate(&self.state, Weights::NONE, None);
-        Ok(())
+        let mut solved = vec![Vec3::ZERO; self.state.q.len()];
+        system.pattern.equations.scatter(&right_hand_side, None, &mut solved);
+        Ok(solved)
     }
 }
 
@@ -75,8 +104,8 @@ fn set_in_motion(state: &mut State, motion: &InitialMotion) {
 
 /// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
 /// zero. They are the null directions of the diagonal blocks.
-fn ignore_massless(system: &mut System, slots: usize, right_hand_side: &mut [f64]) {
-    for slot in 0..slots {
+fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f64]) {
+    for slot in (0..model.slots.len()).filter(|&slot| !model.slots[slot].is_multiplier()) {
         let numbers = system.pattern.equations.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
         let block = diagonal_block(system, numbers);

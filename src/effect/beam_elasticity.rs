@@ -103,6 +103,21 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         Energy { kinetic: 0.0, strain }
     }
 
+    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
+        for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free.is_some()) {
+            let pull: f64 = element
+                .points
+                .iter()
+                .zip(&element.strains_and_stresses::<I>(at))
+                .map(|(point, (_, stress))| {
+                    let free = point.free.unwrap_or(Strain { gamma: Vec3::ZERO, kappa: Vec3::ZERO });
+                    -point.weight * (free.gamma.dot(stress.n) + free.kappa.dot(stress.m))
+                })
+                .sum();
+            show(element.free_amplitude(at), pull);
+        });
+    }
+
     fn noise(&self, at: &State) -> Noise {
         let mut largest = Noise::default();
         for_each_batch!(self.elements, |_first, batch| for element in batch {

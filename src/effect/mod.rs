@@ -6,6 +6,7 @@ pub mod beam_elasticity;
 pub mod beam_mass;
 pub mod gravity;
 pub mod interpolation;
+pub mod joint;
 pub mod line_load;
 pub mod node_load;
 pub mod rigid_body;
@@ -106,6 +107,16 @@ pub trait Effect: Send + Sync {
     fn momentum(&self, _at: &State) -> Momentum {
         Momentum::ZERO
     }
+
+    /// After each converged state: continues what it keeps in the state, such as turns of joints.
+    fn remember(&self, _at: &mut State) {}
+
+    /// First and second derivatives over time of the gaps that its multipliers close, for a motion without accelerations;
+    /// by slot of the multipliers.
+    fn drift(&self, _at: &State, _rates: &mut [Vec3], _rates2: &mut [Vec3]) {}
+
+    /// Coordinates that are driven from outside, each with the derivative of the stored energy over it: motors, free strains.
+    fn drives(&self, _at: &State, _show: &mut dyn FnMut(f64, f64)) {}
 
     /// The round-off of its forces.
     fn noise(&self, _at: &State) -> Noise {

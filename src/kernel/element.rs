@@ -138,6 +138,18 @@ impl<T: Real> ElementSystem<T> {
         Mat3([line(0), line(1), line(2)])
     }
 
+    /// The system of these blocks alone, in their order.
+    pub fn part(&self, blocks: &[usize]) -> Self {
+        let mut out = Self::new(blocks.len());
+        for (row, &i) in blocks.iter().enumerate() {
+            out.set_force(row, self.force_block(i));
+            for (column, &j) in blocks.iter().enumerate() {
+                out.set_tangent(row, column, self.tangent_block(i, j));
+            }
+        }
+        out
+    }
+
     /// Replaces a block of the tangent.
     #[inline(always)]
     pub fn set_tangent(&mut self, row: usize, column: usize, m: Mat3<T>) {

@@ -54,6 +54,11 @@ impl<T: Real> Spin<T> {
         Self { rotation, omega, acceleration, rates: Rates::OfSpin }
     }
 
+    /// s dOmega/dP + d dOmega/drate: of the weighted derivatives of Omega with respect to the rotation unknowns.
+    pub fn omega_derivative(&self, weights: Weights) -> Mat3<T> {
+        self.derivatives(weights).1
+    }
+
     /// The weighted derivatives of Acc and of Omega with respect to the rotation unknowns:
     ///
     /// ```text

@@ -7,6 +7,7 @@ pub mod beam;
 pub mod elastic;
 pub mod element;
 pub mod inertia;
+pub mod joint;
 pub mod load;
 pub mod relative;
 pub mod seam;

@@ -69,17 +69,18 @@ impl Amplitude {
 
     /// Remembers where the stage ended.
     pub fn end_stage(&mut self, time: f64, load: f64) {
-        self.reached = self.at(time, load);
+        self.reached = self.at(time, load)[0];
     }
 
-    /// The factor at `time` and `load`.
-    pub fn at(&self, time: f64, load: f64) -> f64 {
+    /// The factor at `time` and `load`, and its first and second derivative over time.
+    pub fn at(&self, time: f64, load: f64) -> [f64; 3] {
         match self.course {
-            Course::Hold(value) => value,
-            Course::Ramp { from, to } => from + (to - from) * load,
+            Course::Hold(value) => [value, 0.0, 0.0],
+            Course::Ramp { from, to } => [from + (to - from) * load, 0.0, 0.0],
             Course::History(kind) => {
-                let x = if kind == StageKind::Static { load } else { time };
-                self.history.as_ref().map_or(1.0, |history| history.at(x)[0])
+                let still = kind == StageKind::Static;
+                let at = self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.at(if still { load } else { time }));
+                if still { [at[0], 0.0, 0.0] } else { at }
             }
         }
     }
@@ -94,7 +95,7 @@ mod tests {
     fn halves(mut amplitude: Amplitude, kinds: &[StageKind]) -> Vec<f64> {
         let half = |(stage, &kind): (usize, &StageKind)| {
             amplitude.begin_stage(stage, kind);
-            let value = amplitude.at(0.0, if kind == Static { 0.5 } else { 1.0 });
+            let [value, ..] = amplitude.at(0.0, if kind == Static { 0.5 } else { 1.0 });
             amplitude.end_stage(0.0, 1.0);
             value
         };
@@ -121,7 +122,7 @@ mod tests {
         load.begin_stage(0, Static);
         load.end_stage(0.0, 0.4);
         load.begin_stage(1, Static);
-        assert_eq!([load.at(0.0, 0.0), load.at(0.0, 1.0)], [0.4, 1.0]);
+        assert_eq!([load.at(0.0, 0.0)[0], load.at(0.0, 1.0)[0]], [0.4, 1.0]);
     }
 
     #[test]

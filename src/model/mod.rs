@@ -26,6 +26,10 @@ pub enum SlotKind {
     Displacement,
     /// A rotation vector
     Rotation,
+    /// Multipliers of gaps that are lengths: forces
+    Force,
+    /// Multipliers of gaps between directions: moments
+    Moment,
 }
 
 /// A slot, and the node that it is named after.
@@ -49,6 +53,11 @@ pub struct ElementInfo {
 }
 
 impl SlotInfo {
+    /// Whether it holds multipliers: no unknowns of motion, and what stands in the place of forces are gaps.
+    pub fn is_multiplier(&self) -> bool {
+        matches!(self.kind, SlotKind::Force | SlotKind::Moment)
+    }
+
     /// What turns the forces of this slot into forces that compare: a length for moments, 1 for forces.
     pub fn arm(&self, length: f64) -> f64 {
         if self.kind == SlotKind::Rotation { length } else { 1.0 }
@@ -62,6 +71,10 @@ pub struct Model {
     pub slots: Vec<SlotInfo>,
     /// The slots with rotation vectors
     pub rotations: Vec<Slot>,
+    /// The slots with multipliers
+    pub multipliers: Vec<Slot>,
+    /// How many joints remember their angle
+    pub angles: usize,
     /// The slots on which rotational springs act: how they are wound must be known
     pub sprung: Vec<Slot>,
     /// The beam elements
@@ -92,7 +105,7 @@ pub enum StageError {
 impl Model {
     /// The state before the first stage.
     pub fn rest(&self) -> State {
-        State::rest(self.slots.len(), self.elements.len(), self.amplitudes.len())
+        State::rest(self.slots.len(), self.elements.len(), self.amplitudes.len(), self.angles)
     }
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
@@ -135,8 +148,10 @@ impl Model {
     /// its node too far at once, its slot and the angle are returned.
     pub fn set_clock(&self, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
         (state.time, state.load) = (time, load);
-        for (value, amplitude) in state.amplitude.iter_mut().zip(&self.amplitudes) {
-            *value = amplitude.at(time, load);
+        for (k, amplitude) in self.amplitudes.iter().enumerate() {
+            let [value, rate, rate2] = amplitude.at(time, load);
+            state.amplitude[k] = value;
+            state.amplitude_rates[k] = [rate, rate2];
         }
         let mut too_far = None;
         for motion in &self.motions {
@@ -163,6 +178,22 @@ impl Model {
             sum.strain += part.strain;
         }
         sum
+    }
+
+    /// What is driven from outside: each coordinate with the derivative of the energy over it.
+    pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
+        let mut all = Vec::new();
+        self.effects.iter().for_each(|effect| effect.drives(state, &mut |x, force| all.push((x, force))));
+        all
+    }
+
+    /// After a converged state: turns of joints are counted, multipliers have no rates.
+    pub fn remember(&self, state: &mut State) {
+        self.effects.iter().for_each(|effect| effect.remember(state));
+        for &slot in &self.multipliers {
+            let slot = slot as usize;
+            (state.v[slot], state.a[slot], state.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        }
     }
 
     /// Mass and momenta.
@@ -220,6 +251,14 @@ impl Assembly {
     /// Forgets what was remembered: a new step begins.
     pub fn forget(&mut self) {
         self.memories.iter_mut().for_each(|memory| memory.valid = false);
+    }
+
+    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Effect::drift`].
+    pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
+        let zero = vec![Vec3::ZERO; state.q.len()];
+        let (mut rates, mut rates2) = (zero.clone(), zero);
+        self.effects.iter().for_each(|effect| effect.drift(state, &mut rates, &mut rates2));
+        [rates, rates2]
     }
 
     /// The largest round-off among the effects.

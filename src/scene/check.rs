@@ -1,9 +1,8 @@
 //! What can be said of a deck before its mechanics is built.
 
+use super::compose::Composition;
 use super::mesh::Mesh;
 use crate::deck::{self, Deck, Diagnostic, MotionWhat, SectionBody, Spanned, StageBody};
-use crate::effect::rigid_body::Body;
-use crate::effect::spring;
 use crate::model::{StageSet, Support};
 use crate::system::Direction;
 use crate::tensor::{Mat3, Vec3};
@@ -135,13 +134,8 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
 
 /// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
 /// constraint touches are held, so that the tangent stays regular.
-pub fn loose_rotations(
-    deck: &Deck,
-    mesh: &Mesh,
-    bodies: &[Body],
-    springs: &[spring::Instance],
-    held: &[Support],
-) -> Vec<Support> {
+pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {
+    let Composition { bodies, springs, jointed, .. } = composition;
     let on_beams: HashSet<usize> = mesh.beams.iter().flat_map(|beam| beam.nodes.iter().copied()).collect();
     let mut supports = Vec::new();
     for &node in deck.bodies.iter().filter_map(|body| mesh.points.get(&body.at.value)) {
@@ -157,7 +151,7 @@ pub fn loose_rotations(
         held.iter().flat_map(|s| &s.directions).filter(|d| d.slot == slot).for_each(|d| touch(d.axis.outer(d.axis)));
         let moved =
             |m: &deck::Motion| m.at.value == mesh.nodes[node].name && matches!(m.what, MotionWhat::Rotation { .. });
-        if on_beams.contains(&node) || deck.motions.iter().any(moved) {
+        if on_beams.contains(&node) || jointed.contains(&node) || deck.motions.iter().any(moved) {
             continue;
         }
         let directions = untouched(touched).into_iter().map(|axis| Direction { slot, axis }).collect();

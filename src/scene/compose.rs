@@ -1,13 +1,15 @@
 //! Which effects act: for each table that stands in the deck one effect, and for each the reason.
 
+use super::joints::FoundJoint;
 use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
 use super::names;
 use super::section::MassPerLength;
-use crate::deck::{self, Deck, Diagnostic, Frame, InterpolationWord, LoadTarget, LoadVector};
+use crate::deck::{self, Deck, Diagnostic, Frame, InterpolationWord, JointKind, LoadTarget, LoadVector};
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
 use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
 use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
+use crate::effect::joint::{self, Joints};
 use crate::effect::line_load::{LineLoad, LineLoadKind};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::rigid_body::{Body, RigidBody};
@@ -20,7 +22,8 @@ use crate::kernel::elastic::Strain;
 use crate::kernel::inertia::Inertia;
 use crate::kernel::load::Intensity;
 use crate::kernel::volume::VolumePoint;
-use crate::model::{Amplitude, History, StageSet};
+use crate::model::{Amplitude, History, SlotInfo, SlotKind, StageSet, Support};
+use crate::system::Direction;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -50,6 +53,14 @@ pub struct Composition {
     pub bodies: Vec<Body>,
     /// Springs to ground
     pub springs: Vec<spring::Instance>,
+    /// Slots of multipliers, behind those of the mesh
+    pub multipliers: Vec<SlotInfo>,
+    /// Components of these that nothing uses
+    pub idle_multipliers: Vec<Support>,
+    /// Nodes whose rotation a joint takes hold of
+    pub jointed: Vec<usize>,
+    /// How many joints remember their angle
+    pub angles: usize,
 }
 
 /// Collects effects while the tables of the deck are walked through.
@@ -68,6 +79,7 @@ pub fn compose(
     deck: &Deck,
     mesh: &Mesh,
     histories: &HashMap<String, Arc<dyn History>>,
+    connections: &[FoundJoint],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Composition {
     let dynamic = needs_mass(deck);
@@ -78,10 +90,15 @@ pub fn compose(
         elasticity: Vec::new(),
         bodies: Vec::new(),
         springs: Vec::new(),
+        multipliers: Vec::new(),
+        idle_multipliers: Vec::new(),
+        jointed: Vec::new(),
+        angles: 0,
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
     composer.elasticity();
     composer.springs();
+    composer.joints(connections);
     composer.beam_inertia();
     composer.out.bodies = composer.bodies();
     composer.gravity();
@@ -308,6 +325,97 @@ impl Composer<'_> {
             self.reason("gravity on bodies", false, "no [[body]]");
         } else {
             self.push(BodyGravity { acceleration, amplitude, bodies }, "`gravity` is set".into());
+        }
+    }
+
+    /// Joints that need multipliers, and springs and dampers of those that do not.
+    fn joints(&mut self, connections: &[FoundJoint]) {
+        let joints: Vec<joint::Instance> = connections.iter().filter_map(|c| self.joint(c)).collect();
+        if joints.is_empty() {
+            let why = if connections.is_empty() {
+                "no [[joint]]"
+            } else {
+                "every [[joint]] is held by supports or shared nodes"
+            };
+            return self.reason("joints", false, why);
+        }
+        let reason = format!("{} [[joint]] table(s)", joints.len());
+        self.push(Joints { joints }, reason);
+    }
+
+    fn joint(&mut self, connection: &FoundJoint) -> Option<joint::Instance> {
+        let joint = connection.joint;
+        let node = |k: usize| connection.nodes[k].map(|node| self.mesh.nodes[node].node);
+        let nodes = [node(0), node(1)];
+        let place = |k: usize| connection.nodes[k].map_or(connection.place, |node| self.mesh.nodes[node].place);
+        let places = [place(0), place(1)];
+        let sprung = joint.stiffness != 0.0 || joint.damping != 0.0;
+        let support = connection.is_support();
+        let mut kind = connection.kind();
+        if support {
+            // Supports hold it; what is left is its drive, or the one direction of a universal joint.
+            match joint.kind {
+                JointKind::Universal => kind.held = [true; 3],
+                _ if sprung => kind.normal = &[],
+                _ => return None,
+            }
+            if joint.motor.is_some() {
+                return None;
+            }
+        }
+        let motor = match &joint.motor {
+            None => None,
+            Some((value, history)) => {
+                self.refuse_jump(joint, history.is_none());
+                Some(joint::Motor { value: *value, amplitude: self.amplitude(history.as_ref(), None)? })
+            }
+        };
+        let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
+        if !sprung && motor.is_none() && shared && kind.normal.is_empty() {
+            return None;
+        }
+        let turns = sprung && joint.kind == JointKind::Revolute;
+        let mut instance = joint::Instance {
+            kind,
+            nodes,
+            places,
+            arms: connection.arms,
+            axes: connection.axes,
+            along: None,
+            between: None,
+            drive: joint::Drive { stiffness: joint.stiffness, damping: joint.damping, motor },
+            angle: turns.then_some(self.out.angles),
+        };
+        self.out.angles += usize::from(turns);
+        self.out.jointed.extend(connection.nodes.into_iter().flatten());
+        if !shared && !support {
+            instance.along = Some(self.multiplier(SlotKind::Force, connection));
+        }
+        if !kind.normal.is_empty() || (motor.is_some() && joint.kind == JointKind::Revolute) {
+            instance.between = Some(self.multiplier(SlotKind::Moment, connection));
+        }
+        for slot in [instance.along, instance.between].into_iter().flatten() {
+            let used = instance.used(slot);
+            let directions = (0..3).filter(|&k| !used[k]).map(|k| Direction { slot, axis: Vec3::UNIT[k] }).collect();
+            self.out.idle_multipliers.push(Support { directions, stages: StageSet::default() });
+        }
+        Some(instance)
+    }
+
+    fn multiplier(&mut self, kind: SlotKind, connection: &FoundJoint) -> u32 {
+        let names = connection.nodes.into_iter().flatten().map(|node| self.mesh.nodes[node].name.as_str());
+        let node = format!("joint of {}", names.collect::<Vec<_>>().join(" and "));
+        self.out.multipliers.push(SlotInfo { kind, node, place: connection.place });
+        (self.mesh.slots() + self.out.multipliers.len() - 1) as u32
+    }
+
+    /// A motor that acts in full from the start would jump.
+    fn refuse_jump(&mut self, joint: &deck::Joint, without_history: bool) {
+        let dynamic = matches!(self.deck.stages.first().map(|s| &s.body), Some(deck::StageBody::Dynamic { .. }));
+        if dynamic && without_history {
+            let message = "the motor of this joint would jump: it has no history, and the first stage is dynamic";
+            let diagnostic = Diagnostic::error(message, joint.span.clone());
+            self.diagnostics.push(diagnostic.help("give it a `history` that begins with 0"));
         }
     }
 

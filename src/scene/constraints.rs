@@ -1,11 +1,12 @@
 //! Supports and motions: from tables to held directions, and the clashes between them.
 
 use super::compose::stage_set;
+use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, MotionWhat, Span};
 use crate::model::{History, Motion, MotionKind, StageSet, Support, Table};
-use crate::system::{Direction, Slot};
+use crate::system::{Direction, Node, Slot};
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -62,6 +63,7 @@ pub fn constraints(
     deck: &Deck,
     mesh: &Mesh,
     histories: &HashMap<String, Arc<dyn History>>,
+    connections: &[FoundJoint],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> (Vec<Support>, Vec<Motion>) {
     let mut held = Vec::new();
@@ -78,15 +80,17 @@ pub fn constraints(
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
-    for joint in deck.joints.iter().filter(|joint| joint.beams.len() == 1) {
-        if let Some(&node) = mesh.points.get(&joint.at.value) {
-            let slot = mesh.nodes[node].node.u;
-            let directions = Vec3::UNIT.map(|axis| Direction { slot, axis }).to_vec();
-            note(&mut held, &directions, &StageSet::default(), &joint.span, "joint to ground");
-            supports.push(Support { directions, stages: StageSet::default() });
+    let mut motions = Vec::new();
+    for connection in connections.iter().filter(|connection| connection.is_support()) {
+        let Some(node) = connection.nodes[1].map(|node| mesh.nodes[node].node) else { continue };
+        let directions = directions(connection.held(), connection.axes, node.u, node.p);
+        note(&mut held, &directions, &StageSet::default(), &connection.joint.span, "joint to ground");
+        supports.push(Support { directions, stages: StageSet::default() });
+        match ground_motor(deck, histories, connection, node) {
+            Ok(motor) => motions.extend(motor),
+            Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
-    let mut motions = Vec::new();
     for motion in &deck.motions {
         match read_motion(deck, mesh, histories, motion) {
             Ok(found) => {
@@ -100,6 +104,32 @@ pub fn constraints(
     }
     refuse_clashes(deck, mesh, &held, diagnostics);
     (supports, motions)
+}
+
+/// The motor of a joint to ground is a prescribed motion of its node.
+fn ground_motor(
+    deck: &Deck,
+    histories: &HashMap<String, Arc<dyn History>>,
+    connection: &FoundJoint,
+    node: Node,
+) -> Result<Option<Motion>, Diagnostic> {
+    let Some((value, name)) = &connection.joint.motor else { return Ok(None) };
+    let history = find_history(deck, histories, name.as_ref())?;
+    let axis = connection.axes.column(0);
+    let (kind, slot) = match connection.joint.kind {
+        deck::JointKind::Prismatic => (MotionKind::Translation, node.u),
+        _ => (MotionKind::Rotation, node.p),
+    };
+    Ok(Some(Motion::new(kind, slot, axis, *value, history, StageSet::default())))
+}
+
+fn find_history(
+    deck: &Deck,
+    histories: &HashMap<String, Arc<dyn History>>,
+    name: Option<&deck::Spanned<String>>,
+) -> Result<Option<Arc<dyn History>>, Diagnostic> {
+    let unknown = |name| names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()));
+    name.map(|name| histories.get(&name.value).cloned().ok_or_else(|| unknown(name))).transpose()
 }
 
 fn directions(fix: [bool; 6], axes: Mat3, u: Slot, p: Slot) -> Vec<Direction> {
@@ -120,13 +150,7 @@ fn read_motion(
 ) -> Result<Motion, Diagnostic> {
     let (node, _) = mesh.find_node(deck, &motion.at)?;
     let node = mesh.nodes[node].node;
-    let history =
-        match &motion.history {
-            None => None,
-            Some(name) => Some(histories.get(&name.value).cloned().ok_or_else(|| {
-                names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()))
-            })?),
-        };
+    let history = find_history(deck, histories, motion.history.as_ref())?;
     let stages = stage_set(motion.stages.as_ref());
     Ok(match motion.what {
         MotionWhat::Displacement { direction, value } => {

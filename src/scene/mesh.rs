@@ -3,7 +3,7 @@
 use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, PointRef, Spanned};
+use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
 use crate::kernel::shape;
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
@@ -132,36 +132,38 @@ impl Mesh {
     /// Makes the nodes of points that joints part, before any beam asks for them.
     fn part_joints(&mut self, deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         for joint in &deck.joints {
-            let Some(place) = names::point(deck, &joint.at.value) else {
-                diagnostics.push(names::unknown("point", &joint.at, names::points(deck)));
+            let JointParts::Beams { at, beams } = &joint.parts else { continue };
+            let Some(place) = names::point(deck, &at.value) else {
+                diagnostics.push(names::unknown("point", at, names::points(deck)));
                 continue;
             };
             let known: Vec<_> =
-                joint.beams.iter().filter(|b| deck.beams.iter().any(|beam| beam.name.value == b.value)).collect();
-            if known.len() < joint.beams.len() {
-                for beam in joint.beams.iter().filter(|b| !known.iter().any(|k| k.value == b.value)) {
+                beams.iter().filter(|b| deck.beams.iter().any(|beam| beam.name.value == b.value)).collect();
+            if known.len() < beams.len() {
+                for beam in beams.iter().filter(|b| !known.iter().any(|k| k.value == b.value)) {
                     diagnostics.push(names::unknown("beam", beam, deck.beams.iter().map(|b| b.name.value.as_str())));
                 }
                 continue;
             }
-            if let Some(away) = known.iter().find(|name| !passes(deck, &name.value, &joint.at.value)) {
-                let message = format!("beam `{}` does not meet the point `{}`", away.value, joint.at.value);
+            if let Some(away) = known.iter().find(|name| !passes(deck, &name.value, &at.value)) {
+                let message = format!("beam `{}` does not meet the point `{}`", away.value, at.value);
                 diagnostics.push(Diagnostic::error(message, away.span.clone()));
                 continue;
             }
-            let point = joint.at.value.clone();
+            let point = at.value.clone();
             let main = match self.points.get(&point) {
                 Some(&main) => main,
                 None => self.add_point(&point, place),
             };
-            if let [_, second] = &joint.beams[..] {
+            if let [_, second] = &beams[..] {
                 let key = (second.value.clone(), point.clone());
                 if self.parted.contains_key(&key) {
                     let message = format!("beam `{}` is already parted at `{point}`", second.value);
                     diagnostics.push(Diagnostic::error(message, second.span.clone()));
                     continue;
                 }
-                let node = self.add_node(place, format!("{point} ({})", second.value), Some(main));
+                let shares = (joint.kind != JointKind::Prismatic).then_some(main);
+                let node = self.add_node(place, format!("{point} ({})", second.value), shares);
                 self.parted.insert(key, node);
             }
         }
@@ -170,13 +172,14 @@ impl Mesh {
     /// The middle of an arc may be named without being a node.
     fn refuse_joints_off_nodes(&self, deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         for joint in &deck.joints {
-            let Some(&main) = self.points.get(&joint.at.value) else { continue };
-            for name in &joint.beams {
+            let JointParts::Beams { at, beams } = &joint.parts else { continue };
+            let Some(&main) = self.points.get(&at.value) else { continue };
+            for name in beams {
                 let Some(beam) = self.beams.iter().find(|beam| beam.name == name.value) else { continue };
-                let own = self.parted.get(&(name.value.clone(), joint.at.value.clone())).unwrap_or(&main);
-                if passes(deck, &name.value, &joint.at.value) && !beam.nodes.contains(own) {
-                    let message = format!("beam `{}` has no node at the point `{}`", name.value, joint.at.value);
-                    let diagnostic = Diagnostic::error(message, joint.at.span.clone());
+                let own = self.parted.get(&(name.value.clone(), at.value.clone())).unwrap_or(&main);
+                if passes(deck, &name.value, &at.value) && !beam.nodes.contains(own) {
+                    let message = format!("beam `{}` has no node at the point `{}`", name.value, at.value);
+                    let diagnostic = Diagnostic::error(message, at.span.clone());
                     let fraction = beam.line.find(self.nodes[main].place).unwrap_or(0.5);
                     diagnostics.push(diagnostic.help(names::propose(beam, fraction)));
                 }

@@ -3,6 +3,7 @@
 mod check;
 mod compose;
 mod constraints;
+mod joints;
 mod mesh;
 mod names;
 mod output;
@@ -140,8 +141,9 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let complete = mesh.beams.len() == deck.beams.len();
     let histories = constraints::histories(deck);
     let mut found = Vec::new();
-    let composition = compose::compose(deck, &mesh, &histories, &mut found);
-    let (supports, motions) = constraints::constraints(deck, &mesh, &histories, &mut found);
+    let connections = joints::find(deck, &mesh, &mut found);
+    let composition = compose::compose(deck, &mesh, &histories, &connections, &mut found);
+    let (supports, motions) = constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
     let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
     let probes = columns.written(&mut found);
     let stages = stages(deck, &columns, &mut found);
@@ -153,15 +155,19 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let expected =
         expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
-    let loose = check::loose_rotations(deck, &mesh, &composition.bodies, &composition.springs, &supports);
+    let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
+    let first_multiplier = mesh.slots() as u32;
+    let multipliers = composition.multipliers.len();
     let model = Model {
-        slots: slots(&mesh),
+        slots: [slots(&mesh), composition.multipliers].concat(),
         rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
+        multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
+        angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
         elements: elements(&mesh),
         effects: composition.effects,
         amplitudes: composition.amplitudes,
-        supports: [supports, loose].concat(),
+        supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
         length: check::diagonal(&mesh),
     };

@@ -19,6 +19,9 @@ pub struct Convergence {
 /// Correction below which nothing more can be gained, relative to the length of the scene, and in radians.
 const SMALLEST_CORRECTION: f64 = 1e-12;
 
+/// Gaps of joints are closed more tightly than forces are balanced, relative to the scene's length and in radians.
+const GAP: f64 = 1e-2;
+
 /// Sums of a few products carry a few times the round-off of one.
 const NOISE_FACTOR: f64 = 4.0;
 
@@ -64,7 +67,11 @@ impl Convergence {
         for (slot, info) in model.slots.iter().enumerate() {
             let value = free_part(&system.pattern.equations, slot as Slot, system.total(slot));
             let noise = if info.kind == SlotKind::Rotation { noise.moment } else { noise.force };
-            let allowed = (self.tolerance * force * info.arm(model.length)).max(NOISE_FACTOR * noise);
+            let allowed = match info.kind {
+                SlotKind::Force => GAP * self.tolerance * model.length,
+                SlotKind::Moment => GAP * self.tolerance,
+                _ => (self.tolerance * force * info.arm(model.length)).max(NOISE_FACTOR * noise),
+            };
             let size = value.size();
             let ratio = if size == 0.0 { 0.0 } else { size / allowed };
             // NaN compares with nothing, so it is let in by hand.
@@ -79,7 +86,7 @@ impl Convergence {
 /// F: the largest nodal force, or moment over the length, among all categories and what constraints hold.
 fn largest_force(model: &Model, system: &System) -> f64 {
     let mut largest = 0.0_f64;
-    for (slot, info) in model.slots.iter().enumerate() {
+    for (slot, info) in model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
         let total = system.total(slot);
         let held = total - free_part(&system.pattern.equations, slot as Slot, total);
         let parts = [system.force[0][slot], system.force[1][slot], system.force[2][slot], held];
@@ -101,5 +108,5 @@ fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
 /// The largest correction, displacements over the length of the scene.
 pub(super) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
     let size = |(info, dq): (&SlotInfo, &Vec3)| dq.norm() * info.arm(model.length) / model.length;
-    model.slots.iter().zip(dq).map(size).fold(0.0, f64::max)
+    model.slots.iter().zip(dq).filter(|(info, _)| !info.is_multiplier()).map(size).fold(0.0, f64::max)
 }

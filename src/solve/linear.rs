@@ -80,7 +80,7 @@ impl LinearSolver {
             entries[empty] = 1.0;
             return Some(NullVector { entries });
         }
-        let scale: Vec<f64> = diagonal(system).iter().map(|d| d.abs().max(f64::MIN_POSITIVE).sqrt()).collect();
+        let scale = scales(system);
         let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
         for _ in 0..3 {
             x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
@@ -128,6 +128,19 @@ fn diagonal_places(system: &System) -> Vec<Option<usize>> {
 
 fn diagonal(system: &System) -> Vec<f64> {
     diagonal_places(system).into_iter().map(|place| place.map_or(0.0, |place| system.values[place])).collect()
+}
+
+/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column comparable.
+fn scales(system: &System) -> Vec<f64> {
+    let roots: Vec<f64> = diagonal(system).iter().map(|d| d.abs().sqrt()).collect();
+    let starts = &system.pattern.column_starts;
+    let column = |c: usize| {
+        let entries = starts[c] as usize..starts[c + 1] as usize;
+        let compared = entries.map(|k| (system.values[k], roots[system.pattern.rows[k] as usize]));
+        compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
+    };
+    let scale = |c: usize| if roots[c] > 0.0 { roots[c] } else { column(c).max(f64::MIN_POSITIVE) };
+    (0..roots.len()).map(scale).collect()
 }
 
 /// A column without any entry that is not zero.

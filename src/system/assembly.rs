@@ -67,6 +67,17 @@ impl System {
         self.force[0][slot] + self.force[1][slot] + self.force[2][slot]
     }
 
+    /// Drops all forces and keeps the tangent.
+    pub fn forget_forces(&mut self) {
+        self.force.iter_mut().for_each(|f| f.fill(Vec3::ZERO));
+    }
+
+    /// Puts a force in the place of all that stand at a slot.
+    pub fn replace_force(&mut self, slot: Slot, force: Vec3) {
+        self.force.iter_mut().for_each(|f| f[slot as usize] = Vec3::ZERO);
+        self.force[Category::Internal as usize][slot as usize] = force;
+    }
+
     /// The right-hand side of the correction: -g - J lift on the free equations.
     pub fn right_hand_side(&self, out: &mut [f64]) {
         let equations = &self.pattern.equations;

@@ -40,6 +40,10 @@ pub struct State {
     /// For each rotation slot the rotation vector continued without jumps since the start; valid at the last converged
     /// state. It tells a wound spring, and the columns `rc`, which of the turns they are in.
     pub wound: Vec<Vec3>,
+    /// First and second derivative over time of each factor of a load.
+    pub amplitude_rates: Vec<[f64; 2]>,
+    /// The angle of each sprung joint, continued without jumps; valid at the last converged state.
+    pub angles: Vec<f64>,
     /// For each rotation slot the rotation that its vector starts from, while a step is iterated whose unknowns are
     /// increments. Then `q` holds the increment, and `v`, `a`, `algorithmic` the material spin and its rate. Else `None`:
     /// rotation vectors are total ones.
@@ -48,7 +52,7 @@ pub struct State {
 
 impl State {
     /// At rest in the initial placement.
-    pub fn rest(slots: usize, elements: usize, amplitudes: usize) -> Self {
+    pub fn rest(slots: usize, elements: usize, amplitudes: usize, angles: usize) -> Self {
         let zero = vec![Vec3::ZERO; slots];
         Self {
             time: 0.0,
@@ -60,6 +64,8 @@ impl State {
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
             wound: zero,
+            amplitude_rates: vec![[0.0; 2]; amplitudes],
+            angles: vec![0.0; angles],
             base: None,
         }
     }
@@ -75,6 +81,8 @@ impl State {
         self.amplitude.copy_from_slice(&other.amplitude);
         self.mixed.copy_from_slice(&other.mixed);
         self.wound.copy_from_slice(&other.wound);
+        self.amplitude_rates.copy_from_slice(&other.amplitude_rates);
+        self.angles.copy_from_slice(&other.angles);
         self.base.clone_from(&other.base);
     }
 

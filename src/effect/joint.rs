@@ -1,0 +1,382 @@
+//! Joints between two nodes, or a node and ground: a kind is a row of data, which gaps it keeps closed; see
+//! [`crate::kernel::joint`]. Springs, dampers and motors act on what a joint leaves free.
+
+use super::{Effect, Energy};
+use crate::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use crate::kernel::{ElementSystem, Weights};
+use crate::real::{Jet, Real};
+use crate::rotation::Rotation;
+use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, State};
+use crate::tensor::{Mat3, Vec3};
+use std::f64::consts::PI;
+
+/// What a kind of joint keeps closed; the joint's axis is e_1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind {
+    /// The axes along which the ends do not slide
+    pub held: [bool; 3],
+    /// Pairs of axes, one of A and one of B, that stay normal to each other
+    pub normal: &'static [(usize, usize)],
+}
+
+/// All rotations are held.
+const LOCKED: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
+
+impl Kind {
+    /// Rotations are free.
+    pub const SPHERICAL: Self = Self { held: [true; 3], normal: &[] };
+    /// Turns about e_1.
+    pub const REVOLUTE: Self = Self { held: [true; 3], normal: &[(0, 1), (0, 2)] };
+    /// Turns about e_1 of A and e_2 of B.
+    pub const UNIVERSAL: Self = Self { held: [true; 3], normal: &[(0, 1)] };
+    /// Slides along e_1.
+    pub const PRISMATIC: Self = Self { held: [false, true, true], normal: &LOCKED };
+    /// Holds everything.
+    pub const RIGID: Self = Self { held: [true; 3], normal: &LOCKED };
+}
+
+/// A prescribed relative motion along the free direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Motor {
+    /// Angle or displacement
+    pub value: f64,
+    /// The number of its amplitude
+    pub amplitude: usize,
+}
+
+/// What acts on the one free direction of a revolute or prismatic joint.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Drive {
+    /// Moment per angle, or force per length
+    pub stiffness: f64,
+    /// Moment per angular velocity, or force per velocity
+    pub damping: f64,
+    /// A prescribed motion
+    pub motor: Option<Motor>,
+}
+
+/// One joint.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What it holds
+    pub kind: Kind,
+    /// A and B; `None` is ground
+    pub nodes: [Option<Node>; 2],
+    /// Their initial places
+    pub places: [Vec3; 2],
+    /// From each to the joint, at the start
+    pub arms: [Vec3; 2],
+    /// e_1, e_2, e_3 as columns
+    pub axes: Mat3,
+    /// Multipliers of gaps along axes, where there are any: ends with arms or slides
+    pub along: Option<Slot>,
+    /// Multipliers of gaps between directions
+    pub between: Option<Slot>,
+    /// On the free direction
+    pub drive: Drive,
+    /// Where the state remembers its angle, if it has a spring
+    pub angle: Option<usize>,
+}
+
+/// All joints that need multipliers.
+#[derive(Clone, Debug)]
+pub struct Joints {
+    /// The joints
+    pub joints: Vec<Instance>,
+}
+
+impl Instance {
+    fn slots(&self) -> [Option<Slot>; block::COUNT] {
+        let [a, b] = self.nodes;
+        // Ends that share their displacement need none.
+        let displacement = |node: Option<Node>| node.filter(|_| self.slides_matter()).map(|node| node.u);
+        let rotation = |node: Option<Node>| node.map(|node| node.p);
+        [displacement(a), rotation(a), displacement(b), rotation(b), self.along, self.between]
+    }
+
+    fn slides_matter(&self) -> bool {
+        self.along.is_some()
+    }
+
+    /// The free direction slides, it does not turn.
+    fn is_prismatic(&self) -> bool {
+        !self.kind.held[0]
+    }
+
+    fn ends(&self, at: &State) -> [End; 2] {
+        std::array::from_fn(|k| match self.nodes[k] {
+            Some(node) => End { place: self.places[k] + at.q[node.u as usize], rotation: at.rotation(node.p) },
+            None => End { place: self.places[k], rotation: Rotation::new(Vec3::ZERO) },
+        })
+    }
+
+    fn multipliers(&self, at: &State, slot: Option<Slot>) -> Vec3 {
+        slot.map_or(Vec3::ZERO, |slot| at.q[slot as usize])
+    }
+
+    /// The pairs of directions that stay normal; a motor turns that of B.
+    fn directions<T: Real>(&self, motor: T, cos_sin: impl Fn(T) -> (T, T)) -> Vec<(Vec3<T>, Vec3<T>)> {
+        let e = |k: usize| Vec3::<T>::constant(self.axes.column(k));
+        let mut pairs: Vec<_> = self.kind.normal.iter().map(|&(i, k)| (e(i), e(k))).collect();
+        if self.drive.motor.is_some() && !self.is_prismatic() {
+            let (cos, sin) = cos_sin(motor);
+            pairs.push((e(1), e(1) * sin + e(2) * cos));
+        }
+        pairs
+    }
+
+    fn motor_value(&self, at: &State) -> f64 {
+        self.drive.motor.map_or(0.0, |motor| motor.value * at.amplitude[motor.amplitude])
+    }
+
+    fn pairs(&self, at: &State) -> Vec<(Vec3, Vec3)> {
+        self.directions(self.motor_value(at), |angle| (libm::cos(angle), libm::sin(angle)))
+    }
+
+    /// The gaps, zero where nothing is held.
+    fn gaps(&self, at: &State, ends: &[End; 2]) -> (Vec3, Vec3) {
+        let mut along = slides(&self.axes, &self.arms, &ends[0], &ends[1]);
+        let slides_on = self.is_prismatic() && self.drive.motor.is_some();
+        along.0[0] -= if slides_on { self.motor_value(at) } else { 0.0 };
+        let mut between = Vec3::ZERO;
+        for (k, &pair) in self.pairs(at).iter().enumerate() {
+            between.0[k] = cosine(pair, &ends[0], &ends[1]);
+        }
+        let held = |k: usize| self.kind.held[k] || (k == 0 && slides_on);
+        (Vec3([0, 1, 2].map(|k| if held(k) { along.0[k] } else { 0.0 })), between)
+    }
+
+    /// Which of the multipliers of a slot are used.
+    pub fn used(&self, slot: Slot) -> [bool; 3] {
+        let driven = self.drive.motor.is_some();
+        if self.along == Some(slot) {
+            return [self.kind.held[0] || driven, self.kind.held[1], self.kind.held[2]];
+        }
+        let count = self.kind.normal.len() + usize::from(driven && !self.is_prismatic());
+        [0, 1, 2].map(|k| k < count)
+    }
+
+    /// Forces, tangent, and the rows of the multipliers.
+    fn system(&self, at: &State, weights: Weights, out: &mut ElementSystem) {
+        let ends = self.ends(at);
+        // Without a stiffness in the tangent the multipliers belong to accelerations.
+        let couple = if weights.stiffness != 0.0 { weights.stiffness } else { weights.mass };
+        let factors = (weights.stiffness, couple);
+        let (along, between) = self.gaps(at, &ends);
+        if self.slides_matter() {
+            let force = self.multipliers(at, self.along);
+            add_along(&self.axes, &self.arms, &ends, force, factors, out);
+            out.add_force(block::ALONG, along);
+        }
+        let multipliers = self.multipliers(at, self.between);
+        for (k, pair) in self.pairs(at).into_iter().enumerate() {
+            add_between(pair, &ends, multipliers.0[k], factors, k, out);
+        }
+        out.add_force(block::BETWEEN, between);
+        self.add_drive(at, &ends, weights, out);
+    }
+
+    /// A spring and a damper on the free direction.
+    fn add_drive(&self, at: &State, ends: &[End; 2], weights: Weights, out: &mut ElementSystem) {
+        let Drive { stiffness, damping, motor } = self.drive;
+        if motor.is_some() || (stiffness == 0.0 && damping == 0.0) {
+            return;
+        }
+        // The force, what it acts along at each block, and how it varies.
+        let coordinate = self.coordinate(at, ends);
+        let mut force = stiffness * coordinate.value;
+        let mut variation = coordinate.gradient.map(|g| g * (stiffness * weights.stiffness));
+        if damping != 0.0 {
+            let (rate, varies) = self.rate(at, ends, weights);
+            force += damping * rate;
+            variation.iter_mut().zip(varies).for_each(|(v, r)| *v += r * damping);
+        }
+        for row in 0..4 {
+            out.add_force(row, coordinate.gradient[row] * force);
+            for column in 0..4 {
+                out.add_tangent(row, column, coordinate.gradient[row].outer(variation[column]));
+            }
+        }
+        if weights.stiffness == 0.0 {
+            return;
+        }
+        if self.is_prismatic() {
+            let mut own = ElementSystem::new(block::COUNT);
+            let along = Vec3([force, 0.0, 0.0]);
+            add_along(&self.axes, &self.arms, ends, along, (weights.stiffness, 0.0), &mut own);
+            for row in 0..4 {
+                for column in 0..4 {
+                    out.add_tangent(row, column, own.tangent_block(row, column));
+                }
+            }
+        } else {
+            let moment = self.axes.column(0) * (force * weights.stiffness);
+            out.add_tangent(block::P_A, block::P_A, -ends[0].rotation.c2(moment));
+            out.add_tangent(block::P_B, block::P_B, ends[1].rotation.c2(moment));
+        }
+    }
+
+    /// The angle or slide along the free direction, with its gradient over u_A, P_A, u_B, P_B.
+    fn coordinate(&self, at: &State, ends: &[End; 2]) -> Coordinate {
+        let [a, b] = ends;
+        if self.is_prismatic() {
+            let value = slides(&self.axes, &self.arms, a, b).0[0];
+            let mut own = ElementSystem::new(block::COUNT);
+            add_along(&self.axes, &self.arms, ends, Vec3::UNIT[0], (0.0, 0.0), &mut own);
+            return Coordinate { value, gradient: [0, 1, 2, 3].map(|k| own.force_block(k)) };
+        }
+        let raw = self.raw_angle(ends);
+        let before = self.angle.map_or(0.0, |number| at.angles[number]);
+        let value = raw + 2.0 * PI * ((before - raw) / (2.0 * PI)).round();
+        let axis = self.axes.column(0);
+        let gradient = [Vec3::ZERO, -a.rotation.t.transpose_mul(axis), Vec3::ZERO, b.rotation.t.transpose_mul(axis)];
+        Coordinate { value, gradient }
+    }
+
+    fn raw_angle(&self, ends: &[End; 2]) -> f64 {
+        let e = |k: usize| self.axes.column(k);
+        let [a, b] = ends;
+        libm::atan2(-cosine((e(1), e(2)), a, b), cosine((e(1), e(1)), a, b))
+    }
+
+    /// The rate of the angle or slide, and its weighted derivatives over the unknowns and their rates.
+    fn rate(&self, at: &State, ends: &[End; 2], weights: Weights) -> (f64, [Vec3; 4]) {
+        let mut varies = [Vec3::ZERO; 4];
+        let gradient = self.coordinate(at, ends).gradient;
+        let axis = self.axes.column(0);
+        let mut rate = 0.0;
+        for (k, node) in self.nodes.iter().enumerate() {
+            let Some(node) = node else { continue };
+            let spin = at.spin(node.p);
+            rate += gradient[2 * k].dot(at.v[node.u as usize]);
+            varies[2 * k] = gradient[2 * k] * weights.damping;
+            if self.is_prismatic() {
+                // The gradient over spins is that over the vector with T taken out.
+                let over_spin = ends[k].rotation.t_inverse().transpose_mul(gradient[2 * k + 1]);
+                rate += over_spin.dot(spin.omega);
+                varies[2 * k + 1] = spin.omega_derivative(weights).transpose_mul(over_spin);
+            } else {
+                let sign = if k == 0 { -1.0 } else { 1.0 };
+                rate += sign * axis.dot(spin.omega);
+                varies[2 * k + 1] = spin.omega_derivative(weights).transpose_mul(axis) * sign;
+            }
+        }
+        (rate, varies)
+    }
+
+    /// Second derivatives of the gaps over time for a motion without accelerations.
+    fn bias(&self, at: &State) -> (Vec3, Vec3, Vec3, Vec3) {
+        let jet = |value: Vec3, rate: Vec3| {
+            Vec3(std::array::from_fn(|k| Jet { value: value.0[k], rate: rate.0[k], rate2: 0.0 }))
+        };
+        let ends: [End<Jet>; 2] = std::array::from_fn(|k| match self.nodes[k] {
+            Some(node) => {
+                let (u, p) = (node.u as usize, node.p as usize);
+                let place = jet(self.places[k] + at.q[u], at.v[u]);
+                End { place, rotation: Rotation::new(jet(at.q[p], at.v[p])) }
+            }
+            None => End { place: Vec3::constant(self.places[k]), rotation: Rotation::new(Vec3::constant(Vec3::ZERO)) },
+        });
+        let motor = self.drive.motor.map_or(Jet::constant(0.0), |motor| {
+            let [rate, rate2] = at.amplitude_rates[motor.amplitude];
+            let value = motor.value * at.amplitude[motor.amplitude];
+            Jet { value, rate: motor.value * rate, rate2: motor.value * rate2 }
+        });
+        let mut along = slides(&self.axes, &self.arms, &ends[0], &ends[1]);
+        if self.is_prismatic() && self.drive.motor.is_some() {
+            along.0[0] -= motor;
+        }
+        let cos_sin = |angle: Jet| {
+            let (c, s) = (libm::cos(angle.value), libm::sin(angle.value));
+            let square = angle.rate * angle.rate;
+            let cos = Jet { value: c, rate: -s * angle.rate, rate2: -s * angle.rate2 - c * square };
+            (cos, Jet { value: s, rate: c * angle.rate, rate2: c * angle.rate2 - s * square })
+        };
+        let mut between = [Jet::constant(0.0); 3];
+        for (k, &pair) in self.directions(motor, cos_sin).iter().enumerate() {
+            between[k] = cosine(pair, &ends[0], &ends[1]);
+        }
+        let rate = |v: [Jet; 3]| Vec3(v.map(|jet| jet.rate));
+        let rate2 = |v: [Jet; 3]| Vec3(v.map(|jet| jet.rate2));
+        (rate(along.0), rate(between), rate2(along.0), rate2(between))
+    }
+}
+
+/// A scalar coordinate of a joint.
+struct Coordinate {
+    value: f64,
+    gradient: [Vec3; 4],
+}
+
+impl Effect for Joints {
+    fn name(&self) -> &'static str {
+        "joints"
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn cliques(&self) -> Cliques {
+        let mut cliques = Cliques::default();
+        self.joints.iter().for_each(|joint| cliques.push(joint.slots().into_iter().flatten()));
+        cliques
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+        let mut whole = ElementSystem::new(block::COUNT);
+        for (k, joint) in self.joints.iter().enumerate() {
+            whole.clear();
+            joint.system(at, weights, &mut whole);
+            let present: Vec<usize> = (0..block::COUNT).filter(|&b| joint.slots()[b].is_some()).collect();
+            out.add(k, &whole.part(&present));
+        }
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        let one = |joint: &Instance| match joint.drive {
+            Drive { stiffness, motor: None, .. } if stiffness != 0.0 => {
+                let value = joint.coordinate(at, &joint.ends(at)).value;
+                0.5 * stiffness * value * value
+            }
+            _ => 0.0,
+        };
+        Energy { kinetic: 0.0, strain: self.joints.iter().map(one).sum() }
+    }
+
+    fn remember(&self, at: &mut State) {
+        for joint in &self.joints {
+            if let Some(number) = joint.angle {
+                at.angles[number] = joint.coordinate(at, &joint.ends(at)).value;
+            }
+        }
+    }
+
+    fn drift(&self, at: &State, rates: &mut [Vec3], rates2: &mut [Vec3]) {
+        for joint in &self.joints {
+            let (along, between, along2, between2) = joint.bias(at);
+            for (slot, rate, rate2) in [(joint.along, along, along2), (joint.between, between, between2)] {
+                if let Some(slot) = slot {
+                    rates[slot as usize] = rate;
+                    rates2[slot as usize] = rate2;
+                }
+            }
+        }
+    }
+
+    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
+        for joint in self.joints.iter().filter(|joint| joint.drive.motor.is_some()) {
+            let value = joint.motor_value(at);
+            if joint.is_prismatic() {
+                // L = lambda (slide - value): what the motor gives grows with -value.
+                show(value, -joint.multipliers(at, joint.along).0[0]);
+            } else {
+                let ends = joint.ends(at);
+                let e = |k: usize| joint.axes.column(k);
+                let (c, s) = (libm::cos(value), libm::sin(value));
+                let slope = cosine((e(1), e(1) * c - e(2) * s), &ends[0], &ends[1]);
+                show(value, joint.multipliers(at, joint.between).0[joint.kind.normal.len()] * slope);
+            }
+        }
+    }
+}
