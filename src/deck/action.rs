@@ -131,14 +131,41 @@ pub struct Body {
 /// `[[spring]]`
 #[derive(Clone, Debug)]
 pub struct Spring {
-    /// The node
-    pub at: Spanned<String>,
-    /// ux uy uz rx ry rz
-    pub stiffness: [f64; 6],
-    /// What the directions mean
-    pub axes: Option<Axes>,
+    /// What it connects
+    pub body: SpringBody,
     /// Stages from 1
     pub stages: Option<Vec<usize>>,
+    /// Where the table stands
+    pub span: Span,
+}
+
+/// Kinds of springs.
+#[derive(Clone, Debug)]
+pub enum SpringBody {
+    /// From a node to ground
+    Ground {
+        /// The node
+        at: Spanned<String>,
+        /// ux uy uz rx ry rz
+        stiffness: [f64; 6],
+        /// ux uy uz rx ry rz
+        damping: [f64; 6],
+        /// What the directions mean
+        axes: Option<Axes>,
+    },
+    /// Between two nodes
+    Between {
+        /// The nodes
+        nodes: [Spanned<String>; 2],
+        /// Force per length
+        stiffness: f64,
+        /// Force per velocity
+        damping: f64,
+        /// Length without force; left out: the distance at the start
+        length: Option<f64>,
+        /// Whether it is a cable
+        tension_only: bool,
+    },
 }
 
 /// In what frame the components of a load are given.
@@ -530,16 +557,76 @@ fn read_inertia(table: &Table, item: &Item) -> Option<[[f64; 3]; 3]> {
     Some([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]])
 }
 
+const SPRING_KEYS: [&str; 8] = ["at", "between", "stiffness", "damping", "length", "tension_only", "axes", "stages"];
+
 pub(super) fn read_spring<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Spring> {
-    let table = Table::new(context, item, "[[spring]]", &["at", "stiffness", "axes", "stages"], &["damping"])?;
-    let at = required_text(&table, "at");
-    let stiffness = if table.has("damping") { table.get("stiffness") } else { table.required("stiffness") };
-    let stiffness = stiffness.and_then(|item| context.vector::<6>(item));
-    if let Some(k) = stiffness.as_ref().filter(|k| k.value.iter().any(|&v| v < 0.0)) {
-        context.report(Diagnostic::error("`stiffness` of a spring must not be negative", k.span.clone()));
+    let table = Table::new(context, item, "[[spring]]", &SPRING_KEYS, &[])?;
+    let stages = read_stages(&table);
+    if table.has("at") && table.has("between") {
+        return context
+            .wrong(table.key_span("between"), "a spring goes from a node (`at`) to ground or `between` two nodes");
     }
-    let (axes, stages) = (read_axes(&table), read_stages(&table));
-    Some(Spring { at: at?, stiffness: stiffness?.value, axes: axes?, stages: stages? })
+    if !table.has("stiffness") && !table.has("damping") {
+        return context.wrong(table.span.clone(), "[[spring]] needs `stiffness` or `damping`");
+    }
+    let body = if table.has("between") { read_link(&table) } else { read_ground_spring(&table) };
+    Some(Spring { body: body?, stages: stages?, span: table.span.clone() })
+}
+
+fn read_ground_spring(table: &Table) -> Option<SpringBody> {
+    let context = table.context;
+    for key in ["length", "tension_only"].into_iter().filter(|key| table.has(key)) {
+        context.report(Diagnostic::error(format!("`{key}` belongs to a spring `between` nodes"), table.key_span(key)));
+    }
+    let at = required_text(table, "at");
+    let six = |key: &str| {
+        let Some(item) = table.get(key) else { return Some([0.0; 6]) };
+        let values = context.vector::<6>(item)?;
+        if values.value.iter().any(|&v| v < 0.0) {
+            return context.wrong(values.span, format!("`{key}` of a spring must not be negative"));
+        }
+        Some(values.value)
+    };
+    let (stiffness, damping, axes) = (six("stiffness"), six("damping"), read_axes(table));
+    Some(SpringBody::Ground { at: at?, stiffness: stiffness?, damping: damping?, axes: axes? })
+}
+
+fn read_link(table: &Table) -> Option<SpringBody> {
+    let context = table.context;
+    if table.has("axes") {
+        context.report(Diagnostic::error("a spring between nodes has no `axes`", table.key_span("axes")));
+    }
+    let item = table.get("between")?;
+    let Ok(nodes) = <[Spanned<String>; 2]>::try_from(context.texts(item)?) else {
+        return context.wrong(item.span(), "`between` names two nodes");
+    };
+    let number = |key: &str, default: Option<f64>| {
+        if !table.has(key) {
+            return Some(default);
+        }
+        let value = table.number(key)?;
+        let message = || format!("`{key}` of a spring must not be negative");
+        if value.value < 0.0 { context.wrong(value.span, message()) } else { Some(Some(value.value)) }
+    };
+    let (stiffness, damping) = (number("stiffness", Some(0.0)), number("damping", Some(0.0)));
+    let length = number("length", None);
+    let tension_only = if table.has("tension_only") { table.flag("tension_only")? } else { false };
+    Some(SpringBody::Between { nodes, stiffness: stiffness??, damping: damping??, length: length?, tension_only })
+}
+
+/// Rayleigh factors of mass and stiffness.
+pub(super) fn read_damping(top: &Table) -> Option<[f64; 2]> {
+    let table = Table::new(top.context, top.get("damping")?, "[damping]", &["mass", "stiffness"], &[])?;
+    let factor = |key: &str| {
+        if !table.has(key) {
+            return Some(0.0);
+        }
+        let value = table.number(key)?;
+        let message = || format!("`{key}` in [damping] must not be negative");
+        if value.value < 0.0 { table.context.wrong(value.span, message()) } else { Some(value.value) }
+    };
+    let (mass, stiffness) = (factor("mass"), factor("stiffness"));
+    Some([mass?, stiffness?])
 }
 
 pub(super) fn read_load<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Load> {

@@ -14,7 +14,7 @@ mod resolved;
 
 pub use action::{
     Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, JointParts, Load,
-    LoadTarget, LoadVector, Motion, MotionWhat, Spring, Support,
+    LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,
 };
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
 pub use expression::{Expression, Jet};
@@ -60,6 +60,8 @@ pub struct Deck {
     pub springs: Vec<Spring>,
     /// Loads
     pub loads: Vec<Load>,
+    /// Rayleigh factors of mass and stiffness
+    pub damping: Option<[f64; 2]>,
     /// Initial velocities
     pub initials: Vec<Initial>,
     /// Histories
@@ -127,8 +129,8 @@ fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
 }
 
 fn read_tables(context: &Context, document: &DeTable) -> Deck {
-    let keys: Vec<&str> = KEYS.into_iter().chain(["expect"]).collect();
-    let top = Table::top(context, document, &keys, &["damping"]);
+    let keys: Vec<&str> = KEYS.into_iter().chain(["damping", "expect"]).collect();
+    let top = Table::top(context, document, &keys, &[]);
     let points = geometry::read_points(&top);
     let materials = named(&top, "material", geometry::read_material);
     let sections = named(&top, "section", geometry::read_section);
@@ -161,6 +163,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         bodies,
         springs: listed(&top, "spring", action::read_spring),
         loads: listed(&top, "load", action::read_load),
+        damping: action::read_damping(&top),
         initials: listed(&top, "initial", action::read_initial),
         histories,
         stages: listed(&top, "stage", procedure::read_stage),

@@ -31,13 +31,14 @@ pub(super) struct Bookkeeper {
     ledger: Ledger,
     q: Vec<Vec3>,
     force: Vec<Vec3>,
+    drag: Vec<Vec3>,
     drives: Vec<(f64, f64)>,
 }
 
 impl Bookkeeper {
     pub fn new(slots: usize) -> Self {
         let zero = vec![Vec3::ZERO; slots];
-        Self { ledger: Ledger::default(), q: zero.clone(), force: zero, drives: Vec::new() }
+        Self { ledger: Ledger::default(), q: zero.clone(), force: zero.clone(), drag: zero, drives: Vec::new() }
     }
 
     /// Opens a stage: energies are taken, no work is added.
@@ -50,16 +51,10 @@ impl Bookkeeper {
     /// Adds the work of the step that ends here.
     pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
         for (slot, info) in model.slots.iter().enumerate() {
+            let drag = system.force[Category::Damping as usize][slot];
+            self.ledger.damped += work(info.kind, (self.q[slot], self.drag[slot]), (state.q[slot], drag));
             let (before, after) = (self.force[slot], outside(system, slot));
-            if before == Vec3::ZERO && after == Vec3::ZERO {
-                continue;
-            }
-            let (q0, q1) = (self.q[slot], state.q[slot]);
-            self.ledger.external += match info.kind {
-                SlotKind::Displacement => 0.5 * (before + after).dot(q1 - q0),
-                SlotKind::Rotation => turning_work(q0, before, q1, after),
-                SlotKind::Force | SlotKind::Moment => 0.0,
-            };
+            self.ledger.external += work(info.kind, (self.q[slot], before), (state.q[slot], after));
         }
         let drives = model.drives(state);
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
@@ -76,6 +71,7 @@ impl Bookkeeper {
 
     fn remember(&mut self, state: &State, system: &System) {
         self.q.copy_from_slice(&state.q);
+        self.drag.copy_from_slice(&system.force[Category::Damping as usize]);
         for (slot, force) in self.force.iter_mut().enumerate() {
             *force = outside(system, slot);
         }
@@ -91,6 +87,18 @@ impl Bookkeeper {
 fn outside(system: &System, slot: usize) -> Vec3 {
     let equations: &Equations = &system.pattern.equations;
     equations.held_part(slot as Slot, system.total(slot)) - system.force[Category::External as usize][slot]
+}
+
+/// Work of a force over the way from the one place to the other, by the trapezoidal rule.
+fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3)) -> f64 {
+    if f0 == Vec3::ZERO && f1 == Vec3::ZERO {
+        return 0.0;
+    }
+    match kind {
+        SlotKind::Displacement => 0.5 * (f0 + f1).dot(q1 - q0),
+        SlotKind::Rotation => turning_work(q0, f0, q1, f1),
+        SlotKind::Force | SlotKind::Moment => 0.0,
+    }
 }
 
 /// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial moment m = T^-1 f

@@ -24,8 +24,10 @@ impl Scratch {
 
 /// A way to interpolate rotations.
 pub trait Interpolation: Send + Sync + 'static {
-    /// What effects of such elements are called
+    /// What their elasticity is called
     const NAME: &'static str;
+    /// What their damping by strain rates is called
+    const DAMPING_NAME: &'static str;
 
     /// The nodes that the kernel sees.
     fn nodes<const N: usize>(connection: &Connection<N>, at: &State) -> [NodeMotion; N];
@@ -52,6 +54,7 @@ pub struct TotalVectors;
 
 impl Interpolation for TotalVectors {
     const NAME: &'static str = "beam elasticity";
+    const DAMPING_NAME: &'static str = "strain-rate damping";
 
     fn nodes<const N: usize>(connection: &Connection<N>, at: &State) -> [NodeMotion; N] {
         connection.motions_in_one_chart(at)
@@ -96,6 +99,7 @@ impl RelativeVectors {
 
 impl Interpolation for RelativeVectors {
     const NAME: &'static str = "beam elasticity, relative";
+    const DAMPING_NAME: &'static str = "strain-rate damping, relative";
 
     fn nodes<const N: usize>(connection: &Connection<N>, at: &State) -> [NodeMotion; N] {
         Self::see(connection, at).0.nodes

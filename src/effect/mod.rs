@@ -8,11 +8,14 @@ pub mod gravity;
 pub mod interpolation;
 pub mod joint;
 pub mod line_load;
+pub mod link;
+pub mod mass_damping;
 pub mod node_load;
 pub mod rigid_body;
 pub mod rotary_inertia;
 pub mod section_inertia;
 pub mod spring;
+pub mod strain_rate_damping;
 mod volume;
 
 pub use volume::{VolumeElement, VolumeElements};

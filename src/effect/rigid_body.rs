@@ -46,12 +46,7 @@ impl Effect for RigidBody {
         for (k, body) in self.bodies.iter().enumerate() {
             let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &at.spin(body.node.p), weights);
             system.clear();
-            system.add_force(0, force.u);
-            system.add_force(1, force.p);
-            system.set_tangent(0, 0, force.uu);
-            system.set_tangent(0, 1, force.up);
-            system.set_tangent(1, 0, force.pu);
-            system.set_tangent(1, 1, force.pp);
+            force.write(&mut system);
             out.add(k, &system);
         }
     }

@@ -24,6 +24,10 @@ pub struct Instance {
     pub translation: Mat3,
     /// Its stiffness against rotation, global components
     pub rotation: Mat3,
+    /// Its damping of displacement, global components
+    pub translation_damping: Mat3,
+    /// Its damping of the spatial angular velocity, global components
+    pub rotation_damping: Mat3,
     /// The number of its amplitude: 0 in stages where it is absent, else 1
     pub amplitude: usize,
 }
@@ -61,7 +65,18 @@ impl Effect for Spring {
             system.add_force(1, moment);
             system.add_tangent(0, 0, spring.translation * (on * weights.stiffness));
             system.add_tangent(1, 1, tangent * weights.stiffness);
-            out.add(k, &system);
+            let damping = (weights.damping != 0.0
+                || at.v[spring.node.u as usize] != Vec3::ZERO
+                || at.v[spring.node.p as usize] != Vec3::ZERO)
+                .then(|| spring.damping(at, weights));
+            if let Some((force, moment, tangents)) = damping {
+                system.add_tangent(0, 0, tangents[0] * on);
+                system.add_tangent(1, 1, tangents[1] * on);
+                out.add(k, &system);
+                out.add_damping(k, &[force * on, moment * on]);
+            } else {
+                out.add(k, &system);
+            }
         }
     }
 
@@ -72,6 +87,30 @@ impl Effect for Spring {
             0.5 * at.amplitude[spring.amplitude] * (u.dot(spring.translation * u) + wound.dot(spring.rotation * wound))
         };
         Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
+    }
+}
+
+impl Instance {
+    /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P = T c w, whose tangent is
+    /// C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
+    fn damping(&self, at: &State, weights: Weights) -> (Vec3, Vec3, [Mat3; 2]) {
+        let force = self.translation_damping * at.v[self.node.u as usize];
+        let over_velocity = self.translation_damping * weights.damping;
+        if self.rotation_damping == Mat3::ZERO {
+            return (force, Vec3::ZERO, [over_velocity, Mat3::ZERO]);
+        }
+        let spin = at.spin(self.node.p);
+        let rotation = &spin.rotation;
+        let moment = self.rotation_damping * (rotation.r * spin.omega);
+        // T^T R^T = T holds for total vectors; of an increment after a base only T^T R^T is meant.
+        let back = rotation.t.transpose() * rotation.r.transpose();
+        let material = rotation.r.transpose_mul(moment);
+        let turned = Mat3::skew_mul(spin.omega, rotation.t) * -weights.stiffness;
+        let d_spatial = rotation.r * (spin.omega_derivative(weights) + turned);
+        let tangent = back * (self.rotation_damping * d_spatial)
+            + (rotation.c2(material) + rotation.t.transpose_matmul(Mat3::skew_mul(material, rotation.t)))
+                * weights.stiffness;
+        (force, back * moment, [over_velocity, tangent])
     }
 }
 

@@ -150,6 +150,57 @@ pub fn body<T: Real>(inertia: &Inertia, u_rate2: Vec3<T>, spin: &Spin<T>, weight
     out
 }
 
+/// Forces proportional to velocities, as mass-proportional damping has them: with v = u' and h = J0 Omega + m d x R^T v
+///
+/// ```text
+/// f_u = alpha m (v + R (Omega x d)),  f_P = alpha T^T h
+/// ```
+#[inline(always)]
+pub fn drag<T: Real>(
+    inertia: &Inertia,
+    velocity: Vec3<T>,
+    spin: &Spin<T>,
+    alpha: f64,
+    weights: Weights,
+) -> VolumeForce<T> {
+    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
+    let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
+    let (carried, pull) = (omega.cross(d), r.transpose_mul(velocity));
+    let h = (j0 * omega + d.cross(pull).scale(m)).scale(alpha);
+    let mut out = VolumeForce::zero();
+    out.u = (velocity + r * carried).scale(alpha * m);
+    out.p = t.transpose_mul(h);
+    if weights.stiffness == 0.0 && weights.damping == 0.0 {
+        return out;
+    }
+    let (s, d_omega) = (weights.stiffness, spin.omega_derivative(weights));
+    let turned = Mat3::skew_mul(carried, t).scale(s);
+    out.uu = Mat3::identity().scale(alpha * m * weights.damping);
+    out.up = -(r * (Mat3::skew_mul(d, d_omega) + turned)).scale(alpha * m);
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())).scale(alpha * m * weights.damping);
+    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)).scale(m * s);
+    out.pp = t.transpose_matmul((j0 * d_omega + pulled).scale(alpha)) + spin.rotation.c2(h).scale(s);
+    out
+}
+
+/// Mass-proportional damping per length, see [`drag`].
+pub struct Drag {
+    /// alpha
+    pub factor: f64,
+}
+
+impl VolumeKernel for Drag {
+    type Quantity = Inertia;
+    const BLOCKS: Blocks = Blocks::Both;
+    const RATES: bool = true;
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
+        drag(inertia, motion.u_rate, &spin, self.factor, weights)
+    }
+}
+
 /// Mass per length on the centre line: f_u = rhoA u''.
 pub struct Translation;
 

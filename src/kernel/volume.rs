@@ -37,6 +37,18 @@ impl<T: Real> VolumeForce<T> {
     }
 }
 
+impl VolumeForce {
+    /// Adds itself to an element of one node.
+    pub fn write(&self, out: &mut ElementSystem) {
+        out.add_force(0, self.u);
+        out.add_force(1, self.p);
+        out.add_tangent(0, 0, self.uu);
+        out.add_tangent(0, 1, self.up);
+        out.add_tangent(1, 0, self.pu);
+        out.add_tangent(1, 1, self.pp);
+    }
+}
+
 /// Which unknowns of its nodes a kernel couples, and so the blocks of its element: u1, u2, … or P1, P2, … or u1, P1, u2, ….
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blocks {

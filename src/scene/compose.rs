@@ -11,11 +11,14 @@ use crate::effect::gravity::{BeamGravity, BodyGravity};
 use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
 use crate::effect::joint::{self, Joints};
 use crate::effect::line_load::{LineLoad, LineLoadKind};
+use crate::effect::link::{self, Links};
+use crate::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::rigid_body::{Body, RigidBody};
 use crate::effect::rotary_inertia::RotaryInertia;
 use crate::effect::section_inertia::SectionInertia;
 use crate::effect::spring::{self, Spring};
+use crate::effect::strain_rate_damping::StrainRateDamping;
 use crate::effect::{ByOrder, Connection, Effect, VolumeElement, VolumeElements};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Strain;
@@ -98,11 +101,13 @@ pub fn compose(
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
     composer.elasticity();
     composer.springs();
+    composer.links();
     composer.joints(connections);
     composer.beam_inertia();
     composer.out.bodies = composer.bodies();
     composer.gravity();
     composer.body_inertia();
+    composer.damping();
     let along = composer.line_loads();
     composer.node_loads(along);
     composer.never();
@@ -175,7 +180,13 @@ impl Composer<'_> {
         let effect = Arc::new(BeamElasticity::<I>::new(elements));
         self.reason(I::NAME, true, format!("{count} beam elements"));
         self.out.elasticity.push(effect.clone());
-        self.out.effects.push(effect);
+        self.out.effects.push(effect.clone());
+        match self.deck.damping {
+            Some([_, factor]) if factor != 0.0 && self.dynamic => {
+                self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
+            }
+            _ => self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time"),
+        }
     }
 
     /// The amplitudes of free strains, by beam.
@@ -422,16 +433,17 @@ impl Composer<'_> {
     fn springs(&mut self) {
         let mut springs = Vec::new();
         for spring in &self.deck.springs {
-            let Some((node, _)) = self.node(&spring.at) else { continue };
-            self.out.amplitudes.push(Amplitude::of_switch(stage_set(spring.stages.as_ref())));
-            let axes = super::constraints::axes(spring.axes);
-            let k = spring.stiffness;
+            let deck::SpringBody::Ground { at, stiffness: k, damping: c, axes } = &spring.body else { continue };
+            let Some((node, _)) = self.node(at) else { continue };
+            let axes = super::constraints::axes(*axes);
             let turned = |k: [f64; 3]| axes * Mat3::diagonal(k) * axes.transpose();
             springs.push(spring::Instance {
                 node: self.mesh.nodes[node].node,
                 translation: turned([k[0], k[1], k[2]]),
                 rotation: turned([k[3], k[4], k[5]]),
-                amplitude: self.out.amplitudes.len() - 1,
+                translation_damping: turned([c[0], c[1], c[2]]),
+                rotation_damping: turned([c[3], c[4], c[5]]),
+                amplitude: self.switch(spring.stages.as_ref()),
             });
         }
         if springs.is_empty() {
@@ -440,6 +452,80 @@ impl Composer<'_> {
             let reason = format!("{} [[spring]] table(s)", springs.len());
             self.out.springs = springs.clone();
             self.push(Spring { springs }, reason);
+        }
+    }
+
+    /// The number of an amplitude that is 1 in these stages and 0 in others.
+    fn switch(&mut self, stages: Option<&Vec<usize>>) -> usize {
+        self.out.amplitudes.push(Amplitude::of_switch(stage_set(stages)));
+        self.out.amplitudes.len() - 1
+    }
+
+    fn links(&mut self) {
+        let mut links = Vec::new();
+        for spring in &self.deck.springs {
+            let deck::SpringBody::Between { nodes: [a, b], stiffness, damping, length, tension_only } = &spring.body
+            else {
+                continue;
+            };
+            let (Some((a, _)), Some((b, _))) = (self.node(a), self.node(b)) else { continue };
+            let [a, b] = [a, b].map(|node| &self.mesh.nodes[node]);
+            let distance = (b.place - a.place).norm();
+            if a.node.u == b.node.u || distance == 0.0 {
+                let message = "a spring between nodes needs two nodes at different places";
+                self.diagnostics.push(Diagnostic::error(message, spring.span.clone()));
+                continue;
+            }
+            links.push(link::Instance {
+                nodes: [a.node, b.node],
+                places: [a.place, b.place],
+                stiffness: *stiffness,
+                damping: *damping,
+                length: length.unwrap_or(distance),
+                tension_only: *tension_only,
+                amplitude: self.switch(spring.stages.as_ref()),
+            });
+        }
+        if links.is_empty() {
+            return self.reason("springs and cables between nodes", false, "no [[spring]] `between` nodes");
+        }
+        let reason = format!("{} [[spring]] table(s) `between` nodes", links.len());
+        self.push(Links { links }, reason);
+    }
+
+    /// Rayleigh damping, each part only where its factor is not zero.
+    fn damping(&mut self) {
+        let names = ["mass-proportional damping of beams", "mass-proportional damping of bodies"];
+        let [mass, _] = self.deck.damping.unwrap_or_default();
+        if mass == 0.0 || !self.dynamic {
+            let why = if mass == 0.0 { "no `mass` in [damping]" } else { "nothing moves in time" };
+            return names.into_iter().for_each(|name| self.reason(name, false, why));
+        }
+        let (mut elements, mut nodal) = (ByOrder::default(), NodalInertia::default());
+        self.each_element(|beam, number, element, mesh| {
+            let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
+            let relative = beam.interpolation == InterpolationWord::Relative;
+            let eccentric = found.iter().any(|m| m.offset != Vec3::ZERO);
+            if relative {
+                nodal.add(beam, element, |m| if eccentric { m } else { Inertia { mass: 0.0, ..m } });
+            }
+            if !(relative && eccentric) {
+                push_volume(&mut elements, mesh, number, element, |k, s| {
+                    let own = found[k].turned(s.axes);
+                    if relative { Inertia { about_node: Mat3::ZERO, ..own } } else { own }
+                });
+            }
+        });
+        if elements.is_empty() {
+            self.reason(names[0], false, "no beams with mass");
+        } else {
+            self.push(BeamMassDamping { factor: mass, elements }, "`mass` in [damping]".into());
+        }
+        let bodies = [nodal.bodies(self.mesh), self.out.bodies.clone()].concat();
+        if bodies.is_empty() {
+            self.reason(names[1], false, "no bodies");
+        } else {
+            self.push(BodyMassDamping { factor: mass, bodies }, "`mass` in [damping]".into());
         }
     }
 
@@ -545,7 +631,6 @@ impl Composer<'_> {
             "no beam with interpolation = \"total\""
         };
         self.reason("mixed elements", seams, why);
-        self.reason("damping", false, "not supported yet");
         self.reason("planar", false, "not supported yet: every scene is simulated in three dimensions");
     }
 }

@@ -89,7 +89,8 @@ fn largest_force(model: &Model, system: &System) -> f64 {
     for (slot, info) in model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
         let total = system.total(slot);
         let held = total - free_part(&system.pattern.equations, slot as Slot, total);
-        let parts = [system.force[0][slot], system.force[1][slot], system.force[2][slot], held];
+        let [a, b, c, d] = system.force.each_ref().map(|force| force[slot]);
+        let parts = [a, b, c, d, held];
         let size = parts.iter().map(|f| f.size()).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
         let force = size / info.arm(model.length);
         if force > largest || force.is_nan() {

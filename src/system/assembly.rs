@@ -15,6 +15,8 @@ pub enum Category {
     Inertia,
     /// Loads, entered with the opposite sign
     External,
+    /// What takes energy away with velocities
+    Damping,
 }
 
 /// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
@@ -25,7 +27,7 @@ pub struct System {
     /// The pattern of the tangent
     pub pattern: Pattern,
     /// By category and slot
-    pub force: [Vec<Vec3>; 3],
+    pub force: [Vec<Vec3>; 4],
     /// The values of the tangent; one more than the pattern has entries, the last is rubbish.
     pub values: Vec<f64>,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
@@ -41,7 +43,7 @@ impl System {
         let (entries, equations) = (pattern.nonzeros() + 1, pattern.equations.count());
         Self {
             pattern,
-            force: [zero.clone(), zero.clone(), zero.clone()],
+            force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
             values: vec![0.0; entries],
             lift: zero,
             lifts: false,
@@ -64,7 +66,7 @@ impl System {
     /// The sum of the forces at a slot.
     #[inline]
     pub fn total(&self, slot: usize) -> Vec3 {
-        self.force[0][slot] + self.force[1][slot] + self.force[2][slot]
+        self.force[0][slot] + self.force[1][slot] + self.force[2][slot] + self.force[3][slot]
     }
 
     /// Drops all forces and keeps the tangent.
@@ -96,7 +98,8 @@ impl System {
         Sink {
             places: &self.pattern.places[effect],
             equations: &self.pattern.equations,
-            force: &mut self.force[category as usize],
+            force: &mut self.force,
+            category,
             values: &mut self.values,
             lift: self.lifts.then_some(&self.lift[..]),
             lifted: &mut self.lifted,
@@ -109,7 +112,8 @@ impl System {
 pub struct Sink<'a> {
     places: &'a Places,
     equations: &'a Equations,
-    force: &'a mut [Vec3],
+    force: &'a mut [Vec<Vec3>; 4],
+    category: Category,
     values: &'a mut [f64],
     lift: Option<&'a [Vec3]>,
     lifted: &'a mut [f64],
@@ -122,7 +126,7 @@ impl Sink<'_> {
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
         let slots = self.places.cliques.get(k);
         for (block, &slot) in slots.iter().enumerate() {
-            self.force[slot as usize] += element.force_block(block);
+            self.force[self.category as usize][slot as usize] += element.force_block(block);
         }
         if !self.with_tangent {
             return;
@@ -132,6 +136,13 @@ impl Sink<'_> {
         }
         for (&place, &value) in self.places.of(k).iter().zip(element.tangent()) {
             self.values[place as usize] += value;
+        }
+    }
+
+    /// Adds forces of instance `k` that damp, block by block; their tangent goes with the others.
+    pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
+        for (&slot, &force) in self.places.cliques.get(k).iter().zip(force) {
+            self.force[Category::Damping as usize][slot as usize] += force;
         }
     }
 

@@ -1,0 +1,211 @@
+//! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so that rigid motion is not
+//! damped.
+//!
+//! With b_k = w dE_k/dq for each strain component E_k of a point of weight w, and G_k = db_k/dq:
+//!
+//! ```text
+//! dE_k/dt = b_k . qd / w,   s = beta C dE/dt,   f = sum b_k s_k
+//! df/dqd = sum b_k (beta C / w)_kl b_l,   df/dq = sum s_k G_k + sum b_k (beta C / w)_kl (G_l qd)
+//! ```
+//!
+//! b_k and G_k are force and geometric tangent of the elastic element under a unit stress, whatever its interpolation.
+
+use super::beam_elasticity::{BeamElasticity, ElasticElement};
+use super::interpolation::{Interpolation, Scratch};
+use super::{Connection, Effect, for_each_batch};
+use crate::kernel::beam::StiffnessPoint;
+use crate::kernel::elastic::{Stiffness, Stress};
+use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::tensor::{Mat3, Vec3};
+use std::sync::Arc;
+
+/// Damping of all beams that interpolate in one way.
+pub struct StrainRateDamping<I> {
+    /// The beams
+    pub elasticity: Arc<BeamElasticity<I>>,
+    /// beta, a time
+    pub factor: f64,
+}
+
+impl<I: Interpolation> Effect for StrainRateDamping<I> {
+    fn name(&self) -> &'static str {
+        I::DAMPING_NAME
+    }
+
+    fn category(&self) -> Category {
+        Category::Damping
+    }
+
+    fn cliques(&self) -> Cliques {
+        self.elasticity.cliques()
+    }
+
+    fn acts_in_statics(&self) -> bool {
+        false
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+        for_each_batch!(self.elasticity.elements, |first, batch| {
+            add_batch::<I, _, _>(batch, first, self.factor, at, weights, out);
+        });
+    }
+}
+
+fn add_batch<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    first: usize,
+    factor: f64,
+    at: &State,
+    weights: Weights,
+    out: &mut Sink,
+) {
+    let mut work = (ElementSystem::new(2 * N), Scratch::new(N));
+    let mut system = ElementSystem::new(2 * N);
+    for (k, element) in batch.iter().enumerate() {
+        let rates = Rates::new(&element.connection, at);
+        system.clear();
+        for point in &element.points {
+            let units = UnitStresses::new::<I>(point, &element.connection, at, &rates, weights, &mut work);
+            units.add(&matrix(&point.stiffness, factor / point.weight), weights, &mut system);
+        }
+        out.add(first + k, &system);
+    }
+}
+
+/// A section's stiffness as a 6x6 matrix, times a factor.
+fn matrix(stiffness: &Stiffness, factor: f64) -> [[f64; 6]; 6] {
+    let coupling = stiffness.cc.unwrap_or(Mat3::ZERO);
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| {
+            factor
+                * match (i < 3, j < 3) {
+                    (true, true) => stiffness.cn.0[i][j],
+                    (true, false) => coupling.0[i][j - 3],
+                    (false, true) => coupling.0[j][i - 3],
+                    (false, false) => stiffness.cm.0[i - 3][j - 3],
+                }
+        })
+    })
+}
+
+/// The rates of an element's unknowns by block. Where the unknowns are increments X and their rates spins, `correction`
+/// takes what a block's rate loses when X varies under a fixed spin: d(Xd)/dX = -T^-1 C1(Xd).
+struct Rates<const N: usize> {
+    rates: [[Vec3; 2]; N],
+    /// dXd/dOmega and dXd/dX of each node
+    of_spins: Option<[(Mat3, Mat3); N]>,
+}
+
+impl<const N: usize> Rates<N> {
+    fn new(connection: &Connection<N>, at: &State) -> Self {
+        let velocity = |slot: u32| at.v[slot as usize];
+        let nodes = connection.nodes;
+        if at.base.is_none() {
+            return Self { rates: nodes.map(|node| [velocity(node.u), velocity(node.p)]), of_spins: None };
+        }
+        let of_node = |i: usize| {
+            let (rotation, spin) = (at.rotation(nodes[i].p), velocity(nodes[i].p));
+            let inverse = rotation.t_inverse();
+            let rate = inverse * spin;
+            (rate, (inverse, -(inverse * rotation.c1(rate))))
+        };
+        let spun: [(Vec3, (Mat3, Mat3)); N] = std::array::from_fn(of_node);
+        Self {
+            rates: std::array::from_fn(|i| [velocity(nodes[i].u), spun[i].0]),
+            of_spins: Some(std::array::from_fn(|i| spun[i].1)),
+        }
+    }
+
+    fn of_block(&self, block: usize) -> Vec3 {
+        self.rates[block / 2][block % 2]
+    }
+}
+
+/// What the six unit stresses of a point give, by block of the element.
+struct UnitStresses<const N: usize> {
+    blocks: [Vec<UnitBlock>; 6],
+    /// G_k
+    tangent: Vec<ElementSystem>,
+}
+
+/// One block of one unit stress.
+struct UnitBlock {
+    /// b_k
+    force: Vec3,
+    /// w dE_k/dt over the rate of this block
+    over_rate: Vec3,
+    /// w dE_k/dt over this block
+    over_unknown: Vec3,
+    /// The part of w dE_k/dt that this block brings
+    part: f64,
+}
+
+impl<const N: usize> UnitStresses<N> {
+    fn new<I: Interpolation>(
+        point: &StiffnessPoint<N>,
+        connection: &Connection<N>,
+        at: &State,
+        rates: &Rates<N>,
+        weights: Weights,
+        (system, scratch): &mut (ElementSystem, Scratch),
+    ) -> Self {
+        let mut tangent = Vec::new();
+        let blocks = std::array::from_fn(|k| {
+            let unit = |part: usize| if k / 3 == part { Vec3::UNIT[k % 3] } else { Vec3::ZERO };
+            let stress = Stress { n: unit(0), m: unit(1) };
+            let none = Stiffness { cn: Mat3::ZERO, cm: Mat3::ZERO, cc: None };
+            let kernel = |nodes: &[NodeMotion; N], stiffness: f64, out: &mut ElementSystem| {
+                let place = point.configuration(nodes);
+                point.add_force(&place, &stress, out);
+                if stiffness != 0.0 {
+                    point.add_tangent(&place, &none, &stress, stiffness, out);
+                }
+            };
+            let wanted = if weights.stiffness != 0.0 { 1.0 } else { 0.0 };
+            let geometric = None::<fn(&[NodeMotion; N], &mut ElementSystem)>;
+            I::evaluate(connection, at, wanted, scratch, system, kernel, geometric);
+            let block = |b: usize| {
+                let (force, rate) = (system.force_block(b), rates.of_block(b));
+                let bent = (0..2 * N)
+                    .fold(Vec3::ZERO, |sum, row| sum + system.tangent_block(row, b).transpose_mul(rates.of_block(row)));
+                let (mut over_rate, mut over_unknown) = (force, if wanted == 0.0 { Vec3::ZERO } else { bent });
+                if let (Some(spins), 1) = (&rates.of_spins, b % 2) {
+                    let (over_spin, over_increment) = spins[b / 2];
+                    over_rate = over_spin.transpose_mul(force);
+                    over_unknown += over_increment.transpose_mul(force);
+                }
+                UnitBlock { force, over_rate, over_unknown, part: force.dot(rate) }
+            };
+            let blocks: Vec<UnitBlock> = (0..2 * N).map(block).collect();
+            if wanted != 0.0 {
+                tangent.push(system.clone());
+            }
+            blocks
+        });
+        Self { blocks, tangent }
+    }
+
+    /// `c` is beta C / w.
+    fn add(&self, c: &[[f64; 6]; 6], weights: Weights, out: &mut ElementSystem) {
+        let rate: [f64; 6] = std::array::from_fn(|k| self.blocks[k].iter().map(|b| b.part).sum());
+        for k in 0..6 {
+            let stress: f64 = (0..6).map(|l| c[k][l] * rate[l]).sum();
+            for row in 0..2 * N {
+                let force = self.blocks[k][row].force;
+                out.add_force(row, force * stress);
+                for column in 0..2 * N {
+                    let over = (0..6).filter(|&l| c[k][l] != 0.0).fold(Vec3::ZERO, |sum, l| {
+                        let block = &self.blocks[l][column];
+                        sum + (block.over_rate * weights.damping + block.over_unknown * weights.stiffness) * c[k][l]
+                    });
+                    let mut tangent = force.outer(over);
+                    if let Some(bent) = self.tangent.get(k) {
+                        tangent += bent.tangent_block(row, column).scale(stress * weights.stiffness);
+                    }
+                    out.add_tangent(row, column, tangent);
+                }
+            }
+        }
+    }
+}
