@@ -2,8 +2,8 @@
 
 use super::progress::Progress;
 use super::{Status, Verdict, load, say, signals};
-use crate::drive::{Counters, Failure, Moment, Observer, Run, Snapshot};
-use crate::output::{HistoryWriter, Outcome, PartFile, Rows, run_record};
+use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
+use crate::output::{HistoryWriter, ModesWriter, Outcome, PartFile, Rows, run_record};
 use crate::scene::Scene;
 use crate::study::Recorder;
 use std::path::{Path, PathBuf};
@@ -87,6 +87,7 @@ struct Watcher {
     recorder: Recorder,
     progress: Progress,
     dynamic: Vec<bool>,
+    modes: ModesWriter,
 }
 
 impl Observer for Watcher {
@@ -101,6 +102,18 @@ impl Observer for Watcher {
                 Err(Failure::NonFinite { at, effect: Some("a column of the history"), node: column })
             }
         }
+    }
+
+    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
+        self.recorder.modes(modes);
+        self.modes.push_modes(stage, modes);
+        Ok(())
+    }
+
+    fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+        self.recorder.buckling(loads);
+        self.modes.push_loads(stage, loads);
+        Ok(())
     }
 
     fn warn(&mut self, message: &str) {
@@ -133,6 +146,7 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
         history,
         recorder: Recorder::new(scene),
         progress: Progress::new(name),
+        modes: ModesWriter::default(),
         dynamic: scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect(),
     };
     let (mut result, counters) = match opened {
@@ -143,7 +157,8 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
     let seconds = start.elapsed().as_secs_f64();
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
         let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds });
-        let written = write_results(history, folder, result.is_ok(), &format!("{record:#}\n"));
+        let record = format!("{record:#}\n");
+        let written = write_results(history, &watcher.modes, folder, result.is_ok(), &record);
         if let Err(error) = written {
             result = Err(io_failure(error));
         }
@@ -152,9 +167,16 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
 }
 
 /// Both files are whole before either gets its name.
-fn write_results(history: HistoryWriter, folder: &Path, finished: bool, record: &str) -> std::io::Result<()> {
+fn write_results(
+    history: HistoryWriter,
+    modes: &ModesWriter,
+    folder: &Path,
+    finished: bool,
+    record: &str,
+) -> std::io::Result<()> {
     let (part, file) = PartFile::written(folder, "run.json", record.as_bytes())?;
     history.finish(finished)?;
+    modes.finish(folder)?;
     part.finish(&file, "run.json")
 }
 

@@ -1,6 +1,7 @@
 //! What is done with a scene: stages, output, expectations, effects forced on or off.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
+use super::geometry::PointRef;
 use super::reader::{Context, Item, Table, kind_of};
 use toml::de::DeValue;
 
@@ -15,8 +16,19 @@ pub struct Stage {
     pub max_iterations: usize,
     /// Ends it early
     pub until: Option<Until>,
+    /// A rotating frame from which it is seen
+    pub frame: Option<RotatingFrame>,
     /// Where the table stands
     pub span: Span,
+}
+
+/// `frame = { spin = …, about = … }`
+#[derive(Clone, Debug)]
+pub struct RotatingFrame {
+    /// Angular velocity
+    pub spin: [f64; 3],
+    /// A point on the axis; left out: the origin
+    pub about: Option<Spanned<PointRef>>,
 }
 
 /// Kinds of stages.
@@ -28,6 +40,23 @@ pub enum StageBody {
         steps: usize,
         /// Smaller steps where one fails
         adaptive: bool,
+    },
+    /// Arc-length control
+    Path {
+        /// The first increment is that of one of so many levels
+        steps: usize,
+        /// Most increments
+        max_steps: usize,
+    },
+    /// Small motions
+    Modal {
+        /// How many
+        modes: usize,
+    },
+    /// Critical loads
+    Buckling {
+        /// How many
+        modes: usize,
     },
     /// Time steps
     Dynamic {
@@ -167,7 +196,9 @@ pub(super) fn read_units(top: &Table) -> Option<[String; 3]> {
     Some(["length", "force", "time"].map(label))
 }
 
-const COMMON: [&str; 4] = ["kind", "tolerance", "max_iterations", "until"];
+const COMMON: [&str; 5] = ["kind", "tolerance", "max_iterations", "until", "frame"];
+/// Most modes of a stage.
+const MOST_MODES: usize = 1000;
 const STATIC: [&str; 4] = ["steps", "adaptive", "control", "max_steps"];
 const DYNAMIC: [&str; 9] = ["end", "step", "scheme", "beta", "gamma", "alpha", "rho_inf", "adaptive", "step_tolerance"];
 
@@ -185,7 +216,24 @@ pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
             refuse_others(&table, "dynamic", &DYNAMIC);
             read_dynamic(&table)
         }
-        other => context.wrong(kind.span, format!("kind = \"{other}\" is not supported yet")),
+        other => {
+            refuse_others(&table, other, &["modes"]);
+            let modes = table.required("modes").and_then(|item| context.whole(item, 1, MOST_MODES));
+            let modal = other == "modal";
+            modes.map(|n| if modal { StageBody::Modal { modes: n.value } } else { StageBody::Buckling { modes: n.value } })
+        }
+    };
+    if table.has("until") && ["modal", "buckling"].contains(&kind.value) {
+        let message = format!("`until` does not belong to a {} stage", kind.value);
+        context.report(Diagnostic::error(message, table.key_span("until")));
+    }
+    if table.has("frame") && kind.value == "dynamic" {
+        let message = "`frame` belongs to static, modal and buckling stages";
+        context.report(Diagnostic::error(message, table.key_span("frame")));
+    }
+    let frame = match table.get("frame") {
+        Some(item) => read_frame(context, item).map(Some),
+        None => Some(None),
     };
     let tolerance = read_tolerance(&table);
     let max_iterations = match table.get("max_iterations") {
@@ -201,6 +249,7 @@ pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
         tolerance: tolerance?,
         max_iterations: max_iterations?,
         until: until?,
+        frame: frame?,
         span: table.span.clone(),
     })
 }
@@ -215,10 +264,9 @@ fn refuse_others(table: &Table, kind: &str, own: &[&str]) {
 
 fn read_static(table: &Table) -> Option<StageBody> {
     let context = table.context;
-    if let Some(word) = table.word("control", &["load", "arc_length"])
-        && word.value == "arc_length"
-    {
-        return context.wrong(word.span, "control = \"arc_length\" is not supported yet");
+    let word = if table.has("control") { table.word("control", &["load", "arc_length"])?.value } else { "load" };
+    if word == "arc_length" {
+        return read_path_control(table);
     }
     if table.has("max_steps") {
         context
@@ -227,6 +275,34 @@ fn read_static(table: &Table) -> Option<StageBody> {
     let steps = table.required("steps").and_then(|item| context.whole(item, 1, MOST_STEPS));
     let adaptive = if table.has("adaptive") { table.flag("adaptive") } else { Some(true) };
     Some(StageBody::Static { steps: steps?.value, adaptive: adaptive? })
+}
+
+fn read_path_control(table: &Table) -> Option<StageBody> {
+    let context = table.context;
+    if table.has("adaptive") {
+        let message = "`adaptive` does not belong to control = \"arc_length\", which always adapts";
+        context.report(Diagnostic::error(message, table.key_span("adaptive")));
+    }
+    let steps = table.required("steps").and_then(|item| context.whole(item, 1, MOST_STEPS))?.value;
+    let max_steps = match table.get("max_steps") {
+        Some(item) => context.whole(item, 1, MOST_STEPS)?.value,
+        None => steps.saturating_mul(10),
+    };
+    Some(StageBody::Path { steps, max_steps })
+}
+
+fn read_frame<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<RotatingFrame> {
+    let table = Table::new(context, item, "`frame`", &["spin", "about"], &[])?;
+    table.required("spin")?;
+    let spin = table.vector::<3>("spin")?.value;
+    let about = match table.get("about").map(|item| (item, item.get_ref())) {
+        None => None,
+        Some((item, DeValue::String(name))) => {
+            Some(Spanned { value: PointRef::Name(name.to_string()), span: item.span() })
+        }
+        Some((item, _)) => Some(context.vector(item)?.map(PointRef::Coordinates)),
+    };
+    Some(RotatingFrame { spin, about })
 }
 
 fn read_dynamic(table: &Table) -> Option<StageBody> {

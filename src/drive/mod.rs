@@ -1,14 +1,17 @@
 //! Runs: stages in sequence, each a loop over levels or steps, and what watches them.
 
+mod buckling;
 mod control;
 mod dynamics;
 mod failure;
 mod grid;
 mod ledger;
+mod modal;
+mod path;
 mod run;
 mod start;
 mod statics;
 
 pub use failure::{Failure, Moment, Place};
 pub use ledger::Ledger;
-pub use run::{Counters, InitialMotion, Observer, Plan, Run, Snapshot, Stage, StageWork, Until};
+pub use run::{Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until};

@@ -3,10 +3,11 @@
 use super::failure::{Failure, Moment, place};
 use super::ledger::{Bookkeeper, Ledger};
 use crate::integrate::Scheme;
-use crate::model::{Assembly, Jump, Model, StageError, StageKind, charts};
+use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, State, System};
 use crate::tensor::Vec3;
+use std::fmt;
 use std::sync::Arc;
 
 /// What is to be done.
@@ -48,6 +49,31 @@ pub struct Stage {
     pub max_iterations: usize,
     /// Ends the stage early
     pub until: Option<Until>,
+    /// Whether it is seen from a rotating frame
+    pub rotating: bool,
+}
+
+impl Stage {
+    /// As effects see it, at this place among the stages.
+    pub fn context(&self, number: usize) -> StageContext {
+        StageContext { number, kind: self.work.kind(), rotating: self.rotating }
+    }
+}
+
+/// A small motion exp(s t), s = growth + i omega.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    /// Imaginary part of s, not negative
+    pub omega: f64,
+    /// Real part of s; positive: it grows.
+    pub growth: f64,
+}
+
+impl Mode {
+    /// |s|
+    pub fn size(&self) -> f64 {
+        self.omega.hypot(self.growth)
+    }
 }
 
 /// What a stage does.
@@ -59,6 +85,23 @@ pub enum StageWork {
         steps: usize,
         /// Whether a level that fails is approached in smaller steps
         adaptive: bool,
+    },
+    /// A path that may pass limit points
+    Path {
+        /// The first increment is that of one of so many load levels
+        steps: usize,
+        /// Most increments
+        max_steps: usize,
+    },
+    /// Small motions
+    Modal {
+        /// How many modes
+        modes: usize,
+    },
+    /// Critical loads
+    Buckling {
+        /// How many
+        modes: usize,
     },
     /// Time steps
     Dynamic {
@@ -77,7 +120,9 @@ impl StageWork {
     /// Its kind.
     pub fn kind(&self) -> StageKind {
         match self {
-            Self::Static { .. } => StageKind::Static,
+            Self::Static { .. } | Self::Path { .. } => StageKind::Static,
+            Self::Modal { .. } => StageKind::Modal,
+            Self::Buckling { .. } => StageKind::Buckling,
             Self::Dynamic { .. } => StageKind::Dynamic,
         }
     }
@@ -115,12 +160,68 @@ pub trait Observer {
     /// A converged state: the start, a load level, a time step.
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure>;
 
+    /// The modes of a stage (from 1).
+    fn modes(&mut self, _stage: usize, _modes: &[Mode]) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// The critical loads of a stage (from 1).
+    fn buckling(&mut self, _stage: usize, _loads: &[f64]) -> Result<(), Failure> {
+        Ok(())
+    }
+
     /// A remark that is not a failure.
     fn warn(&mut self, _message: &str) {}
 
     /// How far the run has come, from 0 to 1; called at each attempt. It may end the run.
     fn progress(&mut self, _at: Moment, _done: f64) -> Result<(), Failure> {
         Ok(())
+    }
+}
+
+/// Something special on a path of equilibrium.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// Where
+    pub at: Moment,
+    /// What
+    pub kind: EventKind,
+    /// How many pivots of the tangent are negative behind it, where that is known
+    pub negative_pivots: Option<usize>,
+}
+
+/// Kinds of special points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// The load factor is stationary.
+    Limit,
+    /// The displacement that the loads do work on is stationary.
+    Turning,
+    /// The number of negative pivots changed: a bifurcation, or a limit point of load control.
+    Branch,
+}
+
+impl EventKind {
+    /// Its name in run.json
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Limit => "limit point",
+            Self::Turning => "turning point",
+            Self::Branch => "branch or limit point passed",
+        }
+    }
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Moment { stage, load, .. } = self.at;
+        write!(f, "{} in stage {stage} at load factor {load}", self.kind.name())?;
+        match self.negative_pivots {
+            None => Ok(()),
+            Some(0) => f.write_str(": stable behind it"),
+            Some(1) => f.write_str(": unstable behind it, 1 negative pivot"),
+            Some(n) => write!(f, ": unstable behind it, {n} negative pivots"),
+        }
     }
 }
 
@@ -133,6 +234,8 @@ pub struct Counters {
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
+    /// Limit, turning and branch points of static paths
+    pub events: Vec<Event>,
     /// Iterations, factorisations, chart switches, seconds
     pub work: Work,
     /// Evaluations of instances by effect
@@ -150,6 +253,8 @@ pub struct Run<'o> {
     pub(super) plan: Plan,
     pub(super) bookkeeper: Bookkeeper,
     pub(super) stage: usize,
+    /// Whether loads act for the first time in this stage
+    pub(super) fresh: bool,
     started: bool,
     warned_coarse: bool,
     moving: bool,
@@ -177,6 +282,7 @@ impl<'o> Run<'o> {
             counters: Counters::default(),
             observer,
             stage: 0,
+            fresh: true,
             started: false,
             warned_coarse: false,
             moving: false,
@@ -196,6 +302,9 @@ impl<'o> Run<'o> {
             let mut workshop = self.open_stage(stage)?;
             let result = match stage.work {
                 StageWork::Static { steps, adaptive } => self.run_static(&mut workshop, steps, adaptive),
+                StageWork::Path { steps, max_steps } => self.run_path(&mut workshop, steps, max_steps),
+                StageWork::Modal { modes } => self.run_modal(&mut workshop, modes),
+                StageWork::Buckling { modes } => self.run_buckling(&mut workshop, modes),
                 StageWork::Dynamic { end, step, scheme, adaptive } => {
                     self.run_dynamic(&mut workshop, end, step, scheme, adaptive)
                 }
@@ -210,10 +319,11 @@ impl<'o> Run<'o> {
     /// Settles loads and constraints of the stage, and analyses the pattern of its unknowns.
     fn open_stage(&mut self, stage: &Stage) -> Result<Workshop, Failure> {
         let kind = stage.work.kind();
+        self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
         let slots = self.model.slots.len();
-        let assembly = Assembly::new(self.model.acting(kind), equations, slots);
+        let assembly = Assembly::new(self.model.acting(&stage.context(self.stage)), equations, slots);
         let Some(solver) = LinearSolver::new(&assembly.system.pattern) else {
             return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
         };
@@ -254,6 +364,11 @@ impl<'o> Run<'o> {
             self.bookkeeper.add_step(&self.model, &self.state, &workshop.assembly.system);
         }
         Ok(())
+    }
+
+    /// Modes and critical loads count as one step.
+    pub(super) fn count_steps(&mut self) {
+        self.counters.steps += 1;
     }
 
     /// Shows a row to the observer.

@@ -5,21 +5,50 @@ use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::NewtonFailure;
+use crate::solve::{NewtonFailure, Pivots};
 use crate::tensor::Vec3;
 
 /// A level is not approached in steps smaller than this part of it.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
 
+/// Follows the number of negative pivots from level to level.
+struct Stability {
+    pivots: Option<Pivots>,
+    negative: Option<usize>,
+}
+
+impl Stability {
+    /// At the start of a stage.
+    fn new(run: &Run, workshop: &Workshop) -> Self {
+        let system = &workshop.assembly.system;
+        let mut pivots = Pivots::new(system, &run.model.multipliers);
+        // The start was assembled with its stiffness.
+        let negative = pivots.as_mut().and_then(|pivots| pivots.negative(system));
+        Self { pivots, negative }
+    }
+
+    /// At a level: says where a limit or branch point lies behind.
+    fn look(&mut self, run: &mut Run, workshop: &mut Workshop) {
+        let Some(pivots) = &mut self.pivots else { return };
+        workshop.assembly.forget();
+        workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
+        let negative = pivots.negative(&workshop.assembly.system);
+        run.tell_stability(None, self.negative, negative);
+        self.negative = negative;
+    }
+}
+
 impl Run<'_> {
     /// All levels of a static stage.
     pub(super) fn run_static(&mut self, workshop: &mut Workshop, steps: usize, adaptive: bool) -> Result<(), Failure> {
         self.start_static(workshop)?;
+        let mut stability = Stability::new(self, workshop);
         let mut increment = 1.0 / steps as f64;
         for level in 1..=steps {
             let target = level as f64 / steps as f64;
             increment = self.reach(workshop, target, increment, 1.0 / steps as f64, adaptive)?;
             self.counters.steps += 1;
+            stability.look(self, workshop);
             self.show(workshop)?;
             if self.is_over(workshop) {
                 break;
@@ -29,10 +58,8 @@ impl Run<'_> {
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
-    fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
-        self.state.v.fill(Vec3::ZERO);
-        self.state.a.fill(Vec3::ZERO);
-        self.state.algorithmic.fill(Vec3::ZERO);
+    pub(super) fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        self.stand_still();
         let time = self.state.time;
         let held = self.state.q.clone();
         self.model.set_clock(&mut self.state, time, 0.0);
@@ -87,7 +114,7 @@ impl Run<'_> {
 
     /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the
     /// state and handed to Newton as increments.
-    fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
+    pub(super) fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
         let Workshop { assembly, newton, lift, .. } = workshop;
         lift.copy_from_slice(&self.state.q);
         let time = self.state.time;
@@ -104,7 +131,7 @@ impl Run<'_> {
         newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)
     }
 
-    fn static_progress(&self, load: f64) -> f64 {
+    pub(super) fn static_progress(&self, load: f64) -> f64 {
         (self.stage as f64 + load) / self.plan.stages.len() as f64
     }
 }

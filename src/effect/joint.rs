@@ -184,15 +184,13 @@ impl Instance {
         }
         // The force, what it acts along at each block, and how it varies.
         let coordinate = self.coordinate(at, ends);
-        let mut force = stiffness * coordinate.value;
-        let mut variation = coordinate.gradient.map(|g| g * (stiffness * weights.stiffness));
-        if damping != 0.0 {
-            let (rate, varies) = self.rate(at, ends, weights);
-            force += damping * rate;
-            variation.iter_mut().zip(varies).for_each(|(v, r)| *v += r * damping);
-        }
+        let (rate, varies) = if damping == 0.0 { (0.0, [Vec3::ZERO; 4]) } else { self.rate(at, ends, weights) };
+        let force = stiffness * coordinate.value + damping * rate;
+        let variation: [Vec3; 4] = std::array::from_fn(|k| {
+            coordinate.gradient[k] * (stiffness * weights.stiffness) + varies[k] * damping
+        });
         for row in 0..4 {
-            out.add_force(row, coordinate.gradient[row] * force);
+            out.add_force(row, coordinate.gradient[row] * (stiffness * coordinate.value));
             for column in 0..4 {
                 out.add_tangent(row, column, coordinate.gradient[row].outer(variation[column]));
             }
@@ -214,6 +212,13 @@ impl Instance {
             out.add_tangent(block::P_A, block::P_A, -ends[0].rotation.c2(moment));
             out.add_tangent(block::P_B, block::P_B, ends[1].rotation.c2(moment));
         }
+    }
+
+    /// The forces of the damper on u_A, P_A, u_B, P_B.
+    fn drag(&self, at: &State) -> [Vec3; 4] {
+        let ends = self.ends(at);
+        let (rate, _) = self.rate(at, &ends, Weights::NONE);
+        self.coordinate(at, &ends).gradient.map(|gradient| gradient * (self.drive.damping * rate))
     }
 
     /// The angle or slide along the free direction, with its gradient over u_A, P_A, u_B, P_B.
@@ -330,6 +335,11 @@ impl Effect for Joints {
             joint.system(at, weights, &mut whole);
             let present: Vec<usize> = (0..block::COUNT).filter(|&b| joint.slots()[b].is_some()).collect();
             out.add(k, &whole.part(&present));
+            if joint.drive.damping != 0.0 && joint.drive.motor.is_none() {
+                let drag = joint.drag(at);
+                let parts: Vec<Vec3> = present.iter().map(|&b| drag.get(b).copied().unwrap_or(Vec3::ZERO)).collect();
+                out.add_damping(k, &parts);
+            }
         }
     }
 

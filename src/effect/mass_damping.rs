@@ -29,10 +29,6 @@ impl Effect for BeamMassDamping {
         self.elements.cliques(Blocks::Both)
     }
 
-    fn acts_in_statics(&self) -> bool {
-        false
-    }
-
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         self.elements.add(&Drag { factor: self.factor }, at, weights, out);
     }
@@ -60,10 +56,6 @@ impl Effect for BodyMassDamping {
         let mut cliques = Cliques::default();
         self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
         cliques
-    }
-
-    fn acts_in_statics(&self) -> bool {
-        false
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

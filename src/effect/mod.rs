@@ -13,6 +13,7 @@ pub mod mass_damping;
 pub mod node_load;
 pub mod rigid_body;
 pub mod rotary_inertia;
+pub mod rotating_frame;
 pub mod section_inertia;
 pub mod spring;
 pub mod strain_rate_damping;
@@ -22,7 +23,7 @@ pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// Stored energy of one state.
@@ -85,9 +86,14 @@ pub trait Effect: Send + Sync {
         true
     }
 
-    /// Whether it acts in a static stage: inertia does not.
-    fn acts_in_statics(&self) -> bool {
-        self.category() != Category::Inertia
+    /// Whether it acts in a stage: inertia and damping do where something moves, inertia not where a rotating frame holds it.
+    fn acts(&self, stage: &StageContext) -> bool {
+        let moves = matches!(stage.kind, StageKind::Dynamic | StageKind::Modal);
+        match self.category() {
+            Category::Inertia => moves && !stage.rotating,
+            Category::Damping => moves,
+            Category::Internal | Category::External => true,
+        }
     }
 
     /// Points it needs memory for.

@@ -41,10 +41,6 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
         self.elasticity.cliques()
     }
 
-    fn acts_in_statics(&self) -> bool {
-        false
-    }
-
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         for_each_batch!(self.elasticity.elements, |first, batch| {
             add_batch::<I, _, _>(batch, first, self.factor, at, weights, out);

@@ -201,6 +201,72 @@ impl VolumeKernel for Drag {
     }
 }
 
+/// Inertia at rest in a frame that turns with the constant angular velocity w about x0, in components of that frame, and its
+/// derivatives for small motions. With W = R^T w and a = w x (w x (x - x0)) it is [`body`] for Omega = W, Acc = 0, u'' = a;
+///
+/// ```text
+/// dOmega = s W~ T + d T,   dAcc = d W~ T + m T,   da = s w~ w~ + 2 d w~ + m I
+/// ```
+#[inline(always)]
+pub fn steadily_turned<T: Real>(
+    inertia: &Inertia,
+    (spin, from_axis): (Vec3<T>, Vec3<T>),
+    rotation: &Rotation<T>,
+    weights: Weights,
+) -> VolumeForce<T> {
+    let (r, t) = (rotation.r, rotation.t);
+    let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
+    let (w, w_skew) = (r.transpose_mul(spin), spin.skew());
+    let a = spin.cross(spin.cross(from_axis));
+    let (pull, w_d, momentum) = (r.transpose_mul(a), w.cross(d), j0 * w);
+    let s = w.cross(w_d);
+    let h = w.cross(momentum) + d.cross(pull).scale(m);
+    let mut out = VolumeForce::zero();
+    out.u = (a + r * s).scale(m);
+    out.p = t.transpose_mul(h);
+    if weights == Weights::NONE {
+        return out;
+    }
+    let Weights { stiffness, damping, mass } = weights;
+    let w_t = Mat3::skew_mul(w, t);
+    let (d_omega, d_acc) = (w_t.scale(stiffness) + t.scale(damping), w_t.scale(damping) + t.scale(mass));
+    let da = (w_skew * w_skew).scale(stiffness) + w_skew.scale(2.0 * damping) + Mat3::identity().scale(mass);
+    let gyroscopic = Mat3::skew_mul(w, j0) - momentum.skew();
+    let coriolis = w_d.skew() + Mat3::skew_mul(w, d.skew());
+    let ds = -(Mat3::skew_mul(d, d_acc) + coriolis * d_omega + Mat3::skew_mul(s, t).scale(stiffness));
+    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)).scale(m * stiffness);
+    out.uu = da.scale(m);
+    out.up = (r * ds).scale(m);
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose() * da)).scale(m);
+    out.pp = t.transpose_matmul(j0 * d_acc + gyroscopic * d_omega + pulled) + rotation.c2(h).scale(stiffness);
+    out
+}
+
+/// Mass per length with its initial place, see [`steadily_turned`].
+pub struct SteadilyTurned {
+    /// w
+    pub spin: Vec3,
+    /// x0
+    pub about: Vec3,
+}
+
+impl VolumeKernel for SteadilyTurned {
+    type Quantity = (Inertia, Vec3);
+    const BLOCKS: Blocks = Blocks::Both;
+    const RATES: bool = false;
+
+    #[inline(always)]
+    fn evaluate<T: Real>(
+        &self,
+        (inertia, place): &(Inertia, Vec3),
+        motion: &NodeMotion<T>,
+        weights: Weights,
+    ) -> VolumeForce<T> {
+        let from_axis = Vec3::constant(*place - self.about) + motion.u;
+        steadily_turned(inertia, (Vec3::constant(self.spin), from_axis), &Rotation::new(motion.p), weights)
+    }
+}
+
 /// Mass per length on the centre line: f_u = rhoA u''.
 pub struct Translation;
 

@@ -1,27 +1,8 @@
 //! How strongly a load acts: through stages, along the load factor, over time.
 
 use super::history::History;
+use crate::system::{StageKind, StageSet};
 use std::sync::Arc;
-
-/// What a stage does with the clock and the load factor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StageKind {
-    /// The load factor goes from 0 to 1, the clock stands.
-    Static,
-    /// The clock runs, the load factor is 1.
-    Dynamic,
-}
-
-/// The stages in which something acts.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct StageSet(pub Option<Vec<usize>>);
-
-impl StageSet {
-    /// Whether stage number `stage` (from 0) is one of them; no list means all.
-    pub fn contains(&self, stage: usize) -> bool {
-        self.0.as_ref().is_none_or(|stages| stages.contains(&stage))
-    }
-}
 
 /// What an amplitude does in the present stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,13 +21,14 @@ pub struct Amplitude {
     switched: bool,
     course: Course,
     reached: f64,
+    has_acted: bool,
 }
 
 impl Amplitude {
     /// Of a load with this history, or the default one: up with the load factor of the first static stage in which it
     /// acts, then in full; in full from the start of a dynamic stage.
     pub fn of_load(history: Option<Arc<dyn History>>, stages: StageSet) -> Self {
-        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0 }
+        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0, has_acted: false }
     }
 
     /// Of something that is there or not.
@@ -54,14 +36,28 @@ impl Amplitude {
         Self { switched: true, ..Self::of_load(None, stages) }
     }
 
-    /// Settles what it does in stage number `stage`.
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind) {
+    /// Whether it would ramp up for the first time in a static stage with this number.
+    pub fn is_fresh(&self, stage: usize) -> bool {
+        self.stages.contains(stage) && !self.has_acted && !self.switched && self.history.is_none()
+    }
+
+    /// Settles what it does in stage number `stage`. A buckling stage goes on where the last static one has stopped, unless
+    /// there are loads that are `fresh` in it: then these alone grow.
+    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, fresh: bool) {
         let acts = self.stages.contains(stage);
+        let grows = self.is_fresh(stage);
+        self.has_acted |= acts;
         self.course = match (acts, kind, &self.history) {
+            (true, StageKind::Modal, _) if !self.switched => Course::Hold(self.reached),
+            (true, StageKind::Buckling, _) if !self.switched => match (fresh, grows) {
+                (true, true) => Course::Ramp { from: 0.0, to: 1.0 },
+                (false, _) if matches!(self.course, Course::Ramp { .. }) => self.course,
+                _ => Course::Hold(self.reached),
+            },
             (true, ..) if self.switched => Course::Hold(1.0),
             (true, kind, Some(_)) => Course::History(kind),
             (true, StageKind::Static, None) => Course::Ramp { from: self.reached, to: 1.0 },
-            (true, StageKind::Dynamic, None) => Course::Hold(1.0),
+            (true, _, None) => Course::Hold(1.0),
             (false, StageKind::Static, _) if !self.switched => Course::Ramp { from: self.reached, to: 0.0 },
             (false, ..) => Course::Hold(0.0),
         };
@@ -94,7 +90,7 @@ mod tests {
     /// The factor at the half of each stage, stage after stage.
     fn halves(mut amplitude: Amplitude, kinds: &[StageKind]) -> Vec<f64> {
         let half = |(stage, &kind): (usize, &StageKind)| {
-            amplitude.begin_stage(stage, kind);
+            amplitude.begin_stage(stage, kind, false);
             let [value, ..] = amplitude.at(0.0, if kind == Static { 0.5 } else { 1.0 });
             amplitude.end_stage(0.0, 1.0);
             value
@@ -119,9 +115,9 @@ mod tests {
     #[test]
     fn a_load_whose_stage_ended_early_goes_on_from_there() {
         let mut load = Amplitude::of_load(None, StageSet::default());
-        load.begin_stage(0, Static);
+        load.begin_stage(0, Static, false);
         load.end_stage(0.0, 0.4);
-        load.begin_stage(1, Static);
+        load.begin_stage(1, Static, false);
         assert_eq!([load.at(0.0, 0.0)[0], load.at(0.0, 1.0)[0]], [0.4, 1.0]);
     }
 

@@ -1,6 +1,6 @@
 //! What acts on the state instead of the forces: supports and prescribed motions.
 
-use super::amplitude::{StageKind, StageSet};
+use crate::system::{StageKind, StageSet};
 use super::history::History;
 use crate::system::{Direction, Slot, State};
 use crate::tensor::Vec3;
@@ -78,13 +78,27 @@ impl Motion {
     }
 
     /// Settles what it does in stage number `stage`; `Err` where it would have to jump (from, to).
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State, length: f64) -> Result<(), (f64, f64)> {
+    pub fn begin_stage(
+        &mut self,
+        stage: usize,
+        kind: StageKind,
+        state: &State,
+        length: f64,
+        fresh: bool,
+    ) -> Result<(), (f64, f64)> {
         let (from, aside) = self.reached(state);
+        let grows = self.is_fresh(stage);
         if !self.stages.contains(stage) {
             self.course = Course::Off;
             return Ok(());
         }
         self.course = match (kind, &self.history) {
+            (StageKind::Modal, _) => Course::Hold(from),
+            (StageKind::Buckling, _) => match (fresh, grows) {
+                (true, true) => Course::Ramp { from },
+                (false, _) if matches!(self.course, Course::Ramp { .. }) => self.course,
+                _ => Course::Hold(from),
+            },
             (kind, Some(_)) => Course::History(kind),
             (StageKind::Static, None) => Course::Ramp { from },
             (StageKind::Dynamic, None) if self.has_acted => Course::Hold(from),
@@ -95,6 +109,11 @@ impl Motion {
         let to = self.at(state.time, 0.0)[0];
         let jumps = kind == StageKind::Dynamic && (to - from).abs() > 1e-9 * scale;
         if jumps || aside > 1e-9 { Err((from, to)) } else { Ok(()) }
+    }
+
+    /// Whether it would move for the first time in a static stage with this number.
+    pub fn is_fresh(&self, stage: usize) -> bool {
+        self.stages.contains(stage) && !self.has_acted && self.history.is_none()
     }
 
     /// Where the node is along the axis, and how far its rotation is off the axis.

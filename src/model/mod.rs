@@ -6,7 +6,8 @@ mod constraint;
 mod history;
 pub mod increments;
 
-pub use amplitude::{Amplitude, StageKind, StageSet};
+pub use crate::system::{StageContext, StageKind, StageSet};
+pub use amplitude::Amplitude;
 pub use constraint::{Jump, Motion, MotionKind, Support};
 pub use history::{History, Table};
 
@@ -110,14 +111,20 @@ impl Model {
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
     pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<Equations, StageError> {
-        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind));
+        let fresh = self.has_fresh_loads(stage);
+        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind, fresh));
         for (number, motion) in self.motions.iter_mut().enumerate() {
             let jump = |(from, to)| StageError::Jump(Jump { motion: number, from, to });
-            motion.begin_stage(stage, kind, state, self.length).map_err(jump)?;
+            motion.begin_stage(stage, kind, state, self.length, fresh).map_err(jump)?;
         }
         let held = self.held_directions(stage);
         self.refuse_turned_hinges(&held, state)?;
         Equations::new(self.slots.len(), &held).map_err(StageError::Conflict)
+    }
+
+    /// Whether loads or motions without a history act for the first time in this stage.
+    pub fn has_fresh_loads(&self, stage: usize) -> bool {
+        self.amplitudes.iter().any(|a| a.is_fresh(stage)) || self.motions.iter().any(|m| m.is_fresh(stage))
     }
 
     /// Remembers where the stage left the loads.
@@ -163,10 +170,9 @@ impl Model {
         too_far
     }
 
-    /// The effects that act in a stage of this kind, with their numbers.
-    pub fn acting(&self, kind: StageKind) -> Vec<Arc<dyn Effect>> {
-        let acts = |effect: &&Arc<dyn Effect>| kind == StageKind::Dynamic || effect.acts_in_statics();
-        self.effects.iter().filter(acts).cloned().collect()
+    /// The effects that act in a stage.
+    pub fn acting(&self, stage: &StageContext) -> Vec<Arc<dyn Effect>> {
+        self.effects.iter().filter(|effect| effect.acts(stage)).cloned().collect()
     }
 
     /// The stored energy.

@@ -2,8 +2,10 @@
 
 mod files;
 mod history;
+mod modes;
 mod record;
 
 pub use files::{PartFile, remove_if_there};
 pub use history::{HistoryReader, HistoryWriter, Rows};
+pub use modes::ModesWriter;
 pub use record::{Outcome, run_record};

@@ -23,6 +23,7 @@ pub fn deck(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     warn_of_equal_places(deck, diagnostics);
     warn_of_idle_initials(deck, diagnostics);
     refuse_vectors_where_there_are_increments(deck, diagnostics);
+    refuse_histories_on_paths(deck, diagnostics);
 }
 
 fn refuse_twins<'a>(kind: &str, names: impl Iterator<Item = &'a Spanned<String>>, diagnostics: &mut Vec<Diagnostic>) {
@@ -56,12 +57,13 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Inertia and gravity need mass.
 fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let dynamic = deck.stages.iter().any(|s| matches!(s.body, StageBody::Dynamic { .. }));
+    let inertia = |s: &deck::Stage| matches!(s.body, StageBody::Dynamic { .. } | StageBody::Modal { .. }) || s.frame.is_some();
+    let dynamic = deck.stages.iter().any(inertia);
     let weighed = deck.gravity.as_ref().is_some_and(|g| g.value != [0.0; 3]);
     if !dynamic && !weighed {
         return;
     }
-    let why = if dynamic { "a dynamic stage" } else { "`gravity`" };
+    let why = if dynamic { "a stage with inertia" } else { "`gravity`" };
     for section in &deck.sections {
         let used = deck.beams.iter().find(|b| b.sections.iter().any(|s| s.value == section.name.value));
         let Some(beam) = used else { continue };
@@ -107,6 +109,25 @@ fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     if let (Some(initial), false) = (deck.initials.first(), dynamic || deck.stages.is_empty()) {
         let message = "[[initial]] needs a dynamic stage: this deck has none";
         diagnostics.push(Diagnostic::error(message, initial.span.clone()));
+    }
+}
+
+/// A path whose load factor turns back cannot follow a history of it.
+fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    for (number, stage) in deck.stages.iter().enumerate() {
+        let what = match stage.body {
+            StageBody::Path { .. } => "control = \"arc_length\"",
+            StageBody::Buckling { .. } => "a buckling stage",
+            _ => continue,
+        };
+        let acts = |stages: &Option<Vec<usize>>| stages.as_ref().is_none_or(|stages| stages.contains(&(number + 1)));
+        let loads = deck.loads.iter().filter(|l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
+        let motions = deck.motions.iter().filter(|m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
+        for history in loads.chain(motions) {
+            let message = format!("{what} refuses histories: its load factor may go back");
+            let diagnostic = Diagnostic::error(message, history.span.clone());
+            diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
+        }
     }
 }
 

@@ -15,6 +15,7 @@ use crate::effect::link::{self, Links};
 use crate::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::rigid_body::{Body, RigidBody};
+use crate::effect::rotating_frame::RotatingFrame;
 use crate::effect::rotary_inertia::RotaryInertia;
 use crate::effect::section_inertia::SectionInertia;
 use crate::effect::spring::{self, Spring};
@@ -108,6 +109,7 @@ pub fn compose(
     composer.gravity();
     composer.body_inertia();
     composer.damping();
+    composer.rotating_frames();
     let along = composer.line_loads();
     composer.node_loads(along);
     composer.never();
@@ -301,6 +303,69 @@ impl Composer<'_> {
                 self.push(RigidBody { name: "rigid body inertia", bodies }, reason);
             }
         }
+    }
+
+    /// For each stage with a `frame` an effect of its own.
+    fn rotating_frames(&mut self) {
+        let framed: Vec<(usize, deck::Stage)> =
+            self.deck.stages.iter().cloned().enumerate().filter(|(_, stage)| stage.frame.is_some()).collect();
+        if framed.is_empty() {
+            return self.reason("rotating frame", false, "no stage has a `frame`");
+        }
+        let is_static =
+            |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Static { .. } | deck::StageBody::Path { .. });
+        // One amplitude for all static stages: what one has brought in stays for the next.
+        let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
+        let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
+        let (elements, bodies) = self.placed_inertia();
+        for (number, stage) in &framed {
+            let Some(frame) = &stage.frame else { continue };
+            let about = match &frame.about {
+                None => Vec3::ZERO,
+                Some(deck::Spanned { value: deck::PointRef::Coordinates(x), .. }) => Vec3(*x),
+                Some(deck::Spanned { value: deck::PointRef::Name(name), span }) => match names::point(self.deck, name) {
+                    Some(place) => place,
+                    None => {
+                        let name = deck::Spanned { value: name.clone(), span: span.clone() };
+                        self.diagnostics.push(names::unknown("point", &name, names::points(self.deck)));
+                        continue;
+                    }
+                },
+            };
+            self.out.effects.push(Arc::new(RotatingFrame {
+                stage: *number,
+                spin: Vec3(frame.spin),
+                about,
+                amplitude: amplitude.filter(|_| is_static(stage)),
+                elements: elements.clone(),
+                bodies: bodies.clone(),
+            }));
+        }
+        self.reason("rotating frame", true, format!("{} stage(s) with a `frame`", framed.len()));
+    }
+
+    /// All mass of the scene with its initial place; that of relative beams which turns with the section sits at their nodes.
+    fn placed_inertia(&self) -> (VolumeElements<(Inertia, Vec3)>, Vec<Body>) {
+        let rotary = self.deck.effects.rotary_inertia.as_ref().is_none_or(|flag| flag.value);
+        let (mut elements, mut nodal) = (ByOrder::default(), NodalInertia::default());
+        self.each_element(|beam, number, element, mesh| {
+            let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
+            let relative = beam.interpolation == InterpolationWord::Relative;
+            let eccentric = found.iter().any(|m| m.offset != Vec3::ZERO);
+            if relative && (eccentric || rotary) {
+                nodal.add(beam, element, |m| if eccentric { m } else { Inertia { mass: 0.0, ..m } });
+            }
+            if relative && eccentric {
+                return;
+            }
+            push_volume(&mut elements, mesh, number, element, |k, s| {
+                let own = found[k].turned(s.axes);
+                let without = relative || !(rotary || eccentric);
+                let own = if without { Inertia { about_node: Mat3::ZERO, ..own } } else { own };
+                (own, element.nodes.iter().zip(&s.shape).fold(Vec3::ZERO, |sum, (&n, &w)| sum + mesh.nodes[n].place * w))
+            });
+        });
+        (elements, [nodal.bodies(self.mesh), self.out.bodies.clone()].concat())
     }
 
     fn gravity(&mut self) {
@@ -637,7 +702,8 @@ impl Composer<'_> {
 
 /// Inertia is there for dynamic stages, and where momenta are looked at.
 fn needs_mass(deck: &Deck) -> bool {
-    let dynamic = deck.stages.iter().any(|stage| matches!(stage.body, deck::StageBody::Dynamic { .. }));
+    let inertia = |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
+    let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
     let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
     let expected = deck.expects.iter().any(|expect| match &expect.body {
         deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),

@@ -79,8 +79,28 @@ pub enum ExpectationKind {
         /// In which bounds
         bounds: Bounds,
     },
+    /// Of the modes of the last modal stage, or the critical loads of the last buckling stage
+    Mode {
+        /// Which of their numbers
+        quantity: ModeQuantity,
+        /// From 0
+        number: usize,
+        /// In which bounds
+        bounds: Bounds,
+    },
     /// That it fails
     Fails,
+}
+
+/// A number of a mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModeQuantity {
+    /// Imaginary part
+    Omega,
+    /// Real part
+    Growth,
+    /// Critical load factor
+    Load,
 }
 
 /// The bounds of an expected number.
@@ -229,11 +249,15 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
         });
         let work = match stage.body {
             StageBody::Static { steps, adaptive } => StageWork::Static { steps, adaptive },
+            StageBody::Path { steps, max_steps } => StageWork::Path { steps, max_steps },
+            StageBody::Modal { modes } => StageWork::Modal { modes },
+            StageBody::Buckling { modes } => StageWork::Buckling { modes },
             StageBody::Dynamic { end, step, scheme, step_tolerance } => {
                 StageWork::Dynamic { end, step, scheme: coefficients(scheme), adaptive: step_tolerance }
             }
         };
-        stages.push(Stage { work, tolerance: stage.tolerance, max_iterations: stage.max_iterations, until });
+        let (tolerance, max_iterations) = (stage.tolerance, stage.max_iterations);
+        stages.push(Stage { work, tolerance, max_iterations, until, rotating: stage.frame.is_some() });
     }
     stages
 }
@@ -284,13 +308,37 @@ fn expected_column(
         }
         return Ok(ExpectationKind::Counter { name: counter.into(), bounds });
     }
-    let modal = ["mode", "buckling"].iter().any(|p| column.value.starts_with(p)) && column.value.contains('.');
-    if modal && columns.find(column).is_err() {
-        let message = format!("`{}` is not supported yet: there are no modal and buckling stages", column.value);
-        return Err(Diagnostic::error(message, column.span.clone()));
+    if let Some((quantity, number)) = mode_quantity(&column.value) {
+        let wanted = |stage: &deck::Stage| match (quantity, stage.body) {
+            (ModeQuantity::Load, StageBody::Buckling { modes }) => modes,
+            (ModeQuantity::Omega | ModeQuantity::Growth, StageBody::Modal { modes }) => modes,
+            _ => 0,
+        };
+        let known = columns.deck.stages.iter().map(wanted).max().unwrap_or(0);
+        if number >= known {
+            let message = format!("no stage of this deck asks for `{}`", column.value);
+            return Err(Diagnostic::error(message, column.span.clone()));
+        }
+        if reduce != Reduce::At(Instant::End) {
+            let message = "a mode has no history: leave `at` and `reduce` out";
+            return Err(Diagnostic::error(message, column.span.clone()));
+        }
+        return Ok(ExpectationKind::Mode { quantity, number, bounds });
     }
     let (probe, component) = columns.find(column)?;
     Ok(ExpectationKind::Column { probe, component, reduce, bounds })
+}
+
+/// `mode1.omega`, `mode1.growth`, `buckling1.load`: the quantity and the number of the mode from 0.
+fn mode_quantity(name: &str) -> Option<(ModeQuantity, usize)> {
+    let (mode, quantity) = name.split_once('.')?;
+    let (quantity, digits) = match quantity {
+        "omega" => (ModeQuantity::Omega, mode.strip_prefix("mode")?),
+        "growth" => (ModeQuantity::Growth, mode.strip_prefix("mode")?),
+        "load" => (ModeQuantity::Load, mode.strip_prefix("buckling")?),
+        _ => return None,
+    };
+    Some((quantity, digits.parse::<usize>().ok()?.checked_sub(1)?))
 }
 
 fn initial(

@@ -1,14 +1,17 @@
 //! Expectations held against a run.
 
 use crate::deck::{Instant, Reduce};
-use crate::drive::{Counters, Failure, Snapshot};
-use crate::scene::{Bounds, Expectation, ExpectationKind, Scene};
+use crate::drive::{Counters, Failure, Mode, Snapshot};
+use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
 
 /// Follows the expected columns through every converged state.
 pub struct Recorder {
     expectations: Vec<Expectation>,
     rows: Vec<Vec<Row>>,
     scratch: Vec<f64>,
+    /// Of the last stages that had some
+    modes: Vec<Mode>,
+    critical: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +42,26 @@ impl Recorder {
     /// For the expectations of a scene.
     pub fn new(scene: &Scene) -> Self {
         let expectations = scene.expectations.clone();
-        Self { rows: vec![Vec::new(); expectations.len()], expectations, scratch: Vec::new() }
+        let rows = vec![Vec::new(); expectations.len()];
+        Self { rows, expectations, scratch: Vec::new(), modes: Vec::new(), critical: Vec::new() }
+    }
+
+    /// Takes the modes of a stage.
+    pub fn modes(&mut self, modes: &[Mode]) {
+        self.modes = modes.to_vec();
+    }
+
+    /// Takes the critical loads of a stage.
+    pub fn buckling(&mut self, loads: &[f64]) {
+        self.critical = loads.to_vec();
+    }
+
+    fn mode(&self, quantity: ModeQuantity, number: usize) -> Option<f64> {
+        match quantity {
+            ModeQuantity::Omega => self.modes.get(number).map(|mode| mode.omega),
+            ModeQuantity::Growth => self.modes.get(number).map(|mode| mode.growth),
+            ModeQuantity::Load => self.critical.get(number).copied(),
+        }
     }
 
     /// Takes a converged state.
@@ -74,6 +96,9 @@ pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Count
             ExpectationKind::Fails => expected_failure(&expectation.name, came),
             ExpectationKind::Counter { name, bounds } => {
                 hold(expectation.name.clone(), bounds, Some(counter(counters, name) as f64))
+            }
+            ExpectationKind::Mode { quantity, number, bounds } => {
+                hold(expectation.name.clone(), bounds, recorder.mode(*quantity, *number))
             }
             ExpectationKind::Column { reduce: how, bounds, .. } => {
                 hold(format!("{} {}", expectation.name, describe(how)), bounds, reduce(rows, *how))

@@ -80,11 +80,38 @@ impl System {
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
+    /// A x, for a matrix with these values on the pattern of the tangent.
+    pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; x.len()];
+        for (column, &value) in x.iter().enumerate() {
+            let entries = self.pattern.column_starts[column] as usize..self.pattern.column_starts[column + 1] as usize;
+            for k in entries {
+                out[self.pattern.rows[k] as usize] += values[k] * value;
+            }
+        }
+        out
+    }
+
     /// The right-hand side of the correction: -g - J lift on the free equations.
     pub fn right_hand_side(&self, out: &mut [f64]) {
+        self.fill_right_hand_side(|slot| self.total(slot), out);
+    }
+
+    /// The same for other forces than those that were assembled.
+    pub fn right_hand_side_of(&self, force: &[Vec3], out: &mut [f64]) {
+        self.fill_right_hand_side(|slot| force[slot], out);
+    }
+
+    /// The same again, without what prescribed increments bring.
+    pub fn right_hand_side_without_lift(&self, force: &[Vec3], out: &mut [f64]) {
+        self.right_hand_side_of(force, out);
+        out.iter_mut().zip(&self.lifted).for_each(|(out, lifted)| *out += lifted);
+    }
+
+    fn fill_right_hand_side(&self, force: impl Fn(usize) -> Vec3, out: &mut [f64]) {
         let equations = &self.pattern.equations;
         for slot in 0..self.force[0].len() {
-            let local = equations.to_local(slot as Slot, self.total(slot));
+            let local = equations.to_local(slot as Slot, force(slot));
             for (k, number) in equations.of(slot as Slot).into_iter().enumerate() {
                 if number != Equations::HELD {
                     out[number as usize] = -local.0[k] - self.lifted[number as usize];

@@ -3,9 +3,11 @@
 mod assembly;
 mod equations;
 mod pattern;
+mod stage;
 mod state;
 
 pub use assembly::{Category, Sink, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use pattern::{Cliques, Pattern};
+pub use stage::{StageContext, StageKind, StageSet};
 pub use state::{Memory, Node, Slot, State};

@@ -1,0 +1,322 @@
+//! Where the path of equilibrium loses its stiffness: K(q(load), load) x = 0.
+//!
+//! About the present state the tangent varies along the path as K + m K', with K' its derivative over the load factor; the
+//! eigenvalues m of K x = -m K' x tell how far away the critical loads are. Each is then followed: the path is continued to
+//! the load found, and looked at again from there, until it is reached.
+
+use super::failure::Failure;
+use super::run::{Run, Workshop};
+use crate::kernel::Weights;
+use crate::model::charts;
+use crate::solve::{LinearSolver, Operator, Pivots, is_symmetric, largest_eigenvalues};
+use crate::system::{State, System};
+use crate::tensor::Vec3;
+use nalgebra::Complex;
+
+/// How far the state is moved along the path to see the tangent vary: lengths of the scene, and radians.
+const PROBE: f64 = 1e-5;
+/// Looks at one critical load.
+const MOST_LOOKS: usize = 80;
+/// A critical load is known when it lies between two points of the path this near to each other, relative to itself.
+const CLOSED: f64 = 1e-7;
+/// Where pivots cannot be counted: an estimate this near to where it was made; what is left over is its square.
+const NEAR: f64 = 1e-4;
+/// Imaginary part up to which a critical load counts as real, relative; double ones come apart a little.
+const REAL: f64 = 1e-3;
+
+impl Run<'_> {
+    /// The critical loads nearest above the present one, then those below it.
+    pub(super) fn run_buckling(&mut self, workshop: &mut Workshop, modes: usize) -> Result<(), Failure> {
+        self.stand_still();
+        if self.fresh {
+            self.state.load = 0.0;
+        }
+        let (time, load) = (self.state.time, self.state.load);
+        let held = self.state.q.clone();
+        self.model.set_clock(&mut self.state, time, load);
+        self.state.q = held;
+        self.change_charts(None);
+        self.open_account(workshop)?;
+        let mut loads = self.critical_loads(workshop, modes)?;
+        if loads.is_empty() {
+            return Err(Failure::Deck("no load of this scene takes stiffness away: nothing can buckle".into()));
+        }
+        let start = self.state.clone();
+        let mut passed = [0, 0];
+        for number in 0..loads.len() {
+            let back = loads[number] < load;
+            // Of the loads on this side of the present one it is number `before`.
+            let before = passed[usize::from(back)];
+            passed[usize::from(back)] += 1;
+            loads[number] = self.follow(workshop, loads[number], before)?;
+            self.state.copy_from(&start);
+            self.good.copy_from(&start);
+        }
+        loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
+        self.count_steps();
+        self.observer.buckling(self.stage + 1, &loads)
+    }
+
+    /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the
+    /// last point before it, since behind it the way back is not sure to be the same.
+    fn follow(&mut self, workshop: &mut Workshop, estimate: f64, before: usize) -> Result<f64, Failure> {
+        let way = (estimate - self.state.load).signum();
+        let none = self.negative_pivots(workshop);
+        let mut search = Search { here: self.state.clone(), beyond: None, estimate, stretch: 1.0, way };
+        for _ in 0..MOST_LOOKS {
+            if search.is_over() {
+                return Ok(search.estimate);
+            }
+            let target = search.target();
+            self.state.copy_from(&search.here);
+            self.good.copy_from(&search.here);
+            if !self.continue_path(workshop, target) {
+                break;
+            }
+            let count = self.negative_pivots(workshop);
+            let Some(passed) = none.zip(count).map(|(none, count)| count.saturating_sub(none)) else {
+                // Without a count of pivots the tangent itself must do.
+                self.state.copy_from(&search.here);
+                self.good.copy_from(&search.here);
+                return self.follow_nearest(workshop, search.estimate);
+            };
+            if passed > before {
+                search.beyond = Some(target);
+                search.stretch = 1.0;
+            } else {
+                let ahead = self.critical_loads(workshop, before + 4)?;
+                search.advance(&self.state, ahead.into_iter().filter(|load| (load - target) * way > 0.0).nth(before - passed));
+            }
+        }
+        self.warn_of_estimate(search.estimate, search.here.load);
+        Ok(search.estimate)
+    }
+
+    /// Goes from estimate to estimate, each the critical load that looks nearest from the last.
+    fn follow_nearest(&mut self, workshop: &mut Workshop, mut critical: f64) -> Result<f64, Failure> {
+        for _ in 0..MOST_LOOKS {
+            let near = self.critical_loads(workshop, 4)?;
+            let distance = |load: &f64| (load - self.state.load).abs();
+            let Some(nearest) = near.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
+            critical = nearest;
+            if distance(&critical) <= NEAR * critical.abs() {
+                return Ok(critical);
+            }
+            let target = critical - 0.5 * NEAR * (critical - self.state.load).signum() * critical.abs();
+            if !self.continue_path(workshop, target) {
+                break;
+            }
+        }
+        self.warn_of_estimate(critical, self.state.load);
+        Ok(critical)
+    }
+
+    fn warn_of_estimate(&mut self, critical: f64, from: f64) {
+        let message = format!(
+            "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it"
+        );
+        self.observer.warn(&message);
+    }
+
+    /// Of the tangent at the present state, where it is symmetric.
+    fn negative_pivots(&mut self, workshop: &mut Workshop) -> Option<usize> {
+        let assembly = &mut workshop.assembly;
+        assembly.forget();
+        assembly.evaluate(&self.state, Weights::STIFFNESS, None);
+        Pivots::new(&assembly.system, &self.model.multipliers)?.negative(&assembly.system)
+    }
+
+    /// Goes along the path to a load factor in steps that shrink where they must.
+    fn continue_path(&mut self, workshop: &mut Workshop, target: f64) -> bool {
+        let start = self.state.load;
+        let (mut done, mut part) = (0.0, 1.0_f64);
+        self.good.copy_from(&self.state);
+        while done < 1.0 {
+            let next = (done + part).min(1.0);
+            let load = if next == 1.0 { target } else { start + (target - start) * next };
+            if self.attempt(workshop, load).is_ok() {
+                charts::freeze(&mut self.state, &self.model.elements);
+                self.model.remember(&mut self.state);
+                self.good.copy_from(&self.state);
+                done = next;
+                part = 2.0 * part;
+            } else {
+                self.state.copy_from(&self.good);
+                part *= 0.25;
+                if part < 1e-4 {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// The critical loads as they look from the present state.
+    fn critical_loads(&mut self, workshop: &mut Workshop, modes: usize) -> Result<Vec<f64>, Failure> {
+        let Some(direction) = self.path_direction(workshop)? else { return Ok(Vec::new()) };
+        let size = direction.iter().zip(&self.model.slots).filter(|(_, info)| !info.is_multiplier());
+        let size = size.map(|(d, info)| d.norm() * info.arm(self.model.length) / self.model.length).fold(0.0, f64::max);
+        let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
+        let varied = self.varied_tangent(workshop, &direction, reach);
+        let Workshop { assembly, newton, .. } = workshop;
+        assembly.evaluate(&self.state, Weights::STIFFNESS, None);
+        let system = &assembly.system;
+        self.counters.work.factorisations += 1;
+        if !newton.solver.factorise(system) {
+            let vector = newton.solver.null_vector(system);
+            return Err(self.name_mechanism(vector, &workshop.assembly.system));
+        }
+        // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.
+        let pivots = Pivots::new(system, &self.model.multipliers);
+        let stable = pivots.and_then(|mut pivots| pivots.negative(system)) == Some(0);
+        let symmetric = stable && self.model.multipliers.is_empty() && is_symmetric(&system.pattern, &varied);
+        let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
+        let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default();
+        let load = self.state.load;
+        let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
+        let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();
+        loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
+        loads.truncate(modes);
+        Ok(loads)
+    }
+
+    /// dq/dload along the path; `None` where nothing varies with the load factor.
+    pub(super) fn path_direction(&mut self, workshop: &mut Workshop) -> Result<Option<Vec<Vec3>>, Failure> {
+        let pull = self.load_derivative(workshop);
+        let Workshop { assembly, newton, lift, .. } = workshop;
+        if pull.iter().chain(lift.iter()).all(|&v| v == Vec3::ZERO) {
+            return Ok(None);
+        }
+        assembly.forget();
+        assembly.evaluate(&self.state, Weights::STIFFNESS, Some(lift));
+        let system = &assembly.system;
+        let mut solution = vec![0.0; system.pattern.equations.count()];
+        system.right_hand_side_of(&pull, &mut solution);
+        self.counters.work.factorisations += 1;
+        if !(newton.solver.factorise(system) && newton.solver.solve(&mut solution)) {
+            let vector = newton.solver.null_vector(system);
+            return Err(self.name_mechanism(vector, &workshop.assembly.system));
+        }
+        let mut direction = vec![Vec3::ZERO; pull.len()];
+        system.pattern.equations.scatter(&solution, Some(lift), &mut direction);
+        Ok(Some(direction))
+    }
+
+    /// The derivative of the forces over the load factor; that of prescribed directions goes into the workshop's `lift`.
+    /// Loads and motions without a history are linear in it.
+    pub(super) fn load_derivative(&mut self, workshop: &mut Workshop) -> Vec<Vec3> {
+        let Workshop { assembly, lift, .. } = workshop;
+        let mut shifted = self.state.clone();
+        let mut forces = |state: &State| -> Vec<Vec3> {
+            assembly.evaluate(state, Weights::NONE, None);
+            (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
+        };
+        let before = forces(&self.state);
+        self.model.set_clock(&mut shifted, self.state.time, self.state.load + 1.0);
+        for ((lift, moved), q) in lift.iter_mut().zip(&mut shifted.q).zip(&self.state.q) {
+            *lift = *moved - *q;
+            *moved = *q;
+        }
+        let after = forces(&shifted);
+        after.iter().zip(&before).map(|(after, before)| *after - *before).collect()
+    }
+
+    /// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r
+    fn varied_tangent(&mut self, workshop: &mut Workshop, direction: &[Vec3], reach: f64) -> Vec<f64> {
+        let assembly = &mut workshop.assembly;
+        assembly.forget();
+        let mut tangent = |reach: f64| {
+            let mut state = self.state.clone();
+            self.model.set_clock(&mut state, self.state.time, self.state.load + reach);
+            state.q.copy_from_slice(&self.state.q);
+            state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * reach);
+            assembly.evaluate(&state, Weights::STIFFNESS, None);
+            assembly.system.values.clone()
+        };
+        let (after, before) = (tangent(reach), tangent(-reach));
+        after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * reach)).collect()
+    }
+}
+
+/// A critical load between a state that lies before it and a load that lies beyond.
+struct Search {
+    here: State,
+    beyond: Option<f64>,
+    /// What it looks like from here
+    estimate: f64,
+    /// How much farther than the estimate the next look goes: it may fall short again and again
+    stretch: f64,
+    way: f64,
+}
+
+impl Search {
+    /// Whether the estimate stands between two points that lie together.
+    fn is_over(&self) -> bool {
+        self.beyond.is_some_and(|beyond| (beyond - self.here.load).abs() <= CLOSED * beyond.abs())
+    }
+
+    /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the
+    /// estimate does not lie between.
+    fn target(&self) -> f64 {
+        let from = self.here.load;
+        let ahead = self.estimate + self.way * 0.5 * CLOSED * self.estimate.abs();
+        let target = from + self.stretch * (ahead - from);
+        match self.beyond {
+            Some(beyond) if (target - beyond) * self.way >= 0.0 => {
+                let before = self.estimate - self.way * 0.4 * CLOSED * self.estimate.abs();
+                let inside = (before - from) * self.way > 0.0 && (beyond - before) * self.way > 0.0;
+                if inside { before } else { 0.5 * (from + beyond) }
+            }
+            _ => target,
+        }
+    }
+
+    /// A point that lies before the critical load, with what that looks like from there.
+    fn advance(&mut self, state: &State, next: Option<f64>) {
+        let shorter = self.beyond.is_none_or(|beyond| {
+            (beyond - state.load).abs() < 0.5 * (beyond - self.here.load).abs()
+        });
+        self.here = state.clone();
+        self.stretch *= 2.0;
+        self.estimate = match (next, self.beyond) {
+            (Some(next), None) => next,
+            (Some(next), Some(beyond)) if shorter && (beyond - next) * self.way > 0.0 => next,
+            (_, Some(beyond)) => 0.5 * (state.load + beyond),
+            (None, None) => state.load + 2.0 * (self.estimate - state.load).abs().max(CLOSED) * self.way,
+        };
+    }
+}
+
+/// Loads above the present one come first, nearest first, then the others.
+fn rank(critical: f64, load: f64) -> f64 {
+    let distance = critical - load;
+    if distance > 0.0 { -1.0 / distance } else { -distance }
+}
+
+/// K^-1 K': its eigenvalues are -1/m.
+struct Softening<'a> {
+    system: &'a System,
+    varied: &'a [f64],
+    solver: &'a mut LinearSolver,
+    symmetric: bool,
+}
+
+impl Operator for Softening<'_> {
+    fn size(&self) -> usize {
+        self.system.pattern.equations.count()
+    }
+
+    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+        let mut out = self.system.multiply(self.varied, x);
+        out.iter_mut().for_each(|v| *v = -*v);
+        self.solver.solve(&mut out).then_some(out)
+    }
+
+    fn weigh(&mut self, x: &[f64]) -> Vec<f64> {
+        if self.symmetric { self.system.multiply(&self.system.values, x) } else { x.to_vec() }
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.symmetric
+    }
+}

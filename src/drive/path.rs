@@ -1,0 +1,341 @@
+//! Arc-length control: paths of equilibrium that turn back in load or in displacement.
+//!
+//! Along a path the state q and the load factor are both unknown; a step goes a given length ds along the tangent t of the
+//! last point and then back to the path in the plane normal to it (Riks 1979, doi:10.1016/0020-7683(79)90081-7):
+//!
+//! ```text
+//! <t_u, u - u_n>/U^2 + t_l (l - l_n) = ds,     K dq = -g - g_l dl
+//! ```
+//!
+//! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in the load factor; rotation
+//! vectors follow through the equations, so that no chart enters.
+
+use super::failure::Failure;
+use super::run::{Event, EventKind, Run, Workshop};
+use crate::kernel::Weights;
+use crate::model::{SlotKind, charts};
+use crate::solve::{NewtonFailure, Pivots, Verdict};
+use crate::system::State;
+use crate::tensor::Vec3;
+
+/// Iterations after which the next step stays as long.
+const EASY: f64 = 5.0;
+/// Steps grow at most to this multiple of the first.
+const LONGEST: f64 = 2.0;
+/// And shrink to this part of it.
+const SHORTEST: f64 = 1.0 / 16384.0;
+/// Cosine between tangents below which a step was too long: it may have come down on another branch.
+const BENT: f64 = 0.8;
+/// Attempts to come nearer to a special point.
+const MOST_LOOKS: usize = 40;
+/// Relative length to which it is located.
+const LOCATED: f64 = 1e-9;
+
+/// A point of the path and its unit tangent.
+#[derive(Clone)]
+struct Point {
+    state: State,
+    tangent: Vec<Vec3>,
+    /// The tangent's part in the load factor
+    load_rate: f64,
+    /// The rate of the displacement that the loads do work on
+    work_rate: f64,
+    negative: Option<usize>,
+}
+
+/// What is looked for between two points, as a function that changes its sign there.
+#[derive(Clone, Copy, PartialEq)]
+enum Target {
+    Limit,
+    Turning,
+    Load(f64),
+}
+
+impl Target {
+    fn value(self, point: &Point) -> f64 {
+        match self {
+            Self::Limit => point.load_rate,
+            Self::Turning => point.work_rate,
+            Self::Load(load) => point.state.load - load,
+        }
+    }
+}
+
+impl Run<'_> {
+    /// The path until the load factor first reaches 1, or `until`, or `max_steps`.
+    pub(super) fn run_path(&mut self, workshop: &mut Workshop, steps: usize, max_steps: usize) -> Result<(), Failure> {
+        self.start_static(workshop)?;
+        let mut path = Path::new(self, workshop, steps)?;
+        // The signs that were passed last: on a located point itself they are nobody's.
+        let (mut rising, mut working) = (path.here.load_rate > 0.0, path.here.work_rate > 0.0);
+        for number in 0..max_steps {
+            self.observer.progress(self.moment(), self.static_progress(number as f64 / max_steps as f64))?;
+            let (next, length) = path.step(self, workshop)?;
+            let mut targets = Vec::new();
+            if (next.load_rate > 0.0) != rising {
+                targets.push(Target::Limit);
+            }
+            if (next.work_rate > 0.0) != working {
+                targets.push(Target::Turning);
+            }
+            if path.here.state.load < 1.0 && next.state.load >= 1.0 {
+                targets.push(Target::Load(1.0));
+            }
+            let (arrived, target) = path.nearest(self, workshop, next, length, &targets);
+            match target {
+                Some(Target::Limit) => rising = !rising,
+                Some(Target::Turning) => working = !working,
+                _ => {}
+            }
+            self.arrive(workshop, &mut path, arrived, target)?;
+            if target == Some(Target::Load(1.0)) || self.is_over(workshop) {
+                return Ok(());
+            }
+        }
+        self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {}", self.moment()));
+        Ok(())
+    }
+
+    /// What follows a point of the path: account, row, and a word where something special happened.
+    fn arrive(
+        &mut self,
+        workshop: &mut Workshop,
+        path: &mut Path,
+        point: Point,
+        target: Option<Target>,
+    ) -> Result<(), Failure> {
+        self.good.copy_from(&path.here.state);
+        self.state.copy_from(&point.state);
+        workshop.assembly.evaluate(&self.state, Weights::NONE, None);
+        self.accept(workshop)?;
+        self.counters.steps += 1;
+        let kind = match target {
+            Some(Target::Limit) => Some(EventKind::Limit),
+            Some(Target::Turning) => Some(EventKind::Turning),
+            _ => None,
+        };
+        self.tell_stability(kind, path.here.negative, point.negative);
+        path.here = Point { state: self.state.clone(), ..point };
+        self.show(workshop)
+    }
+
+    /// Names limit and turning points, and branches that were passed: where the number of negative pivots changed.
+    pub(super) fn tell_stability(&mut self, kind: Option<EventKind>, before: Option<usize>, after: Option<usize>) {
+        let changed = matches!((before, after), (Some(before), Some(after)) if before != after);
+        let kind = kind.or_else(|| changed.then_some(EventKind::Branch));
+        let Some(kind) = kind else { return };
+        let event = Event { at: self.moment(), kind, negative_pivots: after };
+        self.observer.warn(&event.to_string());
+        self.counters.events.push(event);
+    }
+}
+
+/// A path being followed.
+struct Path {
+    here: Point,
+    length: f64,
+    first: f64,
+    /// 1/U^2
+    scale: f64,
+    pivots: Option<Pivots>,
+}
+
+impl Path {
+    fn new(run: &mut Run, workshop: &mut Workshop, steps: usize) -> Result<Self, Failure> {
+        let Some(direction) = run.path_direction(workshop)? else {
+            return Err(Failure::Deck(
+                "control = \"arc_length\" needs a load or a motion that grows with the load factor".into(),
+            ));
+        };
+        let moved = squared(run, &direction);
+        let mut path = Self {
+            here: Point {
+                state: run.state.clone(),
+                tangent: direction,
+                load_rate: 1.0,
+                work_rate: 1.0,
+                negative: None,
+            },
+            length: 0.0,
+            first: 0.0,
+            scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
+            pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers),
+        };
+        path.here = path.look(run, workshop, &path.here.clone())?;
+        path.first = 1.0 / (steps as f64 * path.here.load_rate.abs());
+        path.length = path.first;
+        Ok(path)
+    }
+
+    /// The point at the run's state: its tangent goes on in the direction of `before`.
+    fn look(&mut self, run: &mut Run, workshop: &mut Workshop, before: &Point) -> Result<Point, Failure> {
+        let direction = run.path_direction(workshop)?.unwrap_or_else(|| vec![Vec3::ZERO; run.state.q.len()]);
+        // The tangent that was just factorised tells the pivots.
+        let negative = self.pivots.as_mut().and_then(|pivots| pivots.negative(&workshop.assembly.system));
+        let along = dot(run, &direction, &before.tangent) * self.scale + before.load_rate;
+        let size = (squared(run, &direction) * self.scale + 1.0).sqrt();
+        let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
+        let pull = run.load_derivative(workshop);
+        let loaded = pull.iter().any(|&force| force != Vec3::ZERO);
+        let work: f64 = pull.iter().zip(&direction).map(|(force, d)| -force.dot(*d)).sum();
+        // Of prescribed motions alone no displacement is known that loads would do work on.
+        let work = if loaded { work } else { load_rate.signum() };
+        let tangent = direction.into_iter().map(|d| d * load_rate).collect();
+        Ok(Point { state: run.state.clone(), tangent, load_rate, work_rate: work * load_rate, negative })
+    }
+
+    /// One step that is neither too hard nor too bent; its length.
+    fn step(&mut self, run: &mut Run, workshop: &mut Workshop) -> Result<(Point, f64), Failure> {
+        loop {
+            let length = self.length;
+            let failure = match self.advance(run, workshop, length) {
+                Ok(iterations) => {
+                    let next = self.look(run, workshop, &self.here.clone())?;
+                    let cosine =
+                        dot(run, &next.tangent, &self.here.tangent) * self.scale + next.load_rate * self.here.load_rate;
+                    if cosine >= BENT || length <= SHORTEST * self.first {
+                        let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
+                        self.length = (length * factor).min(LONGEST * self.first);
+                        return Ok((next, length));
+                    }
+                    None
+                }
+                Err(failure) => Some(failure),
+            };
+            run.counters.cutbacks += 1;
+            self.length = 0.5 * length;
+            if let (Some(failure), true) = (failure, self.length < SHORTEST * self.first) {
+                let named = run.name_failure(failure, &workshop.assembly.system);
+                run.state.copy_from(&self.here.state);
+                return Err(named);
+            }
+        }
+    }
+
+    /// Goes `length` along the tangent and back to the path; leaves the run's state there and returns the iterations.
+    fn advance(&self, run: &mut Run, workshop: &mut Workshop, length: f64) -> Result<usize, NewtonFailure> {
+        let here = &self.here;
+        run.state.copy_from(&here.state);
+        run.state.q.iter_mut().zip(&here.tangent).for_each(|(q, t)| *q += *t * length);
+        let (time, mut load) = (here.state.time, here.state.load + here.load_rate * length);
+        workshop.assembly.forget();
+        let noise = workshop.assembly.noise(&run.state);
+        let limit = workshop.newton.max_iterations;
+        let mut last: Option<Vec<Vec3>> = None;
+        for iteration in 0..=limit {
+            // The held directions are where the predictor and the corrections have taken them.
+            let q = run.state.q.clone();
+            run.model.set_clock(&mut run.state, time, load);
+            run.state.q.copy_from_slice(&q);
+            let pull = run.load_derivative(workshop);
+            let Workshop { assembly, newton, lift, .. } = workshop;
+            assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift));
+            let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last.as_deref());
+            match verdict {
+                Verdict::Converged => return Ok(iteration),
+                Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, &run.state)),
+                Verdict::Continue if iteration == limit => {
+                    return Err(NewtonFailure::NotConverged { residual, iterations: iteration });
+                }
+                Verdict::Continue => {}
+            }
+            let system = &assembly.system;
+            let mut back = vec![0.0; system.pattern.equations.count()];
+            let mut along = back.clone();
+            system.right_hand_side_of(&pull, &mut along);
+            // The residual's own right-hand side takes no part of the lift.
+            let total: Vec<Vec3> = (0..q.len()).map(|slot| system.total(slot)).collect();
+            system.right_hand_side_without_lift(&total, &mut back);
+            run.counters.work.factorisations += 1;
+            run.counters.work.iterations += 1;
+            if !(newton.solver.factorise(system) && newton.solver.solve(&mut back) && newton.solver.solve(&mut along)) {
+                return Err(NewtonFailure::Singular(newton.solver.null_vector(system)));
+            }
+            let (mut a, mut b) = (vec![Vec3::ZERO; q.len()], vec![Vec3::ZERO; q.len()]);
+            system.pattern.equations.scatter(&back, None, &mut a);
+            system.pattern.equations.scatter(&along, Some(lift), &mut b);
+            let part = |run: &Run, d: &[Vec3]| dot(run, &here.tangent, d) * self.scale;
+            let dl = -part(run, &a) / (part(run, &b) + here.load_rate);
+            let dq: Vec<Vec3> = a.iter().zip(&b).map(|(a, b)| *a + *b * dl).collect();
+            let wild = dq.iter().any(|d| !d.is_finite()) || !dl.is_finite();
+            if wild || squared(run, &dq) * self.scale + dl * dl > (100.0 * length).powi(2) {
+                return Err(NewtonFailure::NotConverged { residual, iterations: iteration });
+            }
+            assembly.extrapolate(&run.state, &dq);
+            run.state.q.iter_mut().zip(&dq).for_each(|(q, d)| *q += *d);
+            load += dl;
+            last = Some(dq);
+            let switched = charts::switch(&mut run.state, &run.model.rotations, 0.0, None);
+            if switched > 0 {
+                run.counters.work.chart_switches += switched as u64;
+                charts::freeze(&mut run.state, &run.model.elements);
+                last = None;
+            }
+        }
+        unreachable!("the last iteration returns")
+    }
+
+    /// Of the special points between here and `next` the nearest, or `next` itself.
+    fn nearest(
+        &mut self,
+        run: &mut Run,
+        workshop: &mut Workshop,
+        next: Point,
+        length: f64,
+        targets: &[Target],
+    ) -> (Point, Option<Target>) {
+        let mut best = (next, length, None);
+        for &target in targets {
+            if let Some((point, at)) = self.locate(run, workshop, &best.0, best.1, target) {
+                best = (point, at, Some(target));
+            }
+        }
+        (best.0, best.2)
+    }
+
+    /// Where a function of the path has its zero between here and a point `length` ahead (Illinois' regula falsi); `None`
+    /// where it has none.
+    fn locate(
+        &mut self,
+        run: &mut Run,
+        workshop: &mut Workshop,
+        end: &Point,
+        length: f64,
+        target: Target,
+    ) -> Option<(Point, f64)> {
+        let (mut low, mut high) = ((0.0, target.value(&self.here)), (length, target.value(end)));
+        if low.1 * high.1 > 0.0 {
+            return None;
+        }
+        let size = low.1.abs().max(high.1.abs());
+        let mut found = (end.clone(), length);
+        for _ in 0..MOST_LOOKS {
+            let share = if high.1 == low.1 { 0.5 } else { -low.1 / (high.1 - low.1) };
+            let at = low.0 + (high.0 - low.0) * share.clamp(0.02, 0.98);
+            self.advance(run, workshop, at).ok()?;
+            let point = self.look(run, workshop, &self.here.clone()).ok()?;
+            let value = target.value(&point);
+            found = (point, at);
+            if value.abs() <= LOCATED * size || (high.0 - low.0).abs() <= LOCATED * length {
+                break;
+            }
+            if value * high.1 <= 0.0 {
+                low = high;
+            } else {
+                low.1 *= 0.5;
+            }
+            high = (at, value);
+        }
+        Some(found)
+    }
+}
+
+/// The sum over displacements of squares; rotations follow.
+fn squared(run: &Run, field: &[Vec3]) -> f64 {
+    dot(run, field, field)
+}
+
+fn dot(run: &Run, a: &[Vec3], b: &[Vec3]) -> f64 {
+    let slots = run.model.slots.iter().zip(a.iter().zip(b));
+    slots.filter(|(info, _)| info.kind == SlotKind::Displacement).map(|(_, (a, b))| a.dot(*b)).sum()
+}

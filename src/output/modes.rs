@@ -1,0 +1,45 @@
+//! modes.csv and buckling.csv: what modal and buckling stages find.
+
+use super::files::{PartFile, remove_if_there};
+use crate::drive::Mode;
+use std::io;
+use std::path::Path;
+
+/// Collects modes and critical loads, and writes them when the run has ended.
+#[derive(Clone, Debug, Default)]
+pub struct ModesWriter {
+    modes: Vec<(usize, usize, Mode)>,
+    loads: Vec<(usize, usize, f64)>,
+}
+
+impl ModesWriter {
+    /// The modes of a stage (from 1).
+    pub fn push_modes(&mut self, stage: usize, modes: &[Mode]) {
+        self.modes.extend(modes.iter().enumerate().map(|(k, &mode)| (stage, k + 1, mode)));
+    }
+
+    /// The critical loads of a stage (from 1).
+    pub fn push_loads(&mut self, stage: usize, loads: &[f64]) {
+        self.loads.extend(loads.iter().enumerate().map(|(k, &load)| (stage, k + 1, load)));
+    }
+
+    /// Writes the files that have rows, and removes those that an earlier run has left.
+    pub fn finish(&self, folder: &Path) -> io::Result<()> {
+        // Debug formatting is the shortest text that reads back to the same float.
+        let mode = |(stage, number, m): &(usize, usize, Mode)| format!("{stage},{number},{:?},{:?}", m.omega, m.growth);
+        let load = |(stage, number, load): &(usize, usize, f64)| format!("{stage},{number},{load:?}");
+        let modes: Vec<String> = self.modes.iter().map(mode).collect();
+        let loads: Vec<String> = self.loads.iter().map(load).collect();
+        write(folder, "modes.csv", "stage,mode,omega,growth", &modes)?;
+        write(folder, "buckling.csv", "stage,mode,load", &loads)
+    }
+}
+
+fn write(folder: &Path, name: &str, head: &str, rows: &[String]) -> io::Result<()> {
+    if rows.is_empty() {
+        return remove_if_there(folder, name);
+    }
+    let text = format!("{head}\n{}\n", rows.join("\n"));
+    let (part, file) = PartFile::written(folder, name, text.as_bytes())?;
+    part.finish(&file, name)
+}

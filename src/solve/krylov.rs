@@ -1,0 +1,142 @@
+//! Eigenvalues of largest magnitude of a linear operator, by projection onto a block Krylov space.
+//!
+//! Blocks find eigenvalues that occur several times, such as the six rigid motions of a free body or the bending modes of a
+//! round section. The basis is orthonormal in an inner product x . W y that makes the operator symmetric where there is one.
+
+use nalgebra::{Complex, DMatrix, Schur, SymmetricEigen};
+
+/// A linear operator on vectors.
+pub trait Operator {
+    /// The length of its vectors
+    fn size(&self) -> usize;
+    /// The image of a vector; `None` where it cannot be had.
+    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>>;
+    /// W x, of the inner product; W may be semidefinite.
+    fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
+    /// Whether it is symmetric in that inner product
+    fn is_symmetric(&self) -> bool;
+}
+
+/// Vectors a block
+const BLOCK: usize = 6;
+/// Relative change at which eigenvalues count as found
+const FOUND: f64 = 1e-11;
+/// Vectors that lose this part of themselves when the basis is taken out of them bring nothing new.
+const NOTHING_NEW: f64 = 1e-11;
+
+/// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer.
+pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Vec<Complex<f64>>> {
+    let size = operator.size();
+    let most = size.min(24 * wanted + 160);
+    let mut space = Space::default();
+    let mut block: Vec<Vec<f64>> = Vec::new();
+    for k in 0..BLOCK.min(size) {
+        block.push(operator.apply(&start(size, k))?);
+    }
+    let mut last: Vec<Complex<f64>> = Vec::new();
+    // The projection is looked at when it has grown by a quarter.
+    let mut look = 0;
+    loop {
+        let first = space.basis.len();
+        block.drain(..).for_each(|vector| space.add(operator, vector, most));
+        if space.basis.len() == first {
+            return Some(space.eigenvalues(operator, wanted));
+        }
+        for k in first..space.basis.len() {
+            let image = operator.apply(&space.basis[k])?;
+            space.images.push(image.clone());
+            block.push(image);
+        }
+        space.project(first);
+        if space.basis.len() < look && space.basis.len() < most {
+            continue;
+        }
+        look = space.basis.len() + space.basis.len() / 4;
+        // A few more than wanted must stand still, lest the second of a pair is missed.
+        let guard = wanted + BLOCK;
+        let now = space.eigenvalues(operator, guard);
+        let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= FOUND * a.norm();
+        let still = now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
+        if still || space.basis.len() >= most {
+            return Some(now.into_iter().take(wanted).collect());
+        }
+        last = now;
+    }
+}
+
+/// A vector without any pattern.
+fn start(size: usize, number: usize) -> Vec<f64> {
+    let golden = 0.618_033_988_749_895;
+    (0..size).map(|i| ((i + 1) as f64 * golden * (number as f64 + 1.3) + 0.37 * number as f64).fract() - 0.5).collect()
+}
+
+#[derive(Default)]
+struct Space {
+    basis: Vec<Vec<f64>>,
+    /// W times the basis
+    weighed: Vec<Vec<f64>>,
+    /// The operator times the basis
+    images: Vec<Vec<f64>>,
+    /// By rows: basis . W images
+    projected: Vec<Vec<f64>>,
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+impl Space {
+    /// Adds the part of a vector that is new, normalised.
+    fn add(&mut self, operator: &mut dyn Operator, mut vector: Vec<f64>, most: usize) {
+        if self.basis.len() >= most {
+            return;
+        }
+        let size = |vector: &[f64], weighed: &[f64]| dot(vector, weighed).max(0.0).sqrt();
+        let mut weighed = operator.weigh(&vector);
+        let before = size(&vector, &weighed);
+        // Twice is enough (Kahan, Parlett).
+        for _ in 0..2 {
+            for (own, heavy) in self.basis.iter().zip(&self.weighed) {
+                let along = dot(heavy, &vector);
+                vector.iter_mut().zip(own).for_each(|(v, o)| *v -= along * o);
+            }
+        }
+        weighed = operator.weigh(&vector);
+        let length = size(&vector, &weighed);
+        if length.is_nan() || length <= NOTHING_NEW * before {
+            return;
+        }
+        vector.iter_mut().for_each(|v| *v /= length);
+        weighed.iter_mut().for_each(|v| *v /= length);
+        self.basis.push(vector);
+        self.weighed.push(weighed);
+    }
+
+    /// Adds the rows and columns of the projection that belong to new vectors.
+    fn project(&mut self, first: usize) {
+        for (i, heavy) in self.weighed.iter().enumerate() {
+            if i >= first {
+                self.projected.push(Vec::new());
+            }
+            let known = self.projected[i].len();
+            for image in &self.images[known..] {
+                self.projected[i].push(dot(heavy, image));
+            }
+        }
+    }
+
+    fn eigenvalues(&self, operator: &dyn Operator, wanted: usize) -> Vec<Complex<f64>> {
+        let n = self.projected.len();
+        let entry = |i: usize, j: usize| self.projected[i][j];
+        let mut values: Vec<Complex<f64>> = if operator.is_symmetric() {
+            let matrix = DMatrix::from_fn(n, n, |i, j| 0.5 * (entry(i, j) + entry(j, i)));
+            SymmetricEigen::new(matrix).eigenvalues.iter().map(|&v| Complex::new(v, 0.0)).collect()
+        } else {
+            let schur = Schur::try_new(DMatrix::from_fn(n, n, entry), f64::EPSILON, 10_000);
+            schur.map_or_else(Vec::new, |schur| schur.complex_eigenvalues().iter().copied().collect())
+        };
+        values.sort_by(|a, b| b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im)));
+        values.truncate(wanted);
+        values
+    }
+}
