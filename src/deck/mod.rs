@@ -24,7 +24,8 @@ pub use geometry::{
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use procedure::{
-    Effects, Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage, StageBody, Until,
+    Effects, Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage,
+    StageBody, Until,
 };
 
 use reader::{Context, Table};

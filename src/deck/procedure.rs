@@ -220,7 +220,9 @@ pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
             refuse_others(&table, other, &["modes"]);
             let modes = table.required("modes").and_then(|item| context.whole(item, 1, MOST_MODES));
             let modal = other == "modal";
-            modes.map(|n| if modal { StageBody::Modal { modes: n.value } } else { StageBody::Buckling { modes: n.value } })
+            modes.map(
+                |n| if modal { StageBody::Modal { modes: n.value } } else { StageBody::Buckling { modes: n.value } },
+            )
         }
     };
     if table.has("until") && ["modal", "buckling"].contains(&kind.value) {

@@ -64,8 +64,8 @@ impl Run<'_> {
         let none = self.negative_pivots(workshop);
         let mut search = Search { here: self.state.clone(), beyond: None, estimate, stretch: 1.0, way };
         for _ in 0..MOST_LOOKS {
-            if search.is_over() {
-                return Ok(search.estimate);
+            if let Some(found) = search.found() {
+                return Ok(found);
             }
             let target = search.target();
             self.state.copy_from(&search.here);
@@ -85,7 +85,10 @@ impl Run<'_> {
                 search.stretch = 1.0;
             } else {
                 let ahead = self.critical_loads(workshop, before + 4)?;
-                search.advance(&self.state, ahead.into_iter().filter(|load| (load - target) * way > 0.0).nth(before - passed));
+                search.advance(
+                    &self.state,
+                    ahead.into_iter().filter(|load| (load - target) * way > 0.0).nth(before - passed),
+                );
             }
         }
         self.warn_of_estimate(search.estimate, search.here.load);
@@ -250,9 +253,12 @@ struct Search {
 }
 
 impl Search {
-    /// Whether the estimate stands between two points that lie together.
-    fn is_over(&self) -> bool {
-        self.beyond.is_some_and(|beyond| (beyond - self.here.load).abs() <= CLOSED * beyond.abs())
+    /// The critical load, where the points around it lie together.
+    fn found(&self) -> Option<f64> {
+        let (from, beyond) = (self.here.load, self.beyond?);
+        let between = (self.estimate - from) * self.way > 0.0 && (beyond - self.estimate) * self.way > 0.0;
+        let closed = (beyond - from).abs() <= CLOSED * beyond.abs();
+        closed.then(|| if between { self.estimate } else { 0.5 * (from + beyond) })
     }
 
     /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the
@@ -273,9 +279,8 @@ impl Search {
 
     /// A point that lies before the critical load, with what that looks like from there.
     fn advance(&mut self, state: &State, next: Option<f64>) {
-        let shorter = self.beyond.is_none_or(|beyond| {
-            (beyond - state.load).abs() < 0.5 * (beyond - self.here.load).abs()
-        });
+        let shorter =
+            self.beyond.is_none_or(|beyond| (beyond - state.load).abs() < 0.5 * (beyond - self.here.load).abs());
         self.here = state.clone();
         self.stretch *= 2.0;
         self.estimate = match (next, self.beyond) {

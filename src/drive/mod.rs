@@ -14,4 +14,6 @@ mod statics;
 
 pub use failure::{Failure, Moment, Place};
 pub use ledger::Ledger;
-pub use run::{Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until};
+pub use run::{
+    Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until,
+};

@@ -47,7 +47,8 @@ impl Run<'_> {
         let loose = crate::solve::Convergence { tolerance: 1e-5 };
         let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, noise, None);
         if verdict != crate::solve::Verdict::Converged {
-            self.observer.warn("the state of a modal or buckling stage is not in balance: let a static stage come before it");
+            self.observer
+                .warn("the state of a modal or buckling stage is not in balance: let a static stage come before it");
         }
     }
 
@@ -63,12 +64,7 @@ impl Run<'_> {
     }
 
     /// Twice: the second time about a shift that suits the frequencies themselves.
-    fn find_modes(
-        &mut self,
-        workshop: &mut Workshop,
-        matrices: &Matrices,
-        modes: usize,
-    ) -> Result<Vec<Mode>, Failure> {
+    fn find_modes(&mut self, workshop: &mut Workshop, matrices: &Matrices, modes: usize) -> Result<Vec<Mode>, Failure> {
         let Workshop { assembly, newton, .. } = workshop;
         let system = &mut assembly.system;
         let (stiffest, heaviest) = (largest(&matrices.stiffness), largest(&matrices.mass));

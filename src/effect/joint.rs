@@ -186,9 +186,8 @@ impl Instance {
         let coordinate = self.coordinate(at, ends);
         let (rate, varies) = if damping == 0.0 { (0.0, [Vec3::ZERO; 4]) } else { self.rate(at, ends, weights) };
         let force = stiffness * coordinate.value + damping * rate;
-        let variation: [Vec3; 4] = std::array::from_fn(|k| {
-            coordinate.gradient[k] * (stiffness * weights.stiffness) + varies[k] * damping
-        });
+        let variation: [Vec3; 4] =
+            std::array::from_fn(|k| coordinate.gradient[k] * (stiffness * weights.stiffness) + varies[k] * damping);
         for row in 0..4 {
             out.add_force(row, coordinate.gradient[row] * (stiffness * coordinate.value));
             for column in 0..4 {

@@ -1,8 +1,8 @@
 //! What acts on the state instead of the forces: supports and prescribed motions.
 
-use crate::system::{StageKind, StageSet};
 use super::history::History;
 use crate::system::{Direction, Slot, State};
+use crate::system::{StageKind, StageSet};
 use crate::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;

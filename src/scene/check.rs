@@ -57,7 +57,8 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Inertia and gravity need mass.
 fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let inertia = |s: &deck::Stage| matches!(s.body, StageBody::Dynamic { .. } | StageBody::Modal { .. }) || s.frame.is_some();
+    let inertia =
+        |s: &deck::Stage| matches!(s.body, StageBody::Dynamic { .. } | StageBody::Modal { .. }) || s.frame.is_some();
     let dynamic = deck.stages.iter().any(inertia);
     let weighed = deck.gravity.as_ref().is_some_and(|g| g.value != [0.0; 3]);
     if !dynamic && !weighed {

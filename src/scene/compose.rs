@@ -15,8 +15,8 @@ use crate::effect::link::{self, Links};
 use crate::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::rigid_body::{Body, RigidBody};
-use crate::effect::rotating_frame::RotatingFrame;
 use crate::effect::rotary_inertia::RotaryInertia;
+use crate::effect::rotating_frame::RotatingFrame;
 use crate::effect::section_inertia::SectionInertia;
 use crate::effect::spring::{self, Spring};
 use crate::effect::strain_rate_damping::StrainRateDamping;
@@ -323,14 +323,16 @@ impl Composer<'_> {
             let about = match &frame.about {
                 None => Vec3::ZERO,
                 Some(deck::Spanned { value: deck::PointRef::Coordinates(x), .. }) => Vec3(*x),
-                Some(deck::Spanned { value: deck::PointRef::Name(name), span }) => match names::point(self.deck, name) {
-                    Some(place) => place,
-                    None => {
-                        let name = deck::Spanned { value: name.clone(), span: span.clone() };
-                        self.diagnostics.push(names::unknown("point", &name, names::points(self.deck)));
-                        continue;
+                Some(deck::Spanned { value: deck::PointRef::Name(name), span }) => {
+                    match names::point(self.deck, name) {
+                        Some(place) => place,
+                        None => {
+                            let name = deck::Spanned { value: name.clone(), span: span.clone() };
+                            self.diagnostics.push(names::unknown("point", &name, names::points(self.deck)));
+                            continue;
+                        }
                     }
-                },
+                }
             };
             self.out.effects.push(Arc::new(RotatingFrame {
                 stage: *number,
@@ -362,7 +364,10 @@ impl Composer<'_> {
                 let own = found[k].turned(s.axes);
                 let without = relative || !(rotary || eccentric);
                 let own = if without { Inertia { about_node: Mat3::ZERO, ..own } } else { own };
-                (own, element.nodes.iter().zip(&s.shape).fold(Vec3::ZERO, |sum, (&n, &w)| sum + mesh.nodes[n].place * w))
+                (
+                    own,
+                    element.nodes.iter().zip(&s.shape).fold(Vec3::ZERO, |sum, (&n, &w)| sum + mesh.nodes[n].place * w),
+                )
             });
         });
         (elements, [nodal.bodies(self.mesh), self.out.bodies.clone()].concat())
@@ -702,7 +707,8 @@ impl Composer<'_> {
 
 /// Inertia is there for dynamic stages, and where momenta are looked at.
 fn needs_mass(deck: &Deck) -> bool {
-    let inertia = |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
+    let inertia =
+        |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
     let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
     let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
     let expected = deck.expects.iter().any(|expect| match &expect.body {

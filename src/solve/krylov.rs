@@ -56,7 +56,8 @@ pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option
         let guard = wanted + BLOCK;
         let now = space.eigenvalues(operator, guard);
         let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= FOUND * a.norm();
-        let still = now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
+        let still =
+            now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
         if still || space.basis.len() >= most {
             return Some(now.into_iter().take(wanted).collect());
         }

@@ -87,7 +87,8 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     let values = &values[..pattern.nonzeros()];
     let bound = SYMMETRY * values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     (0..pattern.equations.count() as u32).all(|column| {
-        let entries = pattern.column_starts[column as usize] as usize..pattern.column_starts[column as usize + 1] as usize;
+        let entries =
+            pattern.column_starts[column as usize] as usize..pattern.column_starts[column as usize + 1] as usize;
         entries.into_iter().all(|k| {
             let mirror = pattern.find(column, pattern.rows[k]).map_or(0.0, |place| values[place]);
             (values[k] - mirror).abs() <= bound

@@ -1,6 +1,6 @@
 //! Every deck in `decks/` holds its own expectations.
 
-use beamsim::drive::{Failure, Observer, Run, Snapshot};
+use beamsim::drive::{Failure, Mode, Observer, Run, Snapshot};
 use beamsim::scene;
 use beamsim::study::{Recorder, judge};
 use std::path::{Path, PathBuf};
@@ -10,6 +10,16 @@ struct Watcher(Recorder);
 impl Observer for Watcher {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
         self.0.row(snapshot);
+        Ok(())
+    }
+
+    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
+        self.0.modes(modes);
+        Ok(())
+    }
+
+    fn buckling(&mut self, _stage: usize, loads: &[f64]) -> Result<(), Failure> {
+        self.0.buckling(loads);
         Ok(())
     }
 }
@@ -59,6 +69,27 @@ fn scenes_of_the_paper_hold() {
 #[test]
 fn cases_of_other_programs_hold() {
     all_hold("decks/peers", 30);
+}
+
+#[test]
+fn paths_and_critical_loads_hold() {
+    all_hold("decks/paths", 20);
+    all_hold("decks/paths/euler_columns", 7);
+}
+
+#[test]
+fn modes_hold() {
+    all_hold("decks/modes", 18);
+}
+
+#[test]
+fn joints_hold() {
+    all_hold("decks/joints", 25);
+}
+
+#[test]
+fn prestress_holds() {
+    all_hold("decks/prestress", 6);
 }
 
 #[test]
