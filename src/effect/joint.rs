@@ -176,96 +176,98 @@ impl Instance {
         self.add_drive(at, &ends, weights, out);
     }
 
-    /// A spring and a damper on the free direction.
+    /// A spring and a damper on the free direction x: f = (k x + c dx/dt) dx/dq.
     fn add_drive(&self, at: &State, ends: &[End; 2], weights: Weights, out: &mut ElementSystem) {
         let Drive { stiffness, damping, motor } = self.drive;
         if motor.is_some() || (stiffness == 0.0 && damping == 0.0) {
             return;
         }
-        // The force, what it acts along at each block, and how it varies.
         let coordinate = self.coordinate(at, ends);
-        let (rate, varies) = if damping == 0.0 { (0.0, [Vec3::ZERO; 4]) } else { self.rate(at, ends, weights) };
-        let force = stiffness * coordinate.value + damping * rate;
-        let variation: [Vec3; 4] =
-            std::array::from_fn(|k| coordinate.gradient[k] * (stiffness * weights.stiffness) + varies[k] * damping);
+        let Rate { rate, over_rate, over_unknown } = self.rate(at, &coordinate);
         for row in 0..4 {
-            out.add_force(row, coordinate.gradient[row] * (stiffness * coordinate.value));
+            let along = coordinate.gradient[row];
+            out.add_force(row, along * (stiffness * coordinate.value));
             for column in 0..4 {
-                out.add_tangent(row, column, coordinate.gradient[row].outer(variation[column]));
+                let unknown = coordinate.gradient[column] * stiffness + over_unknown[column] * damping;
+                let varies = unknown * weights.stiffness + over_rate[column] * (damping * weights.damping);
+                let bent = coordinate.hessian.tangent_block(row, column);
+                let force = stiffness * coordinate.value + damping * rate;
+                out.add_tangent(row, column, along.outer(varies) + bent.scale(force * weights.stiffness));
             }
-        }
-        if weights.stiffness == 0.0 {
-            return;
-        }
-        if self.is_prismatic() {
-            let mut own = ElementSystem::new(block::COUNT);
-            let along = Vec3([force, 0.0, 0.0]);
-            add_along(&self.axes, &self.arms, ends, along, (weights.stiffness, 0.0), &mut own);
-            for row in 0..4 {
-                for column in 0..4 {
-                    out.add_tangent(row, column, own.tangent_block(row, column));
-                }
-            }
-        } else {
-            let moment = self.axes.column(0) * (force * weights.stiffness);
-            out.add_tangent(block::P_A, block::P_A, -ends[0].rotation.c2(moment));
-            out.add_tangent(block::P_B, block::P_B, ends[1].rotation.c2(moment));
         }
     }
 
     /// The forces of the damper on u_A, P_A, u_B, P_B.
     fn drag(&self, at: &State) -> [Vec3; 4] {
-        let ends = self.ends(at);
-        let (rate, _) = self.rate(at, &ends, Weights::NONE);
-        self.coordinate(at, &ends).gradient.map(|gradient| gradient * (self.drive.damping * rate))
+        let coordinate = self.coordinate(at, &self.ends(at));
+        let rate = self.rate(at, &coordinate).rate;
+        coordinate.gradient.map(|gradient| gradient * (self.drive.damping * rate))
     }
 
-    /// The angle or slide along the free direction, with its gradient over u_A, P_A, u_B, P_B.
+    /// The angle or slide along the free direction, with its first and second derivatives over u_A, P_A, u_B, P_B.
     fn coordinate(&self, at: &State, ends: &[End; 2]) -> Coordinate {
-        let [a, b] = ends;
         if self.is_prismatic() {
-            let value = slides(&self.axes, &self.arms, a, b).0[0];
             let mut own = ElementSystem::new(block::COUNT);
-            add_along(&self.axes, &self.arms, ends, Vec3::UNIT[0], (0.0, 0.0), &mut own);
-            return Coordinate { value, gradient: [0, 1, 2, 3].map(|k| own.force_block(k)) };
+            add_along(&self.axes, &self.arms, ends, Vec3::UNIT[0], (1.0, 0.0), &mut own);
+            return Coordinate {
+                value: slides(&self.axes, &self.arms, &ends[0], &ends[1]).0[0],
+                gradient: [0, 1, 2, 3].map(|k| own.force_block(k)),
+                hessian: own,
+            };
         }
-        let raw = self.raw_angle(ends);
         let before = self.angle.map_or(0.0, |number| at.angles[number]);
-        let value = raw + 2.0 * PI * ((before - raw) / (2.0 * PI)).round();
-        let axis = self.axes.column(0);
-        let gradient = [Vec3::ZERO, -a.rotation.t.transpose_mul(axis), Vec3::ZERO, b.rotation.t.transpose_mul(axis)];
-        Coordinate { value, gradient }
+        let coordinate = self.angle_of(ends);
+        let turns = ((before - coordinate.value) / (2.0 * PI)).round();
+        Coordinate { value: coordinate.value + 2.0 * PI * turns, ..coordinate }
     }
 
-    fn raw_angle(&self, ends: &[End; 2]) -> f64 {
+    /// The angle atan2(s, c) between e_2 of A and of B, with c = (R_A e_2).(R_B e_2), s = -(R_A e_2).(R_B e_3):
+    ///
+    /// ```text
+    /// r^2 dx = c ds - s dc,   r^2 d2x = c d2s - s d2c + ds dc' - dc ds' - 2 dx (c dc' + s ds'),   r^2 = c^2 + s^2
+    /// ```
+    fn angle_of(&self, ends: &[End; 2]) -> Coordinate {
         let e = |k: usize| self.axes.column(k);
-        let [a, b] = ends;
-        libm::atan2(-cosine((e(1), e(2)), a, b), cosine((e(1), e(1)), a, b))
-    }
-
-    /// The rate of the angle or slide, and its weighted derivatives over the unknowns and their rates.
-    fn rate(&self, at: &State, ends: &[End; 2], weights: Weights) -> (f64, [Vec3; 4]) {
-        let mut varies = [Vec3::ZERO; 4];
-        let gradient = self.coordinate(at, ends).gradient;
-        let axis = self.axes.column(0);
-        let mut rate = 0.0;
-        for (k, node) in self.nodes.iter().enumerate() {
-            let Some(node) = node else { continue };
-            let spin = at.spin(node.p);
-            rate += gradient[2 * k].dot(at.v[node.u as usize]);
-            varies[2 * k] = gradient[2 * k] * weights.damping;
-            if self.is_prismatic() {
-                // The gradient over spins is that over the vector with T taken out.
-                let over_spin = ends[k].rotation.t_inverse().transpose_mul(gradient[2 * k + 1]);
-                rate += over_spin.dot(spin.omega);
-                varies[2 * k + 1] = spin.omega_derivative(weights).transpose_mul(over_spin);
-            } else {
-                let sign = if k == 0 { -1.0 } else { 1.0 };
-                rate += sign * axis.dot(spin.omega);
-                varies[2 * k + 1] = spin.omega_derivative(weights).transpose_mul(axis) * sign;
+        let part = |directions: (Vec3, Vec3)| {
+            let mut own = ElementSystem::new(block::COUNT);
+            add_between(directions, ends, 1.0, (1.0, 0.0), 0, &mut own);
+            (cosine(directions, &ends[0], &ends[1]), own)
+        };
+        let ((c, dc), (s, ds)) = (part((e(1), e(1))), part((e(1), -e(2))));
+        let scale = 1.0 / (c * c + s * s);
+        let gradient: [Vec3; 4] = std::array::from_fn(|k| (ds.force_block(k) * c - dc.force_block(k) * s) * scale);
+        let mut hessian = ElementSystem::new(block::COUNT);
+        for row in 0..4 {
+            for column in 0..4 {
+                let straight = ds.tangent_block(row, column).scale(c) - dc.tangent_block(row, column).scale(s);
+                let turning = ds.force_block(row).outer(dc.force_block(column))
+                    - dc.force_block(row).outer(ds.force_block(column));
+                let growth = dc.force_block(column) * c + ds.force_block(column) * s;
+                let shrinking = gradient[row].outer(growth * 2.0);
+                hessian.add_tangent(row, column, (straight + turning - shrinking).scale(scale));
             }
         }
-        (rate, varies)
+        Coordinate { value: libm::atan2(s, c), gradient, hessian }
+    }
+
+    /// The rate of the coordinate, with its derivatives over the unknown rates and the unknowns.
+    fn rate(&self, at: &State, coordinate: &Coordinate) -> Rate {
+        let mut out = Rate { rate: 0.0, over_rate: coordinate.gradient, over_unknown: [Vec3::ZERO; 4] };
+        let mut rates = [Vec3::ZERO; 4];
+        for (k, node) in self.nodes.iter().enumerate() {
+            let Some(node) = node else { continue };
+            let turning = at.rotation_rate(node.p);
+            (rates[2 * k], rates[2 * k + 1]) = (at.v[node.u as usize], turning.rate);
+            let row = 2 * k + 1;
+            (out.over_rate[row], out.over_unknown[row]) = turning.pull_back(coordinate.gradient[row]);
+        }
+        for row in 0..4 {
+            out.rate += coordinate.gradient[row].dot(rates[row]);
+            for (column, over) in out.over_unknown.iter_mut().enumerate() {
+                *over += coordinate.hessian.tangent_block(row, column).transpose_mul(rates[row]);
+            }
+        }
+        out
     }
 
     /// Second derivatives of the gaps over time for a motion without accelerations.
@@ -310,6 +312,15 @@ impl Instance {
 struct Coordinate {
     value: f64,
     gradient: [Vec3; 4],
+    /// In the tangent
+    hessian: ElementSystem,
+}
+
+/// Its rate.
+struct Rate {
+    rate: f64,
+    over_rate: [Vec3; 4],
+    over_unknown: [Vec3; 4],
 }
 
 impl Effect for Joints {

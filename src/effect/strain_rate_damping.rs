@@ -16,7 +16,7 @@ use super::{Connection, Effect, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Stiffness, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Category, Cliques, Memory, RotationRate, Sink, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -85,36 +85,27 @@ fn matrix(stiffness: &Stiffness, factor: f64) -> [[f64; 6]; 6] {
     })
 }
 
-/// The rates of an element's unknowns by block. Where the unknowns are increments X and their rates spins, `correction`
-/// takes what a block's rate loses when X varies under a fixed spin: d(Xd)/dX = -T^-1 C1(Xd).
+/// The rates of an element's unknowns.
 struct Rates<const N: usize> {
-    rates: [[Vec3; 2]; N],
-    /// dXd/dOmega and dXd/dX of each node
-    of_spins: Option<[(Mat3, Mat3); N]>,
+    displacements: [Vec3; N],
+    rotations: [RotationRate; N],
 }
 
 impl<const N: usize> Rates<N> {
     fn new(connection: &Connection<N>, at: &State) -> Self {
-        let velocity = |slot: u32| at.v[slot as usize];
-        let nodes = connection.nodes;
-        if at.base.is_none() {
-            return Self { rates: nodes.map(|node| [velocity(node.u), velocity(node.p)]), of_spins: None };
-        }
-        let of_node = |i: usize| {
-            let (rotation, spin) = (at.rotation(nodes[i].p), velocity(nodes[i].p));
-            let inverse = rotation.t_inverse();
-            let rate = inverse * spin;
-            (rate, (inverse, -(inverse * rotation.c1(rate))))
-        };
-        let spun: [(Vec3, (Mat3, Mat3)); N] = std::array::from_fn(of_node);
         Self {
-            rates: std::array::from_fn(|i| [velocity(nodes[i].u), spun[i].0]),
-            of_spins: Some(std::array::from_fn(|i| spun[i].1)),
+            displacements: connection.nodes.map(|node| at.v[node.u as usize]),
+            rotations: connection.nodes.map(|node| at.rotation_rate(node.p)),
         }
     }
 
     fn of_block(&self, block: usize) -> Vec3 {
-        self.rates[block / 2][block % 2]
+        if block % 2 == 0 { self.displacements[block / 2] } else { self.rotations[block / 2].rate }
+    }
+
+    /// See [`RotationRate::pull_back`].
+    fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
+        if block % 2 == 0 { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }
 }
 
@@ -165,12 +156,8 @@ impl<const N: usize> UnitStresses<N> {
                 let (force, rate) = (system.force_block(b), rates.of_block(b));
                 let bent = (0..2 * N)
                     .fold(Vec3::ZERO, |sum, row| sum + system.tangent_block(row, b).transpose_mul(rates.of_block(row)));
-                let (mut over_rate, mut over_unknown) = (force, if wanted == 0.0 { Vec3::ZERO } else { bent });
-                if let (Some(spins), 1) = (&rates.of_spins, b % 2) {
-                    let (over_spin, over_increment) = spins[b / 2];
-                    over_rate = over_spin.transpose_mul(force);
-                    over_unknown += over_increment.transpose_mul(force);
-                }
+                let (over_rate, lost) = rates.pull_back(b, force);
+                let over_unknown = lost + if wanted == 0.0 { Vec3::ZERO } else { bent };
                 UnitBlock { force, over_rate, over_unknown, part: force.dot(rate) }
             };
             let blocks: Vec<UnitBlock> = (0..2 * N).map(block).collect();

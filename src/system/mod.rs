@@ -10,4 +10,4 @@ pub use assembly::{Category, Sink, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use pattern::{Cliques, Pattern};
 pub use stage::{StageContext, StageKind, StageSet};
-pub use state::{Memory, Node, Slot, State};
+pub use state::{Memory, Node, RotationRate, Slot, State};

@@ -96,6 +96,18 @@ impl State {
         }
     }
 
+    /// The rate of the unknown at a rotation slot.
+    pub fn rotation_rate(&self, slot: Slot) -> RotationRate {
+        let given = self.v[slot as usize];
+        if self.base.is_none() {
+            return RotationRate { rate: given, over_spin: None };
+        }
+        let rotation = self.rotation(slot);
+        let inverse = rotation.t_inverse();
+        let rate = inverse * given;
+        RotationRate { rate, over_spin: Some((inverse, -(inverse * rotation.c1(rate)))) }
+    }
+
     /// The spin at a slot.
     #[inline]
     pub fn spin(&self, slot: Slot) -> Spin {
@@ -117,6 +129,26 @@ impl State {
             p: self.q[p],
             p_rate: self.v[p],
             p_rate2: self.a[p],
+        }
+    }
+}
+
+/// The rate of a rotation's unknown. Where that is an increment X and the state holds spins, Xd = T^-1 Omega depends on both.
+#[derive(Clone, Copy, Debug)]
+pub struct RotationRate {
+    /// Pd or Xd
+    pub rate: Vec3,
+    /// dXd/dOmega = T^-1 and dXd/dX = -T^-1 C1(Xd)
+    over_spin: Option<(Mat3, Mat3)>,
+}
+
+impl RotationRate {
+    /// What the derivative of something over the rate of the unknown means for the unknown rate of the state, and for the
+    /// unknown itself.
+    pub fn pull_back(&self, over_rate: Vec3) -> (Vec3, Vec3) {
+        match &self.over_spin {
+            None => (over_rate, Vec3::ZERO),
+            Some((spin, increment)) => (spin.transpose_mul(over_rate), increment.transpose_mul(over_rate)),
         }
     }
 }

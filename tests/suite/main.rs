@@ -1,5 +1,6 @@
 //! The tests of the whole, in one binary.
 
+mod assembled;
 mod bad_decks;
 mod coefficients;
 mod command;
@@ -9,6 +10,7 @@ mod decks;
 mod dual;
 mod failures;
 mod invariance;
+mod joints;
 mod layers;
 mod random;
 mod relative;

@@ -80,7 +80,7 @@ fn alternating(scheme: Scheme, h: f64) -> [f64; 3] {
     let mut model = scene.plan.model;
     let mut state = model.rest();
     let equations = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
-    let mut assembly = Assembly::new(model.acting(StageKind::Dynamic), equations, model.slots.len());
+    let mut assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, model.slots.len());
     let solver = LinearSolver::new(&assembly.system.pattern).unwrap();
     let mut newton = Newton::new(Convergence { tolerance: 1e-12 }, 25, solver, &assembly.system);
     let (mut time, mut before, mut work) = (0.0, h, Work::default());

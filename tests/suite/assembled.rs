@@ -1,0 +1,180 @@
+//! The assembled tangent of whole scenes against differences of their assembled forces: what dual numbers do not reach, such
+//! as dampers, wound springs and effects over increments.
+
+use crate::random::Random;
+use beamsim::kernel::Weights;
+use beamsim::model::{Assembly, Model, StageKind, charts, increments};
+use beamsim::scene;
+use beamsim::system::State;
+
+const SECTION: &str = r#"
+[point]
+root = [0, 0, 0]
+knee = [1, 0.2, 0]
+tip = [1.4, 1, 0.3]
+away = [2, 1, 1]
+[section.s]
+EA = 40
+GA = [30, 25]
+GJ = 6
+EI = [7, 5]
+rhoA = 1.3
+rhoJ = [0.4, 0.3, 0.2]
+[[support]]
+at = "root"
+fix = "pin"
+[[stage]]
+kind = "dynamic"
+end = 1
+step = 0.1
+"#;
+
+fn beams(interpolation: &str, order: usize) -> String {
+    let beam = |name: &str, ends: &str| {
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = [{ends}]\nelements = 1\norder = {order}\n\
+             interpolation = \"{interpolation}\"\nfree_strain = [0.1, 0, 0, 0.2, 0.1, 0]\n"
+        )
+    };
+    beam("a", "\"root\", \"knee\"") + &beam("b", "\"knee\", \"tip\"")
+}
+
+/// Everything that acts.
+const EXTRAS: &str = r#"
+[damping]
+mass = 0.3
+stiffness = 0.2
+[[joint]]
+kind = "revolute"
+at = "knee"
+beams = ["a", "b"]
+axis = [0.2, 0.1, 1]
+stiffness = 3
+damping = 0.7
+[[spring]]
+at = "tip"
+stiffness = [3, 2, 1, 0.4, 0.5, 0.6]
+damping = [0.3, 0.2, 0.1, 0.4, 0.2, 0.3]
+[[spring]]
+between = ["root", "tip"]
+stiffness = 2
+damping = 0.4
+length = 1
+[[body]]
+at = "tip"
+mass = 2
+inertia = [0.3, 0.4, 0.5]
+offset = [0.1, -0.2, 0.1]
+[[body]]
+at = "away"
+mass = 1
+inertia = [0.2, 0.3, 0.1]
+[[joint]]
+kind = "rigid"
+nodes = ["tip", "away"]
+[[load]]
+at = "tip"
+force = [1, 2, 3]
+moment = [0.4, 0.2, 0.1]
+frame = "body"
+[[load]]
+at = "tip"
+moment = [0.1, 0.3, 0.2]
+"#;
+
+fn scene_of(text: &str) -> (Model, State, Assembly) {
+    let (scene, _) = scene::from_text(text).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
+    let mut model = scene.plan.model;
+    let mut state = model.rest();
+    let equations = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
+    let assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, model.slots.len());
+    model.set_clock(&mut state, 0.3, 1.0);
+    (model, state, assembly)
+}
+
+fn scatter(assembly: &Assembly, x: &[f64], field: &mut [beamsim::tensor::Vec3], factor: f64) {
+    let mut whole = vec![beamsim::tensor::Vec3::ZERO; field.len()];
+    assembly.system.pattern.equations.scatter(x, None, &mut whole);
+    field.iter_mut().zip(whole).for_each(|(f, w)| *f += w * factor);
+}
+
+fn forces(assembly: &mut Assembly, state: &State, count: usize) -> Vec<f64> {
+    assembly.evaluate(state, Weights::NONE, None);
+    let mut out = vec![0.0; count];
+    assembly.system.right_hand_side(&mut out);
+    out.iter().map(|v| -v).collect()
+}
+
+fn tangent_holds(text: &str, incremental: bool, seed: u64) {
+    let mut random = Random::new(seed);
+    let (model, mut state, mut assembly) = scene_of(text);
+    let count = assembly.system.pattern.equations.count();
+    let numbers =
+        |random: &mut Random, half: f64| -> Vec<f64> { (0..count).map(|_| random.range(-half, half)).collect() };
+    // Somewhere, moving, and wound as the rotations are.
+    for (field, size) in [(0, 0.4), (1, 1.0), (2, 1.0)] {
+        let x = numbers(&mut random, size);
+        let field = [&mut state.q, &mut state.v, &mut state.a][field].as_mut_slice();
+        scatter(&assembly, &x, field, 1.0);
+    }
+    for &slot in &model.rotations {
+        state.wound[slot as usize] = state.q[slot as usize];
+    }
+    charts::freeze(&mut state, &model.elements);
+    if incremental {
+        increments::begin(&mut state, &model.rotations);
+        let x = numbers(&mut random, 0.3);
+        scatter(&assembly, &x, &mut state.q, 1.0);
+    }
+    for weights in [Weights::STIFFNESS, Weights::DAMPING, Weights { stiffness: 1.0, damping: 2.0, mass: 3.0 }] {
+        let x = numbers(&mut random, 1.0);
+        assembly.evaluate(&state, weights, None);
+        let values = assembly.system.values.clone();
+        let got = assembly.system.multiply(&values, &x);
+        let h = 1e-5;
+        let mut moved = |side: f64| {
+            let mut there = state.clone();
+            scatter(&assembly, &x, &mut there.q, side * h * weights.stiffness);
+            scatter(&assembly, &x, &mut there.v, side * h * weights.damping);
+            scatter(&assembly, &x, &mut there.a, side * h * weights.mass);
+            forces(&mut assembly, &there, count)
+        };
+        let (after, before) = (moved(1.0), moved(-1.0));
+        let exact: Vec<f64> = after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * h)).collect();
+        let scale = exact.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for k in 0..count {
+            let direction = assembly.system.pattern.equations.direction(k);
+            let name = &model.slots[direction.slot as usize];
+            assert!(
+                (got[k] - exact[k]).abs() <= 1e-8 * scale,
+                "{weights:?}, {} {:?}: {} instead of {} where {scale} is the largest",
+                name.node,
+                name.kind,
+                got[k],
+                exact[k]
+            );
+        }
+    }
+}
+
+#[test]
+fn everything_together_over_total_vectors() {
+    for order in 1..=3 {
+        tangent_holds(&(beams("total", order) + SECTION + EXTRAS), false, 31 + order as u64);
+    }
+}
+
+#[test]
+fn everything_together_with_relative_beams() {
+    for order in 1..=3 {
+        tangent_holds(&(beams("relative", order) + SECTION + EXTRAS), false, 41 + order as u64);
+    }
+}
+
+#[test]
+fn everything_together_over_increments() {
+    let lie = SECTION.replace("step = 0.1", "step = 0.1\nscheme = \"lie_generalized_alpha\"");
+    for order in 1..=3 {
+        tangent_holds(&(beams("relative", order) + &lie + EXTRAS), true, 51 + order as u64);
+    }
+}

@@ -1,0 +1,241 @@
+//! Joints, dampers, links and rotating frames: forces and tangents against automatic differentiation.
+
+use crate::dual::{Dual, values, variables, with_room};
+use crate::random::Random;
+use crate::tangents::{agree, symmetric};
+use beamsim::effect::link;
+use beamsim::kernel::inertia::{Inertia, Spin, body, drag, steadily_turned};
+use beamsim::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use beamsim::kernel::volume::VolumeForce;
+use beamsim::kernel::{ElementSystem, Weights};
+use beamsim::real::Real;
+use beamsim::rotation::Rotation;
+use beamsim::system::Node;
+use beamsim::tensor::{Mat3, Vec3};
+
+/// u_A, P_A, u_B, P_B and two times three multipliers.
+type Wide = Dual<18>;
+
+const BASES: [f64; 4] = [0.0, 1.2, 3.0, 5.5];
+
+struct Scene {
+    axes: Mat3,
+    arms: [Vec3; 2],
+    fields: [Vec3; 6],
+}
+
+impl Scene {
+    fn new(random: &mut Random, base: f64) -> Self {
+        let axes = Rotation::new(random.vector(1.0)).r;
+        let p = [random.vector(base), random.vector(base)];
+        let fields = [random.cube(1.0), p[0], random.cube(1.0), p[1], random.cube(2.0), random.cube(2.0)];
+        Self { axes, arms: [random.cube(0.5), random.cube(0.5)], fields }
+    }
+
+    fn ends<T: Real>(&self, fields: &[Vec3<T>; 6]) -> [End<T>; 2] {
+        let end = |k: usize| End { place: fields[2 * k], rotation: Rotation::new(fields[2 * k + 1]) };
+        [end(0), end(1)]
+    }
+
+    fn lifted(&self) -> [Vec3<Wide>; 6] {
+        std::array::from_fn(|k| variables(self.fields[k], 3 * k))
+    }
+
+    /// lambda . gaps, in the order of the blocks.
+    fn lagrangian<T: Real>(&self, fields: &[Vec3<T>; 6]) -> T {
+        let [a, b] = self.ends(fields);
+        let along = slides(&self.axes, &self.arms, &a, &b);
+        let mut sum = along.dot(fields[4]);
+        for (k, (i, j)) in [(0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
+            let e = |k: usize| Vec3::constant(self.axes.column(k));
+            sum += cosine((e(i), e(j)), &a, &b) * fields[5].0[k];
+        }
+        sum
+    }
+
+    fn system<T: Real>(&self, fields: &[Vec3<T>; 6], weight: f64) -> ElementSystem<T> {
+        let mut out = ElementSystem::new(block::COUNT);
+        let ends = self.ends(fields);
+        add_along(&self.axes, &self.arms, &ends, fields[4], (weight, weight), &mut out);
+        out.add_force(block::ALONG, slides(&self.axes, &self.arms, &ends[0], &ends[1]));
+        let mut gaps = Vec3::zero();
+        for (k, (i, j)) in [(0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
+            let e = |k: usize| Vec3::constant(self.axes.column(k));
+            add_between((e(i), e(j)), &ends, fields[5].0[k], (weight, weight), k, &mut out);
+            gaps.0[k] = cosine((e(i), e(j)), &ends[0], &ends[1]);
+        }
+        out.add_force(block::BETWEEN, gaps);
+        out
+    }
+}
+
+fn exact(force: &[Wide]) -> Vec<f64> {
+    force.iter().flat_map(|f| f.partials.to_vec()).collect()
+}
+
+#[test]
+fn joints_are_derivatives_of_their_gaps() {
+    with_room(|| {
+        let mut random = Random::new(1200);
+        for base in BASES {
+            for _ in 0..5 {
+                let scene = Scene::new(&mut random, base);
+                let system = scene.system(&scene.fields, 1.0);
+                let energy = scene.lagrangian(&scene.lifted());
+                let what = format!("joint around |P| = {base}");
+                agree(&format!("forces, {what}"), system.force(), &energy.partials, 1e-12);
+                let force = scene.system(&scene.lifted(), 0.0);
+                agree(&format!("tangent, {what}"), system.tangent(), &exact(force.force()), 1e-12);
+                symmetric(&what, system.tangent(), 1e-12);
+            }
+        }
+    });
+}
+
+#[test]
+fn cables_pull_along_themselves() {
+    let node = Node { u: 0, p: 1 };
+    let mut random = Random::new(1300);
+    for tension_only in [false, true] {
+        for _ in 0..20 {
+            let length = random.range(0.2, 1.6);
+            let link = link::Instance {
+                nodes: [node, node],
+                places: [Vec3::ZERO; 2],
+                stiffness: 3.0,
+                damping: 0.7,
+                length,
+                tension_only,
+                amplitude: 0,
+            };
+            let (d, rate) = (random.direction(), random.cube(2.0));
+            let pull = link.pull(d, rate);
+            let moving: (Vec3<Dual<6>>, Vec3<Dual<6>>) = (variables(d, 0), variables(rate, 3));
+            let wide = link.pull(moving.0, moving.1);
+            let total = wide.elastic + wide.damping;
+            let over = |first: usize| -> Vec<f64> {
+                total.0.iter().flat_map(|c| c.partials[first..first + 3].to_vec()).collect()
+            };
+            let entries = |m: Mat3| -> Vec<f64> { m.0.iter().flatten().copied().collect() };
+            if tension_only && length >= 1.0 {
+                assert_eq!(values(total), Vec3::ZERO, "a slack cable pulls");
+                continue;
+            }
+            agree("cable over its place", &entries(pull.over_place), &over(0), 1e-12);
+            agree("cable over its velocity", &entries(pull.over_velocity), &over(3), 1e-12);
+        }
+    }
+}
+
+/// u, P and their first and second rates as the variables of three evaluations.
+type Six = Dual<6>;
+
+const WEIGHTS: [Weights; 4] =
+    [Weights::STIFFNESS, Weights::DAMPING, Weights::MASS, Weights { stiffness: 0.7, damping: 3.0, mass: 11.0 }];
+
+fn volume_tangent(force: &VolumeForce) -> Vec<f64> {
+    let mut system = ElementSystem::new(2);
+    force.write(&mut system);
+    system.tangent().to_vec()
+}
+
+fn weighted(forces: [VolumeForce<Six>; 3], weights: Weights) -> Vec<f64> {
+    let factors = [weights.stiffness, weights.damping, weights.mass];
+    let component = |f: &VolumeForce<Six>, row: usize| if row < 3 { f.u.0[row] } else { f.p.0[row - 3] };
+    let entry = |row: usize, column: usize| -> f64 {
+        (0..3).map(|k| factors[k] * component(&forces[k], row).partials[column]).sum()
+    };
+    (0..36).map(|k| entry(k / 6, k % 6)).collect()
+}
+
+fn some_inertia(random: &mut Random) -> Inertia {
+    Inertia { mass: 1.7, offset: random.vector(0.4), about_node: random.positive_definite() }
+}
+
+#[test]
+fn drag_and_its_tangent_agree() {
+    let mut random = Random::new(1400);
+    for base in BASES {
+        let inertia = some_inertia(&mut random);
+        let (p, v, w) = (random.vector(base), random.cube(2.0), random.cube(2.0));
+        let wide = |moving: usize| {
+            let pick =
+                |k: usize, x: Vec3, first: usize| if k == moving { variables(x, first) } else { Vec3::constant(x) };
+            let spin = Spin::new(pick(0, p, 3), pick(1, w, 3), Vec3::zero());
+            drag(&inertia, pick(1, v, 0), &spin, 0.6, Weights::NONE)
+        };
+        let forces = [wide(0), wide(1), wide(2)];
+        for weights in WEIGHTS {
+            let got = drag(&inertia, v, &Spin::new(p, w, Vec3::ZERO), 0.6, weights);
+            agree(
+                &format!("drag around {base}, {weights:?}"),
+                &volume_tangent(&got),
+                &weighted(forces, weights),
+                1e-12,
+            );
+        }
+    }
+}
+
+/// A body whose unknown rates are its spin and the rate of it, as increments have them.
+#[test]
+fn bodies_with_spins_for_rates_agree() {
+    let mut random = Random::new(1500);
+    for base in BASES {
+        let inertia = some_inertia(&mut random);
+        let before = Rotation::new(random.vector(2.0)).r;
+        let (x, a) = (random.vector(base), random.cube(2.0));
+        let (omega, acceleration) = (random.cube(2.0), random.cube(2.0));
+        let wide = |moving: usize| {
+            let pick =
+                |k: usize, x: Vec3, first: usize| if k == moving { variables(x, first) } else { Vec3::constant(x) };
+            let rotation = Rotation::new(pick(0, x, 3)).after(Mat3::constant(before));
+            let spin = Spin::direct(rotation, pick(1, omega, 3), pick(2, acceleration, 3));
+            body(&inertia, pick(2, a, 0), &spin, Weights::NONE)
+        };
+        let forces = [wide(0), wide(1), wide(2)];
+        for weights in WEIGHTS {
+            let rotation = Rotation::new(x).after(before);
+            let got = body(&inertia, a, &Spin::direct(rotation, omega, acceleration), weights);
+            let what = format!("body after a rotation around {base}, {weights:?}");
+            agree(&what, &volume_tangent(&got), &weighted(forces, weights), 1e-12);
+        }
+    }
+}
+
+/// Inertia seen from a rotating frame, against the same body seen from a frame at rest: the motions
+/// x = x0 + Q (x~ - x0), R = Q R~ of an instant at which Q = I.
+#[test]
+fn a_rotating_frame_sees_the_same_inertia() {
+    let mut random = Random::new(1600);
+    for base in BASES {
+        let inertia = some_inertia(&mut random);
+        let (p, w, arm) = (random.vector(base), random.cube(2.0), random.cube(1.0));
+        // In the frame: u, P with rates; seen from rest by the rules of relative motion.
+        let seen = |u: Vec3<Six>, v: Vec3<Six>, a: Vec3<Six>, p: Vec3<Six>, pd: Vec3<Six>, pdd: Vec3<Six>| {
+            let (w, arm) = (Vec3::constant(w), Vec3::constant(arm) + u);
+            let relative = Spin::new(p, pd, pdd);
+            let carried = relative.rotation.r.transpose_mul(w);
+            let omega = relative.omega + carried;
+            let acceleration = relative.acceleration - relative.omega.cross(carried);
+            let total = a + w.cross(v).scale(2.0) + w.cross(w.cross(arm));
+            let direct = Spin::direct(relative.rotation, omega, acceleration);
+            body(&inertia, total, &direct, Weights::NONE)
+        };
+        let o = Vec3::constant(Vec3::ZERO);
+        let (zero, c) = (Vec3::ZERO, Vec3::<Six>::constant(p));
+        let forces = [
+            seen(variables(zero, 0), o, o, variables(p, 3), o, o),
+            seen(o, variables(zero, 0), o, c, variables(zero, 3), o),
+            seen(o, o, variables(zero, 0), c, o, variables(zero, 3)),
+        ];
+        for weights in WEIGHTS {
+            let got = steadily_turned(&inertia, (w, arm), &Rotation::new(p), weights);
+            let what = format!("rotating frame around {base}, {weights:?}");
+            let force = [got.u.0, got.p.0].concat();
+            let expected = [values(forces[0].u).0, values(forces[0].p).0].concat();
+            agree(&format!("force, {what}"), &force, &expected, 1e-12);
+            agree(&what, &volume_tangent(&got), &weighted(forces, weights), 1e-12);
+        }
+    }
+}
