@@ -5,7 +5,7 @@
 
 use beamsim::drive::{Failure, Observer, Run, Snapshot};
 use beamsim::kernel::ElementSystem;
-use beamsim::model::{Assembly, Model, StageKind};
+use beamsim::model::{Assembly, Model, StageContext, StageKind};
 use beamsim::scene;
 use std::hint::black_box;
 use std::time::Instant;
@@ -38,7 +38,7 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
     let mut model = model.clone();
     let state = model.rest();
     let Ok(equations) = model.begin_stage(0, kind, &state) else { return 0.0 };
-    let effects = model.acting(kind);
+    let effects = model.acting(&StageContext { number: 0, kind, rotating: false });
     let shapes: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
     let mut assembly = Assembly::new(effects.clone(), equations, model.slots.len());
     let mut scatter = || {

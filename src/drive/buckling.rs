@@ -142,7 +142,7 @@ impl Run<'_> {
                 self.model.remember(&mut self.state);
                 self.good.copy_from(&self.state);
                 done = next;
-                part = 2.0 * part;
+                part *= 2.0;
             } else {
                 self.state.copy_from(&self.good);
                 part *= 0.25;
@@ -258,7 +258,7 @@ impl Search {
         let (from, beyond) = (self.here.load, self.beyond?);
         let between = (self.estimate - from) * self.way > 0.0 && (beyond - self.estimate) * self.way > 0.0;
         let closed = (beyond - from).abs() <= CLOSED * beyond.abs();
-        closed.then(|| if between { self.estimate } else { 0.5 * (from + beyond) })
+        closed.then_some(if between { self.estimate } else { 0.5 * (from + beyond) })
     }
 
     /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the

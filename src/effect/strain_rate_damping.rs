@@ -100,12 +100,12 @@ impl<const N: usize> Rates<N> {
     }
 
     fn of_block(&self, block: usize) -> Vec3 {
-        if block % 2 == 0 { self.displacements[block / 2] } else { self.rotations[block / 2].rate }
+        if block.is_multiple_of(2) { self.displacements[block / 2] } else { self.rotations[block / 2].rate }
     }
 
     /// See [`RotationRate::pull_back`].
     fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
-        if block % 2 == 0 { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
+        if block.is_multiple_of(2) { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }
 }
 

@@ -154,6 +154,28 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
     }
 }
 
+/// Under a rule without dissipation multipliers and accelerations oscillate from step to step, larger than their values.
+pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diagnostics: &mut Vec<Diagnostic>) {
+    if composition.multipliers.is_empty() {
+        return;
+    }
+    use deck::SchemeWord::{GeneralizedAlpha, Hht, LieGeneralizedAlpha, Newmark};
+    for stage in &deck.stages {
+        let StageBody::Dynamic { scheme, .. } = stage.body else { continue };
+        let undamped = match scheme {
+            Newmark(_, gamma) => gamma <= 0.5,
+            Hht(alpha) => alpha == 0.0,
+            GeneralizedAlpha(rho) | LieGeneralizedAlpha(rho) => rho >= 1.0,
+        };
+        if undamped {
+            let message = "joints with multipliers need a scheme that dissipates: without, accelerations and forces of joints \
+                           oscillate from step to step";
+            let help = "take scheme = \"generalized_alpha\"; positions and rotations are right either way";
+            diagnostics.push(Diagnostic::warning(message, stage.span.clone()).help(help));
+        }
+    }
+}
+
 /// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
 /// constraint touches are held, so that the tangent stays regular.
 pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {

@@ -175,6 +175,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let expected =
         expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
+    check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
