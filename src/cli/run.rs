@@ -136,6 +136,8 @@ fn io_failure(error: std::io::Error) -> Failure {
 /// Runs a scene; with a folder it leaves its results there.
 pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
     let start = Instant::now();
+    // From here on signals are answered by the run.
+    signals::caught();
     let rows = Rows { every: scene.every, interval: scene.plan.interval };
     let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows)).transpose();
     let (history, opened) = match history {

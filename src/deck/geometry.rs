@@ -465,7 +465,7 @@ fn read_counts(context: &Context, item: &Item) -> Option<Spanned<Vec<usize>>> {
 
 fn read_interpolation(table: &Table) -> Option<InterpolationWord> {
     if !table.has("interpolation") {
-        return Some(InterpolationWord::Total);
+        return Some(InterpolationWord::Relative);
     }
     let word = table.word("interpolation", &["total", "relative"])?;
     Some(if word.value == "total" { InterpolationWord::Total } else { InterpolationWord::Relative })

@@ -15,6 +15,8 @@ use nalgebra::Complex;
 
 /// How far the state is moved along the path to see the tangent vary: lengths of the scene, and radians.
 const PROBE: f64 = 1e-5;
+/// Step over which derivatives over the load factor are taken.
+const LOAD_STEP: f64 = 1.0 / 4096.0;
 /// Looks at one critical load.
 const MOST_LOOKS: usize = 80;
 /// A critical load is known when it lies between two points of the path this near to each other, relative to itself.
@@ -37,6 +39,7 @@ impl Run<'_> {
         self.state.q = held;
         self.change_charts(None);
         self.open_account(workshop)?;
+        self.warn_out_of_balance(workshop);
         let mut loads = self.critical_loads(workshop, modes)?;
         if loads.is_empty() {
             return Err(Failure::Deck("no load of this scene takes stiffness away: nothing can buckle".into()));
@@ -70,6 +73,7 @@ impl Run<'_> {
             let target = search.target();
             self.state.copy_from(&search.here);
             self.good.copy_from(&search.here);
+            self.observer.progress(self.moment(), self.static_progress(0.5))?;
             if !self.continue_path(workshop, target) {
                 break;
             }
@@ -78,7 +82,7 @@ impl Run<'_> {
                 // Without a count of pivots the tangent itself must do.
                 self.state.copy_from(&search.here);
                 self.good.copy_from(&search.here);
-                return self.follow_nearest(workshop, search.estimate);
+                return self.follow_nearest(workshop, search.estimate, before, way);
             };
             if passed > before {
                 search.beyond = Some(target);
@@ -95,14 +99,21 @@ impl Run<'_> {
         Ok(search.estimate)
     }
 
-    /// Goes from estimate to estimate, each the critical load that looks nearest from the last.
-    fn follow_nearest(&mut self, workshop: &mut Workshop, mut critical: f64) -> Result<f64, Failure> {
+    /// Goes from estimate to estimate, each what the critical load looks like from the last.
+    fn follow_nearest(
+        &mut self,
+        workshop: &mut Workshop,
+        mut critical: f64,
+        before: usize,
+        way: f64,
+    ) -> Result<f64, Failure> {
         for _ in 0..MOST_LOOKS {
-            let near = self.critical_loads(workshop, 4)?;
-            let distance = |load: &f64| (load - self.state.load).abs();
-            let Some(nearest) = near.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
-            critical = nearest;
-            if distance(&critical) <= NEAR * critical.abs() {
+            self.observer.progress(self.moment(), self.static_progress(0.5))?;
+            let from = self.state.load;
+            let ahead = self.critical_loads(workshop, before + 4)?;
+            let Some(next) = ahead.into_iter().filter(|load| (load - from) * way > 0.0).nth(before) else { break };
+            critical = next;
+            if (critical - from).abs() <= NEAR * critical.abs() {
                 return Ok(critical);
             }
             let target = critical - 0.5 * NEAR * (critical - self.state.load).signum() * critical.abs();
@@ -139,6 +150,7 @@ impl Run<'_> {
             let load = if next == 1.0 { target } else { start + (target - start) * next };
             if self.attempt(workshop, load).is_ok() {
                 charts::freeze(&mut self.state, &self.model.elements);
+                charts::wind(&mut self.state, &self.good, &self.model.rotations);
                 self.model.remember(&mut self.state);
                 self.good.copy_from(&self.state);
                 done = next;
@@ -206,22 +218,23 @@ impl Run<'_> {
     }
 
     /// The derivative of the forces over the load factor; that of prescribed directions goes into the workshop's `lift`.
-    /// Loads and motions without a history are linear in it.
+    /// Loads and motions without a history are linear in it; the step is small, so that no motion goes around.
     pub(super) fn load_derivative(&mut self, workshop: &mut Workshop) -> Vec<Vec3> {
         let Workshop { assembly, lift, .. } = workshop;
         let mut shifted = self.state.clone();
+        let inverse = 1.0 / LOAD_STEP;
         let mut forces = |state: &State| -> Vec<Vec3> {
             assembly.evaluate(state, Weights::NONE, None);
             (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
         };
         let before = forces(&self.state);
-        self.model.set_clock(&mut shifted, self.state.time, self.state.load + 1.0);
+        self.model.set_clock(&mut shifted, self.state.time, self.state.load + LOAD_STEP);
         for ((lift, moved), q) in lift.iter_mut().zip(&mut shifted.q).zip(&self.state.q) {
-            *lift = *moved - *q;
+            *lift = (*moved - *q) * inverse;
             *moved = *q;
         }
         let after = forces(&shifted);
-        after.iter().zip(&before).map(|(after, before)| *after - *before).collect()
+        after.iter().zip(&before).map(|(after, before)| (*after - *before) * inverse).collect()
     }
 
     /// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Model;
-use crate::solve::{LinearSolver, Operator, is_symmetric, largest_eigenvalues};
+use crate::solve::{LinearSolver, Operator, is_symmetric, largest_eigenvalues, timed};
 use crate::system::System;
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -21,6 +21,8 @@ const NO_DAMPING: f64 = 1e-14;
 impl Run<'_> {
     /// The modes with the lowest frequencies.
     pub(super) fn run_modal(&mut self, workshop: &mut Workshop, modes: usize) -> Result<(), Failure> {
+        self.observer.progress(self.moment(), self.static_progress(0.0))?;
+        let moving = self.state.clone();
         self.stand_still();
         let (time, load) = (self.state.time, self.state.load);
         self.model.set_clock(&mut self.state, time, load);
@@ -30,6 +32,10 @@ impl Run<'_> {
         let matrices = self.matrices(workshop);
         let found = self.find_modes(workshop, &matrices, modes)?;
         self.count_steps();
+        // What moved moves on.
+        self.state.v.copy_from_slice(&moving.v);
+        self.state.a.copy_from_slice(&moving.a);
+        self.state.algorithmic.copy_from_slice(&moving.algorithmic);
         self.observer.modes(self.stage + 1, &found)
     }
 
@@ -40,7 +46,7 @@ impl Run<'_> {
         self.state.algorithmic.fill(Vec3::ZERO);
     }
 
-    fn warn_out_of_balance(&mut self, workshop: &mut Workshop) {
+    pub(super) fn warn_out_of_balance(&mut self, workshop: &mut Workshop) {
         workshop.assembly.forget();
         let noise = workshop.assembly.noise(&self.state);
         workshop.assembly.evaluate(&self.state, Weights::NONE, None);
@@ -65,16 +71,24 @@ impl Run<'_> {
 
     /// Twice: the second time about a shift that suits the frequencies themselves.
     fn find_modes(&mut self, workshop: &mut Workshop, matrices: &Matrices, modes: usize) -> Result<Vec<Mode>, Failure> {
+        let (moment, done) = (self.moment(), self.static_progress(0.5));
         let Workshop { assembly, newton, .. } = workshop;
         let system = &mut assembly.system;
-        let (stiffest, heaviest) = (largest(&matrices.stiffness), largest(&matrices.mass));
+        // The last value of each is rubbish.
+        let part = |values: &[f64]| largest(&values[..system.pattern.nonzeros()]);
+        let (stiffest, heaviest, dampest) = (part(&matrices.stiffness), part(&matrices.mass), part(&matrices.damping));
         if heaviest == 0.0 {
-            return Err(Failure::Deck("a modal stage needs mass: nothing in the scene has any".into()));
+            return Err(Failure::Deck("a modal stage needs mass: nothing that is free to move has any".into()));
         }
         let mut shift = FIRST_SHIFT * softest_ratio(system, matrices).unwrap_or(stiffest / heaviest).sqrt();
-        let damped = largest(&matrices.damping) > NO_DAMPING * (stiffest * heaviest).sqrt();
+        if shift == 0.0 {
+            // Nothing holds anything: every mode is a free motion.
+            shift = 1.0;
+        }
+        let damped = dampest > NO_DAMPING * (stiffest * heaviest).sqrt();
         let mut found = Vec::new();
         for look in 0..2 {
+            self.observer.progress(moment, done)?;
             let values: Vec<f64> = (0..system.values.len()).map(|k| matrices.combined(k, shift)).collect();
             system.values.copy_from_slice(&values);
             self.counters.work.factorisations += 1;
@@ -86,7 +100,8 @@ impl Run<'_> {
             let symmetric = !damped && is_symmetric(&system.pattern, &system.values);
             let mut operator = Motions { system, matrices, solver: &mut newton.solver, shift, symmetric };
             let wanted = if symmetric { modes } else { 2 * modes + 2 };
-            let Some(values) = largest_eigenvalues(&mut operator, wanted) else {
+            let found_values = timed(&mut self.counters.work.solve_seconds, || largest_eigenvalues(&mut operator, wanted));
+            let Some(values) = found_values else {
                 return Err(Failure::Limit("the modes could not be found: a solve with the tangent failed".into()));
             };
             found = if symmetric { undamped(&values, shift) } else { damped_modes(&values, shift) };
@@ -213,7 +228,7 @@ fn undamped(values: &[Complex<f64>], shift: f64) -> Vec<Mode> {
 fn damped_modes(values: &[Complex<f64>], shift: f64) -> Vec<Mode> {
     let s = values.iter().filter(|theta| theta.norm() > 0.0).map(|theta| theta.inv() + shift);
     let upper = s.filter(|s| s.im >= 0.0);
-    upper.map(|s| Mode { omega: s.im, growth: s.re }).collect()
+    upper.map(|s| Mode { omega: s.im.abs(), growth: s.re }).collect()
 }
 
 /// By frequency; of equal frequencies the more unstable first.

@@ -14,7 +14,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
-use crate::solve::{NewtonFailure, Pivots, Verdict};
+use crate::solve::{NewtonFailure, Pivots, Verdict, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -81,7 +81,15 @@ impl Run<'_> {
             if path.here.state.load < 1.0 && next.state.load >= 1.0 {
                 targets.push(Target::Load(1.0));
             }
-            let (arrived, target) = path.nearest(self, workshop, next, length, &targets);
+            let behind = next.negative;
+            let (mut arrived, mut target) = path.nearest(self, workshop, next, length, &targets);
+            if target == Some(Target::Limit) {
+                // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
+                arrived.negative = behind;
+            }
+            if targets.contains(&Target::Load(1.0)) && (target.is_none() || target == Some(Target::Load(1.0))) {
+                target = self.hit_full_load(workshop, &mut arrived).then_some(Target::Load(1.0));
+            }
             match target {
                 Some(Target::Limit) => rising = !rising,
                 Some(Target::Turning) => working = !working,
@@ -94,6 +102,16 @@ impl Run<'_> {
         }
         self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {}", self.moment()));
         Ok(())
+    }
+
+    /// From a point near it to the load factor 1 itself.
+    fn hit_full_load(&mut self, workshop: &mut Workshop, point: &mut Point) -> bool {
+        self.state.copy_from(&point.state);
+        let hit = self.attempt(workshop, 1.0).is_ok();
+        if hit {
+            point.state.copy_from(&self.state);
+        }
+        hit
     }
 
     /// What follows a point of the path: account, row, and a word where something special happened.
@@ -148,6 +166,10 @@ impl Path {
             ));
         };
         let moved = squared(run, &direction);
+        let rotated = run.model.slots.iter().zip(&direction).filter(|(info, _)| info.kind == SlotKind::Rotation);
+        let turned = rotated.map(|(_, d)| d.norm() * run.model.length).fold(0.0, f64::max);
+        // Displacements that are only round-off beside the rotations measure nothing.
+        let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
         let mut path = Self {
             here: Point {
                 state: run.state.clone(),
@@ -229,7 +251,8 @@ impl Path {
             run.state.q.copy_from_slice(&q);
             let pull = run.load_derivative(workshop);
             let Workshop { assembly, newton, lift, .. } = workshop;
-            assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift));
+            let work = &mut run.counters.work;
+            timed(&mut work.evaluation_seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
             let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last.as_deref());
             match verdict {
                 Verdict::Converged => return Ok(iteration),
@@ -248,7 +271,11 @@ impl Path {
             system.right_hand_side_without_lift(&total, &mut back);
             run.counters.work.factorisations += 1;
             run.counters.work.iterations += 1;
-            if !(newton.solver.factorise(system) && newton.solver.solve(&mut back) && newton.solver.solve(&mut along)) {
+            let solver = &mut newton.solver;
+            let solved = timed(&mut run.counters.work.solve_seconds, || {
+                solver.factorise(system) && solver.solve(&mut back) && solver.solve(&mut along)
+            });
+            if !solved {
                 return Err(NewtonFailure::Singular(newton.solver.null_vector(system)));
             }
             let (mut a, mut b) = (vec![Vec3::ZERO; q.len()], vec![Vec3::ZERO; q.len()]);

@@ -33,6 +33,10 @@ impl Stability {
         workshop.assembly.forget();
         workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
         let negative = pivots.negative(&workshop.assembly.system);
+        if negative.is_none() {
+            // Not symmetric: neither will the next be.
+            self.pivots = None;
+        }
         run.tell_stability(None, self.negative, negative);
         self.negative = negative;
     }

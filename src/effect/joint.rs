@@ -114,23 +114,19 @@ impl Instance {
         slot.map_or(Vec3::ZERO, |slot| at.q[slot as usize])
     }
 
-    /// The pairs of directions that stay normal; a motor turns that of B.
-    fn directions<T: Real>(&self, motor: T, cos_sin: impl Fn(T) -> (T, T)) -> Vec<(Vec3<T>, Vec3<T>)> {
+    /// The pairs of directions that stay normal.
+    fn pairs<T: Real>(&self) -> Vec<(Vec3<T>, Vec3<T>)> {
         let e = |k: usize| Vec3::<T>::constant(self.axes.column(k));
-        let mut pairs: Vec<_> = self.kind.normal.iter().map(|&(i, k)| (e(i), e(k))).collect();
-        if self.drive.motor.is_some() && !self.is_prismatic() {
-            let (cos, sin) = cos_sin(motor);
-            pairs.push((e(1), e(1) * sin + e(2) * cos));
-        }
-        pairs
+        self.kind.normal.iter().map(|&(i, k)| (e(i), e(k))).collect()
     }
 
     fn motor_value(&self, at: &State) -> f64 {
         self.drive.motor.map_or(0.0, |motor| motor.value * at.amplitude[motor.amplitude])
     }
 
-    fn pairs(&self, at: &State) -> Vec<(Vec3, Vec3)> {
-        self.directions(self.motor_value(at), |angle| (libm::cos(angle), libm::sin(angle)))
+    /// The row of a motor that turns, behind those of the pairs.
+    fn turning_motor(&self) -> Option<usize> {
+        (self.drive.motor.is_some() && !self.is_prismatic()).then_some(self.kind.normal.len())
     }
 
     /// The gaps, zero where nothing is held.
@@ -139,8 +135,11 @@ impl Instance {
         let slides_on = self.is_prismatic() && self.drive.motor.is_some();
         along.0[0] -= if slides_on { self.motor_value(at) } else { 0.0 };
         let mut between = Vec3::ZERO;
-        for (k, &pair) in self.pairs(at).iter().enumerate() {
+        for (k, &pair) in self.pairs().iter().enumerate() {
             between.0[k] = cosine(pair, &ends[0], &ends[1]);
+        }
+        if let Some(row) = self.turning_motor() {
+            between.0[row] = nearest_angle(self.angle_of(ends).value - self.motor_value(at));
         }
         let held = |k: usize| self.kind.held[k] || (k == 0 && slides_on);
         (Vec3([0, 1, 2].map(|k| if held(k) { along.0[k] } else { 0.0 })), between)
@@ -169,8 +168,11 @@ impl Instance {
             out.add_force(block::ALONG, along);
         }
         let multipliers = self.multipliers(at, self.between);
-        for (k, pair) in self.pairs(at).into_iter().enumerate() {
+        for (k, pair) in self.pairs().into_iter().enumerate() {
             add_between(pair, &ends, multipliers.0[k], factors, k, out);
+        }
+        if let Some(row) = self.turning_motor() {
+            self.angle_of(&ends).add_multiplier(multipliers.0[row], factors, row, out);
         }
         out.add_force(block::BETWEEN, between);
         self.add_drive(at, &ends, weights, out);
@@ -292,15 +294,14 @@ impl Instance {
         if self.is_prismatic() && self.drive.motor.is_some() {
             along.0[0] -= motor;
         }
-        let cos_sin = |angle: Jet| {
-            let (c, s) = (libm::cos(angle.value), libm::sin(angle.value));
-            let square = angle.rate * angle.rate;
-            let cos = Jet { value: c, rate: -s * angle.rate, rate2: -s * angle.rate2 - c * square };
-            (cos, Jet { value: s, rate: c * angle.rate, rate2: c * angle.rate2 - s * square })
-        };
         let mut between = [Jet::constant(0.0); 3];
-        for (k, &pair) in self.directions(motor, cos_sin).iter().enumerate() {
+        for (k, &pair) in self.pairs().iter().enumerate() {
             between[k] = cosine(pair, &ends[0], &ends[1]);
+        }
+        if let Some(row) = self.turning_motor() {
+            let e = |k: usize| Vec3::<Jet>::constant(self.axes.column(k));
+            let sine = -cosine((e(1), e(2)), &ends[0], &ends[1]);
+            between[row] = sine.atan2(cosine((e(1), e(1)), &ends[0], &ends[1])) - motor;
         }
         let rate = |v: [Jet; 3]| Vec3(v.map(|jet| jet.rate));
         let rate2 = |v: [Jet; 3]| Vec3(v.map(|jet| jet.rate2));
@@ -314,6 +315,28 @@ struct Coordinate {
     gradient: [Vec3; 4],
     /// In the tangent
     hessian: ElementSystem,
+}
+
+impl Coordinate {
+    /// Adds the forces of a multiplier on this coordinate, as [`add_between`] does on a gap.
+    fn add_multiplier(&self, multiplier: f64, (weight, couple): (f64, f64), row: usize, out: &mut ElementSystem) {
+        let mut unit = Vec3::ZERO;
+        unit.0[row] = couple;
+        for k in 0..4 {
+            out.add_force(k, self.gradient[k] * multiplier);
+            let column = self.gradient[k].outer(unit);
+            out.add_tangent(k, block::BETWEEN, column);
+            out.add_tangent(block::BETWEEN, k, column.transpose());
+            for j in 0..4 {
+                out.add_tangent(k, j, self.hessian.tangent_block(k, j).scale(multiplier * weight));
+            }
+        }
+    }
+}
+
+/// The same angle in (-pi, pi].
+fn nearest_angle(angle: f64) -> f64 {
+    angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }
 
 /// Its rate.
@@ -384,19 +407,25 @@ impl Effect for Joints {
         }
     }
 
+    fn turned(&self, from: &[f64], to: &[f64]) -> Option<(Slot, f64)> {
+        let turning = self.joints.iter().filter(|joint| joint.turning_motor().is_some());
+        let turn = |joint: &Instance| {
+            let node = joint.nodes[1].or(joint.nodes[0])?;
+            let motor = joint.drive.motor?;
+            Some((node.p, (motor.value * (to[motor.amplitude] - from[motor.amplitude])).abs()))
+        };
+        turning.filter_map(turn).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for joint in self.joints.iter().filter(|joint| joint.drive.motor.is_some()) {
             let value = joint.motor_value(at);
-            if joint.is_prismatic() {
-                // L = lambda (slide - value): what the motor gives grows with -value.
-                show(value, -joint.multipliers(at, joint.along).0[0]);
-            } else {
-                let ends = joint.ends(at);
-                let e = |k: usize| joint.axes.column(k);
-                let (c, s) = (libm::cos(value), libm::sin(value));
-                let slope = cosine((e(1), e(1) * c - e(2) * s), &ends[0], &ends[1]);
-                show(value, joint.multipliers(at, joint.between).0[joint.kind.normal.len()] * slope);
-            }
+            // L = lambda (coordinate - value): what the motor gives grows with -value.
+            let multipliers = match joint.turning_motor() {
+                Some(row) => joint.multipliers(at, joint.between).0[row],
+                None => joint.multipliers(at, joint.along).0[0],
+            };
+            show(value, -multipliers);
         }
     }
 }

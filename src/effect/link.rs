@@ -60,8 +60,12 @@ impl Instance {
         };
         let length = d.norm();
         let slack = self.tension_only && length.largest() <= self.length;
-        if slack || length.largest() == 0.0 {
+        if slack {
             return zero;
+        }
+        if length.largest() == 0.0 {
+            // No direction of its own: as if it had no length.
+            return Pull { over_place: Mat3::identity().scale(self.stiffness), ..zero };
         }
         let inverse = T::one() / length;
         let n = d * inverse;

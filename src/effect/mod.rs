@@ -23,7 +23,7 @@ pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::system::{Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
+use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, StageContext, StageKind, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// Stored energy of one state.
@@ -123,6 +123,11 @@ pub trait Effect: Send + Sync {
     /// First and second derivatives over time of the gaps that its multipliers close, for a motion without accelerations;
     /// by slot of the multipliers.
     fn drift(&self, _at: &State, _rates: &mut [Vec3], _rates2: &mut [Vec3]) {}
+
+    /// How far motors turn their nodes at once when amplitudes change: the slot that turns most, and radians.
+    fn turned(&self, _from: &[f64], _to: &[f64]) -> Option<(Slot, f64)> {
+        None
+    }
 
     /// Coordinates that are driven from outside, each with the derivative of the stored energy over it: motors, free strains.
     fn drives(&self, _at: &State, _show: &mut dyn FnMut(f64, f64)) {}

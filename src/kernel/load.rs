@@ -9,11 +9,13 @@ use crate::real::Real;
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 
-/// A moment that stays fixed in space: M_I = T^T R^T m = T m; its tangent C1(m) is not symmetric, since such a moment has
-/// no potential.
+/// A moment that stays fixed in space: M_I = T^T M with M = R^T m; its tangent C2(M) + T^T M~ T is not symmetric, since such
+/// a moment has no potential. For total vectors the two are T m and C1(m); for increments after another rotation they are not.
 #[inline(always)]
 pub fn spatial_moment<T: Real>(rotation: &Rotation<T>, moment: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
-    (-(rotation.t * moment), -rotation.c1(moment))
+    let (t, material) = (rotation.t, rotation.r.transpose_mul(moment));
+    let tangent = rotation.c2(material) + t.transpose_matmul(Mat3::skew_mul(material, t));
+    (-t.transpose_mul(material), -tangent)
 }
 
 /// A moment that turns with the section: M_I = T^T M; tangent C2(M).

@@ -22,13 +22,15 @@ pub struct Amplitude {
     course: Course,
     reached: f64,
     has_acted: bool,
+    /// The last ramp that went anywhere, over the load factor
+    grown: Option<(f64, f64)>,
 }
 
 impl Amplitude {
     /// Of a load with this history, or the default one: up with the load factor of the first static stage in which it
     /// acts, then in full; in full from the start of a dynamic stage.
     pub fn of_load(history: Option<Arc<dyn History>>, stages: StageSet) -> Self {
-        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0, has_acted: false }
+        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0, has_acted: false, grown: None }
     }
 
     /// Of something that is there or not.
@@ -46,13 +48,14 @@ impl Amplitude {
     pub fn begin_stage(&mut self, stage: usize, kind: StageKind, fresh: bool) {
         let acts = self.stages.contains(stage);
         let grows = self.is_fresh(stage);
-        self.has_acted |= acts;
+        // A modal stage only looks.
+        self.has_acted |= acts && kind != StageKind::Modal;
         self.course = match (acts, kind, &self.history) {
             (true, StageKind::Modal, _) if !self.switched => Course::Hold(self.reached),
             (true, StageKind::Buckling, _) if !self.switched => match (fresh, grows) {
                 (true, true) => Course::Ramp { from: 0.0, to: 1.0 },
-                (false, _) if matches!(self.course, Course::Ramp { .. }) => self.course,
-                _ => Course::Hold(self.reached),
+                (false, _) => self.grown.map_or(Course::Hold(self.reached), |(from, to)| Course::Ramp { from, to }),
+                (true, false) => Course::Hold(self.reached),
             },
             (true, ..) if self.switched => Course::Hold(1.0),
             (true, kind, Some(_)) => Course::History(kind),
@@ -61,6 +64,14 @@ impl Amplitude {
             (false, StageKind::Static, _) if !self.switched => Course::Ramp { from: self.reached, to: 0.0 },
             (false, ..) => Course::Hold(0.0),
         };
+        match self.course {
+            Course::Ramp { from, to } if from != to => self.grown = Some((from, to)),
+            // In full from the start of a dynamic stage: in proportion to its load factor of 1.
+            Course::Hold(_) if acts && kind == StageKind::Dynamic && !self.switched => {
+                self.grown = self.grown.or(Some((0.0, 1.0)));
+            }
+            _ => {}
+        }
     }
 
     /// Remembers where the stage ended.

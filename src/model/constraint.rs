@@ -43,6 +43,8 @@ pub struct Motion {
     /// Present course
     course: Course,
     has_acted: bool,
+    /// Where the last ramp that went anywhere started
+    grown: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +76,7 @@ impl Motion {
         history: Option<Arc<dyn History>>,
         stages: StageSet,
     ) -> Self {
-        Self { kind, slot, axis, value, history, stages, course: Course::Off, has_acted: false }
+        Self { kind, slot, axis, value, history, stages, course: Course::Off, has_acted: false, grown: None }
     }
 
     /// Settles what it does in stage number `stage`; `Err` where it would have to jump (from, to).
@@ -96,15 +98,21 @@ impl Motion {
             (StageKind::Modal, _) => Course::Hold(from),
             (StageKind::Buckling, _) => match (fresh, grows) {
                 (true, true) => Course::Ramp { from },
-                (false, _) if matches!(self.course, Course::Ramp { .. }) => self.course,
-                _ => Course::Hold(from),
+                (false, _) => self.grown.map_or(Course::Hold(from), |from| Course::Ramp { from }),
+                (true, false) => Course::Hold(from),
             },
             (kind, Some(_)) => Course::History(kind),
             (StageKind::Static, None) => Course::Ramp { from },
             (StageKind::Dynamic, None) if self.has_acted => Course::Hold(from),
             (StageKind::Dynamic, None) => Course::Hold(self.value),
         };
-        self.has_acted = true;
+        // A modal stage only looks.
+        self.has_acted |= kind != StageKind::Modal;
+        if let Course::Ramp { from } = self.course
+            && from != self.value
+        {
+            self.grown = Some(from);
+        }
         let scale = if self.kind == MotionKind::Translation { length } else { 1.0 };
         let to = self.at(state.time, 0.0)[0];
         let jumps = kind == StageKind::Dynamic && (to - from).abs() > 1e-9 * scale;

@@ -154,6 +154,7 @@ impl Model {
     /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions. Where a motion turns
     /// its node too far at once, its slot and the angle are returned.
     pub fn set_clock(&self, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
+        let before = state.amplitude.clone();
         (state.time, state.load) = (time, load);
         for (k, amplitude) in self.amplitudes.iter().enumerate() {
             let [value, rate, rate2] = amplitude.at(time, load);
@@ -161,6 +162,11 @@ impl Model {
             state.amplitude_rates[k] = [rate, rate2];
         }
         let mut too_far = None;
+        for turned in self.effects.iter().filter_map(|effect| effect.turned(&before, &state.amplitude)) {
+            if turned.1 > LARGEST_TURN {
+                too_far = Some(turned);
+            }
+        }
         for motion in &self.motions {
             let turned = motion.impose(state);
             if turned > LARGEST_TURN {

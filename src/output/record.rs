@@ -1,6 +1,6 @@
 //! run.json: what was simulated, what it took, how it ended.
 
-use crate::drive::{Counters, Failure, Moment, Place};
+use crate::drive::{Counters, Event, Failure, Moment, Place};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 
@@ -25,6 +25,7 @@ pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         "deck": scene.resolved,
         "effects": effects,
         "counters": counters(outcome.counters),
+        "events": events(outcome.counters),
         "seconds": {
             "total": outcome.seconds,
             "evaluation": outcome.counters.work.evaluation_seconds,
@@ -35,6 +36,19 @@ pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         record["failure"] = numbers(failure);
     }
     record
+}
+
+/// Limit, turning and branch points.
+fn events(counters: &Counters) -> Value {
+    let event = |event: &Event| {
+        json!({
+            "stage": event.at.stage,
+            "load": event.at.load,
+            "kind": event.kind.name(),
+            "negative_pivots": event.negative_pivots,
+        })
+    };
+    counters.events.iter().map(event).collect()
 }
 
 fn counters(counters: &Counters) -> Value {

@@ -124,7 +124,9 @@ fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         let acts = |stages: &Option<Vec<usize>>| stages.as_ref().is_none_or(|stages| stages.contains(&(number + 1)));
         let loads = deck.loads.iter().filter(|l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
         let motions = deck.motions.iter().filter(|m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
-        for history in loads.chain(motions) {
+        let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|(_, history)| history.as_ref());
+        let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
+        for history in loads.chain(motions).chain(motors).chain(strains) {
             let message = format!("{what} refuses histories: its load factor may go back");
             let diagnostic = Diagnostic::error(message, history.span.clone());
             diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));

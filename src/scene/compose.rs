@@ -452,6 +452,12 @@ impl Composer<'_> {
             }
         };
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
+        if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.held[0]) {
+            let message = "these parts share their displacement through another joint at the same point";
+            let diagnostic = Diagnostic::error(message, joint.span.clone());
+            self.diagnostics.push(diagnostic.help("give the parts points of their own, and join these"));
+            return None;
+        }
         if !sprung && motor.is_none() && shared && kind.normal.is_empty() {
             return None;
         }
@@ -571,18 +577,20 @@ impl Composer<'_> {
             let why = if mass == 0.0 { "no `mass` in [damping]" } else { "nothing moves in time" };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
+        let rotary = self.deck.effects.rotary_inertia.as_ref().is_none_or(|flag| flag.value);
         let (mut elements, mut nodal) = (ByOrder::default(), NodalInertia::default());
         self.each_element(|beam, number, element, mesh| {
             let found: Vec<MassPerLength> = element.volume.iter().map(|s| mass_at(beam, s)).collect();
             let relative = beam.interpolation == InterpolationWord::Relative;
             let eccentric = found.iter().any(|m| m.offset != Vec3::ZERO);
-            if relative {
+            if relative && (eccentric || rotary) {
                 nodal.add(beam, element, |m| if eccentric { m } else { Inertia { mass: 0.0, ..m } });
             }
             if !(relative && eccentric) {
                 push_volume(&mut elements, mesh, number, element, |k, s| {
                     let own = found[k].turned(s.axes);
-                    if relative { Inertia { about_node: Mat3::ZERO, ..own } } else { own }
+                    let without = relative || !(rotary || eccentric);
+                    if without { Inertia { about_node: Mat3::ZERO, ..own } } else { own }
                 });
             }
         });

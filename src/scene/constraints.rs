@@ -87,7 +87,11 @@ pub fn constraints(
         note(&mut held, &directions, &StageSet::default(), &connection.joint.span, "joint to ground");
         supports.push(Support { directions, stages: StageSet::default() });
         match ground_motor(deck, histories, connection, node) {
-            Ok(motor) => motions.extend(motor),
+            Ok(None) => {}
+            Ok(Some(motor)) => {
+                note(&mut held, &motor.directions(), &motor.stages, &connection.joint.span, "motion");
+                motions.push(motor);
+            }
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }

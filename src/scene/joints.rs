@@ -74,10 +74,15 @@ fn between_beams<'a>(
     beams: &[Spanned<String>],
 ) -> Option<FoundJoint<'a>> {
     let main = *mesh.points.get(&at.value)?;
+    let own = |beam: &Spanned<String>| *mesh.parted.get(&(beam.value.clone(), at.value.clone())).unwrap_or(&main);
     let nodes = match beams {
-        [_, second] => [Some(main), Some(*mesh.parted.get(&(second.value.clone(), at.value.clone()))?)],
-        _ => [None, Some(main)],
+        [first, second] => [Some(own(first)), Some(own(second))],
+        [only] => [None, Some(own(only))],
+        _ => return None,
     };
+    if nodes[0] == nodes[1] {
+        return None;
+    }
     let place = mesh.nodes[main].place;
     Some(FoundJoint { joint, nodes, arms: [Vec3::ZERO; 2], axes: axes(&joint.axes), place })
 }

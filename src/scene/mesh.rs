@@ -162,7 +162,9 @@ impl Mesh {
                     diagnostics.push(Diagnostic::error(message, second.span.clone()));
                     continue;
                 }
-                let shares = (joint.kind != JointKind::Prismatic).then_some(main);
+                // The first beam may have been parted from the point before.
+                let first = beams.first().and_then(|first| self.parted.get(&(first.value.clone(), point.clone())));
+                let shares = (joint.kind != JointKind::Prismatic).then_some(first.copied().unwrap_or(main));
                 let node = self.add_node(place, format!("{point} ({})", second.value), shares);
                 self.parted.insert(key, node);
             }

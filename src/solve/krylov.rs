@@ -27,6 +27,9 @@ const NOTHING_NEW: f64 = 1e-11;
 /// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Vec<Complex<f64>>> {
     let size = operator.size();
+    if size == 0 {
+        return Some(Vec::new());
+    }
     let most = size.min(24 * wanted + 160);
     let mut space = Space::default();
     let mut block: Vec<Vec<f64>> = Vec::new();
@@ -128,6 +131,9 @@ impl Space {
 
     fn eigenvalues(&self, operator: &dyn Operator, wanted: usize) -> Vec<Complex<f64>> {
         let n = self.projected.len();
+        if n == 0 {
+            return Vec::new();
+        }
         let entry = |i: usize, j: usize| self.projected[i][j];
         let mut values: Vec<Complex<f64>> = if operator.is_symmetric() {
             let matrix = DMatrix::from_fn(n, n, |i, j| 0.5 * (entry(i, j) + entry(j, i)));

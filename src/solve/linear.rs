@@ -139,7 +139,16 @@ fn scales(system: &System) -> Vec<f64> {
         let compared = entries.map(|k| (system.values[k], roots[system.pattern.rows[k] as usize]));
         compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
     };
-    let scale = |c: usize| if roots[c] > 0.0 { roots[c] } else { column(c).max(f64::MIN_POSITIVE) };
+    let entry = |c: usize| {
+        let entries = starts[c] as usize..starts[c + 1] as usize;
+        entries.fold(0.0_f64, |m, k| m.max(system.values[k].abs()))
+    };
+    let scale = |c: usize| match (roots[c], column(c)) {
+        (root, _) if root > 0.0 => root,
+        (_, compared) if compared > 0.0 => compared,
+        // Unknowns and multipliers that only meet each other.
+        _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
+    };
     (0..roots.len()).map(scale).collect()
 }
 

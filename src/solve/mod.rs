@@ -9,5 +9,5 @@ mod pivots;
 pub use convergence::{Convergence, Residual, Verdict};
 pub use krylov::{Operator, largest_eigenvalues};
 pub use linear::{LinearSolver, NullVector};
-pub use newton::{Newton, NewtonFailure, Work};
+pub use newton::{Newton, NewtonFailure, Work, timed};
 pub use pivots::{Pivots, is_symmetric};

@@ -24,7 +24,7 @@ pub struct Work {
 }
 
 /// Runs `part` and adds its seconds to `seconds`.
-fn timed<R>(seconds: &mut f64, part: impl FnOnce() -> R) -> R {
+pub fn timed<R>(seconds: &mut f64, part: impl FnOnce() -> R) -> R {
     let start = Instant::now();
     let result = part();
     *seconds += start.elapsed().as_secs_f64();

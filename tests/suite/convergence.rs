@@ -3,43 +3,51 @@
 use crate::scenes::{bend45, distance, simulate};
 
 /// The 45-degree bend drawn from root to tip.
-fn bend(order: usize, elements: usize) -> [f64; 3] {
-    bend45(order, elements, ["root", "tip"])
+fn bend(order: usize, elements: usize, interpolation: &str) -> [f64; 3] {
+    bend45(order, elements, ["root", "tip"], interpolation)
 }
+
+const INTERPOLATIONS: [&str; 2] = ["total", "relative"];
 
 /// The limit of fine meshes, from an independent boundary-value solution.
 const LIMIT: [f64; 3] = [-23.813908521750506, -13.728996477183344, 53.60485845715535];
 
 /// log2 of the ratio of the errors on two meshes, the second twice as fine.
-fn observed_order(order: usize, elements: usize) -> f64 {
-    let error = |n: usize| distance(bend(order, n), LIMIT);
+fn observed_order(order: usize, elements: usize, interpolation: &str) -> f64 {
+    let error = |n: usize| distance(bend(order, n, interpolation), LIMIT);
     (error(elements) / error(2 * elements)).log2()
 }
 
 #[test]
 fn two_node_elements_are_of_order_two() {
-    let order = observed_order(1, 16);
-    assert!((order - 2.0).abs() < 0.05, "{order}");
+    for interpolation in INTERPOLATIONS {
+        let order = observed_order(1, 16, interpolation);
+        assert!((order - 2.0).abs() < 0.05, "{interpolation}: {order}");
+    }
 }
 
 #[test]
 fn three_node_elements_are_of_order_four() {
-    let order = observed_order(2, 8);
-    assert!((order - 4.0).abs() < 0.15, "{order}");
+    for interpolation in INTERPOLATIONS {
+        let order = observed_order(2, 8, interpolation);
+        assert!((order - 4.0).abs() < 0.15, "{interpolation}: {order}");
+    }
 }
 
 /// On the arc the error falls with the sixth power until the interpolated geometry shows: equally spaced nodes of a cubic
 /// leave an area between arc and curve whose mean does not vanish, an error of order four with a small factor.
 #[test]
 fn four_node_elements_are_of_order_six_on_coarse_arcs() {
-    let error = |n: usize| {
-        let tip = bend(3, n);
-        (0..3).map(|k| (tip[k] - LIMIT[k]) * (tip[k] - LIMIT[k])).sum::<f64>().sqrt()
-    };
-    let order = (error(3) / error(6)).log2();
-    assert!((order - 6.0).abs() < 0.35, "{order}");
-    let fine = (error(8) / error(16)).log2();
-    assert!((fine - 4.0).abs() < 0.3, "{fine}");
+    for interpolation in INTERPOLATIONS {
+        let error = |n: usize| {
+            let tip = bend(3, n, interpolation);
+            (0..3).map(|k| (tip[k] - LIMIT[k]) * (tip[k] - LIMIT[k])).sum::<f64>().sqrt()
+        };
+        let order = (error(3) / error(6)).log2();
+        assert!((order - 6.0).abs() < 0.35, "{interpolation}: {order}");
+        let fine = (error(8) / error(16)).log2();
+        assert!((fine - 4.0).abs() < 0.3, "{interpolation}: {fine}");
+    }
 }
 
 /// A straight cantilever under a force across and a moment about its axis.

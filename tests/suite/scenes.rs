@@ -72,7 +72,7 @@ pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// The tip of the 45-degree bend (Bathe & Bolourchi 1979, doi:10.1002/nme.1620140703) with GJ = 0.141 G, drawn from the
 /// first of its `ends` to the second.
-pub fn bend45(order: usize, elements: usize, ends: [&str; 2]) -> [f64; 3] {
+pub fn bend45(order: usize, elements: usize, ends: [&str; 2], interpolation: &str) -> [f64; 3] {
     let [start, end] = ends;
     let text = format!(
         r#"
@@ -90,6 +90,7 @@ section = "s"
 arc = ["{start}", ["100*sin(22.5*deg)", "100*(1-cos(22.5*deg))", 0], "{end}"]
 elements = {elements}
 order = {order}
+interpolation = "{interpolation}"
 axis3 = [0, 0, 1]
 [[support]]
 at = "root"

@@ -148,3 +148,109 @@ fn a_step_whose_newton_fails_is_taken_smaller() {
     let simulation = simulate(&hit("adaptive = true\nstep_tolerance = 1e-3"));
     assert!(simulation.counters.cutbacks > 0);
 }
+
+/// The deck of a scene of the paper with other settings, and a column at its end.
+fn paper(deck: &str, settings: &[String], column: &str) -> [f64; 3] {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("decks").join(deck);
+    let text = beamsim::deck::apply(&std::fs::read_to_string(path).unwrap(), settings).unwrap();
+    simulate(&text).vector(column)
+}
+
+/// The paper's own scenes, each across changes of chart, under every scheme.
+#[test]
+fn every_scheme_is_of_order_two_in_the_scenes_of_the_paper() {
+    let schemes = [
+        "\"newmark\"",
+        "\"hht\"",
+        "\"generalized_alpha\"",
+        "\"lie_generalized_alpha\"",
+    ];
+    // Deck, beams, end, first step, column.
+    let scenes = [
+        ("top_rigid.toml", 0, 0.6, 0.002, "pin.r"),
+        ("right_angle_coarse.toml", 2, 4.0, 0.02, "tip.u"),
+        ("robot_arm.toml", 2, 1.5, 0.004, "tip.u"),
+    ];
+    for (deck, beams, end, step, column) in scenes {
+        for scheme in schemes {
+            let run = |h: f64| {
+                let mut settings =
+                    vec![format!("stage.0.end={end}"), format!("stage.0.step={h}"), format!("stage.0.scheme={scheme}")];
+                settings.push("stage.0.tolerance=1e-12".into());
+                settings.extend((0..beams).map(|k| format!("beam.{k}.interpolation=\"relative\"")));
+                paper(deck, &settings, column)
+            };
+            let [a, b, c] = [step, 0.5 * step, 0.25 * step].map(run);
+            let order = (distance(a, b) / distance(b, c)).log2();
+            assert!((order - 2.0).abs() < 0.4, "{deck}, {scheme}: order {order}");
+        }
+    }
+}
+
+/// A free body near its middle axis, started at an orientation that a static stage has turned it to.
+fn free_body(scheme: &str, step: f64, turned: beamsim::tensor::Vec3) -> [f64; 9] {
+    let spin = beamsim::rotation::Rotation::new(turned).r * beamsim::tensor::Vec3([0.01, 2.0, 0.01]);
+    let ([x, y, z], [a, b, c], angle) = (turned.0, spin.0, turned.norm());
+    let text = format!(
+        r#"
+[point]
+a = [0, 0, 0]
+[[body]]
+at = "a"
+mass = 1
+inertia = [1, 2, 3]
+[[support]]
+at = "a"
+fix = "pin"
+[[motion]]
+at = "a"
+rotate = [{x}, {y}, {z}]
+angle = {angle}
+stages = [1]
+[[initial]]
+at = "a"
+spin = [{a}, {b}, {c}]
+[[stage]]
+kind = "static"
+steps = 4
+[[stage]]
+kind = "dynamic"
+end = 20
+step = {step}
+scheme = "{scheme}"
+tolerance = 1e-12
+[output]
+columns = ["d"]
+"#
+    );
+    let simulation = simulate(&text);
+    let back = beamsim::rotation::Rotation::new(turned).r.transpose();
+    let axis = |k: usize| back * beamsim::tensor::Vec3(["x", "y", "z"].map(|c| simulation.end(&format!("a.d{k}{c}"))));
+    let [d1, d2, d3] = [1, 2, 3].map(axis);
+    let axes = [d1, d2, d3].map(|d| d.0);
+    std::array::from_fn(|k| axes[k / 3][k % 3])
+}
+
+/// Increments do not notice where the total vector happens to be: the same error from twenty orientations, and far less
+/// than that of total vectors.
+#[test]
+fn increments_do_not_notice_the_orientation() {
+    let mut random = crate::random::Random::new(77);
+    let orientations: Vec<_> = (0..20)
+        .map(|_| {
+            let angle = random.range(0.3, 3.1);
+            random.vector(angle)
+        })
+        .collect();
+    let error = |a: [f64; 9], b: [f64; 9]| a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let exact = free_body("lie_generalized_alpha", 0.0005, orientations[0]);
+    let (mut increments, mut totals) = (Vec::new(), Vec::new());
+    for &turned in &orientations {
+        increments.push(error(free_body("lie_generalized_alpha", 0.02, turned), exact));
+        totals.push(error(free_body("newmark", 0.02, turned), exact));
+    }
+    let (least, most) = (increments.iter().copied().fold(f64::INFINITY, f64::min), increments.iter().copied().fold(0.0, f64::max));
+    assert!(most - least < 1e-6 * most, "{least:e} to {most:e}");
+    let best = totals.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(best > 5.0 * most, "total vectors {best:e}, increments {most:e}");
+}
