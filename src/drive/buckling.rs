@@ -221,18 +221,20 @@ impl Run<'_> {
     /// Loads and motions without a history are linear in it; the step is small, so that no motion goes around.
     pub(super) fn load_derivative(&mut self, workshop: &mut Workshop) -> Vec<Vec3> {
         let Workshop { assembly, lift, .. } = workshop;
-        let mut shifted = self.state.clone();
+        let (mut here, mut shifted) = (self.state.clone(), self.state.clone());
         let inverse = 1.0 / LOAD_STEP;
+        self.model.set_clock(&mut here, self.state.time, self.state.load);
         let mut forces = |state: &State| -> Vec<Vec3> {
             assembly.evaluate(state, Weights::NONE, None);
             (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
         };
         let before = forces(&self.state);
         self.model.set_clock(&mut shifted, self.state.time, self.state.load + LOAD_STEP);
-        for ((lift, moved), q) in lift.iter_mut().zip(&mut shifted.q).zip(&self.state.q) {
-            *lift = (*moved - *q) * inverse;
-            *moved = *q;
+        // From where the motions put their directions now, not from where round-off has left them: the step is small.
+        for (lift, (moved, from)) in lift.iter_mut().zip(shifted.q.iter().zip(&here.q)) {
+            *lift = (*moved - *from) * inverse;
         }
+        shifted.q.copy_from_slice(&self.state.q);
         let after = forces(&shifted);
         after.iter().zip(&before).map(|(after, before)| (*after - *before) * inverse).collect()
     }

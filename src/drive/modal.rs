@@ -100,7 +100,8 @@ impl Run<'_> {
             let symmetric = !damped && is_symmetric(&system.pattern, &system.values);
             let mut operator = Motions { system, matrices, solver: &mut newton.solver, shift, symmetric };
             let wanted = if symmetric { modes } else { 2 * modes + 2 };
-            let found_values = timed(&mut self.counters.work.solve_seconds, || largest_eigenvalues(&mut operator, wanted));
+            let found_values =
+                timed(&mut self.counters.work.solve_seconds, || largest_eigenvalues(&mut operator, wanted));
             let Some(values) = found_values else {
                 return Err(Failure::Limit("the modes could not be found: a solve with the tangent failed".into()));
             };

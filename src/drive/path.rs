@@ -245,10 +245,9 @@ impl Path {
         let limit = workshop.newton.max_iterations;
         let mut last: Option<Vec<Vec3>> = None;
         for iteration in 0..=limit {
-            // The held directions are where the predictor and the corrections have taken them.
-            let q = run.state.q.clone();
+            // Held directions are put where they belong, free of the round-off of predictor and corrections.
             run.model.set_clock(&mut run.state, time, load);
-            run.state.q.copy_from_slice(&q);
+            let slots = run.state.q.len();
             let pull = run.load_derivative(workshop);
             let Workshop { assembly, newton, lift, .. } = workshop;
             let work = &mut run.counters.work;
@@ -267,7 +266,7 @@ impl Path {
             let mut along = back.clone();
             system.right_hand_side_of(&pull, &mut along);
             // The residual's own right-hand side takes no part of the lift.
-            let total: Vec<Vec3> = (0..q.len()).map(|slot| system.total(slot)).collect();
+            let total: Vec<Vec3> = (0..slots).map(|slot| system.total(slot)).collect();
             system.right_hand_side_without_lift(&total, &mut back);
             run.counters.work.factorisations += 1;
             run.counters.work.iterations += 1;
@@ -278,7 +277,7 @@ impl Path {
             if !solved {
                 return Err(NewtonFailure::Singular(newton.solver.null_vector(system)));
             }
-            let (mut a, mut b) = (vec![Vec3::ZERO; q.len()], vec![Vec3::ZERO; q.len()]);
+            let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
             system.pattern.equations.scatter(&back, None, &mut a);
             system.pattern.equations.scatter(&along, Some(lift), &mut b);
             let part = |run: &Run, d: &[Vec3]| dot(run, &here.tangent, d) * self.scale;

@@ -30,7 +30,15 @@ impl Amplitude {
     /// Of a load with this history, or the default one: up with the load factor of the first static stage in which it
     /// acts, then in full; in full from the start of a dynamic stage.
     pub fn of_load(history: Option<Arc<dyn History>>, stages: StageSet) -> Self {
-        Self { history, stages, switched: false, course: Course::Hold(0.0), reached: 0.0, has_acted: false, grown: None }
+        Self {
+            history,
+            stages,
+            switched: false,
+            course: Course::Hold(0.0),
+            reached: 0.0,
+            has_acted: false,
+            grown: None,
+        }
     }
 
     /// Of something that is there or not.

@@ -95,7 +95,11 @@ fn a_run_leaves_a_history_and_a_record() {
     assert_eq!(record["deck"]["load"][0]["force"][2], 5.0);
     assert_eq!(record["counters"]["steps"], 4);
     assert!(
-        record["effects"].as_array().unwrap().iter().any(|e| e["name"] == "beam elasticity, relative" && e["active"] == true)
+        record["effects"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|e| e["name"] == "beam elasticity, relative" && e["active"] == true)
     );
 }
 

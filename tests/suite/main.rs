@@ -12,6 +12,7 @@ mod failures;
 mod invariance;
 mod joints;
 mod layers;
+mod mechanics;
 mod random;
 mod relative;
 mod rotations;

@@ -19,7 +19,7 @@ struct Collector {
 
 impl Observer for Collector {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
-        let mut row = Vec::new();
+        let mut row = vec![snapshot.state.load];
         self.probes.iter().for_each(|probe| probe.read(snapshot, &mut row));
         self.rows.push(row);
         Ok(())
@@ -34,7 +34,8 @@ pub fn attempt(text: &str) -> Simulation {
     });
     let mut collector = Collector { probes: scene.probes.clone(), rows: Vec::new() };
     let (result, counters) = Run::new(scene.plan, &mut collector).finish();
-    let names = collector.probes.iter().flat_map(|probe| probe.names.clone()).collect();
+    let columns = collector.probes.iter().flat_map(|probe| probe.names.clone());
+    let names = std::iter::once("load".to_string()).chain(columns).collect();
     Simulation { names, rows: collector.rows, result, counters }
 }
 

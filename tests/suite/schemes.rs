@@ -159,12 +159,7 @@ fn paper(deck: &str, settings: &[String], column: &str) -> [f64; 3] {
 /// The paper's own scenes, each across changes of chart, under every scheme.
 #[test]
 fn every_scheme_is_of_order_two_in_the_scenes_of_the_paper() {
-    let schemes = [
-        "\"newmark\"",
-        "\"hht\"",
-        "\"generalized_alpha\"",
-        "\"lie_generalized_alpha\"",
-    ];
+    let schemes = ["\"newmark\"", "\"hht\"", "\"generalized_alpha\"", "\"lie_generalized_alpha\""];
     // Deck, beams, end, first step, column.
     let scenes = [
         ("top_rigid.toml", 0, 0.6, 0.002, "pin.r"),
@@ -249,7 +244,8 @@ fn increments_do_not_notice_the_orientation() {
         increments.push(error(free_body("lie_generalized_alpha", 0.02, turned), exact));
         totals.push(error(free_body("newmark", 0.02, turned), exact));
     }
-    let (least, most) = (increments.iter().copied().fold(f64::INFINITY, f64::min), increments.iter().copied().fold(0.0, f64::max));
+    let (least, most) =
+        (increments.iter().copied().fold(f64::INFINITY, f64::min), increments.iter().copied().fold(0.0, f64::max));
     assert!(most - least < 1e-6 * most, "{least:e} to {most:e}");
     let best = totals.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(best > 5.0 * most, "total vectors {best:e}, increments {most:e}");

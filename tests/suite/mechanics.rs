@@ -1,0 +1,222 @@
+//! Bugs that were found by looking: each a small scene with an exact answer.
+
+use crate::scenes::{attempt, simulate};
+use beamsim::drive::Failure;
+
+const ROD: &str = r#"
+[point]
+near = [0, 0, 0]
+far = [10, 0, 0]
+[section.rod]
+EA = 1e5
+GA = 1e5
+GJ = 100
+EI = 1e3
+rhoA = 1
+[[beam]]
+name = "rod"
+section = "rod"
+through = ["near", "far"]
+elements = 4
+order = 2
+[[support]]
+at = "near"
+fix = "all"
+"#;
+
+/// Angular momentum grows with the moment: in space, not with the body.
+#[test]
+fn a_fixed_moment_is_fixed_under_every_scheme() {
+    for scheme in ["newmark", "generalized_alpha", "lie_generalized_alpha"] {
+        let simulation = simulate(&format!(
+            r#"
+[point]
+a = [0, 0, 0]
+[[body]]
+at = "a"
+mass = 1
+inertia = [1, 1, 1]
+[[initial]]
+at = "a"
+spin = [2, 0, 0]
+[[load]]
+at = "a"
+moment = [0, 0, 1]
+[[stage]]
+kind = "dynamic"
+end = 3
+step = 0.01
+scheme = "{scheme}"
+[output]
+columns = ["momentum"]
+"#
+        ));
+        let momentum = ["lx", "ly", "lz"].map(|c| simulation.end(&format!("momentum.{c}")));
+        for (came, exact) in momentum.into_iter().zip([2.0, 0.0, 3.0]) {
+            assert!((came - exact).abs() < 1e-3, "{scheme}: {momentum:?}");
+        }
+    }
+}
+
+/// A motor that turns by 2 rad a level keeps its turns.
+#[test]
+fn a_motor_does_not_lose_half_turns() {
+    let simulation = simulate(
+        &(ROD.replace("far = [10, 0, 0]", "far = [10, 0, 0]\nend = [12, 0, 0]")
+            + r#"
+[[beam]]
+name = "arm"
+section = "rod"
+through = ["far", "end"]
+elements = 1
+[[joint]]
+kind = "revolute"
+at = "far"
+beams = ["rod", "arm"]
+axis = [0, 0, 1]
+angle = 20
+[[stage]]
+kind = "static"
+steps = 10
+[output]
+nodes = ["end"]
+columns = ["rc"]
+"#),
+    );
+    assert!((simulation.end("end.rz") - 20.0).abs() < 1e-9, "{}", simulation.end("end.rz"));
+}
+
+/// Arc length goes along a prescribed rotation beyond pi as load control does.
+#[test]
+fn a_path_goes_around_with_its_motion() {
+    let simulation = simulate(
+        &(ROD.to_string()
+            + r#"
+[[support]]
+at = "far"
+fix = "pin"
+[[motion]]
+at = "far"
+rotate = [1, 0, 0]
+angle = "1.5*pi"
+[[stage]]
+kind = "static"
+control = "arc_length"
+steps = 20
+[output]
+nodes = ["far"]
+columns = ["rc", "reaction"]
+"#),
+    );
+    assert_eq!(simulation.end("load"), 1.0);
+    let exact = 15.0 * std::f64::consts::PI;
+    assert!((simulation.end("far.mx") - exact).abs() < 1e-8, "{}", simulation.end("far.mx"));
+}
+
+/// Pure twist moves nothing: what round-off moves must not steer the path.
+#[test]
+fn a_path_of_rotations_alone_reaches_its_load() {
+    let simulation = simulate(
+        &(ROD.replace("far = [10, 0, 0]", "far = [6, 8, 0]")
+            + r#"
+[[load]]
+at = "far"
+moment = [6, 8, 0]
+frame = "body"
+[[stage]]
+kind = "static"
+control = "arc_length"
+steps = 10
+"#),
+    );
+    assert_eq!(simulation.end("load"), 1.0);
+    assert!(simulation.counters.events.is_empty());
+}
+
+/// Beams that joints chain at one point: each hangs on the one that it names.
+#[test]
+fn joints_at_one_point_make_a_chain() {
+    let simulation = simulate(
+        r#"
+[point]
+a = [-1, 0, 0]
+h = [0, 0, 0]
+b = [0, 1, 0]
+c = [1, 0, 0]
+[section.s]
+EA = 1e6
+GA = 1e6
+GJ = 1e6
+EI = 1e6
+[[beam]]
+name = "A"
+section = "s"
+through = ["a", "h"]
+elements = 1
+[[beam]]
+name = "B"
+section = "s"
+through = ["h", "b"]
+elements = 1
+[[beam]]
+name = "C"
+section = "s"
+through = ["h", "c"]
+elements = 1
+[[support]]
+at = "a"
+fix = "all"
+[[joint]]
+kind = "revolute"
+at = "h"
+beams = ["A", "B"]
+axis = [0, 0, 1]
+stiffness = 1
+[[joint]]
+kind = "rigid"
+at = "h"
+beams = ["B", "C"]
+[[load]]
+at = "c"
+moment = [0, 0, 0.5]
+[[stage]]
+kind = "static"
+steps = 2
+[output]
+nodes = ["b", "c"]
+"#,
+    );
+    for node in ["b", "c"] {
+        let turned = simulation.end(&format!("{node}.rz"));
+        assert!((turned - 0.5).abs() < 1e-4, "{node}: {turned}");
+    }
+}
+
+/// A modal or buckling stage without anything to find says so.
+#[test]
+fn empty_eigenproblems_are_named() {
+    for kind in ["modal", "buckling"] {
+        let deck = ROD.to_string()
+            + &format!("[[support]]\nat = \"far\"\nfix = \"all\"\n[[stage]]\nkind = \"{kind}\"\nmodes = 2\n");
+        for deck in [deck.replace("elements = 4\norder = 2", "elements = 1"), deck] {
+            match attempt(&deck).result {
+                Err(Failure::Deck(_)) | Ok(()) => {}
+                other => panic!("{kind}: {other:?}"),
+            }
+        }
+    }
+}
+
+/// A modal stage only looks: loads ramp, buckle and move on as if it were not there.
+#[test]
+fn modal_stages_leave_everything_as_it_was() {
+    let column = |stages: &str| {
+        let deck = ROD.to_string() + "[[load]]\nat = \"far\"\nforce = [-1, 0, 0]\n" + stages;
+        simulate(&deck)
+    };
+    let modal = "[[stage]]\nkind = \"modal\"\nmodes = 1\n";
+    let rest = "[[stage]]\nkind = \"static\"\nsteps = 2\n";
+    let plain = column(rest);
+    let looked = column(&(modal.to_string() + rest));
+    assert_eq!(plain.end("far.ux"), looked.end("far.ux"));
+}
