@@ -83,12 +83,23 @@ impl<const N: usize, T: Real> Relative<N, T> {
             let start = Vec3::constant(places[i] - places[first]);
             frame.transpose_mul(start + (u[i] - u[first]))
         });
-        let turned = theta.map(Rotation::new);
+        // The two nodes that carry the frame stand h away from it on either side.
+        let turned: [Rotation<T>; N] = std::array::from_fn(|i| match i {
+            _ if i == last => half.rotation,
+            _ if i == first => half.rotation.reversed(),
+            _ => Rotation::new(theta[i]),
+        });
+        let inverse = half.rotation.t_inverse();
+        let back = std::array::from_fn(|i| match i {
+            _ if i == last => inverse,
+            _ if i == first => inverse.transpose(),
+            _ => turned[i].t_inverse(),
+        });
         let node = |i: usize| {
             let start = Vec3::constant(places[i] - places[first]);
             NodeMotion { u: arms[i] - start, p: theta[i], ..NodeMotion::rest() }
         };
-        Self { nodes: std::array::from_fn(node), frame, arms, back: turned.map(|r| r.t_inverse()), turned, half }
+        Self { nodes: std::array::from_fn(node), frame, arms, back, turned, half }
     }
 
     /// F_i: how the frame follows node i.
@@ -184,37 +195,40 @@ impl<const N: usize, T: Real> Relative<N, T> {
         out: &mut ElementSystem<T>,
     ) {
         let over = self.over_frame(local, source, forces, s);
-        let follows: [Option<Mat3<T>>; N] = std::array::from_fn(|i| self.follows(i));
-        let drift = self.drift(forces.frame, s);
+        let drift = self.drift(rotations, forces.frame, s);
+        // What each node's rotation vector does: dTheta_i = own_i dP_i - ..., t = following_i dP_i.
+        let own: [Mat3<T>; N] = std::array::from_fn(|i| self.back[i] * rotations[i].t);
+        let following: [Option<Mat3<T>>; N] = std::array::from_fn(|i| self.follows(i).map(|f| f * rotations[i].t));
+        let spin: [Mat3<T>; N] = std::array::from_fn(|i| rotations[i].t.transpose_matmul(over.spin[i]));
+        // The row of the frame over each rotation vector, with what comes back through the frame itself.
+        let row: [Mat3<T>; N] = std::array::from_fn(|j| {
+            let through = following[j].map_or(Mat3::zero(), |following| over.frame * following);
+            over.row[j] * rotations[j].t + through
+        });
         for i in 0..N {
             for j in 0..N {
-                let mut xt = self.frame * local.tangent_block(2 * i, 2 * j + 1) * self.back[j];
-                if let Some(follows) = follows[j] {
-                    xt += over.displacement[i] * follows;
+                let mut xp = self.frame * (local.tangent_block(2 * i, 2 * j + 1) * own[j]);
+                if let Some(following) = following[j] {
+                    xp += over.displacement[i] * following;
                 }
-                let xp = xt * rotations[j].t;
                 out.add_tangent(2 * i, 2 * j + 1, xp);
                 out.add_tangent(2 * j + 1, 2 * i, xp.transpose());
                 if j < i {
                     continue;
                 }
                 let xx = self.frame * local.tangent_block(2 * i, 2 * j) * self.frame.transpose();
-                let mut tt = self.back[i].transpose_matmul(local.tangent_block(2 * i + 1, 2 * j + 1) * self.back[j]);
+                let mut pp = own[i].transpose_matmul(local.tangent_block(2 * i + 1, 2 * j + 1) * own[j]);
+                if let Some(following) = following[j] {
+                    pp += spin[i] * following;
+                }
+                if let Some(following) = following[i] {
+                    pp += following.transpose_matmul(row[j]);
+                }
+                if let Some(drift) = drift(i, j) {
+                    pp += drift;
+                }
                 if i == j {
-                    tt -= over.own[i];
-                }
-                if let Some(column) = follows[j] {
-                    tt += over.spin[i] * column;
-                }
-                if let Some(row) = follows[i] {
-                    tt += row.transpose_matmul(over.row[j]);
-                    if let Some(column) = follows[j] {
-                        tt += row.transpose_matmul(over.frame * column) + drift(i, j);
-                    }
-                }
-                let mut pp = rotations[i].t.transpose_matmul(tt * rotations[j].t);
-                if i == j {
-                    pp += rotations[i].c2(forces.spin[i]).scale(s);
+                    pp += rotations[i].c2(forces.spin[i]).scale(s) - own[i].transpose_matmul(over.own[i] * own[i]);
                 }
                 out.add_tangent(2 * i, 2 * j, xx);
                 out.add_tangent(2 * i + 1, 2 * j + 1, pp);
@@ -231,7 +245,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// ```text
     /// Z_xi = sum K_xi_x ij xi_j~ - K_xi_Theta ij A_j^T,   Z_Theta likewise
     /// x_i,t: R_r (Z_xi - f_xi~)      t_i,t: A_i^T (Z_Theta + C2(m_i) A_i^T)      t,t_j: Z_Theta^T A_j + A_j C1(A_j f) A_j
-    /// t,t:   sum -xi_i~ Z_xi + f_xi~ xi_i~ - A_i Z_Theta - A_i C1(A_i f) A_i^T   t_i,t_i: - A_i^T C2(m_i) A_i (own)
+    /// t,t:   sum -xi_i~ Z_xi + f_xi~ xi_i~ - A_i Z_Theta - A_i C1(A_i f) A_i^T   Theta_i,Theta_i: - C2(m_i) (own)
     /// ```
     fn over_frame(
         &self,
@@ -252,15 +266,17 @@ impl<const N: usize, T: Real> Relative<N, T> {
             let (force, moment) = (source.force_block(2 * i), source.force_block(2 * i + 1));
             let (a, turned) = (self.back[i], &self.turned[i]);
             let c1 = a * turned.c1(a * moment).scale(s);
-            let c2 = a.transpose_matmul(turned.c2(forces.own[i]).scale(s));
+            let c2 = turned.c2(forces.own[i]).scale(s);
+            let a_transposed = a.transpose();
             over.displacement[i] = self.frame * (zx - force.skew().scale(s));
-            over.spin[i] = a.transpose_matmul(zt) + c2 * a.transpose();
-            over.row[i] = zt.transpose() * a + c1 * a;
-            over.own[i] = c2 * a;
+            over.spin[i] = a_transposed * (zt + c2 * a_transposed);
+            over.row[i] = (zt.transpose() + c1) * a;
+            // A^T C2 is what the moments of the node lose; over Theta itself it stands alone.
+            over.own[i] = c2;
             over.frame += Mat3::skew_mul(force, self.arms[i].skew()).scale(s)
                 - Mat3::skew_mul(self.arms[i], zx)
                 - a * zt
-                - c1 * a.transpose();
+                - c1 * a_transposed;
         }
         over
     }
@@ -270,21 +286,29 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// ```text
     /// F_1^T m = exp(h) (m/2 - c h x m),   F_2^T m = exp(h)^T (m/2 + c h x m),   2 dh = T(2h)^-1 t_2 - T(2h)^-T t_1
     /// ```
-    fn drift(&self, m: Vec3<T>, s: f64) -> impl Fn(usize, usize) -> Mat3<T> + use<N, T> {
+    fn drift(
+        &self,
+        rotations: &[Rotation<T>; N],
+        m: Vec3<T>,
+        s: f64,
+    ) -> impl Fn(usize, usize) -> Option<Mat3<T>> + use<N, T> {
         let (first, last) = carriers(N);
         let Half { rotation: Rotation { r, t, p: h, .. }, c, c_slope } = self.half;
         let across = h.cross(m);
         let bend = across.outer(h) * (c_slope * 2.0) - m.skew() * c;
         let (g1, g2) = (m.scale(0.5) - across * c, m.scale(0.5) + across * c);
-        let row_first = r * (-Mat3::skew_mul(g1, t) - bend);
-        let row_last = r.transpose_matmul(Mat3::skew_mul(g2, t.transpose()) + bend);
+        let (t1, t2) = (rotations[first].t, rotations[last].t);
+        let rows = [
+            t1.transpose_matmul(r * (-Mat3::skew_mul(g1, t) - bend)),
+            t2.transpose_matmul(r.transpose_matmul(Mat3::skew_mul(g2, t.transpose()) + bend)),
+        ];
+        // T(2h)^-1
         let inverse = Rotation::new(h.scale(2.0)).t_inverse().scale(0.5 * s);
+        let columns = [-(inverse.transpose() * t1), inverse * t2];
         move |i, j| {
-            if first == last {
-                return Mat3::zero();
-            }
-            let row = if i == first { row_first } else { row_last };
-            if j == first { -(row * inverse.transpose()) } else { row * inverse }
+            let carries = |k: usize| k == first || k == last;
+            let both = first != last && carries(i) && carries(j);
+            both.then(|| rows[usize::from(i == last)] * columns[usize::from(j == last)])
         }
     }
 }

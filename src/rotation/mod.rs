@@ -53,12 +53,19 @@ impl<T: Real> Rotation<T> {
         Self { r: base * self.r, ..self }
     }
 
+    /// The rotation of -P: R and T are transposed.
+    #[inline(always)]
+    pub fn reversed(&self) -> Self {
+        Self { p: -self.p, r: self.r.transpose(), t: self.t.transpose(), c: self.c }
+    }
+
     /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation elsewhere.
     pub fn t_inverse(&self) -> Mat3<T> {
-        let [_, f1, f2, f3, ..] = Series::at(self.p.squared() * 0.25).0;
+        let (p, z) = (self.p, self.p.squared());
+        let [_, f1, f2, f3, ..] = Series::at(z * 0.25).0;
         let e = (f2 - f3) / (f1 * 4.0);
-        let skew = self.p.skew();
-        Mat3::identity() + skew.scale(0.5) + skew * skew * e
+        // P~^2 = P(x)P - (P.P) I
+        Mat3::diagonal([T::one() - e * z; 3]) + p.skew().scale(0.5) + p.outer(p) * e
     }
 
     /// C1(V) = D_P (T V), (A1):
