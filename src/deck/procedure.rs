@@ -268,6 +268,11 @@ fn read_static(table: &Table) -> Option<StageBody> {
     let context = table.context;
     let word = if table.has("control") { table.word("control", &["load", "arc_length"])?.value } else { "load" };
     if word == "arc_length" {
+        if table.has("frame") {
+            let message =
+                "`frame` does not go with control = \"arc_length\": its forces grow with the square of the load factor";
+            context.report(Diagnostic::error(message, table.key_span("frame")));
+        }
         return read_path_control(table);
     }
     if table.has("max_steps") {

@@ -42,7 +42,8 @@ impl Run<'_> {
         self.warn_out_of_balance(workshop);
         let mut loads = self.critical_loads(workshop, modes)?;
         if loads.is_empty() {
-            return Err(Failure::Deck("no load of this scene takes stiffness away: nothing can buckle".into()));
+            return Err(Failure::Deck("no load of this scene takes stiffness away: nothing can buckle (under following loads it may flutter: \
+                 see a modal stage)".into()));
         }
         let start = self.state.clone();
         let mut passed = [0, 0];
@@ -82,7 +83,7 @@ impl Run<'_> {
                 // Without a count of pivots the tangent itself must do.
                 self.state.copy_from(&search.here);
                 self.good.copy_from(&search.here);
-                return self.follow_nearest(workshop, search.estimate, before, way);
+                return self.follow_nearest(workshop, search.estimate, before);
             };
             if passed > before {
                 search.beyond = Some(target);
@@ -100,18 +101,14 @@ impl Run<'_> {
     }
 
     /// Goes from estimate to estimate, each what the critical load looks like from the last.
-    fn follow_nearest(
-        &mut self,
-        workshop: &mut Workshop,
-        mut critical: f64,
-        before: usize,
-        way: f64,
-    ) -> Result<f64, Failure> {
+    fn follow_nearest(&mut self, workshop: &mut Workshop, mut critical: f64, before: usize) -> Result<f64, Failure> {
         for _ in 0..MOST_LOOKS {
             self.observer.progress(self.moment(), self.static_progress(0.5))?;
             let from = self.state.load;
-            let ahead = self.critical_loads(workshop, before + 4)?;
-            let Some(next) = ahead.into_iter().filter(|load| (load - from) * way > 0.0).nth(before) else { break };
+            let near = self.critical_loads(workshop, before + 4)?;
+            // Those that were passed lie behind: it is the one that looks most like the last estimate.
+            let off = |load: &f64| (load - critical).abs();
+            let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
             critical = next;
             if (critical - from).abs() <= NEAR * critical.abs() {
                 return Ok(critical);

@@ -86,6 +86,13 @@ pub enum Failure {
     },
 }
 
+impl Place {
+    /// Whether it is a condition of a joint.
+    pub fn is_joint(&self) -> bool {
+        matches!(self.kind, SlotKind::Force | SlotKind::Moment)
+    }
+}
+
 impl Failure {
     /// The name of the failure.
     pub fn name(&self) -> &'static str {
@@ -112,6 +119,10 @@ impl Failure {
                 Some("let the stage take smaller levels: `adaptive`, or more `steps`")
             }
             Self::NotConverged { .. } => Some("try a finer mesh where it turns most, or a smaller `step`"),
+            Self::Singular { place: Some(place), .. } if place.is_joint() => Some(
+                "a support, another joint or a loop of rigid parts holds the same already: release one of them, for example by a \
+                 spherical joint in place of a revolute one",
+            ),
             Self::Singular { .. } => {
                 Some("add a support, a spring or a joint that holds this direction, or give it mass")
             }
@@ -134,7 +145,7 @@ impl fmt::Display for Place {
             SlotKind::Displacement => "displacement",
             SlotKind::Rotation => "rotation",
             SlotKind::Force | SlotKind::Moment => {
-                return write!(f, "{}: what it holds is held already, or by nothing that could give way", self.node);
+                return f.write_str(&self.node);
             }
         };
         let [x, y, z] = self.direction.0;
@@ -156,6 +167,9 @@ impl fmt::Display for Failure {
                 "no balance at {at}: after {iterations} iterations and {cutbacks} cut-backs the residual at {place} is \
                  {residual:.3e}, the largest force {force:.3e}"
             ),
+            Self::Singular { at, place: Some(place) } if place.is_joint() => {
+                write!(f, "the {place} holds what is held already ({at})")
+            }
             Self::Singular { at, place: Some(place) } => {
                 write!(f, "nothing holds {place} ({at}): a mechanism or a loose part")
             }

@@ -198,8 +198,11 @@ impl Path {
         let size = (squared(run, &direction) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
         let pull = run.load_derivative(workshop);
-        let loaded = pull.iter().any(|&force| force != Vec3::ZERO);
-        let work: f64 = pull.iter().zip(&direction).map(|(force, d)| -force.dot(*d)).sum();
+        // What stands at multipliers are gaps of motors, not forces.
+        let acting = |slot: usize| !run.model.slots[slot].is_multiplier();
+        let loaded = pull.iter().enumerate().any(|(slot, &force)| acting(slot) && force != Vec3::ZERO);
+        let parts = pull.iter().zip(&direction).enumerate().filter(|(slot, _)| acting(*slot));
+        let work: f64 = parts.map(|(_, (force, d))| -force.dot(*d)).sum();
         // Of prescribed motions alone no displacement is known that loads would do work on.
         let work = if loaded { work } else { load_rate.signum() };
         let tangent = direction.into_iter().map(|d| d * load_rate).collect();

@@ -4,12 +4,15 @@ use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
 use crate::integrate::{Rotations, Scheme};
 use crate::kernel::Weights;
-use crate::model::{Model, increments};
+use crate::model::{Model, SlotKind, increments};
 use crate::rotation::Rotation;
 use crate::solve::NewtonFailure;
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
+
+/// What a joint may be open by when a dynamic stage begins, in radians or relative to the scene's length.
+const LARGEST_GAP: f64 = 1e-6;
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
@@ -44,10 +47,28 @@ impl Run<'_> {
         }
         let [rates, _] = workshop.assembly.drift(&self.state);
         workshop.assembly.evaluate(&self.state, Weights::MASS, None);
+        self.refuse_open_joints(workshop)?;
         workshop.assembly.system.forget_forces();
         let impulse = self.solve_with_mass(workshop, &rates)?;
         for (slot, _) in self.model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
             self.state.v[slot] += impulse[slot];
+        }
+        Ok(())
+    }
+
+    /// A dynamic stage never jumps: neither do motors, nor joints that a stage before has left open.
+    fn refuse_open_joints(&self, workshop: &Workshop) -> Result<(), Failure> {
+        for &slot in &self.model.multipliers {
+            let info = &self.model.slots[slot as usize];
+            let size = if info.kind == SlotKind::Force { self.model.length } else { 1.0 };
+            let gap = workshop.assembly.system.total(slot as usize).norm();
+            if gap > LARGEST_GAP * size {
+                let at = self.moment();
+                return Err(Failure::Deck(format!(
+                    "the {} would have to jump by {gap:.3e} ({at}); give its motor a `history` that starts where the joint is",
+                    info.node
+                )));
+            }
         }
         Ok(())
     }

@@ -95,7 +95,7 @@ impl Instance {
     }
 
     fn slides_matter(&self) -> bool {
-        self.along.is_some()
+        self.along.is_some() || self.is_prismatic()
     }
 
     /// The free direction slides, it does not turn.

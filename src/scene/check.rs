@@ -172,7 +172,7 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
         if undamped {
             let message = "joints with multipliers need a scheme that dissipates: without, accelerations and forces of joints \
                            oscillate from step to step";
-            let help = "take scheme = \"generalized_alpha\"; positions and rotations are right either way";
+            let help = "take scheme = \"generalized_alpha\"; without dissipation a run may even lose its balance";
             diagnostics.push(Diagnostic::warning(message, stage.span.clone()).help(help));
         }
     }

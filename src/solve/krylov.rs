@@ -70,8 +70,15 @@ pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option
 
 /// A vector without any pattern.
 fn start(size: usize, number: usize) -> Vec<f64> {
-    let golden = 0.618_033_988_749_895;
-    (0..size).map(|i| ((i + 1) as f64 * golden * (number as f64 + 1.3) + 0.37 * number as f64).fract() - 0.5).collect()
+    // splitmix64
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(number as u64 + 1);
+    let mut next = || {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    (0..size).map(|_| next()).collect()
 }
 
 #[derive(Default)]

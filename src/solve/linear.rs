@@ -98,7 +98,9 @@ impl LinearSolver {
     fn null_vector_of_shifted(&mut self, system: &System) -> Option<NullVector> {
         let mut shifted = system.clone();
         for place in diagonal_places(system).into_iter().flatten() {
-            shifted.values[place] *= 1.0 + 1e-10;
+            // Multipliers have no diagonal: they get a little compliance.
+            let value = shifted.values[place];
+            shifted.values[place] = if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
         }
         if !self.factorise(&shifted) {
             return None;

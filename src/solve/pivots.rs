@@ -19,8 +19,9 @@ pub struct Pivots {
     multipliers: Vec<usize>,
 }
 
-/// A tangent whose entries differ from their mirror images by more than this, relative to the largest, is not symmetric.
-const SYMMETRY: f64 = 1e-10;
+/// A tangent whose entries differ from their mirror images by more than this is not symmetric: relative to the roots of the
+/// diagonal entries that they stand between, so that stiff directions do not hide soft ones.
+const SYMMETRY: f64 = 1e-9;
 
 /// What multipliers get on their diagonal, relative to the largest stiffness, so that pivots exist.
 const COMPLIANCE: f64 = 1e-9;
@@ -85,13 +86,18 @@ impl Pivots {
 /// Whether each entry is what its mirror image is.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     let values = &values[..pattern.nonzeros()];
-    let bound = SYMMETRY * values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let root = |k: u32| match pattern.find(k, k).map_or(0.0, |place| values[place].abs().sqrt()) {
+        0.0 => largest.sqrt(),
+        root => root,
+    };
+    let roots: Vec<f64> = (0..pattern.equations.count() as u32).map(root).collect();
     (0..pattern.equations.count() as u32).all(|column| {
         let entries =
             pattern.column_starts[column as usize] as usize..pattern.column_starts[column as usize + 1] as usize;
         entries.into_iter().all(|k| {
             let mirror = pattern.find(column, pattern.rows[k]).map_or(0.0, |place| values[place]);
-            (values[k] - mirror).abs() <= bound
+            (values[k] - mirror).abs() <= SYMMETRY * roots[column as usize] * roots[pattern.rows[k] as usize]
         })
     })
 }

@@ -220,3 +220,73 @@ fn modal_stages_leave_everything_as_it_was() {
     let looked = column(&(modal.to_string() + rest));
     assert_eq!(plain.end("far.ux"), looked.end("far.ux"));
 }
+
+/// A dynamic stage never jumps: a motor must begin where its joint is.
+#[test]
+fn a_motor_that_would_jump_is_refused() {
+    let simulation = attempt(
+        r#"
+[point]
+o = [0, 0, 0]
+p = [1, 0, 0]
+[[body]]
+at = "o"
+mass = 1
+inertia = [1, 1, 1]
+[[body]]
+at = "p"
+mass = 1
+inertia = [1, 1, 1]
+[[support]]
+at = "o"
+fix = "all"
+[[joint]]
+kind = "revolute"
+nodes = ["o", "p"]
+axis = [0, 0, 1]
+angle = 1
+history = "h"
+[history.h]
+times = [0, 1]
+values = [0.5, 1]
+[[stage]]
+kind = "dynamic"
+end = 0.1
+step = 0.01
+scheme = "generalized_alpha"
+"#,
+    );
+    assert!(matches!(&simulation.result, Err(Failure::Deck(why)) if why.contains("jump")), "{:?}", simulation.result);
+}
+
+/// Two rigid joints between the same nodes: the second says nothing new, and the failure names the joint.
+#[test]
+fn a_condition_said_twice_names_its_joint() {
+    let simulation = attempt(
+        &(ROD.to_string()
+            + r#"
+[[body]]
+at = "away"
+mass = 1
+[[joint]]
+kind = "rigid"
+nodes = ["far", "away"]
+[[joint]]
+kind = "rigid"
+nodes = ["away", "far"]
+[[load]]
+at = "away"
+force = [0, 0, 1]
+[[stage]]
+kind = "static"
+steps = 2
+"#)
+        .replace("far = [10, 0, 0]", "far = [10, 0, 0]\naway = [10, 1, 0]"),
+    );
+    match &simulation.result {
+        Err(failure @ Failure::Singular { place: Some(place), .. }) => {
+            assert!(place.is_joint(), "{failure}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
