@@ -19,7 +19,7 @@ impl Observer for Silent {
 }
 
 /// A cantilever under a force across, in statics or starting to swing.
-fn deck(elements: usize, dynamic: bool) -> String {
+fn deck(elements: usize, dynamic: bool, interpolation: &str) -> String {
     let (stage, force) = if dynamic {
         ("kind = \"dynamic\"\nend = 0.05\nstep = 0.01", "[0, 0, 5]")
     } else {
@@ -29,7 +29,7 @@ fn deck(elements: usize, dynamic: bool) -> String {
         "[point]\nroot = [0, 0, 0]\ntip = [10, 0, 0]\n\
          [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [2, 1, 1]\n\
          [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = {elements}\n\
-         [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = {force}\n[[stage]]\n{stage}\n"
+         interpolation = \"{interpolation}\"\n[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = {force}\n[[stage]]\n{stage}\n"
     )
 }
 
@@ -57,8 +57,9 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
     scatter().min(scatter())
 }
 
-fn row(elements: usize, dynamic: bool) {
-    let (scene, _) = scene::from_text(&deck(elements, dynamic)).unwrap_or_else(|_| panic!("the deck is good"));
+fn row(elements: usize, dynamic: bool, interpolation: &str) {
+    let (scene, _) =
+        scene::from_text(&deck(elements, dynamic, interpolation)).unwrap_or_else(|_| panic!("the deck is good"));
     let kind = if dynamic { StageKind::Dynamic } else { StageKind::Static };
     let model = scene.plan.model.clone();
     let repeats = (20_000 / elements).max(1);
@@ -81,7 +82,7 @@ fn row(elements: usize, dynamic: bool) {
     let assembly = scatter * micro;
     let name = if dynamic { "dynamic" } else { "static" };
     println!(
-        "{name:<8} {elements:>8} {:>11.3} {assembly:>9.3} {solve:>9.3} {:>9.3}   ({} iterations a run)",
+        "{name:<8} {interpolation:<9} {elements:>8} {:>11.3} {assembly:>9.3} {solve:>9.3} {:>9.3}   ({} iterations a run)",
         evaluation - assembly,
         evaluation + solve,
         iterations / repeats as u64
@@ -92,8 +93,11 @@ fn main() {
     let smoke = std::env::args().any(|argument| argument == "--smoke" || argument == "--test");
     let sizes: &[usize] = if smoke { &[10, 100] } else { &[10, 100, 1_000, 10_000, 100_000] };
     println!("microseconds per element and iteration");
-    println!("{:<8} {:>8} {:>11} {:>9} {:>9} {:>9}", "stage", "elements", "evaluation", "assembly", "solve", "all");
-    for dynamic in [false, true] {
-        sizes.iter().for_each(|&elements| row(elements, dynamic));
+    println!(
+        "{:<8} {:<9} {:>8} {:>11} {:>9} {:>9} {:>9}",
+        "stage", "rotations", "elements", "evaluation", "assembly", "solve", "all"
+    );
+    for (dynamic, interpolation) in [(false, "total"), (false, "relative"), (true, "total"), (true, "relative")] {
+        sizes.iter().for_each(|&elements| row(elements, dynamic, interpolation));
     }
 }
