@@ -1,0 +1,281 @@
+//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional damping.
+
+use super::{Composer, push_volume};
+use crate::deck::{self, Diagnostic, InterpolationWord};
+use crate::effect::ByOrder;
+use crate::effect::beam_mass::BeamMass;
+use crate::effect::gravity::{BeamGravity, BodyGravity};
+use crate::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
+use crate::effect::rigid_body::{Body, RigidBody};
+use crate::effect::rotary_inertia::RotaryInertia;
+use crate::effect::rotating_frame::RotatingFrame;
+use crate::effect::section_inertia::SectionInertia;
+use crate::kernel::inertia::Inertia;
+use crate::scene::mesh::{Mesh, MeshBeam, MeshElement, Station};
+use crate::scene::names;
+use crate::scene::section::MassPerLength;
+use crate::tensor::{Mat3, Vec3};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+impl Composer<'_> {
+    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
+    pub(super) fn beam_inertia(&mut self) {
+        let names = ["beam mass", "rotary inertia", "eccentric section inertia", "section inertia at nodes"];
+        if !self.dynamic || self.mesh.elements.is_empty() {
+            let why = if self.mesh.elements.is_empty() { "no beams" } else { "no dynamic stage" };
+            return names.into_iter().for_each(|name| self.reason(name, false, why));
+        }
+        let wanted = self.deck.effects.rotary_inertia.as_ref().map(|flag| flag.value);
+        let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
+        let bodies = self.each_inertia(|number, element, found| {
+            if found.iter().any(|m| m.offset != Vec3::ZERO) {
+                return push_volume(&mut eccentric, self.mesh, number, element, |k, _| found[k]);
+            }
+            if found.iter().any(|m| m.mass != 0.0) {
+                push_volume(&mut mass, self.mesh, number, element, |k, _| found[k].mass);
+            }
+            if found.iter().any(|m| m.about_node != Mat3::ZERO) {
+                push_volume(&mut rotary, self.mesh, number, element, |k, _| found[k].about_node);
+            }
+        });
+        let (mass, rotary, eccentric) =
+            (BeamMass { elements: mass }, RotaryInertia { elements: rotary }, SectionInertia { elements: eccentric });
+        if mass.elements.is_empty() {
+            self.reason(names[0], false, "no section has mass on its centre line");
+        } else {
+            self.push(mass, "a dynamic stage, and sections with `rhoA`".into());
+        }
+        match (rotary.elements.is_empty(), wanted) {
+            (_, Some(false)) => self.reason(names[1], false, "switched off in [effects]"),
+            (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
+            _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
+        }
+        if bodies.is_empty() {
+            self.reason(
+                names[3],
+                false,
+                "no beam with interpolation = \"relative\" has rotary inertia or eccentric mass",
+            );
+        } else {
+            self.push(
+                RigidBody { name: names[3], bodies },
+                "relative beams with rotary inertia or eccentric mass".into(),
+            );
+        }
+        if eccentric.elements.is_empty() {
+            self.reason(names[2], false, "no section has its mass centre off the centre line");
+        } else {
+            self.push(eccentric, "sections with an eccentric `mass`".into());
+        }
+    }
+
+    pub(super) fn bodies(&mut self) -> Vec<Body> {
+        let bodies = &self.deck.bodies;
+        bodies.iter().filter_map(|body| self.body(body)).collect()
+    }
+
+    fn body(&mut self, body: &deck::Body) -> Option<Body> {
+        let (node, _) = self.node(&body.at)?;
+        let centre = Mat3(body.inertia.unwrap_or([[0.0; 3]; 3]));
+        if let Some(inertia) = body.inertia
+            && !is_inertia(inertia)
+        {
+            let message = "`inertia` of a body has positive principal values, none larger than the sum of the others";
+            self.diagnostics.push(Diagnostic::error(message, body.span.clone()));
+            return None;
+        }
+        let d = Vec3(body.offset);
+        let steiner = (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.mass;
+        let inertia = Inertia { mass: body.mass, offset: d, about_node: centre + steiner };
+        let node = &self.mesh.nodes[node];
+        Some(Body { node: node.node, place: node.place, inertia })
+    }
+
+    pub(super) fn body_inertia(&mut self) {
+        let bodies = self.out.bodies.clone();
+        match (bodies.is_empty(), self.dynamic) {
+            (true, _) => self.reason("rigid body inertia", false, "no [[body]]"),
+            (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
+            _ => {
+                let reason = format!("{} [[body]] table(s) and a dynamic stage", bodies.len());
+                self.push(RigidBody { name: "rigid body inertia", bodies }, reason);
+            }
+        }
+    }
+
+    /// For each stage with a `frame` an effect of its own.
+    pub(super) fn rotating_frames(&mut self) {
+        let framed: Vec<(usize, deck::Stage)> =
+            self.deck.stages.iter().cloned().enumerate().filter(|(_, stage)| stage.frame.is_some()).collect();
+        if framed.is_empty() {
+            return self.reason("rotating frame", false, "no stage has a `frame`");
+        }
+        let is_static =
+            |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Static { .. } | deck::StageBody::Path { .. });
+        // One amplitude for all static stages: what one has brought in stays for the next.
+        let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
+        let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
+        let mut elements = ByOrder::default();
+        let nodal = self.each_inertia(|number, element, found| {
+            push_volume(&mut elements, self.mesh, number, element, |k, s| (found[k], self.start_place(element, s)));
+        });
+        let bodies = [nodal, self.out.bodies.clone()].concat();
+        for (number, stage) in &framed {
+            let Some(frame) = &stage.frame else { continue };
+            let about = match &frame.about {
+                None => Vec3::ZERO,
+                Some(deck::Spanned { value: deck::PointRef::Coordinates(x), .. }) => Vec3(*x),
+                Some(deck::Spanned { value: deck::PointRef::Name(name), span }) => {
+                    match names::point(self.deck, name) {
+                        Some(place) => place,
+                        None => {
+                            let name = deck::Spanned { value: name.clone(), span: span.clone() };
+                            self.diagnostics.push(names::unknown("point", &name, names::points(self.deck)));
+                            continue;
+                        }
+                    }
+                }
+            };
+            self.out.effects.push(Arc::new(RotatingFrame {
+                stage: *number,
+                spin: Vec3(frame.spin),
+                about,
+                amplitude: amplitude.filter(|_| is_static(stage)),
+                elements: elements.clone(),
+                bodies: bodies.clone(),
+            }));
+        }
+        self.reason("rotating frame", true, format!("{} stage(s) with a `frame`", framed.len()));
+    }
+
+    /// Visits the elements with the mass properties of their volume points, about the centre line and in global axes, and
+    /// returns what sits at nodes instead: on beams whose rotations are relative all that turns with the section, because no
+    /// chart matters there.
+    fn each_inertia(&self, mut visit: impl FnMut(usize, &MeshElement, &[Inertia])) -> Vec<Body> {
+        let rotary = self.deck.effects.rotary_inertia.as_ref().is_none_or(|flag| flag.value);
+        let mut nodal = NodalInertia::default();
+        self.each_element(|beam, number, element, _| {
+            let relative = beam.interpolation == InterpolationWord::Relative;
+            let eccentric = element.volume.iter().any(|station| mass_at(beam, station).offset != Vec3::ZERO);
+            if relative && eccentric {
+                return nodal.add(beam, element, |whole| whole);
+            }
+            if relative && rotary {
+                nodal.add(beam, element, |whole| Inertia { mass: 0.0, ..whole });
+            }
+            let turns = eccentric || (rotary && !relative);
+            let at = |station: &Station| {
+                let whole = mass_at(beam, station).turned(station.axes);
+                if turns { whole } else { Inertia { about_node: Mat3::ZERO, ..whole } }
+            };
+            let found: Vec<Inertia> = element.volume.iter().map(at).collect();
+            visit(number, element, &found);
+        });
+        nodal.bodies(self.mesh)
+    }
+
+    /// The initial place of a station, between the nodes of its element.
+    fn start_place(&self, element: &MeshElement, station: &Station) -> Vec3 {
+        let parts = element.nodes.iter().zip(&station.shape);
+        parts.fold(Vec3::ZERO, |sum, (&node, &weight)| sum + self.mesh.nodes[node].place * weight)
+    }
+
+    pub(super) fn gravity(&mut self) {
+        let mut bodies = self.out.bodies.clone();
+        let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
+        let Some(acceleration) = acceleration else {
+            let why = if self.deck.gravity.is_some() { "`gravity` is zero" } else { "no `gravity`" };
+            self.reason("gravity on beams", false, why);
+            return self.reason("gravity on bodies", false, why);
+        };
+        let Some(amplitude) = self.amplitude(None, None) else { return };
+        if self.mesh.elements.is_empty() {
+            self.reason("gravity on beams", false, "no beams");
+        } else {
+            let mut elements = ByOrder::default();
+            let nodal = self.each_inertia(|number, element, found| {
+                push_volume(&mut elements, self.mesh, number, element, |k, _| found[k]);
+            });
+            bodies.extend(nodal.into_iter().filter(|body| body.inertia.mass > 0.0));
+            if elements.is_empty() {
+                self.reason("gravity on beams", false, "all masses of beams are eccentric and sit at their nodes");
+            } else {
+                self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
+            }
+        }
+        if bodies.is_empty() {
+            self.reason("gravity on bodies", false, "no [[body]]");
+        } else {
+            self.push(BodyGravity { acceleration, amplitude, bodies }, "`gravity` is set".into());
+        }
+    }
+
+    /// Rayleigh damping, each part only where its factor is not zero.
+    pub(super) fn damping(&mut self) {
+        let names = ["mass-proportional damping of beams", "mass-proportional damping of bodies"];
+        let [mass, _] = self.deck.damping.unwrap_or_default();
+        if mass == 0.0 || !self.dynamic {
+            let why = if mass == 0.0 { "no `mass` in [damping]" } else { "nothing moves in time" };
+            return names.into_iter().for_each(|name| self.reason(name, false, why));
+        }
+        let mut elements = ByOrder::default();
+        let nodal = self.each_inertia(|number, element, found| {
+            push_volume(&mut elements, self.mesh, number, element, |k, _| found[k]);
+        });
+        if elements.is_empty() {
+            self.reason(names[0], false, "no beams with mass");
+        } else {
+            self.push(BeamMassDamping { factor: mass, elements }, "`mass` in [damping]".into());
+        }
+        let bodies = [nodal, self.out.bodies.clone()].concat();
+        if bodies.is_empty() {
+            self.reason(names[1], false, "no bodies");
+        } else {
+            self.push(BodyMassDamping { factor: mass, bodies }, "`mass` in [damping]".into());
+        }
+    }
+}
+
+/// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the node.
+#[derive(Default)]
+struct NodalInertia {
+    nodes: BTreeMap<usize, (f64, Vec3, Mat3)>,
+}
+
+impl NodalInertia {
+    /// Adds what an element brings to its nodes; `pick` may leave parts out.
+    fn add(&mut self, beam: &MeshBeam, element: &MeshElement, pick: impl Fn(Inertia) -> Inertia) {
+        for (station, &node) in element.nodal.iter().zip(&element.nodes) {
+            let own = pick(mass_at(beam, station).turned(station.axes));
+            let (mass, moment, about) = self.nodes.entry(node).or_insert((0.0, Vec3::ZERO, Mat3::ZERO));
+            *mass += own.mass * station.weight;
+            *moment += own.offset * (own.mass * station.weight);
+            *about += own.about_node * station.weight;
+        }
+    }
+
+    /// The bodies at nodes that have any.
+    fn bodies(self, mesh: &Mesh) -> Vec<Body> {
+        let body = |(node, (mass, moment, about_node)): (usize, (f64, Vec3, Mat3))| {
+            let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
+            let node = &mesh.nodes[node];
+            Body { node: node.node, place: node.place, inertia: Inertia { mass, offset, about_node } }
+        };
+        let there = |(_, (mass, _, about)): &(usize, (f64, Vec3, Mat3))| *mass != 0.0 || *about != Mat3::ZERO;
+        self.nodes.into_iter().filter(there).map(body).collect()
+    }
+}
+
+fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {
+    let none = MassPerLength { mass: 0.0, offset: Vec3::ZERO, about_line: Mat3::ZERO };
+    beam.section.at(station.fraction).mass.unwrap_or(none)
+}
+
+/// Whether a matrix can be the inertia of a body: principal values not negative, none beyond the sum of the others.
+fn is_inertia(matrix: [[f64; 3]; 3]) -> bool {
+    let eigen = nalgebra::SymmetricEigen::new(nalgebra::Matrix3::from_fn(|i, j| matrix[i][j])).eigenvalues;
+    let slack = 1e-9 * eigen.amax();
+    let sum = eigen.sum();
+    eigen.iter().all(|&value| value >= -slack && 2.0 * value <= sum + slack)
+}

@@ -1,0 +1,136 @@
+//! Loads at nodes and along beams.
+
+use super::{Composer, push_volume};
+use crate::deck::{self, Diagnostic, Frame, InterpolationWord, LoadTarget, LoadVector};
+use crate::effect::line_load::{LineLoad, LineLoadKind};
+use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
+use crate::effect::{ByOrder, Effect};
+use crate::kernel::load::Intensity;
+use crate::scene::mesh::{Mesh, MeshElement, Station};
+use crate::scene::names;
+use crate::tensor::{Mat3, Vec3};
+
+impl Composer<'_> {
+    /// Loads at nodes, and beside them those that line loads on relative beams leave there.
+    pub(super) fn node_loads(&mut self, mut loads: NodeLoads) {
+        use NodeLoadKind::{MaterialForce, MaterialMoment, SpatialForce, SpatialMoment};
+        let kinds = [SpatialForce, SpatialMoment, MaterialForce, MaterialMoment];
+        for load in &self.deck.loads {
+            let LoadTarget::At(at) = &load.target else { continue };
+            let Some((node, on)) = self.node(at) else { continue };
+            let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
+            let Some(frame) = self.load_axes(load, at, node, on) else { continue };
+            let node = self.mesh.nodes[node].node;
+            for (vector, kind) in [(load.force, force_kind(load)), (load.moment, force_kind(load) + 1)] {
+                if let Some(vector) = vector {
+                    loads[kind].push(node_load::Instance { node, vector: frame * Vec3(vector.start), amplitude });
+                }
+            }
+        }
+        for (kind, loads) in kinds.into_iter().zip(loads) {
+            let effect = NodeLoad { kind, loads };
+            if effect.loads.is_empty() {
+                self.reason(effect.name(), false, "no such [[load]] at a node");
+            } else {
+                let reason = format!("{} at nodes", effect.loads.len());
+                self.push(effect, reason);
+            }
+        }
+    }
+
+    /// From the components of a load at a node to global ones at the start.
+    fn load_axes(
+        &mut self,
+        load: &deck::Load,
+        at: &deck::Spanned<String>,
+        node: usize,
+        on: Option<(usize, f64)>,
+    ) -> Option<Mat3> {
+        if load.frame != Frame::Section {
+            return Some(Mat3::IDENTITY);
+        }
+        let beams = self.mesh.beams_at(&names::Found::Node(node, on));
+        match beams[..] {
+            [(beam, fraction)] => Some(self.mesh.beams[beam].frame(fraction)),
+            [] => {
+                let message = format!("frame = \"section\" needs a section, and no beam meets the node `{}`", at.value);
+                self.diagnostics.push(Diagnostic::error(message, at.span.clone()));
+                None
+            }
+            _ => {
+                let message = format!("several beams meet at `{}`; whose section is meant?", at.value);
+                let (first, fraction) = beams[0];
+                let end = if fraction > 0.5 { "end" } else { "start" };
+                let help = format!("name the node on a beam, such as `{}@{end}`", self.mesh.beams[first].name);
+                self.diagnostics.push(Diagnostic::error(message, at.span.clone()).help(help));
+                None
+            }
+        }
+    }
+
+    /// Line loads; those that turn with a relative beam are returned as loads at its nodes.
+    pub(super) fn line_loads(&mut self) -> NodeLoads {
+        let (mut spatial, mut material) = (ByOrder::default(), ByOrder::default());
+        let mut nodal = NodeLoads::default();
+        for load in &self.deck.loads {
+            let LoadTarget::Along(along) = &load.target else { continue };
+            let Some(beam) = self.mesh.beams.iter().find(|b| b.name == along.value) else {
+                if !self.deck.beams.iter().any(|b| b.name.value == along.value) {
+                    let known = self.deck.beams.iter().map(|b| b.name.value.as_str());
+                    self.diagnostics.push(names::unknown("beam", along, known));
+                }
+                continue;
+            };
+            let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
+            let out = if load.frame == Frame::Space { &mut spatial } else { &mut material };
+            let turning = load.frame != Frame::Space || load.moment.is_some();
+            for number in beam.elements.clone() {
+                let element = &self.mesh.elements[number];
+                if turning && beam.interpolation == InterpolationWord::Relative {
+                    add_nodal_loads(&mut nodal, load, element, self.mesh, amplitude);
+                    continue;
+                }
+                push_volume(out, self.mesh, number, element, |_, station| intensity(load, station, amplitude));
+            }
+        }
+        for (kind, elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
+            let effect = LineLoad { kind, elements };
+            if effect.elements.is_empty() {
+                self.reason(effect.name(), false, "no such [[load]] along a beam");
+            } else {
+                self.push(effect, "[[load]] along a beam".into());
+            }
+        }
+        nodal
+    }
+}
+
+/// Loads at nodes by kind: forces and moments fixed in space, then those that turn with the section.
+pub(super) type NodeLoads = [Vec<node_load::Instance>; 4];
+
+/// The place of a load's forces among [`NodeLoads`]; that of its moments is the next.
+fn force_kind(load: &deck::Load) -> usize {
+    if load.frame == Frame::Space { 0 } else { 2 }
+}
+
+/// A load along an element, taken at its nodes.
+fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &MeshElement, mesh: &Mesh, amplitude: usize) {
+    for (station, &node) in element.nodal.iter().zip(&element.nodes) {
+        let Intensity { force, moment, .. } = intensity(load, station, amplitude);
+        for (vector, kind) in [(force, force_kind(load)), (moment, force_kind(load) + 1)] {
+            if vector != Vec3::ZERO {
+                let vector = vector * station.weight;
+                out[kind].push(node_load::Instance { node: mesh.nodes[node].node, vector, amplitude });
+            }
+        }
+    }
+}
+
+fn intensity(load: &deck::Load, station: &Station, amplitude: usize) -> Intensity {
+    let axes = if load.frame == Frame::Section { station.exact_axes } else { Mat3::IDENTITY };
+    let at = |vector: Option<LoadVector>| {
+        let [start, end] = vector.map_or([[0.0; 3]; 2], |v| [v.start, v.end]).map(Vec3);
+        axes * (start + (end - start) * station.fraction)
+    };
+    Intensity { force: at(load.force), moment: at(load.moment), amplitude }
+}

@@ -1,0 +1,298 @@
+//! Which effects act: for each table that stands in the deck one effect, and for each the reason.
+
+mod connections;
+mod inertia;
+mod loads;
+
+use super::joints::FoundJoint;
+use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
+use super::names;
+use crate::deck::{self, Deck, Diagnostic, InterpolationWord};
+use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
+use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
+use crate::effect::rigid_body::Body;
+use crate::effect::spring;
+use crate::effect::strain_rate_damping::StrainRateDamping;
+use crate::effect::{Connection, Effect, VolumeElement, VolumeElements};
+use crate::kernel::beam::StiffnessPoint;
+use crate::kernel::elastic::Strain;
+use crate::kernel::volume::VolumePoint;
+use crate::model::{Amplitude, History, SlotInfo, StageSet, Support};
+use crate::tensor::{Mat3, Vec3};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// An effect that a scene may have: acting or not, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reason {
+    /// The effect
+    pub name: &'static str,
+    /// Whether it acts
+    pub active: bool,
+    /// Why
+    pub reason: String,
+}
+
+/// The effects of a scene with what they need.
+pub struct Composition {
+    /// The effects
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Every effect that beamsim knows, acting or not
+    pub reasons: Vec<Reason>,
+    /// The factors of loads and springs
+    pub amplitudes: Vec<Amplitude>,
+    /// The elasticity, for resultants
+    pub elasticity: Vec<Arc<dyn StressField>>,
+    /// Rigid bodies
+    pub bodies: Vec<Body>,
+    /// Springs to ground
+    pub springs: Vec<spring::Instance>,
+    /// Slots of multipliers, behind those of the mesh
+    pub multipliers: Vec<SlotInfo>,
+    /// Components of these that nothing uses
+    pub idle_multipliers: Vec<Support>,
+    /// Nodes whose rotation a joint takes hold of
+    pub jointed: Vec<usize>,
+    /// How many joints remember their angle
+    pub angles: usize,
+}
+
+/// Collects effects while the tables of the deck are walked through.
+struct Composer<'a> {
+    deck: &'a Deck,
+    mesh: &'a Mesh,
+    histories: &'a HashMap<String, Arc<dyn History>>,
+    diagnostics: &'a mut Vec<Diagnostic>,
+    out: Composition,
+    known_amplitudes: HashMap<(Option<String>, Option<Vec<usize>>), usize>,
+    dynamic: bool,
+}
+
+/// Composes the effects of a deck.
+pub fn compose(
+    deck: &Deck,
+    mesh: &Mesh,
+    histories: &HashMap<String, Arc<dyn History>>,
+    connections: &[FoundJoint],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Composition {
+    let dynamic = needs_mass(deck);
+    let out = Composition {
+        effects: Vec::new(),
+        reasons: Vec::new(),
+        amplitudes: Vec::new(),
+        elasticity: Vec::new(),
+        bodies: Vec::new(),
+        springs: Vec::new(),
+        multipliers: Vec::new(),
+        idle_multipliers: Vec::new(),
+        jointed: Vec::new(),
+        angles: 0,
+    };
+    let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
+    composer.elasticity();
+    composer.springs();
+    composer.links();
+    composer.joints(connections);
+    composer.beam_inertia();
+    composer.out.bodies = composer.bodies();
+    composer.gravity();
+    composer.body_inertia();
+    composer.damping();
+    composer.rotating_frames();
+    let along = composer.line_loads();
+    composer.node_loads(along);
+    composer.never();
+    composer.out
+}
+
+impl Composer<'_> {
+    fn push(&mut self, effect: impl Effect + 'static, reason: String) {
+        self.reason(effect.name(), true, reason);
+        self.out.effects.push(Arc::new(effect));
+    }
+
+    fn reason(&mut self, name: &'static str, active: bool, reason: impl Into<String>) {
+        self.out.reasons.push(Reason { name, active, reason: reason.into() });
+    }
+
+    /// The number of the amplitude with this history and these stages.
+    fn amplitude(&mut self, history: Option<&deck::Spanned<String>>, stages: Option<&Vec<usize>>) -> Option<usize> {
+        let key = (history.map(|h| h.value.clone()), stages.cloned());
+        if let Some(&number) = self.known_amplitudes.get(&key) {
+            return Some(number);
+        }
+        let function = match history {
+            None => None,
+            Some(name) => match self.histories.get(&name.value) {
+                Some(function) => Some(function.clone()),
+                None => {
+                    let known = self.deck.histories.iter().map(|h| h.name.value.as_str());
+                    self.diagnostics.push(names::unknown("history", name, known));
+                    return None;
+                }
+            },
+        };
+        self.out.amplitudes.push(Amplitude::of_load(function, stage_set(stages)));
+        self.known_amplitudes.insert(key, self.out.amplitudes.len() - 1);
+        Some(self.out.amplitudes.len() - 1)
+    }
+
+    fn node(&mut self, name: &deck::Spanned<String>) -> Option<(usize, Option<(usize, f64)>)> {
+        self.mesh.find_node(self.deck, name).map_err(|d| self.diagnostics.push(d)).ok()
+    }
+
+    fn elasticity(&mut self) {
+        self.elasticity_of::<TotalVectors>(InterpolationWord::Total);
+        self.elasticity_of::<RelativeVectors>(InterpolationWord::Relative);
+    }
+
+    fn elasticity_of<I: Interpolation>(&mut self, way: InterpolationWord) {
+        let free: HashMap<String, usize> = self.free_strains();
+        let mut elements = ElasticElements::default();
+        self.each_element(|beam, number, element, mesh| {
+            if beam.interpolation != way {
+                return;
+            }
+            let free = free.get(&beam.name).copied();
+            match element.nodes.len() {
+                2 => elements.two.push(elastic::<2, 1>(mesh, beam, number, element, free)),
+                3 => elements.three.push(elastic::<3, 2>(mesh, beam, number, element, free)),
+                _ => elements.four.push(elastic::<4, 3>(mesh, beam, number, element, free)),
+            }
+        });
+        if elements.is_empty() {
+            return self.reason(
+                I::NAME,
+                false,
+                if self.mesh.elements.is_empty() { "no beams" } else { "no such beams" },
+            );
+        }
+        let count = elements.two.len() + elements.three.len() + elements.four.len();
+        let effect = Arc::new(BeamElasticity::<I>::new(elements));
+        self.reason(I::NAME, true, format!("{count} beam elements"));
+        self.out.elasticity.push(effect.clone());
+        self.out.effects.push(effect.clone());
+        match self.deck.damping {
+            Some([_, factor]) if factor != 0.0 && self.dynamic => {
+                self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
+            }
+            _ => self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time"),
+        }
+    }
+
+    /// The amplitudes of free strains, by beam.
+    fn free_strains(&mut self) -> HashMap<String, usize> {
+        let beams: Vec<(String, deck::FreeStrain)> =
+            self.mesh.beams.iter().filter_map(|b| Some((b.name.clone(), b.free_strain.clone()?))).collect();
+        let numbered =
+            |(name, free): (String, deck::FreeStrain)| Some((name, self.amplitude(free.history.as_ref(), None)?));
+        beams.into_iter().filter_map(numbered).collect()
+    }
+
+    fn each_element(&self, mut visit: impl FnMut(&MeshBeam, usize, &MeshElement, &Mesh)) {
+        for beam in &self.mesh.beams {
+            for number in beam.elements.clone() {
+                visit(beam, number, &self.mesh.elements[number], self.mesh);
+            }
+        }
+    }
+
+    /// What is known and never acts yet.
+    fn never(&mut self) {
+        let seams = self.mesh.beams.iter().any(|beam| beam.interpolation == InterpolationWord::Total);
+        let why = if seams {
+            "as soon as neighbouring nodes of beams with interpolation = \"total\" sit in different charts"
+        } else {
+            "no beam with interpolation = \"total\""
+        };
+        self.reason("mixed elements", seams, why);
+        self.reason("planar", false, "not supported yet: every scene is simulated in three dimensions");
+    }
+}
+
+/// Inertia is there for dynamic stages, and where momenta are looked at.
+fn needs_mass(deck: &Deck) -> bool {
+    let inertia =
+        |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
+    let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
+    let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
+    let expected = deck.expects.iter().any(|expect| match &expect.body {
+        deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
+        deck::ExpectBody::Fails(_) => false,
+    });
+    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
+    dynamic || written || expected || watched
+}
+
+/// The stages of the deck count from 1, those of a run from 0.
+pub fn stage_set(stages: Option<&Vec<usize>>) -> StageSet {
+    StageSet(stages.map(|stages| stages.iter().map(|s| s - 1).collect()))
+}
+
+fn connect<const N: usize>(mesh: &Mesh, number: usize, element: &MeshElement) -> Connection<N> {
+    Connection {
+        element: number as u32,
+        nodes: std::array::from_fn(|i| mesh.nodes[element.nodes[i]].node),
+        places: std::array::from_fn(|i| mesh.nodes[element.nodes[i]].place),
+    }
+}
+
+/// Pushes an element with volume points into the batch of its order.
+fn push_volume<Q: Copy>(
+    batches: &mut VolumeElements<Q>,
+    mesh: &Mesh,
+    number: usize,
+    element: &MeshElement,
+    quantity: impl Fn(usize, &Station) -> Q,
+) {
+    match element.nodes.len() {
+        2 => batches.two.push(volume(mesh, number, element, quantity)),
+        3 => batches.three.push(volume(mesh, number, element, quantity)),
+        _ => batches.four.push(volume(mesh, number, element, quantity)),
+    }
+}
+
+fn volume<const N: usize, Q: Copy>(
+    mesh: &Mesh,
+    number: usize,
+    element: &MeshElement,
+    quantity: impl Fn(usize, &Station) -> Q,
+) -> VolumeElement<N, Q> {
+    let point = |k: usize| {
+        let station = &element.volume[k];
+        VolumePoint {
+            shape: std::array::from_fn(|i| station.shape[i]),
+            weight: station.weight,
+            quantity: quantity(k, station),
+        }
+    };
+    VolumeElement { connection: connect(mesh, number, element), points: std::array::from_fn(point) }
+}
+
+fn elastic<const N: usize, const G: usize>(
+    mesh: &Mesh,
+    beam: &MeshBeam,
+    number: usize,
+    element: &MeshElement,
+    free: Option<usize>,
+) -> ElasticElement<N, G> {
+    let point = |k: usize| {
+        let station = &element.inner[k];
+        StiffnessPoint {
+            shape: std::array::from_fn(|i| station.shape[i]),
+            slope: std::array::from_fn(|i| station.slope[i]),
+            weight: station.weight,
+            tangent: station.axes.column(0),
+            stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+            free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
+        }
+    };
+    ElasticElement { connection: connect(mesh, number, element), points: std::array::from_fn(point), free }
+}
+
+/// From section axes to global components.
+fn free_strain(strain: [f64; 6], axes: Mat3) -> Strain {
+    let [g1, g2, g3, k1, k2, k3] = strain;
+    Strain { gamma: axes * Vec3([g1, g2, g3]), kappa: axes * Vec3([k1, k2, k3]) }
+}
