@@ -1,7 +1,7 @@
 //! Steps that adapt to their local error.
 
-use crate::integrate::{Rotations, Scheme};
-use crate::model::{Model, SlotKind, increments};
+use crate::integrate::{Increments, Rotations, Scheme};
+use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
 use crate::system::{Slot, State};
 
@@ -74,7 +74,7 @@ impl Control {
         for (slot, info) in model.slots.iter().enumerate() {
             let e = (end.a[slot] - start.a[slot]) * factor;
             let spins = self.scheme.rotations == Rotations::Increments;
-            let spun = |state: &State| increments::spin_acceleration(state, slot as Slot);
+            let spun = |state: &State| Increments::spin_acceleration(state, slot as Slot);
             let size = match info.kind {
                 SlotKind::Displacement => e.norm() / model.length,
                 SlotKind::Rotation if spins => ((spun(end) - spun(start)) * factor).norm(),

@@ -4,9 +4,9 @@ use super::control::Control;
 use super::failure::Failure;
 use super::grid::Grid;
 use super::run::{Run, Workshop};
-use crate::integrate::{Rotations, Scheme, Step};
+use crate::integrate::{Increments, Rotations, Scheme, Step};
 use crate::kernel::Weights;
-use crate::model::{charts, increments};
+use crate::model::charts;
 use crate::solve::NewtonFailure;
 
 impl Run<'_> {
@@ -19,7 +19,9 @@ impl Run<'_> {
         scheme: Scheme,
         adaptive: Option<f64>,
     ) -> Result<(), Failure> {
-        self.start_dynamic(workshop, scheme)?;
+        workshop.increments = (scheme.rotations == Rotations::Increments)
+            .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.equations));
+        self.start_dynamic(workshop)?;
         let mut before = step;
         match adaptive {
             None => self.run_fixed(workshop, end, step, scheme, &mut before),
@@ -88,18 +90,17 @@ impl Run<'_> {
     /// One attempt at a step: predict, prescribe, iterate.
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
-        let incremental = step.scheme.rotations == Rotations::Increments;
-        if incremental {
-            increments::begin(&mut self.state, &self.model.rotations);
+        let Workshop { assembly, newton, increments, .. } = workshop;
+        if let Some(increments) = increments {
+            increments.begin(&mut self.state, &step, before);
         }
         step.predict(&mut self.state, before);
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        let Workshop { assembly, newton, .. } = workshop;
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
-        if incremental {
-            let switched = increments::end(&mut self.state, &self.good, &self.model.rotations);
+        if let Some(increments) = increments {
+            let switched = increments.end(&mut self.state, &self.good);
             self.counters.work.chart_switches += switched as u64;
             // Forces conjugate to total vectors, for reactions and the energy account.
             assembly.evaluate(&self.state, Weights::NONE, None);

@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, Moment, place};
 use super::ledger::{Bookkeeper, Ledger};
-use crate::integrate::Scheme;
+use crate::integrate::{Increments, Scheme};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, State, System};
@@ -267,6 +267,8 @@ pub(super) struct Workshop {
     /// Increments of prescribed directions in a load step
     pub lift: Vec<Vec3>,
     pub until: Option<Until>,
+    /// Where the unknowns of time steps are increments of rotation
+    pub increments: Option<Increments>,
 }
 
 impl<'o> Run<'o> {
@@ -329,7 +331,7 @@ impl<'o> Run<'o> {
         };
         let convergence = Convergence { tolerance: stage.tolerance };
         let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
-        Ok(Workshop { assembly, newton, lift: vec![Vec3::ZERO; slots], until: stage.until.clone() })
+        Ok(Workshop { assembly, newton, lift: vec![Vec3::ZERO; slots], until: stage.until.clone(), increments: None })
     }
 
     /// The first dynamic stage gives the initial velocities.

@@ -2,9 +2,8 @@
 
 use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
-use crate::integrate::{Rotations, Scheme};
 use crate::kernel::Weights;
-use crate::model::{Model, SlotKind, increments};
+use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
 use crate::solve::NewtonFailure;
 use crate::system::{Equations, Slot, State, System};
@@ -16,7 +15,7 @@ const LARGEST_GAP: f64 = 1e-6;
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
-    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, scheme: Scheme) -> Result<(), Failure> {
+    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
         if self.takes_initial_motion() {
             let initial = std::mem::take(&mut self.plan.initial);
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
@@ -33,8 +32,8 @@ impl Run<'_> {
         self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
         self.state.algorithmic.copy_from_slice(&self.state.a);
-        if scheme.rotations == Rotations::Increments {
-            increments::start(&mut self.state, &self.model.rotations);
+        if let Some(increments) = &workshop.increments {
+            increments.start(&mut self.state);
         }
         self.open_account(workshop)
     }

@@ -117,6 +117,9 @@ pub trait Effect: Send + Sync {
         Momentum::ZERO
     }
 
+    /// Adds the inertia about its nodes that bodies have, by slot of the rotation.
+    fn inertia_of_rotations(&self, _sums: &mut [Mat3]) {}
+
     /// After each converged state: continues what it keeps in the state, such as turns of joints.
     fn remember(&self, _at: &mut State) {}
 

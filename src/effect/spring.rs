@@ -118,7 +118,7 @@ impl Instance {
 /// it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
 fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     let wound = at.wound[slot as usize];
-    if at.base.is_none() {
+    if at.turn(slot).is_none() {
         return wound_up(stiffness, at.q[slot as usize], wound);
     }
     if stiffness == Mat3::ZERO {

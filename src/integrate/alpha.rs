@@ -14,7 +14,8 @@
 
 use super::Method;
 use crate::kernel::Weights;
-use crate::system::State;
+use crate::kernel::turn::StepCoefficients;
+use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 
 /// The coefficients of a method.
@@ -37,7 +38,7 @@ pub struct Scheme {
 pub enum Rotations {
     /// Total rotation vectors with their rates
     Totals,
-    /// Increments from the last converged rotation, with material spins as velocities: see [`crate::model::increments`]
+    /// Increments from the last converged rotation, with material spins as velocities: see [`super::Increments`]
     Increments,
 }
 
@@ -62,7 +63,8 @@ impl Scheme {
         Self { beta, gamma, alpha_m, alpha_f, rotations: Rotations::Totals }
     }
 
-    /// The same on increments and spins (Bruls, Cardona & Arnold 2012, doi:10.1016/j.mechmachtheory.2011.07.017).
+    /// The same on increments of rotation (Bruls, Cardona & Arnold 2012, doi:10.1016/j.mechmachtheory.2011.07.017), as
+    /// [`crate::kernel::turn`] has them.
     pub fn lie_generalized_alpha(rho: f64) -> Self {
         Self { rotations: Rotations::Increments, ..Self::generalized_alpha(rho) }
     }
@@ -96,6 +98,12 @@ impl Step {
         let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
         let stretch = h / before;
         for slot in 0..state.q.len() {
+            if let Some(turn) = state.turn(slot as Slot) {
+                let x = turn.guess();
+                let (omega, acceleration) = turn.rates(x);
+                (state.q[slot], state.v[slot], state.a[slot]) = (x, omega, acceleration);
+                continue;
+            }
             let (v, a) = (state.v[slot], state.a[slot]);
             let old =
                 if stretch == 1.0 { state.algorithmic[slot] } else { a + (state.algorithmic[slot] - a) * stretch };
@@ -104,6 +112,12 @@ impl Step {
             state.v[slot] += (old * (1.0 - gamma) + new * gamma) * h;
             state.algorithmic[slot] = new;
         }
+    }
+
+    /// The coefficients of a rotation over the step.
+    pub fn coefficients(&self) -> StepCoefficients {
+        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, length) = (self.scheme, self.length);
+        StepCoefficients { beta, gamma, alpha_m, alpha_f, length }
     }
 }
 
@@ -117,8 +131,13 @@ impl Method for Step {
     fn correct(&self, state: &mut State, dq: &[Vec3]) {
         let Weights { damping, mass, .. } = self.weights();
         let algorithmic = 1.0 / (self.scheme.beta * self.length * self.length);
-        for (slot, &dq) in dq.iter().enumerate() {
+        // Where a motion is prescribed nothing is corrected, and rates stay as they are prescribed.
+        for (slot, &dq) in dq.iter().enumerate().filter(|(_, dq)| **dq != Vec3::ZERO) {
             state.q[slot] += dq;
+            if let Some(turn) = state.turn(slot as Slot) {
+                (state.v[slot], state.a[slot]) = turn.rates(state.q[slot]);
+                continue;
+            }
             state.v[slot] += dq * damping;
             state.a[slot] += dq * mass;
             state.algorithmic[slot] += dq * algorithmic;

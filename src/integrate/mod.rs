@@ -2,8 +2,10 @@
 //! which weights stiffness, damping and mass enter the tangent.
 
 mod alpha;
+mod increments;
 
 pub use alpha::{Rotations, Scheme, Step};
+pub use increments::Increments;
 
 use crate::kernel::Weights;
 use crate::system::State;

@@ -29,13 +29,22 @@ pub struct Spin<T = f64> {
     rates: Rates<T>,
 }
 
-/// What the unknown rates of a spin are.
+/// What a spin depends on.
 #[derive(Clone, Copy, Debug)]
 enum Rates<T> {
-    /// Those of the rotation vector
+    /// The rotation vector and its rates
     OfVector(Vec3<T>, Vec3<T>),
-    /// Omega and Acc themselves
-    OfSpin,
+    /// One unknown alone
+    OfUnknown(Derivatives<T>),
+}
+
+/// The derivatives of a spin over the one unknown that it is a function of: the increment of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Derivatives<T = f64> {
+    /// dOmega
+    pub d_omega: Mat3<T>,
+    /// dAcc
+    pub d_acceleration: Mat3<T>,
 }
 
 impl<T: Real> Spin<T> {
@@ -48,10 +57,10 @@ impl<T: Real> Spin<T> {
         Self { rotation, omega, acceleration, rates: Rates::OfVector(p_rate, p_rate2) }
     }
 
-    /// A spin whose unknown rates are Omega and Acc themselves.
+    /// A spin that is a function of one unknown.
     #[inline]
-    pub fn direct(rotation: Rotation<T>, omega: Vec3<T>, acceleration: Vec3<T>) -> Self {
-        Self { rotation, omega, acceleration, rates: Rates::OfSpin }
+    pub fn direct(rotation: Rotation<T>, omega: Vec3<T>, acceleration: Vec3<T>, over: Derivatives<T>) -> Self {
+        Self { rotation, omega, acceleration, rates: Rates::OfUnknown(over) }
     }
 
     /// s dOmega/dP + d dOmega/drate: of the weighted derivatives of Omega with respect to the rotation unknowns.
@@ -65,12 +74,13 @@ impl<T: Real> Spin<T> {
     /// dAcc   = s (C5 + C1(Pdd)) + d C4 + m T          dOmega = s C1(Pd) + d T
     /// ```
     ///
-    /// Where Omega and Acc are the unknown rates themselves: dAcc = m I, dOmega = d I.
+    /// Of a function of one unknown, in which the weights are already: dAcc and dOmega themselves.
     #[inline(always)]
     fn derivatives(&self, w: Weights) -> (Mat3<T>, Mat3<T>) {
         let rotation = &self.rotation;
-        let Rates::OfVector(p_rate, p_rate2) = self.rates else {
-            return (Mat3::identity().scale(w.mass), Mat3::identity().scale(w.damping));
+        let (p_rate, p_rate2) = match self.rates {
+            Rates::OfVector(p_rate, p_rate2) => (p_rate, p_rate2),
+            Rates::OfUnknown(over) => return (over.d_acceleration, over.d_omega),
         };
         let mut acceleration = rotation.t.scale(w.mass);
         let mut omega = Mat3::zero();

@@ -12,6 +12,7 @@ pub mod load;
 pub mod relative;
 pub mod seam;
 pub mod shape;
+pub mod turn;
 pub mod volume;
 
 pub use element::{ElementSystem, MAX_NODES, NodeMotion, Weights};

@@ -186,7 +186,7 @@ impl Motion {
             }
             MotionKind::Rotation => {
                 let turned = (value - state.wound[slot].dot(n)).abs();
-                state.q[slot] = if state.base.is_some() {
+                state.q[slot] = if state.turn(self.slot).is_some() {
                     n * (value - state.wound[slot].dot(n))
                 } else {
                     let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();

@@ -1,8 +1,9 @@
 //! The state of a scene: one 3-vector of unknowns a slot, with its rates.
 
-use crate::kernel::NodeMotion;
 use crate::kernel::inertia::Spin;
 use crate::kernel::seam::Conversion;
+use crate::kernel::turn::Turn;
+use crate::kernel::{NodeMotion, Weights};
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 
@@ -31,7 +32,8 @@ pub struct State {
     pub v: Vec<Vec3>,
     /// d2q/dt2; zero in static stages.
     pub a: Vec<Vec3>,
-    /// The algorithmic acceleration of generalised-alpha methods; equal to `a` where a method has none of its own.
+    /// The algorithmic acceleration of generalised-alpha methods; equal to `a` where a method has none of its own. Where
+    /// the unknowns of steps are increments, that of a rotation is the rate of the momentum that it carries, see [`Turn`].
     pub algorithmic: Vec<Vec3>,
     /// The factor of each load, valid at `time` and `load`.
     pub amplitude: Vec<f64>,
@@ -44,10 +46,9 @@ pub struct State {
     pub amplitude_rates: Vec<[f64; 2]>,
     /// The angle of each sprung joint, continued without jumps; valid at the last converged state.
     pub angles: Vec<f64>,
-    /// For each rotation slot the rotation that its vector starts from, while a step is iterated whose unknowns are
-    /// increments. Then `q` holds the increment, and `v`, `a`, `algorithmic` the material spin and its rate. Else `None`:
-    /// rotation vectors are total ones.
-    pub base: Option<Vec<Mat3>>,
+    /// For each rotation slot the step it is in, while a step is iterated whose unknowns are increments. Then `q` holds the
+    /// increment, `v` and `a` the material spin and its rate. Else empty: rotation vectors are total ones.
+    pub turns: Vec<Option<Turn>>,
 }
 
 impl State {
@@ -66,7 +67,7 @@ impl State {
             wound: zero,
             amplitude_rates: vec![[0.0; 2]; amplitudes],
             angles: vec![0.0; angles],
-            base: None,
+            turns: Vec::new(),
         }
     }
 
@@ -83,38 +84,46 @@ impl State {
         self.wound.copy_from_slice(&other.wound);
         self.amplitude_rates.copy_from_slice(&other.amplitude_rates);
         self.angles.copy_from_slice(&other.angles);
-        self.base.clone_from(&other.base);
+        self.turns.clone_from(&other.turns);
+    }
+
+    /// The step that a rotation is in, where its unknown is an increment.
+    #[inline]
+    pub fn turn(&self, slot: Slot) -> Option<&Turn> {
+        self.turns.get(slot as usize)?.as_ref()
     }
 
     /// The rotation at a slot, in the chart of the state.
     #[inline]
     pub fn rotation(&self, slot: Slot) -> Rotation {
         let rotation = Rotation::new(self.q[slot as usize]);
-        match &self.base {
+        match self.turn(slot) {
             None => rotation,
-            Some(base) => rotation.after(base[slot as usize]),
+            Some(turn) => rotation.after(turn.base()),
         }
     }
 
     /// The rate of the unknown at a rotation slot.
     pub fn rotation_rate(&self, slot: Slot) -> RotationRate {
         let given = self.v[slot as usize];
-        if self.base.is_none() {
-            return RotationRate { rate: given, over_spin: None };
+        if self.turn(slot).is_none() {
+            return RotationRate { rate: given, over_unknown: None };
         }
-        let rotation = self.rotation(slot);
-        let inverse = rotation.t_inverse();
+        let spin = self.spin(slot);
+        let inverse = spin.rotation.t_inverse();
         let rate = inverse * given;
-        RotationRate { rate, over_spin: Some((inverse, -(inverse * rotation.c1(rate)))) }
+        // The weights stand in the derivatives of the spin already.
+        let d_omega = spin.omega_derivative(Weights::NONE);
+        RotationRate { rate, over_unknown: Some(inverse * (d_omega - spin.rotation.c1(rate))) }
     }
 
     /// The spin at a slot.
     #[inline]
     pub fn spin(&self, slot: Slot) -> Spin {
         let k = slot as usize;
-        match &self.base {
+        match self.turn(slot) {
             None => Spin::new(self.q[k], self.v[k], self.a[k]),
-            Some(_) => Spin::direct(self.rotation(slot), self.v[k], self.a[k]),
+            Some(turn) => turn.spin(self.q[k], self.v[k], self.a[k]),
         }
     }
 
@@ -133,22 +142,22 @@ impl State {
     }
 }
 
-/// The rate of a rotation's unknown. Where that is an increment X and the state holds spins, Xd = T^-1 Omega depends on both.
+/// The rate of a rotation's unknown. Where that is an increment X, its rate Xd = T^-1 Omega is a function of X.
 #[derive(Clone, Copy, Debug)]
 pub struct RotationRate {
     /// Pd or Xd
     pub rate: Vec3,
-    /// dXd/dOmega = T^-1 and dXd/dX = -T^-1 C1(Xd)
-    over_spin: Option<(Mat3, Mat3)>,
+    /// dXd/dX = T^-1 (dOmega - C1(Xd))
+    over_unknown: Option<Mat3>,
 }
 
 impl RotationRate {
     /// What the derivative of something over the rate of the unknown means for the unknown rate of the state, and for the
     /// unknown itself.
     pub fn pull_back(&self, over_rate: Vec3) -> (Vec3, Vec3) {
-        match &self.over_spin {
+        match &self.over_unknown {
             None => (over_rate, Vec3::ZERO),
-            Some((spin, increment)) => (spin.transpose_mul(over_rate), increment.transpose_mul(over_rate)),
+            Some(over_unknown) => (Vec3::ZERO, over_unknown.transpose_mul(over_rate)),
         }
     }
 }

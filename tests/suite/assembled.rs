@@ -2,8 +2,9 @@
 //! as dampers, wound springs and effects over increments.
 
 use crate::random::Random;
+use beamsim::integrate::{Increments, Method, Scheme, Step};
 use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model, StageKind, charts, increments};
+use beamsim::model::{Assembly, Model, StageKind, charts};
 use beamsim::scene;
 use beamsim::system::State;
 
@@ -98,6 +99,12 @@ fn scatter(assembly: &Assembly, x: &[f64], field: &mut [beamsim::tensor::Vec3], 
     field.iter_mut().zip(whole).for_each(|(f, w)| *f += w * factor);
 }
 
+fn correct(assembly: &Assembly, step: &Step, x: &[f64], state: &mut State, factor: f64) {
+    let mut dq = vec![beamsim::tensor::Vec3::ZERO; state.q.len()];
+    scatter(assembly, x, &mut dq, factor);
+    step.correct(state, &dq);
+}
+
 fn forces(assembly: &mut Assembly, state: &State, count: usize) -> Vec<f64> {
     assembly.evaluate(state, Weights::NONE, None);
     let mut out = vec![0.0; count];
@@ -121,12 +128,19 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
         state.wound[slot as usize] = state.q[slot as usize];
     }
     charts::freeze(&mut state, &model.elements);
-    if incremental {
-        increments::begin(&mut state, &model.rotations);
-        let x = numbers(&mut random, 0.3);
-        scatter(&assembly, &x, &mut state.q, 1.0);
-    }
-    for weights in [Weights::STIFFNESS, Weights::DAMPING, Weights { stiffness: 1.0, damping: 2.0, mass: 3.0 }] {
+    // Over increments, accelerations and velocities of rotations are functions of the unknown of the step.
+    let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
+    let combinations = if incremental {
+        let increments = Increments::new(&model, &assembly.system.pattern.equations);
+        increments.start(&mut state);
+        increments.begin(&mut state, &step, 0.5);
+        step.predict(&mut state, 0.5);
+        correct(&assembly, &step, &numbers(&mut random, 0.3), &mut state, 1.0);
+        vec![step.weights()]
+    } else {
+        vec![Weights::STIFFNESS, Weights::DAMPING, Weights { stiffness: 1.0, damping: 2.0, mass: 3.0 }]
+    };
+    for weights in combinations {
         let x = numbers(&mut random, 1.0);
         assembly.evaluate(&state, weights, None);
         let values = assembly.system.values.clone();
@@ -134,9 +148,13 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
         let h = 1e-5;
         let mut moved = |side: f64| {
             let mut there = state.clone();
-            scatter(&assembly, &x, &mut there.q, side * h * weights.stiffness);
-            scatter(&assembly, &x, &mut there.v, side * h * weights.damping);
-            scatter(&assembly, &x, &mut there.a, side * h * weights.mass);
+            if incremental {
+                correct(&assembly, &step, &x, &mut there, side * h);
+            } else {
+                scatter(&assembly, &x, &mut there.q, side * h * weights.stiffness);
+                scatter(&assembly, &x, &mut there.v, side * h * weights.damping);
+                scatter(&assembly, &x, &mut there.a, side * h * weights.mass);
+            }
             forces(&mut assembly, &there, count)
         };
         let (after, before) = (moved(1.0), moved(-1.0));
