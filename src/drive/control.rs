@@ -8,13 +8,15 @@ use crate::system::{Slot, State};
 /// Chooses the length of steps.
 ///
 /// The local error of a step of a second-order method is e = h^2 (beta - 1/6 + (alpha_m - alpha_f)/2)(a1 - a0), translations
-/// over the length of the scene and rotations as spins T e; a step whose largest error is above the tolerance is rejected,
-/// and the next is chosen so that it should be a little below.
+/// over the length of the scene and rotations as spins T e. Errors of steps add up, so each step is given its share of the
+/// tolerance, by its part of the stage; a step whose largest error is above its share is rejected, and the next is chosen so that it
+/// should be a little below.
 #[derive(Clone, Debug)]
 pub(super) struct Control {
     /// The method
     pub scheme: Scheme,
-    tolerance: f64,
+    /// The error allowed to a step over its length
+    rate: f64,
     length: f64,
     smallest: f64,
 }
@@ -27,9 +29,9 @@ const GROWTH: f64 = 2.0;
 const SMALLEST: f64 = 1e-8;
 
 impl Control {
-    /// Begins with steps of this length.
-    pub fn new(tolerance: f64, length: f64, scheme: Scheme) -> Self {
-        Self { scheme, tolerance, length, smallest: SMALLEST * length }
+    /// Begins with steps of this length; the tolerance is for all errors of the next `span` of time.
+    pub fn new(tolerance: f64, span: f64, length: f64, scheme: Scheme) -> Self {
+        Self { scheme, rate: tolerance / span, length, smallest: SMALLEST * length }
     }
 
     /// The end and the length of the next step. What remains to the next stop is not left as a sliver.
@@ -57,10 +59,11 @@ impl Control {
 
     /// Takes or rejects a step with this error, and chooses the next length.
     pub fn judge(&mut self, length: f64, error: f64) -> bool {
-        let ratio = (error / self.tolerance).max(1e-9);
-        // The error of a step falls with the third power of its length.
-        let factor = SAFETY / libm::cbrt(ratio);
-        let taken = error <= self.tolerance || length <= self.smallest;
+        let allowed = self.rate * length;
+        let ratio = (error / allowed).max(1e-9);
+        // The error of a step falls with the third power of its length, its share with the first.
+        let factor = SAFETY / libm::sqrt(ratio);
+        let taken = error <= allowed || length <= self.smallest;
         let most = if taken { GROWTH } else { SAFETY };
         self.length = (length * factor.clamp(1.0 / (GROWTH * GROWTH), most)).max(self.smallest);
         taken
@@ -92,15 +95,16 @@ mod tests {
     use super::*;
 
     fn control() -> Control {
-        Control::new(1e-4, 0.1, Scheme::newmark(0.25, 0.5))
+        Control::new(1e-3, 1.0, 0.1, Scheme::newmark(0.25, 0.5))
     }
 
     #[test]
     fn a_step_too_far_is_rejected_and_comes_back_smaller() {
         let mut control = control();
-        assert!(!control.judge(0.1, 8e-4));
+        assert!(!control.judge(0.1, 4e-4));
         assert!((control.length - 0.045).abs() < 1e-12);
-        assert!(control.judge(0.045, 0.9e-4));
+        assert!(control.judge(0.045, 0.44e-4));
+        assert!(!control.judge(0.045, 0.46e-4));
     }
 
     #[test]

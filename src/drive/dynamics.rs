@@ -25,7 +25,10 @@ impl Run<'_> {
         let mut before = step;
         match adaptive {
             None => self.run_fixed(workshop, end, step, scheme, &mut before),
-            Some(tolerance) => self.run_adaptive(workshop, end, Control::new(tolerance, step, scheme), &mut before),
+            Some(tolerance) => {
+                let control = Control::new(tolerance, end - self.state.time, step, scheme);
+                self.run_adaptive(workshop, end, control, &mut before)
+            }
         }
     }
 
