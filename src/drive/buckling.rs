@@ -4,6 +4,7 @@
 //! eigenvalues m of K x = -m K' x tell how far away the critical loads are. Each is then followed: the path is continued to
 //! the load found, and looked at again from there, until it is reached.
 
+use super::direction::Direction;
 use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
@@ -15,8 +16,6 @@ use nalgebra::Complex;
 
 /// How far the state is moved along the path to see the tangent vary: lengths of the scene, and radians.
 const PROBE: f64 = 1e-5;
-/// Step over which derivatives over the load factor are taken.
-const LOAD_STEP: f64 = 1.0 / 4096.0;
 /// Looks at one critical load.
 const MOST_LOOKS: usize = 80;
 /// A critical load is known when it lies between two points of the path this near to each other, relative to itself.
@@ -165,7 +164,7 @@ impl Run<'_> {
 
     /// The critical loads as they look from the present state.
     fn critical_loads(&mut self, workshop: &mut Workshop, modes: usize) -> Result<Vec<f64>, Failure> {
-        let Some(direction) = self.path_direction(workshop)? else { return Ok(Vec::new()) };
+        let Some(Direction { rate: direction, .. }) = self.path_direction(workshop)? else { return Ok(Vec::new()) };
         let size = direction.iter().zip(&self.model.slots).filter(|(_, info)| !info.is_multiplier());
         let size = size.map(|(d, info)| d.norm() * info.arm(self.model.length) / self.model.length).fold(0.0, f64::max);
         let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
@@ -190,50 +189,6 @@ impl Run<'_> {
         loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
         loads.truncate(modes);
         Ok(loads)
-    }
-
-    /// dq/dload along the path; `None` where nothing varies with the load factor.
-    pub(super) fn path_direction(&mut self, workshop: &mut Workshop) -> Result<Option<Vec<Vec3>>, Failure> {
-        let pull = self.load_derivative(workshop);
-        let Workshop { assembly, newton, lift, .. } = workshop;
-        if pull.iter().chain(lift.iter()).all(|&v| v == Vec3::ZERO) {
-            return Ok(None);
-        }
-        assembly.forget();
-        assembly.evaluate(&self.state, Weights::STIFFNESS, Some(lift));
-        let system = &assembly.system;
-        let mut solution = vec![0.0; system.pattern.equations.count()];
-        system.right_hand_side_of(&pull, &mut solution);
-        self.counters.work.factorisations += 1;
-        if !(newton.solver.factorise(system) && newton.solver.solve(&mut solution)) {
-            let vector = newton.solver.null_vector(system);
-            return Err(self.name_mechanism(vector, &workshop.assembly.system));
-        }
-        let mut direction = vec![Vec3::ZERO; pull.len()];
-        system.pattern.equations.scatter(&solution, Some(lift), &mut direction);
-        Ok(Some(direction))
-    }
-
-    /// The derivative of the forces over the load factor; that of prescribed directions goes into the workshop's `lift`.
-    /// Loads and motions without a history are linear in it; the step is small, so that no motion goes around.
-    pub(super) fn load_derivative(&mut self, workshop: &mut Workshop) -> Vec<Vec3> {
-        let Workshop { assembly, lift, .. } = workshop;
-        let (mut here, mut shifted) = (self.state.clone(), self.state.clone());
-        let inverse = 1.0 / LOAD_STEP;
-        self.model.set_clock(&mut here, self.state.time, self.state.load);
-        let mut forces = |state: &State| -> Vec<Vec3> {
-            assembly.evaluate(state, Weights::NONE, None);
-            (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
-        };
-        let before = forces(&self.state);
-        self.model.set_clock(&mut shifted, self.state.time, self.state.load + LOAD_STEP);
-        // From where the motions put their directions now, not from where round-off has left them: the step is small.
-        for (lift, (moved, from)) in lift.iter_mut().zip(shifted.q.iter().zip(&here.q)) {
-            *lift = (*moved - *from) * inverse;
-        }
-        shifted.q.copy_from_slice(&self.state.q);
-        let after = forces(&shifted);
-        after.iter().zip(&before).map(|(after, before)| (*after - *before) * inverse).collect()
     }
 
     /// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r

@@ -2,6 +2,7 @@
 
 mod buckling;
 mod control;
+mod direction;
 mod dynamics;
 mod failure;
 mod grid;

@@ -10,6 +10,7 @@
 //! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in the load factor; rotation
 //! vectors follow through the equations, so that no chart enters.
 
+use super::direction::Direction;
 use super::failure::Failure;
 use super::run::{Event, EventKind, Run, Workshop};
 use crate::kernel::Weights;
@@ -28,6 +29,8 @@ const SHORTEST: f64 = 1.0 / 16384.0;
 const BENT: f64 = 0.8;
 /// Attempts to come nearer to a special point.
 const MOST_LOOKS: usize = 40;
+/// A correction of so many times the step is a flight.
+const FLIGHT: f64 = 100.0;
 /// Relative length to which it is located.
 const LOCATED: f64 = 1e-9;
 
@@ -160,7 +163,7 @@ struct Path {
 
 impl Path {
     fn new(run: &mut Run, workshop: &mut Workshop, steps: usize) -> Result<Self, Failure> {
-        let Some(direction) = run.path_direction(workshop)? else {
+        let Some(Direction { rate: direction, .. }) = run.path_direction(workshop)? else {
             return Err(Failure::Deck(
                 "control = \"arc_length\" needs a load or a motion that grows with the load factor".into(),
             ));
@@ -191,21 +194,16 @@ impl Path {
 
     /// The point at the run's state: its tangent goes on in the direction of `before`.
     fn look(&mut self, run: &mut Run, workshop: &mut Workshop, before: &Point) -> Result<Point, Failure> {
-        let direction = run.path_direction(workshop)?.unwrap_or_else(|| vec![Vec3::ZERO; run.state.q.len()]);
+        let slots = run.state.q.len();
+        let Direction { rate, pull } = run.path_direction(workshop)?.unwrap_or_else(|| Direction::none(slots));
         // The tangent that was just factorised tells the pivots.
         let negative = self.pivots.as_mut().and_then(|pivots| pivots.negative(&workshop.assembly.system));
-        let along = dot(run, &direction, &before.tangent) * self.scale + before.load_rate;
-        let size = (squared(run, &direction) * self.scale + 1.0).sqrt();
+        let along = dot(run, &rate, &before.tangent) * self.scale + before.load_rate;
+        let size = (squared(run, &rate) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
-        let pull = run.load_derivative(workshop);
-        // What stands at multipliers are gaps of motors, not forces.
-        let acting = |slot: usize| !run.model.slots[slot].is_multiplier();
-        let loaded = pull.iter().enumerate().any(|(slot, &force)| acting(slot) && force != Vec3::ZERO);
-        let parts = pull.iter().zip(&direction).enumerate().filter(|(slot, _)| acting(*slot));
-        let work: f64 = parts.map(|(_, (force, d))| -force.dot(*d)).sum();
         // Of prescribed motions alone no displacement is known that loads would do work on.
-        let work = if loaded { work } else { load_rate.signum() };
-        let tangent = direction.into_iter().map(|d| d * load_rate).collect();
+        let work = work_of_loads(run, &pull, &rate).unwrap_or(load_rate.signum());
+        let tangent = rate.into_iter().map(|d| d * load_rate).collect();
         Ok(Point { state: run.state.clone(), tangent, load_rate, work_rate: work * load_rate, negative })
     }
 
@@ -239,69 +237,79 @@ impl Path {
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and returns the iterations.
     fn advance(&self, run: &mut Run, workshop: &mut Workshop, length: f64) -> Result<usize, NewtonFailure> {
-        let here = &self.here;
-        run.state.copy_from(&here.state);
-        run.state.q.iter_mut().zip(&here.tangent).for_each(|(q, t)| *q += *t * length);
-        let (time, mut load) = (here.state.time, here.state.load + here.load_rate * length);
+        let mut load = self.predict(run, length);
         workshop.assembly.forget();
         let noise = workshop.assembly.noise(&run.state);
-        let limit = workshop.newton.max_iterations;
         let mut last: Option<Vec<Vec3>> = None;
-        for iteration in 0..=limit {
+        let mut iterations = 0;
+        loop {
             // Held directions are put where they belong, free of the round-off of predictor and corrections.
-            run.model.set_clock(&mut run.state, time, load);
-            let slots = run.state.q.len();
+            run.model.set_clock(&mut run.state, self.here.state.time, load);
             let pull = run.load_derivative(workshop);
             let Workshop { assembly, newton, lift, .. } = workshop;
-            let work = &mut run.counters.work;
-            timed(&mut work.evaluation_seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
+            let seconds = &mut run.counters.work.evaluation_seconds;
+            timed(seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
             let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last.as_deref());
             match verdict {
-                Verdict::Converged => return Ok(iteration),
+                Verdict::Converged => return Ok(iterations),
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, &run.state)),
-                Verdict::Continue if iteration == limit => {
-                    return Err(NewtonFailure::NotConverged { residual, iterations: iteration });
+                Verdict::Continue if iterations == newton.max_iterations => {
+                    return Err(NewtonFailure::NotConverged { residual, iterations });
                 }
                 Verdict::Continue => {}
             }
-            let system = &assembly.system;
-            let mut back = vec![0.0; system.pattern.equations.count()];
-            let mut along = back.clone();
-            system.right_hand_side_of(&pull, &mut along);
-            // The residual's own right-hand side takes no part of the lift.
-            let total: Vec<Vec3> = (0..slots).map(|slot| system.total(slot)).collect();
-            system.right_hand_side_without_lift(&total, &mut back);
-            run.counters.work.factorisations += 1;
-            run.counters.work.iterations += 1;
-            let solver = &mut newton.solver;
-            let solved = timed(&mut run.counters.work.solve_seconds, || {
-                solver.factorise(system) && solver.solve(&mut back) && solver.solve(&mut along)
-            });
-            if !solved {
-                return Err(NewtonFailure::Singular(newton.solver.null_vector(system)));
-            }
-            let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
-            system.pattern.equations.scatter(&back, None, &mut a);
-            system.pattern.equations.scatter(&along, Some(lift), &mut b);
-            let part = |run: &Run, d: &[Vec3]| dot(run, &here.tangent, d) * self.scale;
-            let dl = -part(run, &a) / (part(run, &b) + here.load_rate);
-            let dq: Vec<Vec3> = a.iter().zip(&b).map(|(a, b)| *a + *b * dl).collect();
+            let (dq, dl) = self.correction(run, workshop, &pull)?;
             let wild = dq.iter().any(|d| !d.is_finite()) || !dl.is_finite();
-            if wild || squared(run, &dq) * self.scale + dl * dl > (100.0 * length).powi(2) {
-                return Err(NewtonFailure::NotConverged { residual, iterations: iteration });
+            if wild || squared(run, &dq) * self.scale + dl * dl > (FLIGHT * length).powi(2) {
+                return Err(NewtonFailure::NotConverged { residual, iterations });
             }
-            assembly.extrapolate(&run.state, &dq);
-            run.state.q.iter_mut().zip(&dq).for_each(|(q, d)| *q += *d);
             load += dl;
-            last = Some(dq);
-            let switched = charts::switch(&mut run.state, &run.model.rotations, 0.0, None);
-            if switched > 0 {
-                run.counters.work.chart_switches += switched as u64;
-                charts::freeze(&mut run.state, &run.model.elements);
-                last = None;
-            }
+            let switched = correct(run, workshop, &dq);
+            // What was a correction before is none in a new chart.
+            last = (!switched).then_some(dq);
+            iterations += 1;
         }
-        unreachable!("the last iteration returns")
+    }
+
+    /// The state `length` along the tangent; its load factor.
+    fn predict(&self, run: &mut Run, length: f64) -> f64 {
+        let here = &self.here;
+        run.state.copy_from(&here.state);
+        run.state.q.iter_mut().zip(&here.tangent).for_each(|(q, t)| *q += *t * length);
+        here.state.load + here.load_rate * length
+    }
+
+    /// The correction of Newton within the plane normal to the tangent: of the unknowns, and of the load factor. The
+    /// assembly holds forces and tangent of the run's state.
+    fn correction(
+        &self,
+        run: &mut Run,
+        workshop: &mut Workshop,
+        pull: &[Vec3],
+    ) -> Result<(Vec<Vec3>, f64), NewtonFailure> {
+        let Workshop { assembly, newton, lift, .. } = workshop;
+        let (system, solver, work) = (&assembly.system, &mut newton.solver, &mut run.counters.work);
+        let slots = pull.len();
+        let mut back = vec![0.0; system.pattern.equations.count()];
+        let mut along = back.clone();
+        system.right_hand_side_of(pull, &mut along);
+        // The residual's own right-hand side takes no part of the lift.
+        let total: Vec<Vec3> = (0..slots).map(|slot| system.total(slot)).collect();
+        system.right_hand_side_without_lift(&total, &mut back);
+        work.factorisations += 1;
+        work.iterations += 1;
+        let solved = timed(&mut work.solve_seconds, || {
+            solver.factorise(system) && solver.solve(&mut back) && solver.solve(&mut along)
+        });
+        if !solved {
+            return Err(NewtonFailure::Singular(solver.null_vector(system)));
+        }
+        let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
+        system.pattern.equations.scatter(&back, None, &mut a);
+        system.pattern.equations.scatter(&along, Some(lift), &mut b);
+        let part = |d: &[Vec3]| dot(run, &self.here.tangent, d) * self.scale;
+        let dl = -part(&a) / (part(&b) + self.here.load_rate);
+        Ok((a.iter().zip(&b).map(|(a, b)| *a + *b * dl).collect(), dl))
     }
 
     /// Of the special points between here and `next` the nearest, or `next` itself.
@@ -357,6 +365,26 @@ impl Path {
         }
         Some(found)
     }
+}
+
+/// Adds a correction; whether nodes changed their charts by it.
+fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
+    workshop.assembly.extrapolate(&run.state, dq);
+    run.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
+    let switched = charts::switch(&mut run.state, &run.model.rotations, 0.0, None);
+    if switched > 0 {
+        run.counters.work.chart_switches += switched as u64;
+        charts::freeze(&mut run.state, &run.model.elements);
+    }
+    switched > 0
+}
+
+/// The rate of the displacement that the loads do work on; `None` without loads. What stands at multipliers are gaps of motors,
+/// not forces.
+fn work_of_loads(run: &Run, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
+    let acting = || pull.iter().zip(rate).zip(&run.model.slots).filter(|(_, info)| !info.is_multiplier());
+    let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
+    loaded.then(|| acting().map(|((force, d), _)| -force.dot(*d)).sum())
 }
 
 /// The sum over displacements of squares; rotations follow.

@@ -1,0 +1,71 @@
+//! How equilibrium and its forces vary with the load factor.
+
+use super::failure::Failure;
+use super::run::{Run, Workshop};
+use crate::kernel::Weights;
+use crate::system::State;
+use crate::tensor::Vec3;
+
+/// Step over which derivatives over the load factor are taken.
+const LOAD_STEP: f64 = 1.0 / 4096.0;
+
+/// The direction of a path of equilibrium.
+pub(super) struct Direction {
+    /// dq/dload
+    pub rate: Vec<Vec3>,
+    /// dg/dload at rest: of the forces, and at multipliers of the gaps of motors
+    pub pull: Vec<Vec3>,
+}
+
+impl Direction {
+    /// Of a path on which nothing varies with the load factor.
+    pub fn none(slots: usize) -> Self {
+        Self { rate: vec![Vec3::ZERO; slots], pull: vec![Vec3::ZERO; slots] }
+    }
+}
+
+impl Run<'_> {
+    /// The direction of the path; `None` where nothing varies with the load factor. The tangent stays factorised.
+    pub(super) fn path_direction(&mut self, workshop: &mut Workshop) -> Result<Option<Direction>, Failure> {
+        let pull = self.load_derivative(workshop);
+        let Workshop { assembly, newton, lift, .. } = workshop;
+        if pull.iter().chain(lift.iter()).all(|&v| v == Vec3::ZERO) {
+            return Ok(None);
+        }
+        assembly.forget();
+        assembly.evaluate(&self.state, Weights::STIFFNESS, Some(lift));
+        let system = &assembly.system;
+        let mut solution = vec![0.0; system.pattern.equations.count()];
+        system.right_hand_side_of(&pull, &mut solution);
+        self.counters.work.factorisations += 1;
+        if !(newton.solver.factorise(system) && newton.solver.solve(&mut solution)) {
+            let vector = newton.solver.null_vector(system);
+            return Err(self.name_mechanism(vector, &workshop.assembly.system));
+        }
+        let mut rate = vec![Vec3::ZERO; pull.len()];
+        system.pattern.equations.scatter(&solution, Some(lift), &mut rate);
+        Ok(Some(Direction { rate, pull }))
+    }
+
+    /// The derivative of the forces over the load factor; that of prescribed directions goes into the workshop's `lift`.
+    /// Loads and motions without a history are linear in it; the step is small, so that no motion goes around.
+    pub(super) fn load_derivative(&mut self, workshop: &mut Workshop) -> Vec<Vec3> {
+        let Workshop { assembly, lift, .. } = workshop;
+        let (mut here, mut shifted) = (self.state.clone(), self.state.clone());
+        let inverse = 1.0 / LOAD_STEP;
+        self.model.set_clock(&mut here, self.state.time, self.state.load);
+        let mut forces = |state: &State| -> Vec<Vec3> {
+            assembly.evaluate(state, Weights::NONE, None);
+            (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
+        };
+        let before = forces(&self.state);
+        self.model.set_clock(&mut shifted, self.state.time, self.state.load + LOAD_STEP);
+        // From where the motions put their directions now, not from where round-off has left them: the step is small.
+        for (lift, (moved, from)) in lift.iter_mut().zip(shifted.q.iter().zip(&here.q)) {
+            *lift = (*moved - *from) * inverse;
+        }
+        shifted.q.copy_from_slice(&self.state.q);
+        let after = forces(&shifted);
+        after.iter().zip(&before).map(|(after, before)| (*after - *before) * inverse).collect()
+    }
+}
