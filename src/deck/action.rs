@@ -2,7 +2,7 @@
 
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
 use super::expression::Expression;
-use super::geometry::{check_name, matrix};
+use super::geometry::{check_name, matrix, read_point};
 use super::reader::{Context, Item, Table, kind_of};
 use toml::de::DeValue;
 
@@ -461,13 +461,7 @@ fn read_joint_parts(table: &Table) -> Option<JointParts> {
         (true, true) => context.wrong(table.key_span("nodes"), "a joint connects `beams` or `nodes`, not both"),
         (false, true) => {
             let nodes = one_or_two("nodes");
-            let at = match table.get("at").map(|item| (item, item.get_ref())) {
-                None => Some(None),
-                Some((item, DeValue::String(name))) => {
-                    Some(Some(Spanned { value: super::PointRef::Name(name.to_string()), span: item.span() }))
-                }
-                Some((item, _)) => context.vector(item).map(|v| Some(v.map(super::PointRef::Coordinates))),
-            };
+            let at = table.get("at").map_or(Some(None), |item| read_point(context, item).map(Some));
             Some(JointParts::Nodes { nodes: nodes?, at: at? })
         }
         _ => {
@@ -706,13 +700,7 @@ pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
     }
     let vector = |key: &str| if table.has(key) { table.vector::<3>(key).map(|v| v.value) } else { Some([0.0; 3]) };
     let (velocity, spin) = (vector("velocity"), vector("spin"));
-    let about = match table.get("about").map(|item| (item, item.get_ref())) {
-        None => Some(None),
-        Some((item, DeValue::String(name))) => {
-            Some(Some(Spanned { value: super::PointRef::Name(name.to_string()), span: item.span() }))
-        }
-        Some((item, _)) => context.vector(item).map(|v| Some(v.map(super::PointRef::Coordinates))),
-    };
+    let about = table.get("about").map_or(Some(None), |item| read_point(context, item).map(Some));
     Some(Initial { target: target?, velocity: velocity?, spin: spin?, about: about?, span: table.span.clone() })
 }
 

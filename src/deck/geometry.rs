@@ -440,13 +440,17 @@ fn read_point_list(context: &Context, item: &Item) -> Option<Vec<Spanned<PointRe
     let DeValue::Array(array) = item.get_ref() else {
         return context.wrong(item.span(), format!("expected a list of points, found {}", kind_of(item.get_ref())));
     };
-    let read = |entry: &Item| match entry.get_ref() {
-        DeValue::String(name) => Some(Spanned { value: PointRef::Name(name.to_string()), span: entry.span() }),
-        DeValue::Array(_) => Some(context.vector(entry)?.map(PointRef::Coordinates)),
-        other => context.wrong(entry.span(), format!("a point is a name or [x, y, z], found {}", kind_of(other))),
-    };
-    let points: Vec<Option<Spanned<PointRef>>> = array.iter().map(read).collect();
+    let points: Vec<Option<Spanned<PointRef>>> = array.iter().map(|entry| read_point(context, entry)).collect();
     points.into_iter().collect()
+}
+
+/// A point by its name or its coordinates.
+pub(super) fn read_point(context: &Context, item: &Item) -> Option<Spanned<PointRef>> {
+    match item.get_ref() {
+        DeValue::String(name) => Some(Spanned { value: PointRef::Name(name.to_string()), span: item.span() }),
+        DeValue::Array(_) => Some(context.vector(item)?.map(PointRef::Coordinates)),
+        other => context.wrong(item.span(), format!("a point is a name or [x, y, z], found {}", kind_of(other))),
+    }
 }
 
 fn read_counts(context: &Context, item: &Item) -> Option<Spanned<Vec<usize>>> {

@@ -1,7 +1,7 @@
 //! What is done with a scene: stages, output, expectations, effects forced on or off.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
-use super::geometry::PointRef;
+use super::geometry::{PointRef, read_point};
 use super::reader::{Context, Item, Table, kind_of};
 use toml::de::DeValue;
 
@@ -302,12 +302,9 @@ fn read_frame<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<RotatingFr
     let table = Table::new(context, item, "`frame`", &["spin", "about"], &[])?;
     table.required("spin")?;
     let spin = table.vector::<3>("spin")?.value;
-    let about = match table.get("about").map(|item| (item, item.get_ref())) {
+    let about = match table.get("about") {
         None => None,
-        Some((item, DeValue::String(name))) => {
-            Some(Spanned { value: PointRef::Name(name.to_string()), span: item.span() })
-        }
-        Some((item, _)) => Some(context.vector(item)?.map(PointRef::Coordinates)),
+        Some(item) => Some(read_point(context, item)?),
     };
     Some(RotatingFrame { spin, about })
 }

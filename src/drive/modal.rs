@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Model;
-use crate::solve::{LinearSolver, Operator, is_symmetric, largest_eigenvalues, timed};
+use crate::solve::{Convergence, LinearSolver, Operator, Verdict, is_symmetric, largest_eigenvalues, timed};
 use crate::system::System;
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -50,9 +50,9 @@ impl Run<'_> {
         workshop.assembly.forget();
         let noise = workshop.assembly.noise(&self.state);
         workshop.assembly.evaluate(&self.state, Weights::NONE, None);
-        let loose = crate::solve::Convergence { tolerance: 1e-5 };
+        let loose = Convergence { tolerance: 1e-5 };
         let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, noise, None);
-        if verdict != crate::solve::Verdict::Converged {
+        if verdict != Verdict::Converged {
             self.observer
                 .warn("the state of a modal or buckling stage is not in balance: let a static stage come before it");
         }

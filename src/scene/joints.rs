@@ -104,14 +104,7 @@ fn between_nodes<'a>(
         return Err(Diagnostic::error("both names stand for the same node", joint.span.clone()));
     }
     let last = nodes[1].map_or(Vec3::ZERO, |node| mesh.nodes[node].place);
-    let place = match at {
-        None => last,
-        Some(Spanned { value: PointRef::Coordinates(x), .. }) => Vec3(*x),
-        Some(Spanned { value: PointRef::Name(name), span }) => names::point(deck, name).ok_or_else(|| {
-            let name = Spanned { value: name.clone(), span: span.clone() };
-            names::unknown("point", &name, names::points(deck))
-        })?,
-    };
+    let place = at.map_or(Ok(last), |point| names::place(deck, point))?;
     let arms = nodes.map(|node| node.map_or(Vec3::ZERO, |node| place - mesh.nodes[node].place));
     Ok(FoundJoint { joint, nodes, arms, axes: axes(&joint.axes), place })
 }

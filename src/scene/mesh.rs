@@ -219,14 +219,7 @@ impl Mesh {
             [one, ..] => SectionCourse::Uniform(section::matrices(find(one)?, &deck.materials)?),
             [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
         };
-        let place = |point: &Spanned<PointRef>| match &point.value {
-            PointRef::Coordinates(x) => Ok(Vec3(*x)),
-            PointRef::Name(name) => names::point(deck, name).ok_or_else(|| {
-                let name = Spanned { value: name.clone(), span: point.span.clone() };
-                names::unknown("point", &name, names::points(deck))
-            }),
-        };
-        let line = path::centre_line(beam, &place)?;
+        let line = path::centre_line(beam, &|point| names::place(deck, point))?;
         let (pieces, counts) = (line.pieces.len(), beam.elements.value.len());
         if counts != 1 && counts != pieces {
             let message = format!("`elements` has {counts} entries, beam `{}` has {pieces} piece(s)", beam.name.value);

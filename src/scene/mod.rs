@@ -14,7 +14,7 @@ pub use compose::Reason;
 pub use mesh::{Mesh, MeshBeam};
 pub use section::{MassPerLength, SectionMatrices};
 
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Spanned, StageBody};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
 use crate::drive::{InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
@@ -366,17 +366,12 @@ fn initial(
             }
         },
     };
-    let about = match &initial.about {
-        None => Vec3::ZERO,
-        Some(Spanned { value: PointRef::Coordinates(x), .. }) => Vec3(*x),
-        Some(Spanned { value: PointRef::Name(name), span }) => match names::point(deck, name) {
-            Some(place) => place,
-            None => {
-                let name = Spanned { value: name.clone(), span: span.clone() };
-                report(names::unknown("point", &name, names::points(deck)));
-                return None;
-            }
-        },
+    let about = match initial.about.as_ref().map_or(Ok(Vec3::ZERO), |point| names::place(deck, point)) {
+        Ok(place) => place,
+        Err(diagnostic) => {
+            report(diagnostic);
+            return None;
+        }
     };
     let nodes: Vec<(Node, Vec3)> = nodes.into_iter().map(|n| (mesh.nodes[n].node, mesh.nodes[n].place)).collect();
     Some(InitialMotion { nodes, velocity: Vec3(initial.velocity), spin: Vec3(initial.spin), about })

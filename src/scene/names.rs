@@ -1,7 +1,7 @@
 //! From names in the deck to nodes and places of the mesh.
 
 use super::mesh::{Mesh, MeshBeam, shape_at};
-use crate::deck::{Deck, Diagnostic, InterpolationWord, Spanned, nearest, one_of};
+use crate::deck::{Deck, Diagnostic, InterpolationWord, PointRef, Spanned, nearest, one_of};
 use crate::probe::Place;
 use crate::tensor::{Mat3, Vec3};
 
@@ -17,6 +17,17 @@ pub enum Found {
 /// The place of a named point.
 pub fn point(deck: &Deck, name: &str) -> Option<Vec3> {
     deck.points.iter().find(|(known, _)| known.value == name).map(|(_, x)| Vec3(*x))
+}
+
+/// Where a point is that stands in the deck by its name or its coordinates.
+pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Result<Vec3, Diagnostic> {
+    match &point.value {
+        PointRef::Coordinates(x) => Ok(Vec3(*x)),
+        PointRef::Name(name) => self::point(deck, name).ok_or_else(|| {
+            let name = Spanned { value: name.clone(), span: point.span.clone() };
+            unknown("point", &name, points(deck))
+        }),
+    }
 }
 
 /// The names of all points.

@@ -123,18 +123,11 @@ impl Composer<'_> {
         let bodies = [nodal, self.out.bodies.clone()].concat();
         for (number, stage) in &framed {
             let Some(frame) = &stage.frame else { continue };
-            let about = match &frame.about {
-                None => Vec3::ZERO,
-                Some(deck::Spanned { value: deck::PointRef::Coordinates(x), .. }) => Vec3(*x),
-                Some(deck::Spanned { value: deck::PointRef::Name(name), span }) => {
-                    match names::point(self.deck, name) {
-                        Some(place) => place,
-                        None => {
-                            let name = deck::Spanned { value: name.clone(), span: span.clone() };
-                            self.diagnostics.push(names::unknown("point", &name, names::points(self.deck)));
-                            continue;
-                        }
-                    }
+            let about = match frame.about.as_ref().map_or(Ok(Vec3::ZERO), |point| names::place(self.deck, point)) {
+                Ok(place) => place,
+                Err(diagnostic) => {
+                    self.diagnostics.push(diagnostic);
+                    continue;
                 }
             };
             self.out.effects.push(Arc::new(RotatingFrame {
