@@ -68,6 +68,8 @@ pub enum StageBody {
         scheme: SchemeWord,
         /// Tolerance of the local error, where steps adapt to it
         step_tolerance: Option<f64>,
+        /// The part of the largest energies so far by which the total may grow
+        energy_limit: f64,
     },
 }
 
@@ -200,11 +202,14 @@ const COMMON: [&str; 5] = ["kind", "tolerance", "max_iterations", "until", "fram
 /// Most modes of a stage.
 const MOST_MODES: usize = 1000;
 const STATIC: [&str; 4] = ["steps", "adaptive", "control", "max_steps"];
-const DYNAMIC: [&str; 9] = ["end", "step", "scheme", "beta", "gamma", "alpha", "rho_inf", "adaptive", "step_tolerance"];
+const DYNAMIC: [&str; 10] =
+    ["end", "step", "scheme", "beta", "gamma", "alpha", "rho_inf", "adaptive", "step_tolerance", "energy_limit"];
+/// The part of the largest energies so far by which the total may grow.
+const ENERGY_LIMIT: f64 = 0.2;
 
 pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Stage> {
     let known = [&COMMON[..], &STATIC, &DYNAMIC, &["modes"]].concat();
-    let table = Table::new(context, item, "[[stage]]", &known, &["energy_limit"])?;
+    let table = Table::new(context, item, "[[stage]]", &known, &[])?;
     table.required("kind")?;
     let kind = table.word("kind", &["static", "dynamic", "modal", "buckling"])?;
     let body = match kind.value {
@@ -322,7 +327,14 @@ fn read_dynamic(table: &Table) -> Option<StageBody> {
         context.report(Diagnostic::limit(message, step.span));
         return None;
     }
-    Some(StageBody::Dynamic { end: end.value, step: step.value, scheme: scheme?, step_tolerance: step_tolerance? })
+    let energy_limit = if table.has("energy_limit") { table.positive("energy_limit")?.value } else { ENERGY_LIMIT };
+    Some(StageBody::Dynamic {
+        end: end.value,
+        step: step.value,
+        scheme: scheme?,
+        step_tolerance: step_tolerance?,
+        energy_limit,
+    })
 }
 
 /// The coefficients that each scheme has.

@@ -3,6 +3,7 @@
 use super::control::Control;
 use super::failure::Failure;
 use super::grid::Grid;
+use super::guard::Growth;
 use super::run::{Run, Workshop};
 use crate::integrate::{Increments, Rotations, Scheme, Step};
 use crate::kernel::Weights;
@@ -116,12 +117,20 @@ impl Run<'_> {
         self.accept(workshop)?;
         self.counters.steps += 1;
         self.show(workshop)?;
+        self.refuse_growth(workshop)?;
         if self.is_over(workshop) {
             return Ok(true);
         }
         let total = step.scheme.rotations == Rotations::Totals;
         self.change_charts(total.then_some(step.scheme.lag() * step.length));
         Ok(false)
+    }
+
+    /// A scheme that makes energy from nothing ends the run while its results can still be told from noise.
+    fn refuse_growth(&self, workshop: &mut Workshop) -> Result<(), Failure> {
+        let Some(guard) = &mut workshop.guard else { return Ok(()) };
+        let Some(Growth { grown, largest }) = guard.judge(self.bookkeeper.ledger()) else { return Ok(()) };
+        Err(Failure::EnergyGrowth { at: self.moment(), grown, largest })
     }
 
     /// Names the failure and goes back to the last good state.

@@ -73,6 +73,15 @@ pub enum Failure {
         /// Radians
         relative_rotation: f64,
     },
+    /// The total energy grows where nothing brings any.
+    EnergyGrowth {
+        /// When
+        at: Moment,
+        /// How much it has grown by
+        grown: f64,
+        /// The largest sum of kinetic energy, strain energy and work from outside so far
+        largest: f64,
+    },
     /// Larger than the stated bounds
     Limit(String),
     /// A file that could not be written
@@ -102,6 +111,7 @@ impl Failure {
             Self::Singular { .. } => "singular",
             Self::NonFinite { .. } => "non_finite",
             Self::MeshTooCoarse { .. } => "mesh_too_coarse",
+            Self::EnergyGrowth { .. } => "energy_growth",
             Self::Limit(_) => "limit",
             Self::Io(_) => "io",
             Self::Interrupted { .. } => "interrupted",
@@ -127,6 +137,10 @@ impl Failure {
                 Some("add a support, a spring or a joint that holds this direction, or give it mass")
             }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there"),
+            Self::EnergyGrowth { .. } => Some(
+                "the time step does not resolve the motion: damp what it cannot resolve (scheme = \"generalized_alpha\"), or take a \
+                 smaller `step`; where the growth is meant, raise `energy_limit`",
+            ),
             Self::NonFinite { .. } => Some("look for values near the limits of floating-point numbers in the deck"),
             Self::Deck(_) | Self::Limit(_) | Self::Io(_) | Self::Interrupted { .. } => None,
         }
@@ -181,6 +195,10 @@ impl fmt::Display for Failure {
             Self::MeshTooCoarse { at, nodes: [a, b], relative_rotation } => write!(
                 f,
                 "the element between \"{a}\" and \"{b}\" turns by {relative_rotation:.3} rad from node to node ({at})"
+            ),
+            Self::EnergyGrowth { at, grown, largest } => write!(
+                f,
+                "the total energy has grown by {grown:.3e}, where the largest energies so far add up to {largest:.3e} ({at})"
             ),
             Self::Interrupted { at, signal } => write!(f, "stopped by signal {signal} at {at}"),
         }

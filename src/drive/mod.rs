@@ -6,6 +6,7 @@ mod direction;
 mod dynamics;
 mod failure;
 mod grid;
+mod guard;
 mod ledger;
 mod modal;
 mod path;

@@ -1,6 +1,7 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
 use super::failure::{Failure, Moment, place};
+use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use crate::integrate::{Increments, Scheme};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
@@ -111,8 +112,10 @@ pub enum StageWork {
         step: f64,
         /// The method
         scheme: Scheme,
-        /// Tolerance of the local error, where steps adapt to it
+        /// Tolerance of the errors of all steps, where they adapt to it
         adaptive: Option<f64>,
+        /// The part of the largest energies so far by which the total may grow
+        energy_limit: f64,
     },
 }
 
@@ -269,6 +272,8 @@ pub(super) struct Workshop {
     pub until: Option<Until>,
     /// Where the unknowns of time steps are increments of rotation
     pub increments: Option<Increments>,
+    /// Watches the energy of time steps
+    pub guard: Option<EnergyGuard>,
 }
 
 impl<'o> Run<'o> {
@@ -307,7 +312,8 @@ impl<'o> Run<'o> {
                 StageWork::Path { steps, max_steps } => self.run_path(&mut workshop, steps, max_steps),
                 StageWork::Modal { modes } => self.run_modal(&mut workshop, modes),
                 StageWork::Buckling { modes } => self.run_buckling(&mut workshop, modes),
-                StageWork::Dynamic { end, step, scheme, adaptive } => {
+                StageWork::Dynamic { end, step, scheme, adaptive, energy_limit } => {
+                    workshop.guard = Some(EnergyGuard::new(energy_limit));
                     self.run_dynamic(&mut workshop, end, step, scheme, adaptive)
                 }
             };
@@ -331,7 +337,8 @@ impl<'o> Run<'o> {
         };
         let convergence = Convergence { tolerance: stage.tolerance };
         let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
-        Ok(Workshop { assembly, newton, lift: vec![Vec3::ZERO; slots], until: stage.until.clone(), increments: None })
+        let (lift, until) = (vec![Vec3::ZERO; slots], stage.until.clone());
+        Ok(Workshop { assembly, newton, lift, until, increments: None, guard: None })
     }
 
     /// The first dynamic stage gives the initial velocities.
@@ -345,9 +352,12 @@ impl<'o> Run<'o> {
     }
 
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
-    pub(super) fn open_account(&mut self, workshop: &Workshop) -> Result<(), Failure> {
-        if self.plan.energy {
+    pub(super) fn open_account(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        if self.keeps_account(workshop) {
             self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
+        }
+        if let Some(guard) = &mut workshop.guard {
+            guard.open(self.bookkeeper.ledger());
         }
         if std::mem::replace(&mut self.started, true) {
             return Ok(());
@@ -362,10 +372,15 @@ impl<'o> Run<'o> {
         self.model.remember(&mut self.state);
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
-        if self.plan.energy {
+        if self.keeps_account(workshop) {
             self.bookkeeper.add_step(&self.model, &self.state, &workshop.assembly.system);
         }
         Ok(())
+    }
+
+    /// Energies are counted where somebody asks for them, or watches them.
+    fn keeps_account(&self, workshop: &Workshop) -> bool {
+        self.plan.energy || workshop.guard.is_some()
     }
 
     /// Modes and critical loads count as one step.

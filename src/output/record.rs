@@ -106,6 +106,11 @@ fn numbers(failure: &Failure) -> Value {
             record["nodes"] = json!(nodes);
             record["relative_rotation"] = json!(relative_rotation);
         }
+        Failure::EnergyGrowth { at, grown, largest } => {
+            when(at, &mut record);
+            record["grown"] = json!(grown);
+            record["largest"] = json!(largest);
+        }
         Failure::Interrupted { at, signal } => {
             when(at, &mut record);
             record["signal"] = json!(signal);

@@ -253,8 +253,8 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
             StageBody::Path { steps, max_steps } => StageWork::Path { steps, max_steps },
             StageBody::Modal { modes } => StageWork::Modal { modes },
             StageBody::Buckling { modes } => StageWork::Buckling { modes },
-            StageBody::Dynamic { end, step, scheme, step_tolerance } => {
-                StageWork::Dynamic { end, step, scheme: coefficients(scheme), adaptive: step_tolerance }
+            StageBody::Dynamic { end, step, scheme, step_tolerance, energy_limit } => {
+                StageWork::Dynamic { end, step, scheme: coefficients(scheme), adaptive: step_tolerance, energy_limit }
             }
         };
         let (tolerance, max_iterations) = (stage.tolerance, stage.max_iterations);

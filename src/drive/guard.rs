@@ -1,0 +1,68 @@
+//! Watches the total energy of a dynamic stage.
+
+use super::ledger::Ledger;
+
+/// So many steps running the energy must be too large: a single peak is the trapezoidal rule of the account.
+const RUNNING: usize = 3;
+
+/// Follows the total from the start of a stage.
+#[derive(Clone, Debug)]
+pub(super) struct EnergyGuard {
+    limit: f64,
+    start: Option<f64>,
+    largest: f64,
+    running: usize,
+}
+
+/// By how much the total has grown, and what that is to be compared with.
+pub(super) struct Growth {
+    pub grown: f64,
+    pub largest: f64,
+}
+
+impl EnergyGuard {
+    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far.
+    pub fn new(limit: f64) -> Self {
+        Self { limit, start: None, largest: 0.0, running: 0 }
+    }
+
+    /// The account where the stage begins.
+    pub fn open(&mut self, ledger: Ledger) {
+        self.start = Some(ledger.total());
+        self.largest = size(ledger);
+    }
+
+    /// Looks at the account of a step; tells a growth that lasts.
+    pub fn judge(&mut self, ledger: Ledger) -> Option<Growth> {
+        self.largest = self.largest.max(size(ledger));
+        let grown = ledger.total() - self.start?;
+        self.running = if grown > self.limit * self.largest { self.running + 1 } else { 0 };
+        (self.running >= RUNNING).then_some(Growth { grown, largest: self.largest })
+    }
+}
+
+fn size(ledger: Ledger) -> f64 {
+    ledger.kinetic.abs() + ledger.strain.abs() + ledger.external.abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ledger(kinetic: f64) -> Ledger {
+        Ledger { kinetic, ..Ledger::default() }
+    }
+
+    #[test]
+    fn growth_that_lasts_three_steps_is_told() {
+        let mut guard = EnergyGuard::new(0.2);
+        guard.open(ledger(1.0));
+        assert!(guard.judge(ledger(1.2)).is_none());
+        assert!(guard.judge(ledger(1.3)).is_none());
+        assert!(guard.judge(ledger(1.1)).is_none());
+        assert!(guard.judge(ledger(1.3)).is_none());
+        assert!(guard.judge(ledger(1.3)).is_none());
+        let growth = guard.judge(ledger(1.4)).unwrap();
+        assert!((growth.grown - 0.4).abs() < 1e-15 && growth.largest == 1.4);
+    }
+}
