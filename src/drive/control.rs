@@ -1,9 +1,9 @@
 //! Steps that adapt to their local error.
 
-use crate::integrate::{Increments, Rotations, Scheme};
-use crate::model::{Model, SlotKind};
+use crate::integrate::{Increments, Scheme};
+use crate::model::{Model, SlotInfo, SlotKind};
 use crate::rotation::Rotation;
-use crate::system::{Slot, State};
+use crate::system::State;
 
 /// Chooses the length of steps.
 ///
@@ -70,23 +70,26 @@ impl Control {
     }
 
     /// The largest local error of a step, from the accelerations at its ends; both states in one chart.
-    pub fn error(&self, model: &Model, start: &State, end: &State, length: f64) -> f64 {
+    pub fn error(
+        &self,
+        model: &Model,
+        increments: Option<&Increments>,
+        start: &State,
+        end: &State,
+        length: f64,
+    ) -> f64 {
         // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps sensible.
-        let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs() * length * length;
-        let mut largest = 0.0_f64;
-        for (slot, info) in model.slots.iter().enumerate() {
-            let e = (end.a[slot] - start.a[slot]) * factor;
-            let spins = self.scheme.rotations == Rotations::Increments;
-            let spun = |state: &State| Increments::spin_acceleration(state, slot as Slot);
-            let size = match info.kind {
+        let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs();
+        let of_slot = |(slot, info): (usize, &SlotInfo)| {
+            let e = (end.a[slot] - start.a[slot]) * (factor * length * length);
+            match info.kind {
                 SlotKind::Displacement => e.norm() / model.length,
-                SlotKind::Rotation if spins => ((spun(end) - spun(start)) * factor).norm(),
-                SlotKind::Rotation => (Rotation::new(end.q[slot]).t * e).norm(),
-                SlotKind::Force | SlotKind::Moment => 0.0,
-            };
-            largest = largest.max(size);
-        }
-        largest
+                SlotKind::Rotation if increments.is_none() => (Rotation::new(end.q[slot]).t * e).norm(),
+                SlotKind::Rotation | SlotKind::Force | SlotKind::Moment => 0.0,
+            }
+        };
+        let turned = increments.map_or(0.0, |increments| increments.largest_error(start, end, length, factor));
+        model.slots.iter().enumerate().map(of_slot).fold(turned, f64::max)
     }
 }
 

@@ -74,7 +74,11 @@ impl Run<'_> {
             let step = Step { scheme: control.scheme, length };
             let tried = self.advance(workshop, step, *before, next);
             let taken = match tried {
-                Ok(()) => control.judge(length, control.error(&self.model, &self.good, &self.state, length)),
+                Ok(()) => {
+                    let increments = workshop.increments.as_ref();
+                    let error = control.error(&self.model, increments, &self.good, &self.state, length);
+                    control.judge(length, error)
+                }
                 Err(failure) if control.is_smallest() => return Err(self.give_up(workshop, failure)),
                 Err(_) => control.fail(length),
             };
@@ -121,8 +125,8 @@ impl Run<'_> {
         if self.is_over(workshop) {
             return Ok(true);
         }
-        let total = step.scheme.rotations == Rotations::Totals;
-        self.change_charts(total.then_some(step.scheme.lag() * step.length));
+        let lag = workshop.increments.is_none().then_some(step.scheme.lag() * step.length);
+        self.change_charts(lag);
         Ok(false)
     }
 

@@ -21,6 +21,7 @@ mod volume;
 
 pub use volume::{VolumeElement, VolumeElements};
 
+use crate::kernel::inertia::Inertia;
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, StageContext, StageKind, State};
@@ -117,8 +118,8 @@ pub trait Effect: Send + Sync {
         Momentum::ZERO
     }
 
-    /// Adds the inertia about its nodes that bodies have, by slot of the rotation.
-    fn inertia_of_rotations(&self, _sums: &mut [Mat3]) {}
+    /// Shows the bodies at nodes with their mass properties.
+    fn bodies(&self, _show: &mut dyn FnMut(Node, &Inertia)) {}
 
     /// After each converged state: continues what it keeps in the state, such as turns of joints.
     fn remember(&self, _at: &mut State) {}

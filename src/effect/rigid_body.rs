@@ -4,7 +4,7 @@ use super::{Effect, Energy, Momentum, quadratic};
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::system::{Category, Cliques, Memory, Node, Sink, State};
-use crate::tensor::{Mat3, Vec3};
+use crate::tensor::Vec3;
 
 /// A body.
 #[derive(Clone, Copy, Debug)]
@@ -51,8 +51,8 @@ impl Effect for RigidBody {
         }
     }
 
-    fn inertia_of_rotations(&self, sums: &mut [Mat3]) {
-        self.bodies.iter().for_each(|body| sums[body.node.p as usize] += body.inertia.about_node);
+    fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
+        self.bodies.iter().for_each(|body| show(body.node, &body.inertia));
     }
 
     fn energy(&self, at: &State) -> Energy {

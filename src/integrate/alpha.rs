@@ -1,4 +1,5 @@
-//! The family of generalised-alpha methods in displacements and total rotation vectors, as coefficients.
+//! The family of generalised-alpha methods in displacements and total rotation vectors, as coefficients; rotations may take
+//! increments instead ([`super::Increments`]).
 //!
 //! Equilibrium is kept at the end of each step with the true acceleration a = q''; beside it an algorithmic acceleration A is
 //! carried, which approximates q'' at t + (alpha_m - alpha_f) h:

@@ -5,7 +5,7 @@
 //! the total vector happens to be.
 
 use super::Step;
-use crate::kernel::inertia::Spin;
+use crate::kernel::inertia::Inertia;
 use crate::kernel::turn::{Carrier, Start, Turn};
 use crate::model::Model;
 use crate::model::charts::DYNAMIC_BAND;
@@ -13,10 +13,12 @@ use crate::rotation::{Rotation, complement, log};
 use crate::system::{Equations, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// An inertia with principal values farther apart than this makes no momentum that a spin could be found from.
-const LARGEST_RATIO: f64 = 1e8;
+/// Principal values of a carrier are at least the largest over this: the smaller they are, the more they make of the error of
+/// a momentum.
+const LARGEST_RATIO: f64 = 10.0;
 
 /// The rotations of a scene, and the momentum that each carries from step to step.
 pub struct Increments {
@@ -26,11 +28,15 @@ pub struct Increments {
 impl Increments {
     /// For a stage with these equations.
     pub fn new(model: &Model, equations: &Equations) -> Self {
-        let inertia = model.inertia_of_rotations();
+        let bodies = bodies_by_rotation(model);
         let carrier = |&slot: &Slot| {
             // A hinge turns about a fixed axis: its spin has one component, its momentum three.
-            let free = equations.of(slot).iter().all(|&number| number != Equations::HELD);
-            (slot, Some(inertia[slot as usize]).filter(|_| free).and_then(momentum).unwrap_or(Carrier::SPIN))
+            let turns_freely = equations.of(slot).iter().all(|&number| number != Equations::HELD);
+            let carrier = bodies.get(&slot).filter(|_| turns_freely).and_then(|(u, body)| {
+                let moves = equations.of(*u).iter().all(|&number| number != Equations::HELD);
+                momentum(if moves { body.about_centre() } else { body.about_node })
+            });
+            (slot, carrier.unwrap_or(Carrier::SPIN))
         };
         Self { carriers: model.rotations.iter().map(carrier).collect() }
     }
@@ -39,15 +45,14 @@ impl Increments {
     pub fn start(&self, state: &mut State) {
         for &(slot, carrier) in &self.carriers {
             let spin = state.spin(slot);
-            let (r, inertia) = (spin.rotation.r, carrier.tensor);
-            let rate = inertia * spin.acceleration + spin.omega.cross(inertia * spin.omega);
-            state.algorithmic[slot as usize] = r * rate;
+            state.algorithmic[slot as usize] = spin.rotation.r * carrier.rate(spin.omega, spin.acceleration);
         }
     }
 
     /// From total vectors to increments. `before` is the length of the step before.
     pub fn begin(&self, state: &mut State, step: &Step, before: f64) {
-        let mut turns = vec![None; state.q.len()];
+        let mut turns = std::mem::take(&mut state.turns);
+        turns.resize(state.q.len(), None);
         for &(slot, carrier) in &self.carriers {
             let (k, spin) = (slot as usize, state.spin(slot));
             let start = Start {
@@ -66,7 +71,8 @@ impl Increments {
     /// From increments to total vectors, each in the chart of `before` unless that has been left; returns how many have.
     pub fn end(&self, state: &mut State, before: &State) -> usize {
         let mut switched = 0;
-        for (k, turn) in std::mem::take(&mut state.turns).into_iter().enumerate() {
+        let mut turns = std::mem::take(&mut state.turns);
+        for (k, turn) in turns.drain(..).enumerate() {
             let Some(turn) = turn else { continue };
             state.algorithmic[k] = turn.algorithmic(state.q[k], state.v[k]);
             let short = log(turn.base() * Rotation::new(state.q[k]).r);
@@ -78,24 +84,56 @@ impl Increments {
             let (velocity, acceleration) = rates(p, state.v[k], state.a[k]);
             (state.q[k], state.v[k], state.a[k]) = (p, velocity, acceleration);
         }
+        // The room is kept for the next step.
+        state.turns = turns;
         switched
     }
 
-    /// The spatial acceleration of the spin at a slot of a state with total vectors.
-    pub fn spin_acceleration(state: &State, slot: Slot) -> Vec3 {
-        let k = slot as usize;
-        let spin = Spin::new(state.q[k], state.v[k], state.a[k]);
-        spin.rotation.r * spin.acceleration
+    /// The largest local error of a rotation over a step between two states with total vectors. What moments give, mu = E J^-1 E^T b,
+    /// is integrated to second order, with the error factor h^2 (mu1 - mu0). The rest of the acceleration, phi, is integrated to
+    /// fourth order: h^5/720 of the fourth derivative of the spin, which is about |w|^2 times the second, (phi1 - phi0)/h, and as
+    /// much again from each of the two next terms of Magnus' series.
+    pub fn largest_error(&self, start: &State, end: &State, length: f64, factor: f64) -> f64 {
+        let h2 = length * length;
+        let error = |&(slot, carrier): &(Slot, Carrier)| {
+            let [(mu0, phi0, _), (mu1, phi1, w2)] = [start, end].map(|state| accelerations(state, slot, &carrier));
+            (mu1 - mu0).norm() * (factor * h2) + (phi1 - phi0).norm() * (h2 * h2 * w2 / 240.0)
+        };
+        self.carriers.iter().map(error).fold(0.0, f64::max)
     }
 }
 
-/// The carrier of an angular momentum, where the inertia is definite enough.
+/// mu and phi, spatial, and the square of the spin.
+fn accelerations(state: &State, slot: Slot, carrier: &Carrier) -> (Vec3, Vec3, f64) {
+    let spin = state.spin(slot);
+    let driven = carrier.inverse * carrier.rate(spin.omega, spin.acceleration);
+    let r = spin.rotation.r;
+    (r * driven, r * (spin.acceleration - driven), spin.omega.squared())
+}
+
+/// What sits at each rotation, taken together, with the slot of its displacement.
+fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
+    let mut sums: BTreeMap<Slot, (Slot, Inertia)> = BTreeMap::new();
+    for effect in &model.effects {
+        effect.bodies(&mut |node, body| {
+            let sum = sums.entry(node.p).or_insert((node.u, Inertia::NONE));
+            sum.1 = sum.1.with(body);
+        });
+    }
+    sums
+}
+
+/// The carrier of an angular momentum; `None` without inertia. Of slender inertias the small principal values are raised.
 fn momentum(inertia: Mat3) -> Option<Carrier> {
-    let matrix = Matrix3::from_fn(|i, j| inertia.0[i][j]);
-    let values = SymmetricEigen::new(matrix).eigenvalues;
-    let definite = values.min() * LARGEST_RATIO > values.max();
-    let inverse = matrix.try_inverse().filter(|_| definite)?;
-    Some(Carrier { tensor: inertia, inverse: Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| inverse[(i, j)]))) })
+    let SymmetricEigen { eigenvectors, eigenvalues } =
+        SymmetricEigen::new(Matrix3::from_fn(|i, j| 0.5 * (inertia.0[i][j] + inertia.0[j][i])));
+    let largest = eigenvalues.max();
+    let with = |f: &dyn Fn(f64) -> f64| {
+        let diagonal = Matrix3::from_diagonal(&eigenvalues.map(|value| f(value.max(largest / LARGEST_RATIO))));
+        let whole = eigenvectors * diagonal * eigenvectors.transpose();
+        Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| whole[(i, j)])))
+    };
+    (largest > 0.0).then(|| Carrier { tensor: with(&|value| value), inverse: with(&|value| 1.0 / value) })
 }
 
 /// Pd = T^-1 Omega, Pdd = T^-1 (Acc - Td Pd)

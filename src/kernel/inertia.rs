@@ -17,6 +17,25 @@ pub struct Inertia {
     pub about_node: Mat3,
 }
 
+impl Inertia {
+    /// Of nothing.
+    pub const NONE: Self = Self { mass: 0.0, offset: Vec3::ZERO, about_node: Mat3::ZERO };
+
+    /// Together with another body at the same node.
+    pub fn with(&self, other: &Self) -> Self {
+        let mass = self.mass + other.mass;
+        let moment = self.offset * self.mass + other.offset * other.mass;
+        let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
+        Self { mass, offset, about_node: self.about_node + other.about_node }
+    }
+
+    /// The inertia about the mass centre (Steiner): J0 - m [(d.d) I - d(x)d]
+    pub fn about_centre(&self) -> Mat3 {
+        let d = self.offset;
+        self.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * self.mass
+    }
+}
+
 /// The spin of a point: Omega = T Pd, Acc = T Pdd + Td Pd, both material.
 #[derive(Clone, Copy, Debug)]
 pub struct Spin<T = f64> {
@@ -47,6 +66,13 @@ pub struct Derivatives<T = f64> {
     pub d_acceleration: Mat3<T>,
 }
 
+impl<T: Real> Derivatives<T> {
+    /// Of a spin that depends on nothing.
+    pub fn none() -> Self {
+        Self { d_omega: Mat3::zero(), d_acceleration: Mat3::zero() }
+    }
+}
+
 impl<T: Real> Spin<T> {
     /// The spin that belongs to a rotation vector and its rates.
     #[inline(always)]
@@ -61,6 +87,14 @@ impl<T: Real> Spin<T> {
     #[inline]
     pub fn direct(rotation: Rotation<T>, omega: Vec3<T>, acceleration: Vec3<T>, over: Derivatives<T>) -> Self {
         Self { rotation, omega, acceleration, rates: Rates::OfUnknown(over) }
+    }
+
+    /// The derivatives over the one unknown, where there is but one.
+    pub fn over_unknown(&self) -> Option<&Derivatives<T>> {
+        match &self.rates {
+            Rates::OfVector(..) => None,
+            Rates::OfUnknown(over) => Some(over),
+        }
     }
 
     /// s dOmega/dP + d dOmega/drate: of the weighted derivatives of Omega with respect to the rotation unknowns.
@@ -80,7 +114,13 @@ impl<T: Real> Spin<T> {
         let rotation = &self.rotation;
         let (p_rate, p_rate2) = match self.rates {
             Rates::OfVector(p_rate, p_rate2) => (p_rate, p_rate2),
-            Rates::OfUnknown(over) => return (over.d_acceleration, over.d_omega),
+            Rates::OfUnknown(over) => {
+                debug_assert!(
+                    w.stiffness == 1.0 || w == Weights::NONE,
+                    "the weights of a step stand in the derivatives"
+                );
+                return (over.d_acceleration, over.d_omega);
+            }
         };
         let mut acceleration = rotation.t.scale(w.mass);
         let mut omega = Mat3::zero();

@@ -10,12 +10,14 @@
 //! b = E (J Acc + Omega x J Omega)            phi(Omega) = -J^-1 (Omega x J Omega)
 //! ```
 //!
-//! Without the last bracket and with J = I it is the method of Bruls, Cardona & Arnold (2012,
-//! doi:10.1016/j.mechmachtheory.2011.07.017) written in space. The last bracket is of the order of the error of a step: phi is what
-//! a spin changes by without a moment (Euler), and with it the sum is the fourth-order integral of a spin (Hermite's
-//! quadrature, and Magnus 1954, doi:10.1002/cpa.3160070404: one rotation does not commute with the next). phi1 is taken at the
-//! momentum L0, so that all is explicit in X. With J the inertia, L is the angular momentum: of a free body it is constant, and what
-//! remains is the error of the bracket, h^4; J = I carries the spin where no inertia is definite. Any J keeps the order.
+//! Without the last bracket and with J = I this is the counterpart in space of the method of Bruls, Cardona & Arnold
+//! (2012, doi:10.1016/j.mechmachtheory.2011.07.017), who add spins of the body. The last bracket is of the order of the
+//! error of a step: phi is what a spin changes by without a moment (Euler), and with it the sum is the fourth-order
+//! integral of a spin (Hermite's quadrature, and Magnus 1954, doi:10.1002/cpa.3160070404: one rotation does not commute
+//! with the next). phi1 is taken at the momentum L0, so that all is explicit in X.
+//!
+//! With J the inertia, L is the angular momentum: without moments it is constant, and what remains is the error of the bracket,
+//! of order four. Any J keeps order two, but its error grows with the ratio of J's principal values.
 
 use super::inertia::{Derivatives, Spin};
 use crate::real::Real;
@@ -49,6 +51,11 @@ pub struct Carrier {
 impl Carrier {
     /// J = I: what is carried is the spin.
     pub const SPIN: Self = Self { tensor: Mat3::IDENTITY, inverse: Mat3::IDENTITY };
+
+    /// b in the axes of the body: J Acc + Omega x J Omega
+    pub fn rate(&self, omega: Vec3, acceleration: Vec3) -> Vec3 {
+        self.tensor * acceleration + omega.cross(self.tensor * omega)
+    }
 }
 
 /// Where a step of one rotation starts.
@@ -88,7 +95,7 @@ impl Turn {
     /// From the state at the start of the step.
     pub fn new(step: StepCoefficients, carrier: Carrier, start: &Start) -> Self {
         let (omega, momentum) = (start.omega, carrier.tensor * start.omega);
-        let rate = carrier.tensor * start.acceleration + omega.cross(momentum);
+        let rate = carrier.rate(omega, start.acceleration);
         let lag = start.rotation.transpose_mul(start.algorithmic) - rate;
         let h = step.length;
         Self {
@@ -130,18 +137,18 @@ impl Turn {
         (omega, inverse * (turned.transpose_mul(rate) - omega.cross(momentum)))
     }
 
-    /// The rotation after the increment `x`, with the rates that belong to it and their derivatives over it. With X = gain^-1 w1 +
-    /// constant + E y:
+    /// The rotation after the increment `x`, with the rates that belong to it and their derivatives over it. With
+    /// X = gain^-1 w1 + constant + E y:
     ///
     /// ```text
-    /// dOmega = [Omega~ T + E^T gain (I - E (dy - y~ T))] dX
+    /// dOmega = [Omega~ T + E^T gain (I - E (dy - y~) T)] dX
     /// J dAcc = [(J Acc + Omega x J Omega)~ T - k (J Omega)~ T + (k J - Omega~ J + (J Omega)~) dOmega] dX
     /// ```
     pub fn spin(&self, x: Vec3, omega: Vec3, acceleration: Vec3) -> Spin {
         let rotation = Rotation::new(x);
         let (e, t, inertia, k) = (rotation.r, rotation.t, self.carrier.tensor, self.stiffness());
         let momentum = inertia * omega;
-        let rate = inertia * acceleration + omega.cross(momentum);
+        let rate = self.carrier.rate(omega, acceleration);
         let (y, dy) = self.carried(e);
         let advance = Mat3::IDENTITY - e * ((dy - y.skew()) * t);
         let d_omega = Mat3::skew_mul(omega, t) + e.transpose_matmul(self.gain * advance);
@@ -207,6 +214,69 @@ fn inverse(a: f64, b: f64, w: Vec3) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const STEP: StepCoefficients = StepCoefficients { beta: 0.3, gamma: 0.6, alpha_m: 0.2, alpha_f: 0.4, length: 0.3 };
+
+    /// A slanted inertia and a start in motion, without lag.
+    fn turn(stretch: f64) -> (Turn, Start) {
+        let inertia = Mat3([[2.0, 0.3, -0.1], [0.3, 1.5, 0.2], [-0.1, 0.2, 3.0]]);
+        let matrix = nalgebra::Matrix3::from_fn(|i, j| inertia.0[i][j]).try_inverse().unwrap();
+        let inverse = Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)])));
+        let start = Start {
+            rotation: Rotation::new(Vec3([0.4, -1.0, 0.7])).r,
+            omega: Vec3([1.0, -0.5, 0.8]),
+            acceleration: Vec3([0.3, 0.9, -0.4]),
+            algorithmic: Vec3([0.5, -0.7, 0.2]),
+            stretch,
+        };
+        (Turn::new(STEP, Carrier { tensor: inertia, inverse }, &start), start)
+    }
+
+    #[test]
+    fn the_rates_solve_the_equations_of_the_step() {
+        let (turn, start) = turn(1.0);
+        let (StepCoefficients { beta, gamma, alpha_m, alpha_f, length: h }, carrier) = (STEP, turn.carrier);
+        let x = Vec3([0.2, -0.3, 0.25]);
+        let (omega, acceleration) = turn.rates(x);
+        let e = Rotation::new(x).r;
+        let b0 = carrier.rate(start.omega, start.acceleration);
+        let b1 = e * carrier.rate(omega, acceleration);
+        let old = start.rotation.transpose_mul(start.algorithmic);
+        let new = start.rotation.transpose_mul(turn.algorithmic(x, omega));
+        let momentum = carrier.tensor * start.omega;
+        let gained = (old * (1.0 - gamma) + new * gamma) * h;
+        assert!((e * (carrier.tensor * omega) - momentum - gained).max_abs() < 1e-13);
+        let lag = new * (1.0 - alpha_m) + old * alpha_m - b1 * (1.0 - alpha_f) - b0 * alpha_f;
+        assert!(lag.max_abs() < 1e-13, "{lag:?}");
+        let phi = |omega: Vec3| -(carrier.inverse * omega.cross(carrier.tensor * omega));
+        let (w0, w1) = (start.omega, e * omega);
+        let z = carrier.inverse * e.transpose_mul(momentum);
+        let spun = e * (carrier.inverse * e.transpose_mul(new)) - carrier.inverse * old;
+        let bracket = phi(w0) - e * phi(z) - w0.cross(w1);
+        let whole = (w0 + w1) * (0.5 * h) + spun * (h * h * (beta - 0.5 * gamma)) + bracket * (h * h / 12.0);
+        assert!((x - whole).max_abs() < 1e-14, "{x:?} {whole:?}");
+    }
+
+    #[test]
+    fn the_lag_stretches_with_the_step() {
+        let ((same, start), (longer, _)) = (turn(1.0), turn(2.0));
+        let now = same.carrier.rate(start.omega, start.acceleration);
+        assert!((longer.algorithmic - now - (same.algorithmic - now) * 2.0).max_abs() < 1e-15);
+    }
+
+    #[test]
+    fn steady_turning_is_guessed_exactly() {
+        let spin = Vec3([0.0, 0.0, 3.0]);
+        let start = Start {
+            rotation: Mat3::IDENTITY,
+            omega: spin,
+            acceleration: Vec3::ZERO,
+            algorithmic: Vec3::ZERO,
+            stretch: 1.0,
+        };
+        let turn = Turn::new(STEP, Carrier::SPIN, &start);
+        assert!((turn.guess() - spin * STEP.length).max_abs() < 1e-15);
+    }
 
     #[test]
     fn the_inverse_is_one() {

@@ -26,8 +26,8 @@ const FAR: f64 = PI / 2.0;
 const NEAR_TURN: f64 = 0.5;
 
 /// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left. `lag` is
-/// the time by which the algorithmic acceleration lies ahead of the state; `None` where it is that of the spin, to which
-/// charts do not matter.
+/// the time by which the algorithmic acceleration lies ahead of the state; `None` where it is the rate of a momentum, to
+/// which charts do not matter.
 pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
     let mut switched = 0;
     for &slot in rotations {

@@ -13,7 +13,7 @@ pub use history::{History, Table};
 use crate::effect::{Effect, Energy, Momentum, Noise};
 use crate::kernel::Weights;
 use crate::system::{Direction, Equations, FrameConflict, Memory, Node, Pattern, Slot, State, System};
-use crate::tensor::{Mat3, Vec3};
+use crate::tensor::Vec3;
 use std::sync::Arc;
 
 /// A prescribed rotation may go this far in one step or load increment.
@@ -178,13 +178,6 @@ impl Model {
     /// The effects that act in a stage.
     pub fn acting(&self, stage: &StageContext) -> Vec<Arc<dyn Effect>> {
         self.effects.iter().filter(|effect| effect.acts(stage)).cloned().collect()
-    }
-
-    /// The inertia that bodies have about their nodes, summed by slot of the rotation; global components of the initial placement.
-    pub fn inertia_of_rotations(&self) -> Vec<Mat3> {
-        let mut sums = vec![Mat3::ZERO; self.slots.len()];
-        self.effects.iter().for_each(|effect| effect.inertia_of_rotations(&mut sums));
-        sums
     }
 
     /// The stored energy.

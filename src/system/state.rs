@@ -1,9 +1,9 @@
 //! The state of a scene: one 3-vector of unknowns a slot, with its rates.
 
+use crate::kernel::NodeMotion;
 use crate::kernel::inertia::Spin;
 use crate::kernel::seam::Conversion;
 use crate::kernel::turn::Turn;
-use crate::kernel::{NodeMotion, Weights};
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 
@@ -33,7 +33,8 @@ pub struct State {
     /// d2q/dt2; zero in static stages.
     pub a: Vec<Vec3>,
     /// The algorithmic acceleration of generalised-alpha methods; equal to `a` where a method has none of its own. Where
-    /// the unknowns of steps are increments, that of a rotation is the rate of the momentum that it carries, see [`Turn`].
+    /// the unknowns of steps are increments, that of a rotation is the rate of the momentum that it carries, see [`Turn`];
+    /// while a step is iterated, that of its start.
     pub algorithmic: Vec<Vec3>,
     /// The factor of each load, valid at `time` and `load`.
     pub amplitude: Vec<f64>,
@@ -106,15 +107,12 @@ impl State {
     /// The rate of the unknown at a rotation slot.
     pub fn rotation_rate(&self, slot: Slot) -> RotationRate {
         let given = self.v[slot as usize];
-        if self.turn(slot).is_none() {
-            return RotationRate { rate: given, over_unknown: None };
-        }
-        let spin = self.spin(slot);
+        let Some(turn) = self.turn(slot) else { return RotationRate { rate: given, over_unknown: None } };
+        let spin = turn.spin(self.q[slot as usize], given, self.a[slot as usize]);
         let inverse = spin.rotation.t_inverse();
         let rate = inverse * given;
-        // The weights stand in the derivatives of the spin already.
-        let d_omega = spin.omega_derivative(Weights::NONE);
-        RotationRate { rate, over_unknown: Some(inverse * (d_omega - spin.rotation.c1(rate))) }
+        let over = spin.over_unknown().map(|over| inverse * (over.d_omega - spin.rotation.c1(rate)));
+        RotationRate { rate, over_unknown: over }
     }
 
     /// The spin at a slot.

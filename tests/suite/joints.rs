@@ -205,8 +205,8 @@ fn bodies_over_increments_agree() {
             };
             let spin = |x: Vec3<Six>| {
                 let (omega, acceleration) = turn.rates(x);
-                let over = Derivatives { d_omega: Mat3::zero(), d_acceleration: Mat3::zero() };
-                Spin::direct(Rotation::new(x).after(Mat3::constant(turn.base())), omega, acceleration, over)
+                let rotation = Rotation::new(x).after(Mat3::constant(turn.base()));
+                Spin::direct(rotation, omega, acceleration, Derivatives::none())
             };
             let wide =
                 |moving: usize| body(&inertia, pick(moving == 2, a, 0), &spin(pick(moving == 0, x, 3)), Weights::NONE);
@@ -235,8 +235,7 @@ fn a_rotating_frame_sees_the_same_inertia() {
             let omega = relative.omega + carried;
             let acceleration = relative.acceleration - relative.omega.cross(carried);
             let total = a + w.cross(v).scale(2.0) + w.cross(w.cross(arm));
-            let none = Derivatives { d_omega: Mat3::zero(), d_acceleration: Mat3::zero() };
-            let direct = Spin::direct(relative.rotation, omega, acceleration, none);
+            let direct = Spin::direct(relative.rotation, omega, acceleration, Derivatives::none());
             body(&inertia, total, &direct, Weights::NONE)
         };
         let o = Vec3::constant(Vec3::ZERO);

@@ -11,7 +11,8 @@ use beamsim::solve::{Convergence, LinearSolver, Newton, Work};
 use beamsim::system::State;
 use beamsim::tensor::{Mat3, Vec3};
 
-const SCHEMES: [&str; 6] = [
+const SCHEMES: [&str; 7] = [
+    "scheme = \"lie_generalized_alpha\"",
     "scheme = \"newmark\"",
     "scheme = \"hht\"",
     "scheme = \"hht\"\nalpha = 0.3",
@@ -186,14 +187,33 @@ fn adaptive_steps_meet_their_tolerance() {
                 simulate(&with_settings(&deck, &settings))
             };
             let exact = run(&[format!("step={fine}")]).vector("tip.u");
+            let mut before = None;
             for tolerance in [1e-2, 1e-3, 1e-4] {
                 let adaptive = ["step=0.2".into(), "adaptive=true".into(), format!("step_tolerance={tolerance}")];
                 let simulation = run(&adaptive);
                 let error = distance(simulation.vector("tip.u"), exact) / length;
                 assert!(error < 5.0 * tolerance, "{scheme}, tolerance {tolerance}: error {error}\n{deck}");
                 assert!(simulation.counters.cutbacks > 0, "{scheme}, {tolerance}: a first step of 0.2 is too long");
+                // Errors of order two: a tenth of the tolerance takes about three times the steps.
+                let steps = simulation.counters.steps as f64;
+                assert!(before.is_none_or(|before| (1.5..6.0).contains(&(steps / before))), "{before:?} {steps}");
+                before = Some(steps);
             }
         }
+    }
+}
+
+/// Of a free body over increments the error is of order four, and so few steps are enough.
+#[test]
+fn adaptive_steps_know_what_increments_are_good_at() {
+    let settings = |tolerance: f64| format!("lie_generalized_alpha\"\nadaptive = true\nstep_tolerance = {tolerance} #");
+    let still = Vec3([0.3, 0.4, 0.5]);
+    let tumbling = Pinned { end: 10.0, ..FREE };
+    let exact = tumbling.simulate("lie_generalized_alpha", 0.005, still);
+    for (tolerance, most) in [(1e-3, 100), (1e-5, 300)] {
+        let (end, steps) = tumbling.simulate_counting(&settings(tolerance), 0.1, still);
+        let error = (0..3).map(|k| (end[k] - exact[k]).max_abs()).fold(0.0, f64::max);
+        assert!(error < 5.0 * tolerance && steps < most, "tolerance {tolerance}: {error:e} in {steps} steps");
     }
 }
 
@@ -286,6 +306,8 @@ struct Pinned {
     /// Rotation vector at the start
     lean: Vec3,
     end: f64,
+    /// Whether the point is held while it turns
+    held: bool,
 }
 
 /// Spins about its middle axis, where it is not stable: it turns over twice until 20.
@@ -296,6 +318,7 @@ const FREE: Pinned = Pinned {
     spin: Vec3([0.01, 2.0, 0.01]),
     lean: Vec3::ZERO,
     end: 20.0,
+    held: true,
 };
 
 /// The top of the paper
@@ -306,11 +329,17 @@ const TOP: Pinned = Pinned {
     spin: Vec3([0.0, 0.0, 50.0]),
     lean: Vec3([0.3, 0.0, 0.0]),
     end: 1.5,
+    held: true,
 };
 
 impl Pinned {
     /// Its axes at the end. It is drawn turned back, so that a static stage that turns it by `turned` brings it to its place.
     fn simulate(&self, scheme: &str, step: f64, turned: Vec3) -> [Vec3; 3] {
+        self.simulate_counting(scheme, step, turned).0
+    }
+
+    /// And how many steps it took.
+    fn simulate_counting(&self, scheme: &str, step: f64, turned: Vec3) -> ([Vec3; 3], u64) {
         let lean = Rotation::new(self.lean).r;
         let drawn = Rotation::new(turned).r.transpose() * lean;
         let d = self.offset;
@@ -332,6 +361,7 @@ inertia = [{rows}]
 [[support]]
 at = "a"
 fix = "pin"
+stages = {held}
 [[motion]]
 at = "a"
 rotate = {axis}
@@ -359,11 +389,12 @@ columns = ["d"]
             angle = turned.norm(),
             spin = numbers(lean * self.spin),
             end = self.end,
+            held = if self.held { "[1, 2]" } else { "[1]" },
         );
         let simulation = simulate(&text);
         let column = |k: usize| Vec3(["x", "y", "z"].map(|c| simulation.end(&format!("a.d{k}{c}"))));
         let end = Mat3::from_columns(column(1), column(2), column(3)) * drawn;
-        [0, 1, 2].map(|k| end.column(k))
+        ([0, 1, 2].map(|k| end.column(k)), simulation.counters.steps)
     }
 }
 
@@ -396,9 +427,111 @@ fn increments_do_not_notice_the_orientation() {
 /// Without moments what remains is the error of the quadrature of the spin, which is of order four for every rho_inf.
 #[test]
 fn a_free_body_is_of_order_four_over_increments() {
-    let run = |step: f64| FREE.simulate("lie_generalized_alpha", step, Vec3([0.3, 0.4, 0.5]));
-    let [a, b, c] = [0.08, 0.04, 0.02].map(run);
     let change = |a: [Vec3; 3], b: [Vec3; 3]| (0..3).map(|k| (a[k] - b[k]).max_abs()).fold(0.0, f64::max);
-    let order = (change(a, b) / change(b, c)).log2();
-    assert!((order - 4.0).abs() < 0.2, "order {order}");
+    // With the mass centre at its node, pinned, and aside of it, flying.
+    let aside = Pinned { offset: Vec3([0.0, 0.0, 0.5]), inertia: [1.25, 2.25, 3.0], held: false, end: 10.0, ..FREE };
+    for (body, step) in [(FREE, 0.08), (aside, 0.04)] {
+        for rho in [0.0, 0.5, 0.9, 1.0] {
+            let scheme = format!("lie_generalized_alpha\"\nrho_inf = {rho} #");
+            let run = |step: f64| body.simulate(&scheme, step, Vec3([0.3, 0.4, 0.5]));
+            let [a, b, c] = [step, 0.5 * step, 0.25 * step].map(run);
+            let order = (change(a, b) / change(b, c)).log2();
+            assert!((order - 4.0).abs() < 0.2, "rho_inf {rho}: order {order}");
+        }
+    }
+}
+
+/// The thinner a rod, the more its spin about itself would make of errors of its momentum.
+#[test]
+fn slender_bodies_are_no_harder() {
+    let change = |a: [Vec3; 3], b: [Vec3; 3]| (0..3).map(|k| (a[k] - b[k]).max_abs()).fold(0.0, f64::max);
+    for thin in [1.0, 1e-2, 1e-4, 1e-8] {
+        let length = 2.2;
+        let rod = Pinned {
+            offset: Vec3([0.0, 0.0, length]),
+            inertia: [length * length + 1.0, length * length + 1.0, thin],
+            gravity: 9.81,
+            spin: Vec3([0.5, 2.5, 0.0]),
+            lean: Vec3([0.3, 0.0, 0.0]),
+            end: 3.0,
+            held: true,
+        };
+        let run = |step: f64| rod.simulate("lie_generalized_alpha", step, Vec3([0.3, 0.4, 0.5]));
+        let error = change(run(0.01), run(0.00125));
+        assert!(error < 2e-3, "inertia about the axis {thin}: {error:e}");
+    }
+}
+
+/// A pendulum on a hinge that two held components of its rotation make: it goes over the top again and again.
+#[test]
+fn hinges_stay_hinges_over_increments() {
+    let run = |scheme: &str, step: f64| {
+        simulate(&format!(
+            r#"
+gravity = [0, -9.81, 0]
+[point]
+a = [0, 0, 0]
+[[body]]
+at = "a"
+mass = 2
+offset = [0.5, 0, 0.1]
+inertia = [0.3, 0.2, 0.4]
+[[support]]
+at = "a"
+fix = ["ux", "uy", "uz", "rx", "ry"]
+[[initial]]
+at = "a"
+spin = [0, 0, 12]
+[[stage]]
+kind = "dynamic"
+end = 10
+step = {step}
+scheme = "{scheme}"
+[output]
+columns = ["rc", "w", "energy"]
+"#
+        ))
+    };
+    let simulation = run("lie_generalized_alpha", 0.005);
+    for column in ["a.rx", "a.ry", "a.wx", "a.wy"] {
+        assert!(simulation.end(column).abs() < 1e-12, "{column} {:e}", simulation.end(column));
+    }
+    let exact = run("newmark", 0.0005).end("a.rz");
+    assert!(exact > 60.0, "it turns over: {exact}");
+    assert!((simulation.end("a.rz") - exact).abs() < 2e-2, "{} {exact}", simulation.end("a.rz"));
+}
+
+/// Stages of one scheme after another: what is algorithmic starts anew, and the motion goes on.
+#[test]
+fn schemes_follow_one_another() {
+    let stages = |schemes: [&str; 3]| -> String {
+        let stage = |(k, scheme): (usize, &str)| {
+            format!("[[stage]]\nkind = \"dynamic\"\nend = {}\nstep = 0.002\nscheme = \"{scheme}\"\n", k + 1)
+        };
+        let stages: String = schemes.into_iter().enumerate().map(stage).collect();
+        format!(
+            r#"
+[point]
+a = [0, 0, 0]
+[[body]]
+at = "a"
+mass = 1
+inertia = [1, 2, 3]
+[[initial]]
+at = "a"
+spin = [1, 2, 3]
+{stages}
+[output]
+columns = ["d"]
+"#
+        )
+    };
+    let (lie, newmark) = ("lie_generalized_alpha", "newmark");
+    let end = |schemes: [&str; 3]| {
+        let simulation = simulate(&stages(schemes));
+        ["a.d1x", "a.d2y", "a.d3z"].map(|column| simulation.end(column))
+    };
+    let (mixed, one) = (end([lie, newmark, lie]), end([lie; 3]));
+    let error = distance(mixed, one);
+    assert!(error > 0.0 && error < 1e-3, "{error:e}");
 }

@@ -55,7 +55,11 @@ impl Composer<'_> {
             self.reason(
                 names[3],
                 false,
-                "no beam with interpolation = \"relative\" has rotary inertia or eccentric mass",
+                if wanted == Some(false) {
+                    "rotary inertia is switched off in [effects], and no relative beam has eccentric mass"
+                } else {
+                    "no beam with interpolation = \"relative\" has rotary inertia or eccentric mass"
+                },
             );
         } else {
             self.push(
