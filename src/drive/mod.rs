@@ -8,6 +8,7 @@ mod failure;
 mod grid;
 mod guard;
 mod ledger;
+mod mechanism;
 mod modal;
 mod path;
 mod run;

@@ -251,7 +251,7 @@ impl Path {
             timed(seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
             let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last.as_deref());
             match verdict {
-                Verdict::Converged => return Ok(iterations),
+                Verdict::Converged | Verdict::Noisy => return Ok(iterations),
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, &run.state)),
                 Verdict::Continue if iterations == newton.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, iterations });

@@ -260,6 +260,8 @@ pub struct Run<'o> {
     pub(super) fresh: bool,
     started: bool,
     warned_coarse: bool,
+    /// The uncertainty by round-off that a warning told; below the first value none is worth one.
+    warned_uncertainty: f64,
     moving: bool,
 }
 
@@ -292,6 +294,7 @@ impl<'o> Run<'o> {
             fresh: true,
             started: false,
             warned_coarse: false,
+            warned_uncertainty: 1e-7,
             moving: false,
         }
     }
@@ -318,6 +321,7 @@ impl<'o> Run<'o> {
                 }
             };
             self.count_evaluations(&workshop.assembly);
+            self.warn_of_round_off();
             result?;
             self.model.end_stage(&self.state);
         }
@@ -450,6 +454,18 @@ impl<'o> Run<'o> {
         self.warned_coarse = true;
         self.observer.warn(&format!("{failure}: more elements would tell the shape better"));
         Ok(())
+    }
+
+    /// Says where the answer has fewer digits than it shows.
+    fn warn_of_round_off(&mut self) {
+        let uncertainty = self.counters.work.uncertainty;
+        if uncertainty > 10.0 * self.warned_uncertainty {
+            self.warned_uncertainty = uncertainty;
+            self.observer.warn(&format!(
+                "round-off has taken digits: displacements are uncertain by about {uncertainty:.0e} of the largest (very slender \
+                 beams on very fine meshes lose them: use fewer elements of a higher order)"
+            ));
+        }
     }
 
     fn count_evaluations(&mut self, assembly: &Assembly) {

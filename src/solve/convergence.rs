@@ -36,6 +36,8 @@ pub struct Residual {
     pub value: Vec3,
     /// The force F to which it is compared
     pub force: f64,
+    /// Whether some residual is allowed for its round-off alone.
+    pub noisy: bool,
 }
 
 /// What the test says.
@@ -43,6 +45,8 @@ pub struct Residual {
 pub enum Verdict {
     /// In balance
     Converged,
+    /// The residual is not larger than what round-off may have made of it, but the last correction was.
+    Noisy,
     /// Not yet
     Continue,
     /// A force is not finite.
@@ -57,26 +61,33 @@ impl Convergence {
             return (Verdict::NotFinite, residual);
         }
         let small = dq.is_some_and(|dq| correction(model, dq) <= SMALLEST_CORRECTION);
-        let verdict = if residual.ratio <= 1.0 || small { Verdict::Converged } else { Verdict::Continue };
+        let verdict = match residual.ratio {
+            _ if small => Verdict::Converged,
+            ratio if ratio > 1.0 => Verdict::Continue,
+            _ if residual.noisy => Verdict::Noisy,
+            _ => Verdict::Converged,
+        };
         (verdict, residual)
     }
 
     fn residual(&self, model: &Model, system: &System, noise: Noise) -> Residual {
         let force = largest_force(model, system);
-        let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force };
+        let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force, noisy: false };
         for (slot, info) in model.slots.iter().enumerate() {
             let value = free_part(&system.pattern.equations, slot as Slot, system.total(slot));
             let noise = if info.kind == SlotKind::Rotation { noise.moment } else { noise.force };
-            let allowed = match info.kind {
+            let tolerated = match info.kind {
                 SlotKind::Force => GAP * self.tolerance * model.length,
                 SlotKind::Moment => GAP * self.tolerance,
-                _ => (self.tolerance * force * info.arm(model.length)).max(NOISE_FACTOR * noise),
+                _ => self.tolerance * force * info.arm(model.length),
             };
+            let allowed = if info.is_multiplier() { tolerated } else { tolerated.max(NOISE_FACTOR * noise) };
             let size = value.size();
+            worst.noisy |= size > tolerated;
             let ratio = if size == 0.0 { 0.0 } else { size / allowed };
             // NaN compares with nothing, so it is let in by hand.
             if ratio > worst.ratio || ratio.is_nan() {
-                worst = Residual { ratio, slot: slot as Slot, value, force };
+                worst = Residual { ratio, slot: slot as Slot, value, ..worst };
             }
         }
         worst

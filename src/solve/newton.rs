@@ -21,6 +21,8 @@ pub struct Work {
     pub evaluation_seconds: f64,
     /// Seconds spent on factorising and solving
     pub solve_seconds: f64,
+    /// The largest correction that round-off still made where an iteration ended, relative to the unknowns
+    pub uncertainty: f64,
 }
 
 /// Runs `part` and adds its seconds to `seconds`.
@@ -81,8 +83,16 @@ pub struct Newton {
     dq: Vec<Vec3>,
 }
 
+/// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
+const FINE: f64 = 1e-8;
+
 /// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
 const RUNAWAY: f64 = 1e6;
+
+/// The largest unknown, displacements over the length of the scene.
+fn size(model: &Model, state: &State) -> f64 {
+    correction(model, &state.q)
+}
 
 impl Newton {
     /// For a stage with these unknowns.
@@ -106,12 +116,22 @@ impl Newton {
         assembly.forget();
         let noise = assembly.noise(state);
         let mut iterations = 0;
+        let mut before = f64::INFINITY;
         loop {
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
             match verdict {
                 Verdict::Converged if lift.is_none() => return Ok(()),
+                // Each correction with a new residual refines the solution, until round-off makes it no smaller.
+                Verdict::Noisy if lift.is_none() && iterations > 0 => {
+                    let last = correction(model, &self.dq) / size(model, state);
+                    if last <= FINE || last > 0.5 * before || iterations >= self.max_iterations {
+                        work.uncertainty = work.uncertainty.max(last);
+                        return Ok(());
+                    }
+                    before = last;
+                }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
                 _ if iterations >= self.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, iterations });
