@@ -19,6 +19,8 @@ pub(super) struct Control {
     rate: f64,
     length: f64,
     smallest: f64,
+    /// The slots whose accelerations mean something; of others they tell no error.
+    judged: Vec<bool>,
 }
 
 /// Part of the step that the tolerance would allow.
@@ -30,8 +32,13 @@ const SMALLEST: f64 = 1e-8;
 
 impl Control {
     /// Begins with steps of this length; the tolerance is for all errors of the next `span` of time.
-    pub fn new(tolerance: f64, span: f64, length: f64, scheme: Scheme) -> Self {
-        Self { scheme, rate: tolerance / span, length, smallest: SMALLEST * length }
+    pub fn new(tolerance: f64, span: f64, length: f64, scheme: Scheme, judged: Vec<bool>) -> Self {
+        Self { scheme, rate: tolerance / span, length, smallest: SMALLEST * length.min(span), judged }
+    }
+
+    /// The error that a step is allowed.
+    pub fn share(&self, length: f64) -> f64 {
+        self.rate * length
     }
 
     /// The end and the length of the next step. What remains to the next stop is not left as a sliver.
@@ -46,9 +53,9 @@ impl Control {
         }
     }
 
-    /// Whether steps cannot become smaller.
-    pub fn is_smallest(&self) -> bool {
-        self.length <= self.smallest
+    /// Whether a step cannot become smaller.
+    pub fn is_smallest(&self, length: f64) -> bool {
+        length <= self.smallest
     }
 
     /// Newton failed: the next attempt takes a quarter.
@@ -59,17 +66,17 @@ impl Control {
 
     /// Takes or rejects a step with this error, and chooses the next length.
     pub fn judge(&mut self, length: f64, error: f64) -> bool {
-        let allowed = self.rate * length;
+        let allowed = self.share(length);
         let ratio = (error / allowed).max(1e-9);
         // The error of a step falls with the third power of its length, its share with the first.
         let factor = SAFETY / libm::sqrt(ratio);
-        let taken = error <= allowed || length <= self.smallest;
+        let taken = error <= allowed;
         let most = if taken { GROWTH } else { SAFETY };
         self.length = (length * factor.clamp(1.0 / (GROWTH * GROWTH), most)).max(self.smallest);
         taken
     }
 
-    /// The largest local error of a step, from the accelerations at its ends; both states in one chart.
+    /// The largest local error of a step and its slot, from the accelerations at its ends; both states in one chart.
     pub fn error(
         &self,
         model: &Model,
@@ -77,19 +84,25 @@ impl Control {
         start: &State,
         end: &State,
         length: f64,
-    ) -> f64 {
+    ) -> (f64, usize) {
         // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps sensible.
         let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs();
         let of_slot = |(slot, info): (usize, &SlotInfo)| {
+            if !self.judged[slot] {
+                return (0.0, slot);
+            }
             let e = (end.a[slot] - start.a[slot]) * (factor * length * length);
-            match info.kind {
+            let size = match info.kind {
                 SlotKind::Displacement => e.norm() / model.length,
                 SlotKind::Rotation if increments.is_none() => (Rotation::new(end.q[slot]).t * e).norm(),
                 SlotKind::Rotation | SlotKind::Force | SlotKind::Moment => 0.0,
-            }
+            };
+            (size, slot)
         };
-        let turned = increments.map_or(0.0, |increments| increments.largest_error(start, end, length, factor));
-        model.slots.iter().enumerate().map(of_slot).fold(turned, f64::max)
+        let turned = increments.into_iter().flat_map(|increments| increments.errors(start, end, length, factor));
+        let turned = turned.filter(|&(_, slot)| self.judged[slot]);
+        let all = model.slots.iter().enumerate().map(of_slot).chain(turned);
+        all.fold((0.0, 0), |worst, one| if one.0 > worst.0 || one.0.is_nan() { one } else { worst })
     }
 }
 
@@ -98,7 +111,7 @@ mod tests {
     use super::*;
 
     fn control() -> Control {
-        Control::new(1e-3, 1.0, 0.1, Scheme::newmark(0.25, 0.5))
+        Control::new(1e-3, 1.0, 0.1, Scheme::newmark(0.25, 0.5), Vec::new())
     }
 
     #[test]

@@ -9,6 +9,8 @@ use crate::integrate::{Increments, Rotations, Scheme, Step};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::NewtonFailure;
+use crate::system::{Slot, State};
+use std::f64::consts::PI;
 
 impl Run<'_> {
     /// All steps of a dynamic stage, up to `end` on the run's clock.
@@ -23,11 +25,13 @@ impl Run<'_> {
         workshop.increments = (scheme.rotations == Rotations::Increments)
             .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.equations));
         self.start_dynamic(workshop)?;
+        workshop.massive = self.slots_with_mass(workshop);
         let mut before = step;
         match adaptive {
             None => self.run_fixed(workshop, end, step, scheme, &mut before),
             Some(tolerance) => {
-                let control = Control::new(tolerance, end - self.state.time, step, scheme);
+                let judged = workshop.massive.clone();
+                let control = Control::new(tolerance, end - self.state.time, step, scheme, judged);
                 self.run_adaptive(workshop, end, control, &mut before)
             }
         }
@@ -73,13 +77,19 @@ impl Run<'_> {
             self.observer.progress(self.moment(), self.dynamic_progress(next, end))?;
             let step = Step { scheme: control.scheme, length };
             let tried = self.advance(workshop, step, *before, next);
+            let at_floor = control.is_smallest(length);
             let taken = match tried {
                 Ok(()) => {
                     let increments = workshop.increments.as_ref();
-                    let error = control.error(&self.model, increments, &self.good, &self.state, length);
-                    control.judge(length, error)
+                    let (error, slot) = control.error(&self.model, increments, &self.good, &self.state, length);
+                    let taken = control.judge(length, error);
+                    if !taken && at_floor {
+                        let failure = NewtonFailure::StepTooSmall { slot, error, share: control.share(length) };
+                        return Err(self.give_up(workshop, failure));
+                    }
+                    taken
                 }
-                Err(failure) if control.is_smallest() => return Err(self.give_up(workshop, failure)),
+                Err(failure) if at_floor => return Err(self.give_up(workshop, failure)),
                 Err(_) => control.fail(length),
             };
             if taken {
@@ -87,6 +97,9 @@ impl Run<'_> {
                 if self.complete(workshop, &step)? {
                     return Ok(());
                 }
+                // Where velocities leave the joints by the error of a step, accelerations of a shorter one must jump to
+                // bring them back, more and more the shorter it is.
+                self.close_joints(workshop)?;
             } else {
                 self.state.copy_from(&self.good);
                 self.counters.cutbacks += 1;
@@ -98,7 +111,7 @@ impl Run<'_> {
     /// One attempt at a step: predict, prescribe, iterate.
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
-        let Workshop { assembly, newton, increments, .. } = workshop;
+        let Workshop { assembly, newton, increments, massive, .. } = workshop;
         if let Some(increments) = increments {
             increments.begin(&mut self.state, &step, before);
         }
@@ -113,7 +126,8 @@ impl Run<'_> {
             // Forces conjugate to total vectors, for reactions and the energy account.
             assembly.evaluate(&self.state, Weights::NONE, None);
         }
-        Ok(())
+        let turning = self.model.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
+        turns_within(&self.state, turning, step.length)
     }
 
     /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.
@@ -168,5 +182,15 @@ impl Run<'_> {
     fn dynamic_progress(&self, time: f64, end: f64) -> f64 {
         let done = if end > 0.0 { (time / end).clamp(0.0, 1.0) } else { 1.0 };
         (self.stage as f64 + done) / self.plan.stages.len() as f64
+    }
+}
+
+/// Beyond half a turn in a step nobody could count the turns of a node.
+fn turns_within(state: &State, rotations: impl Iterator<Item = Slot>, length: f64) -> Result<(), NewtonFailure> {
+    let turned = |slot: Slot| (slot as usize, state.spin(slot).omega.norm() * length);
+    let mut turned = rotations.map(turned);
+    match turned.find(|&(_, angle)| angle > PI) {
+        Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot, angle }),
+        None => Ok(()),
     }
 }

@@ -48,6 +48,17 @@ pub enum Failure {
         /// Whether it was a time step
         dynamic: bool,
     },
+    /// Steps that adapt have become as small as they may, and their error is still too large.
+    StepTooSmall {
+        /// When
+        at: Moment,
+        /// Where the error is
+        place: Place,
+        /// Relative to the scene's length, or in radians
+        error: f64,
+        /// What the step is allowed
+        share: f64,
+    },
     /// A mechanism or a loose part
     Singular {
         /// When
@@ -107,7 +118,7 @@ impl Failure {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Deck(_) => "deck",
-            Self::NotConverged { .. } => "not_converged",
+            Self::NotConverged { .. } | Self::StepTooSmall { .. } => "not_converged",
             Self::Singular { .. } => "singular",
             Self::NonFinite { .. } => "non_finite",
             Self::MeshTooCoarse { .. } => "mesh_too_coarse",
@@ -129,6 +140,10 @@ impl Failure {
                 Some("let the stage take smaller levels: `adaptive`, or more `steps`")
             }
             Self::NotConverged { .. } => Some("try a finer mesh where it turns most, or a smaller `step`"),
+            Self::StepTooSmall { .. } => Some(
+                "accelerations jump there from step to step: let the scheme damp them (a smaller `rho_inf`), take fixed steps, or a larger \
+                 `step_tolerance`",
+            ),
             Self::Singular { place: Some(place), .. } if place.is_joint() => Some(
                 "a support, another joint or a loop of rigid parts holds the same already: release one of them, for example by a \
                  spherical joint in place of a revolute one",
@@ -180,6 +195,10 @@ impl fmt::Display for Failure {
                 f,
                 "no balance at {at}: after {iterations} iterations and {cutbacks} cut-backs the residual at {place} is \
                  {residual:.3e}, the largest force {force:.3e}"
+            ),
+            Self::StepTooSmall { at, place, error, share } => write!(
+                f,
+                "the smallest step has an error of {error:.3e} at {place}, where it may have {share:.3e} ({at})"
             ),
             Self::Singular { at, place: Some(place) } if place.is_joint() => {
                 write!(f, "the {place} holds what is held already ({at})")

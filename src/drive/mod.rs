@@ -8,7 +8,6 @@ mod failure;
 mod grid;
 mod guard;
 mod ledger;
-mod mechanism;
 mod modal;
 mod path;
 mod run;

@@ -274,6 +274,8 @@ pub(super) struct Workshop {
     pub until: Option<Until>,
     /// Where the unknowns of time steps are increments of rotation
     pub increments: Option<Increments>,
+    /// For each slot whether its accelerations mean something; known in dynamic stages
+    pub massive: Vec<bool>,
     /// Watches the energy of time steps
     pub guard: Option<EnergyGuard>,
 }
@@ -342,7 +344,7 @@ impl<'o> Run<'o> {
         let convergence = Convergence { tolerance: stage.tolerance };
         let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
         let (lift, until) = (vec![Vec3::ZERO; slots], stage.until.clone());
-        Ok(Workshop { assembly, newton, lift, until, increments: None, guard: None })
+        Ok(Workshop { assembly, newton, lift, until, increments: None, massive: Vec::new(), guard: None })
     }
 
     /// The first dynamic stage gives the initial velocities.
@@ -490,10 +492,12 @@ impl<'o> Run<'o> {
                 cutbacks: self.counters.cutbacks,
                 dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
             },
+            NewtonFailure::StepTooSmall { slot, error, share } => {
+                Failure::StepTooSmall { at, place: place(&self.model, slot, Vec3::ZERO), error, share }
+            }
             NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
             NewtonFailure::TurnsTooFar { slot, angle } => Failure::Deck(format!(
-                "a motion turns node \"{}\" by {angle:.3} rad at once ({at}), so that its direction cannot be told: use \
-                 smaller steps",
+                "node \"{}\" turns by {angle:.3} rad at once ({at}), so that its direction cannot be told: use smaller steps",
                 self.model.slots[slot].node
             )),
             NewtonFailure::NotFinite { effect, slot } => {

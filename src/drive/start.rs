@@ -40,7 +40,7 @@ impl Run<'_> {
 
     /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing the joints takes,
     /// [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
-    fn close_joints(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn close_joints(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
         if self.model.multipliers.is_empty() {
             return Ok(());
         }
@@ -149,6 +149,21 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
                 }
             }
         }
+    }
+}
+
+impl Run<'_> {
+    /// For each slot whether its accelerations mean something: its unknowns have inertia, or their motion is prescribed.
+    pub(super) fn slots_with_mass(&self, workshop: &mut Workshop) -> Vec<bool> {
+        workshop.assembly.evaluate(&self.state, Weights::MASS, None);
+        let system = &workshop.assembly.system;
+        let has = |slot: usize| {
+            let numbers = system.pattern.equations.of(slot as Slot);
+            numbers.contains(&Equations::HELD) || diagonal_block(system, numbers).max_abs() > 0.0
+        };
+        let moves = (0..self.model.slots.len()).map(has).collect();
+        workshop.assembly.evaluate(&self.state, Weights::NONE, None);
+        moves
     }
 }
 

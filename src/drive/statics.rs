@@ -1,7 +1,6 @@
 //! Load control: equal levels, approached in smaller steps where Newton fails.
 
 use super::failure::Failure;
-use super::mechanism;
 use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
@@ -75,7 +74,6 @@ impl Run<'_> {
         let Workshop { assembly, newton, .. } = &mut *workshop;
         if newton.solver.factorise(&assembly.system)
             && let Some(vector) = newton.solver.null_vector(&assembly.system)
-            && !mechanism::is_stiff(&self.model, &self.state, &assembly.system, &vector)
         {
             return Err(self.name_mechanism(Some(vector), &assembly.system));
         }

@@ -20,6 +20,9 @@ use std::f64::consts::PI;
 /// a momentum.
 const LARGEST_RATIO: f64 = 10.0;
 
+/// Part of the largest principal value below which there is no inertia.
+const MASSLESS: f64 = 1e-12;
+
 /// The rotations of a scene, and the momentum that each carries from step to step.
 pub struct Increments {
     carriers: Vec<(Slot, Carrier)>,
@@ -89,17 +92,23 @@ impl Increments {
         switched
     }
 
-    /// The largest local error of a rotation over a step between two states with total vectors. What moments give, mu = E J^-1 E^T b,
+    /// The local errors of rotations over a step between two states with total vectors, with their slots. What moments give, mu = E J^-1 E^T b,
     /// is integrated to second order, with the error factor h^2 (mu1 - mu0). The rest of the acceleration, phi, is integrated to
     /// fourth order: h^5/720 of the fourth derivative of the spin, which is about |w|^2 times the second, (phi1 - phi0)/h, and as
     /// much again from each of the two next terms of Magnus' series.
-    pub fn largest_error(&self, start: &State, end: &State, length: f64, factor: f64) -> f64 {
+    pub fn errors<'a>(
+        &'a self,
+        start: &'a State,
+        end: &'a State,
+        length: f64,
+        factor: f64,
+    ) -> impl Iterator<Item = (f64, usize)> + 'a {
         let h2 = length * length;
-        let error = |&(slot, carrier): &(Slot, Carrier)| {
+        self.carriers.iter().map(move |&(slot, carrier)| {
             let [(mu0, phi0, _), (mu1, phi1, w2)] = [start, end].map(|state| accelerations(state, slot, &carrier));
-            (mu1 - mu0).norm() * (factor * h2) + (phi1 - phi0).norm() * (h2 * h2 * w2 / 240.0)
-        };
-        self.carriers.iter().map(error).fold(0.0, f64::max)
+            let size = (mu1 - mu0).norm() * (factor * h2) + (phi1 - phi0).norm() * (h2 * h2 * w2 / 240.0);
+            (size, slot as usize)
+        })
     }
 }
 
@@ -123,17 +132,21 @@ fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     sums
 }
 
-/// The carrier of an angular momentum; `None` without inertia. Of slender inertias the small principal values are raised.
+/// The carrier of an angular momentum; `None` without inertia about some axis. Of slender inertias the small principal values are raised.
 fn momentum(inertia: Mat3) -> Option<Carrier> {
     let SymmetricEigen { eigenvectors, eigenvalues } =
         SymmetricEigen::new(Matrix3::from_fn(|i, j| 0.5 * (inertia.0[i][j] + inertia.0[j][i])));
     let largest = eigenvalues.max();
+    // Nothing resists a turn about this axis: its momentum says nothing of its spin.
+    if eigenvalues.min() <= MASSLESS * largest {
+        return None;
+    }
     let with = |f: &dyn Fn(f64) -> f64| {
         let diagonal = Matrix3::from_diagonal(&eigenvalues.map(|value| f(value.max(largest / LARGEST_RATIO))));
         let whole = eigenvectors * diagonal * eigenvectors.transpose();
         Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| whole[(i, j)])))
     };
-    (largest > 0.0).then(|| Carrier { tensor: with(&|value| value), inverse: with(&|value| 1.0 / value) })
+    Some(Carrier { tensor: with(&|value| value), inverse: with(&|value| 1.0 / value) })
 }
 
 /// Pd = T^-1 Omega, Pdd = T^-1 (Acc - Td Pd)

@@ -90,6 +90,12 @@ fn numbers(failure: &Failure) -> Value {
             record["iterations"] = json!(iterations);
             record["cutbacks"] = json!(cutbacks);
         }
+        Failure::StepTooSmall { at, place: node, error, share } => {
+            when(at, &mut record);
+            place(node, &mut record);
+            record["error"] = json!(error);
+            record["share"] = json!(share);
+        }
         Failure::Singular { at, place: node } => {
             when(at, &mut record);
             if let Some(node) = node {

@@ -50,6 +50,15 @@ pub enum NewtonFailure {
         /// Radians
         angle: f64,
     },
+    /// The error of the smallest step is above what it may be.
+    StepTooSmall {
+        /// Of this slot
+        slot: usize,
+        /// Relative to the scene's length, or in radians
+        error: f64,
+        /// What is allowed
+        share: f64,
+    },
     /// The tangent cannot be solved with.
     Singular(Option<NullVector>),
     /// A force is not finite.

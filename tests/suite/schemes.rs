@@ -535,3 +535,70 @@ columns = ["d"]
     let error = distance(mixed, one);
     assert!(error > 0.0 && error < 1e-3, "{error:e}");
 }
+
+/// A body that hangs from a hinge of multipliers: steps do not collapse, and the hinge stays closed.
+#[test]
+fn adaptive_steps_go_with_joints() {
+    let run = |stage: &str| {
+        simulate(&format!(
+            r#"
+gravity = [0, 0, -9.81]
+[point]
+a = [1, 0, 0]
+[[body]]
+at = "a"
+mass = 1
+inertia = [0.1, 0.2, 0.3]
+[[joint]]
+kind = "revolute"
+nodes = ["a"]
+at = [0, 0, 0]
+axis = [0, 1, 0]
+[[initial]]
+at = "a"
+velocity = [0, 0, -10]
+spin = [0, 10, 0]
+[[stage]]
+kind = "dynamic"
+end = 1
+{stage}
+[output]
+columns = ["u"]
+"#
+        ))
+    };
+    let fine = run("step = 0.0002\nscheme = \"generalized_alpha\"").vector("a.u");
+    for scheme in ["generalized_alpha", "lie_generalized_alpha"] {
+        let stage = format!("step = 0.1\nscheme = \"{scheme}\"\nadaptive = true\nstep_tolerance = 1e-3");
+        let simulation = run(&stage);
+        let error = distance(simulation.vector("a.u"), fine);
+        assert!(error < 5e-3, "{scheme}: {error:e}");
+        assert!(simulation.counters.steps < 3000, "{scheme}: {} steps", simulation.counters.steps);
+    }
+}
+
+/// Nobody can count turns that a step leaps over.
+#[test]
+fn more_than_half_a_turn_a_step_is_refused() {
+    let run = |step: &str| {
+        crate::scenes::attempt(&format!(
+            "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [1, 1, 1]\n[[initial]]\nat = \"a\"\nspin = [0, 0, 10]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 2\nscheme = \"lie_generalized_alpha\"\n{step}\n[output]\ncolumns = [\"rc\"]\n"
+        ))
+    };
+    let told = run("step = 0.4").result.unwrap_err().to_string();
+    assert!(told.contains("node \"a\" turns by 4.000 rad"), "{told}");
+    let counted = run("step = 0.4\nadaptive = true");
+    assert!(counted.result.is_ok());
+    assert!((counted.end("a.rz") - 20.0).abs() < 1e-9, "{}", counted.end("a.rz"));
+}
+
+/// Where the smallest step is still too wrong, the run says so.
+#[test]
+fn the_smallest_step_is_not_taken_on_trust() {
+    let text = turned_rod("step = 0.2\nadaptive = true\nstep_tolerance = 1e-30");
+    let result = crate::scenes::attempt(&text).result;
+    let failure = result.expect_err("no step is that good");
+    assert_eq!(failure.name(), "not_converged");
+    assert!(failure.to_string().contains("the smallest step has an error"), "{failure}");
+}
