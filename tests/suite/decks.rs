@@ -92,6 +92,12 @@ fn prestress_holds() {
     all_hold("decks/prestress", 6);
 }
 
+/// Those of `decks/hard/long` are for `beamsim verify decks/hard/long`.
+#[test]
+fn hard_cases_hold() {
+    all_hold("decks/hard", 30);
+}
+
 #[test]
 fn minimal_decks_hold() {
     all_hold("decks/minimal", 55);
