@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{LinearSolver, Operator, Pivots, is_symmetric, largest_eigenvalues};
+use crate::solve::{LinearSolver, Operator, Pivots, is_symmetric, largest_eigenvalues, mechanism};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -174,7 +174,7 @@ impl Run<'_> {
         let system = &assembly.system;
         self.counters.work.factorisations += 1;
         if !newton.solver.factorise(system) {
-            let vector = newton.solver.null_vector(system);
+            let vector = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
         // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.

@@ -12,6 +12,9 @@ use crate::solve::NewtonFailure;
 use crate::system::{Slot, State};
 use std::f64::consts::PI;
 
+/// A fixed step that fails is not taken in smaller parts than this.
+const SMALLEST_PART: f64 = 1.0 / 64.0;
+
 impl Run<'_> {
     /// All steps of a dynamic stage, up to `end` on the run's clock.
     pub(super) fn run_dynamic(
@@ -37,7 +40,7 @@ impl Run<'_> {
         }
     }
 
-    /// Rows at start + k step, the last one at `end`; a step that fails ends the run.
+    /// Rows at start + k step, the last one at `end`.
     fn run_fixed(
         &mut self,
         workshop: &mut Workshop,
@@ -51,17 +54,62 @@ impl Run<'_> {
             for number in 1..=grid.steps {
                 let (next, length) = grid.step(number);
                 self.observer.progress(self.moment(), self.dynamic_progress(next, end))?;
-                let step = Step { scheme, length };
-                if let Err(failure) = self.advance(workshop, step, *before, next) {
-                    return Err(self.give_up(workshop, failure));
-                }
-                *before = length;
-                if self.complete(workshop, &step)? {
+                let last = self.stride(workshop, Step { scheme, length }, before, next)?;
+                if self.complete(workshop, &last)? {
                     return Ok(());
                 }
             }
         }
         Ok(())
+    }
+
+    /// A step of the grid at once, or where that fails in halves, and halves of halves. Returns the last of them, which is
+    /// not settled yet.
+    fn stride(&mut self, workshop: &mut Workshop, whole: Step, before: &mut f64, next: f64) -> Result<Step, Failure> {
+        let mut step = whole;
+        loop {
+            let rest = next - self.state.time;
+            let last = step.length >= rest * (1.0 - 1e-9);
+            let target = if last { next } else { self.state.time + step.length };
+            match self.advance(workshop, step, *before, target) {
+                Ok(()) => {
+                    *before = step.length;
+                    if last {
+                        return Ok(step);
+                    }
+                    self.settle(workshop, &step)?;
+                    self.close_joints(workshop)?;
+                }
+                Err(failure) => {
+                    step.length *= 0.5;
+                    if step.length < SMALLEST_PART * whole.length {
+                        return Err(self.give_up(workshop, failure));
+                    }
+                    self.warn_of_subdivision();
+                    self.state.copy_from(&self.good);
+                    self.counters.cutbacks += 1;
+                }
+            }
+        }
+    }
+
+    /// What every step is followed by, written or not.
+    fn settle(&mut self, workshop: &mut Workshop, step: &Step) -> Result<(), Failure> {
+        self.accept(workshop)?;
+        self.settle_charts(workshop, step);
+        Ok(())
+    }
+
+    fn settle_charts(&mut self, workshop: &Workshop, step: &Step) {
+        let lag = workshop.increments.is_none().then_some(step.scheme.lag() * step.length);
+        self.change_charts(lag);
+    }
+
+    fn warn_of_subdivision(&mut self) {
+        if !std::mem::replace(&mut self.subdivided, true) {
+            let at = self.moment();
+            self.observer.warn(&format!("a step fails at {at} and is taken in smaller ones, as are others that fail"));
+        }
     }
 
     /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller one.
@@ -139,8 +187,7 @@ impl Run<'_> {
         if self.is_over(workshop) {
             return Ok(true);
         }
-        let lag = workshop.increments.is_none().then_some(step.scheme.lag() * step.length);
-        self.change_charts(lag);
+        self.settle_charts(workshop, step);
         Ok(false)
     }
 

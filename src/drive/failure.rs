@@ -26,6 +26,41 @@ pub struct Place {
     pub direction: Vec3,
 }
 
+/// What had been tried where no balance was found, and what is known that may be its cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tried {
+    /// Attempts that were taken back
+    pub cutbacks: u64,
+    /// Whether it was a time step
+    pub dynamic: bool,
+    /// Whether round-off takes the stiffness of the softest motion
+    pub soft: bool,
+    /// Whether there are beams, whose mesh may be too coarse
+    pub beams: bool,
+}
+
+impl Tried {
+    fn hint(&self) -> &'static str {
+        match self {
+            Self { soft: true, .. } => {
+                "round-off takes the stiffness of the softest motion (see the warning): use fewer elements of a higher order"
+            }
+            Self { dynamic: true, beams: true, .. } => {
+                "smaller steps were tried: damp what the step does not resolve (a smaller `rho_inf`), take a smaller `step`, or more \
+                 elements where it turns most"
+            }
+            Self { dynamic: true, .. } => {
+                "smaller steps were tried: damp what the step does not resolve (a smaller `rho_inf`), or take a smaller `step`"
+            }
+            Self { cutbacks: 1.., .. } => {
+                "smaller load levels and arc length were tried: the mesh may be too coarse where it turns most, or a buckling load \
+                 lie just ahead (a small side force chooses a branch)"
+            }
+            _ => "let the stage take smaller levels: `adaptive`, or more `steps`",
+        }
+    }
+}
+
 /// A failure of a run. The names are part of the contract with users.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Failure {
@@ -41,12 +76,30 @@ pub enum Failure {
         residual: f64,
         /// The force it is compared to
         force: f64,
-        /// Iterations of the last attempt
-        iterations: usize,
-        /// Cut-backs tried before giving up
-        cutbacks: u64,
-        /// Whether it was a time step
-        dynamic: bool,
+        /// The largest residual of each iterate of the last attempt, over what is allowed
+        history: Vec<f64>,
+        /// What had been tried
+        tried: Tried,
+    },
+    /// A node turns so far at once that nobody could tell which way.
+    TurnsTooFar {
+        /// When
+        at: Moment,
+        /// The node
+        node: String,
+        /// Radians
+        angle: f64,
+    },
+    /// The load does not grow to the next level, neither by load control nor along the path.
+    LimitPoint {
+        /// Where load control stood still
+        at: Moment,
+        /// The load factor of the next level
+        goal: f64,
+        /// Increments of arc length
+        increments: u64,
+        /// Where they ended
+        end: Moment,
     },
     /// Steps that adapt have become as small as they may, and their error is still too large.
     StepTooSmall {
@@ -118,7 +171,10 @@ impl Failure {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Deck(_) => "deck",
-            Self::NotConverged { .. } | Self::StepTooSmall { .. } => "not_converged",
+            Self::NotConverged { .. }
+            | Self::TurnsTooFar { .. }
+            | Self::LimitPoint { .. }
+            | Self::StepTooSmall { .. } => "not_converged",
             Self::Singular { .. } => "singular",
             Self::NonFinite { .. } => "non_finite",
             Self::MeshTooCoarse { .. } => "mesh_too_coarse",
@@ -132,14 +188,15 @@ impl Failure {
     /// What to try.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
-            Self::NotConverged { dynamic: false, cutbacks: 1.., .. } => Some(
-                "smaller load levels were tried: a limit point (the load cannot grow further on this path) or a buckling \
-                 load may lie just ahead, or the mesh is too coarse where it turns most",
+            Self::NotConverged { tried, .. } => Some(tried.hint()),
+            Self::TurnsTooFar { .. } => Some(
+                "use smaller steps; where nothing should turn so fast the step does not resolve the motion: damp what it cannot \
+                 resolve (a smaller `rho_inf`)",
             ),
-            Self::NotConverged { dynamic: false, .. } => {
-                Some("let the stage take smaller levels: `adaptive`, or more `steps`")
-            }
-            Self::NotConverged { .. } => Some("try a finer mesh where it turns most, or a smaller `step`"),
+            Self::LimitPoint { .. } => Some(
+                "the scene does not carry this load on the path it is on (the rows follow it beyond its limit points): load it less, \
+                 prescribe a motion in place of the load, or let it move in a dynamic stage",
+            ),
             Self::StepTooSmall { .. } => Some(
                 "accelerations jump there from step to step: let the scheme damp them (a smaller `rho_inf`), take fixed steps, or a larger \
                  `step_tolerance`",
@@ -191,10 +248,24 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Deck(message) | Self::Limit(message) | Self::Io(message) => f.write_str(message),
-            Self::NotConverged { at, place, residual, force, iterations, cutbacks, .. } => write!(
+            Self::NotConverged { at, place, residual, force, history, tried } => write!(
                 f,
-                "no balance at {at}: after {iterations} iterations and {cutbacks} cut-backs the residual at {place} is \
-                 {residual:.3e}, the largest force {force:.3e}"
+                "no balance at {at}: after {} iterations and {} cut-backs the residual at {place} is {residual:.3e}, the \
+                 largest force {force:.3e}",
+                history.len().saturating_sub(1),
+                tried.cutbacks
+            ),
+            Self::TurnsTooFar { at, node, angle } => {
+                write!(
+                    f,
+                    "node \"{node}\" turns by {angle:.3} rad at once ({at}), so that its direction cannot be told"
+                )
+            }
+            Self::LimitPoint { at, goal, increments, end } => write!(
+                f,
+                "the load does not grow to the factor {goal}: load control stands still at {at}, and {increments} increments of arc \
+                 length along the path end at load factor {}",
+                end.load
             ),
             Self::StepTooSmall { at, place, error, share } => write!(
                 f,

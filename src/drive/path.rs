@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
-use crate::solve::{NewtonFailure, Pivots, Verdict, timed};
+use crate::solve::{NewtonFailure, Pivots, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -33,6 +33,8 @@ const MOST_LOOKS: usize = 40;
 const FLIGHT: f64 = 100.0;
 /// Relative length to which it is located.
 const LOCATED: f64 = 1e-9;
+/// Increments that a detour of load control may take.
+const LONGEST_DETOUR: usize = 1000;
 
 /// A point of the path and its unit tangent.
 #[derive(Clone)]
@@ -64,13 +66,53 @@ impl Target {
     }
 }
 
+/// How following a path ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arrival {
+    /// At the load factor that it was to go to
+    Goal,
+    /// By the stage's `until`
+    Until,
+    /// Neither came in sight
+    OutOfSteps,
+}
+
 impl Run<'_> {
     /// The path until the load factor first reaches 1, or `until`, or `max_steps`.
     pub(super) fn run_path(&mut self, workshop: &mut Workshop, steps: usize, max_steps: usize) -> Result<(), Failure> {
         self.start_static(workshop)?;
         let mut path = Path::new(self, workshop, steps)?;
+        if self.go_along(workshop, &mut path, 1.0, max_steps)? == Arrival::OutOfSteps {
+            let at = self.moment();
+            self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
+        }
+        Ok(())
+    }
+
+    /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
+    /// cannot pass. `from` is a state further back on the path, `increment` a load increment that is easy there.
+    pub(super) fn detour(
+        &mut self,
+        workshop: &mut Workshop,
+        from: &State,
+        goal: f64,
+        increment: f64,
+    ) -> Result<Arrival, Failure> {
+        let mut path = Path::onward(self, workshop, from, increment)?;
+        self.go_along(workshop, &mut path, goal, LONGEST_DETOUR)
+    }
+
+    /// Along a path until the load factor reaches `goal` from below, or `until`, or `max_steps`.
+    fn go_along(
+        &mut self,
+        workshop: &mut Workshop,
+        path: &mut Path,
+        goal: f64,
+        max_steps: usize,
+    ) -> Result<Arrival, Failure> {
         // The signs that were passed last: on a located point itself they are nobody's.
         let (mut rising, mut working) = (path.here.load_rate > 0.0, path.here.work_rate > 0.0);
+        let goal = Target::Load(goal);
         for number in 0..max_steps {
             self.observer.progress(self.moment(), self.static_progress(number as f64 / max_steps as f64))?;
             let (next, length) = path.step(self, workshop)?;
@@ -81,8 +123,8 @@ impl Run<'_> {
             if (next.work_rate > 0.0) != working {
                 targets.push(Target::Turning);
             }
-            if path.here.state.load < 1.0 && next.state.load >= 1.0 {
-                targets.push(Target::Load(1.0));
+            if goal.value(&path.here) < 0.0 && goal.value(&next) >= 0.0 {
+                targets.push(goal);
             }
             let behind = next.negative;
             let (mut arrived, mut target) = path.nearest(self, workshop, next, length, &targets);
@@ -90,27 +132,30 @@ impl Run<'_> {
                 // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
                 arrived.negative = behind;
             }
-            if targets.contains(&Target::Load(1.0)) && (target.is_none() || target == Some(Target::Load(1.0))) {
-                target = self.hit_full_load(workshop, &mut arrived).then_some(Target::Load(1.0));
+            if targets.contains(&goal) && (target.is_none() || target == Some(goal)) {
+                target = self.hit(workshop, goal, &mut arrived).then_some(goal);
             }
             match target {
                 Some(Target::Limit) => rising = !rising,
                 Some(Target::Turning) => working = !working,
                 _ => {}
             }
-            self.arrive(workshop, &mut path, arrived, target)?;
-            if target == Some(Target::Load(1.0)) || self.is_over(workshop) {
-                return Ok(());
+            self.arrive(workshop, path, arrived, target)?;
+            if self.is_over(workshop) {
+                return Ok(Arrival::Until);
+            }
+            if target == Some(goal) {
+                return Ok(Arrival::Goal);
             }
         }
-        self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {}", self.moment()));
-        Ok(())
+        Ok(Arrival::OutOfSteps)
     }
 
-    /// From a point near it to the load factor 1 itself.
-    fn hit_full_load(&mut self, workshop: &mut Workshop, point: &mut Point) -> bool {
+    /// From a point near it to a load factor itself.
+    fn hit(&mut self, workshop: &mut Workshop, goal: Target, point: &mut Point) -> bool {
+        let Target::Load(load) = goal else { return false };
         self.state.copy_from(&point.state);
-        let hit = self.attempt(workshop, 1.0).is_ok();
+        let hit = self.attempt(workshop, load).is_ok();
         if hit {
             point.state.copy_from(&self.state);
         }
@@ -168,28 +213,43 @@ impl Path {
                 "control = \"arc_length\" needs a load or a motion that grows with the load factor".into(),
             ));
         };
-        let moved = squared(run, &direction);
-        let rotated = run.model.slots.iter().zip(&direction).filter(|(info, _)| info.kind == SlotKind::Rotation);
-        let turned = rotated.map(|(_, d)| d.norm() * run.model.length).fold(0.0, f64::max);
-        // Displacements that are only round-off beside the rotations measure nothing.
-        let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
-        let mut path = Self {
-            here: Point {
-                state: run.state.clone(),
-                tangent: direction,
-                load_rate: 1.0,
-                work_rate: 1.0,
-                negative: None,
-            },
-            length: 0.0,
-            first: 0.0,
-            scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
-            pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers),
-        };
+        let mut path = Self::with_measure(run, workshop, direction);
         path.here = path.look(run, workshop, &path.here.clone())?;
         path.first = 1.0 / (steps as f64 * path.here.load_rate.abs());
         path.length = path.first;
         Ok(path)
+    }
+
+    /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`: near a limit point the
+    /// tangent moves without bounds.
+    fn onward(run: &mut Run, workshop: &mut Workshop, from: &State, increment: f64) -> Result<Self, Failure> {
+        let risen = run.state.load - from.load;
+        if risen <= 0.0 {
+            return Self::new(run, workshop, (1.0 / increment).ceil() as usize);
+        }
+        let secant = run.state.q.iter().zip(&from.q).map(|(q, before)| (*q - *before) * (1.0 / risen)).collect();
+        let mut path = Self::with_measure(run, workshop, secant);
+        path.here = path.look(run, workshop, &path.here.clone())?;
+        path.first = std::f64::consts::SQRT_2 * increment;
+        path.length = path.first;
+        Ok(path)
+    }
+
+    /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to go on in.
+    fn with_measure(run: &Run, workshop: &Workshop, rate: Vec<Vec3>) -> Self {
+        let moved = squared(run, &rate);
+        let rotated = run.model.slots.iter().zip(&rate).filter(|(info, _)| info.kind == SlotKind::Rotation);
+        let turned = rotated.map(|(_, d)| d.norm() * run.model.length).fold(0.0, f64::max);
+        // Displacements that are only round-off beside the rotations measure nothing.
+        let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
+        let here = Point { state: run.state.clone(), tangent: rate, load_rate: 1.0, work_rate: 1.0, negative: None };
+        Self {
+            here,
+            length: 0.0,
+            first: 0.0,
+            scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
+            pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers),
+        }
     }
 
     /// The point at the run's state: its tangent goes on in the direction of `before`.
@@ -241,7 +301,7 @@ impl Path {
         workshop.assembly.forget();
         let noise = workshop.assembly.noise(&run.state);
         let mut last: Option<Vec<Vec3>> = None;
-        let mut iterations = 0;
+        let (mut iterations, mut history) = (0, Vec::new());
         loop {
             // Held directions are put where they belong, free of the round-off of predictor and corrections.
             run.model.set_clock(&mut run.state, self.here.state.time, load);
@@ -250,18 +310,19 @@ impl Path {
             let seconds = &mut run.counters.work.evaluation_seconds;
             timed(seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
             let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last.as_deref());
+            history.push(residual.ratio);
             match verdict {
                 Verdict::Converged | Verdict::Noisy => return Ok(iterations),
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, &run.state)),
                 Verdict::Continue if iterations == newton.max_iterations => {
-                    return Err(NewtonFailure::NotConverged { residual, iterations });
+                    return Err(NewtonFailure::NotConverged { residual, history });
                 }
                 Verdict::Continue => {}
             }
             let (dq, dl) = self.correction(run, workshop, &pull)?;
             let wild = dq.iter().any(|d| !d.is_finite()) || !dl.is_finite();
             if wild || squared(run, &dq) * self.scale + dl * dl > (FLIGHT * length).powi(2) {
-                return Err(NewtonFailure::NotConverged { residual, iterations });
+                return Err(NewtonFailure::NotConverged { residual, history });
             }
             load += dl;
             let switched = correct(run, workshop, &dq);
@@ -302,7 +363,7 @@ impl Path {
             solver.factorise(system) && solver.solve(&mut back) && solver.solve(&mut along)
         });
         if !solved {
-            return Err(NewtonFailure::Singular(solver.null_vector(system)));
+            return Err(NewtonFailure::Singular(mechanism(solver, assembly, &run.model, &run.state)));
         }
         let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
         system.pattern.equations.scatter(&back, None, &mut a);
@@ -388,7 +449,7 @@ fn work_of_loads(run: &Run, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
 }
 
 /// The sum over displacements of squares; rotations follow.
-fn squared(run: &Run, field: &[Vec3]) -> f64 {
+pub(super) fn squared(run: &Run, field: &[Vec3]) -> f64 {
     dot(run, field, field)
 }
 

@@ -1,6 +1,6 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
-use super::failure::{Failure, Moment, place};
+use super::failure::{Failure, Moment, Tried, place};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use crate::integrate::{Increments, Scheme};
@@ -245,6 +245,10 @@ pub struct Counters {
     pub evaluations: Vec<(&'static str, u64)>,
 }
 
+/// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
+/// their nodes: measured over 4000 orientations.
+const FRAME_ERROR: f64 = 0.0533;
+
 /// A run in progress.
 pub struct Run<'o> {
     pub(super) model: Model,
@@ -262,6 +266,12 @@ pub struct Run<'o> {
     warned_coarse: bool,
     /// The uncertainty by round-off that a warning told; below the first value none is worth one.
     warned_uncertainty: f64,
+    /// The error of total interpolation that a warning told; below the first value none is worth one.
+    warned_frame: f64,
+    /// Whether round-off takes the stiffness of the softest motion
+    pub(super) soft: bool,
+    /// Whether a fixed step has been taken in smaller ones
+    pub(super) subdivided: bool,
     moving: bool,
 }
 
@@ -297,6 +307,9 @@ impl<'o> Run<'o> {
             started: false,
             warned_coarse: false,
             warned_uncertainty: 1e-7,
+            warned_frame: 1e-2,
+            soft: false,
+            subdivided: false,
             moving: false,
         }
     }
@@ -324,6 +337,7 @@ impl<'o> Run<'o> {
             };
             self.count_evaluations(&workshop.assembly);
             self.warn_of_round_off();
+            self.warn_of_frame();
             result?;
             self.model.end_stage(&self.state);
         }
@@ -446,7 +460,11 @@ impl<'o> Run<'o> {
 
     fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.warned_coarse { charts::COARSE } else { charts::COARSE_WARNING };
-        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
+        let elements = &self.model.elements;
+        let coarsest = charts::coarsest(&self.state, elements, limit);
+        let Some((element, angle)) = coarsest.or_else(|| charts::leapt(&self.state, &self.good, elements)) else {
+            return Ok(());
+        };
         let nodes = &self.model.elements[element].nodes;
         let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
         let failure = Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle };
@@ -464,8 +482,34 @@ impl<'o> Run<'o> {
         if uncertainty > 10.0 * self.warned_uncertainty {
             self.warned_uncertainty = uncertainty;
             self.observer.warn(&format!(
-                "round-off has taken digits: displacements are uncertain by about {uncertainty:.0e} of the largest (very slender \
-                 beams on very fine meshes lose them: use fewer elements of a higher order)"
+                "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
+                 largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
+                16.0 + uncertainty.log10()
+            ));
+        }
+    }
+
+    /// The tangent has lost the stiffness of a motion that something holds.
+    pub(super) fn warn_of_softness(&mut self) {
+        if !std::mem::replace(&mut self.soft, true) {
+            self.observer.warn(
+                "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
+                 all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
+            );
+        }
+    }
+
+    /// Total rotation vectors are interpolated in charts that do not turn with the element: the strains of a turned scene differ.
+    fn warn_of_frame(&mut self) {
+        let angle = charts::widest_in_one_chart(&self.state, &self.model.elements);
+        let error = FRAME_ERROR * angle * angle;
+        if error > self.warned_frame {
+            self.warned_frame = 2.0 * error;
+            self.observer.warn(&format!(
+                "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
+                 two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
+                 the square of the element's length)",
+                100.0 * error
             ));
         }
     }
@@ -483,23 +527,26 @@ impl<'o> Run<'o> {
     pub(super) fn name_failure(&self, failure: NewtonFailure, system: &System) -> Failure {
         let at = self.moment();
         match failure {
-            NewtonFailure::NotConverged { residual, iterations } => Failure::NotConverged {
+            NewtonFailure::NotConverged { residual, history } => Failure::NotConverged {
                 at,
                 place: place(&self.model, residual.slot as usize, residual.value),
                 residual: residual.value.norm(),
                 force: residual.force,
-                iterations,
-                cutbacks: self.counters.cutbacks,
-                dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
+                history,
+                tried: Tried {
+                    cutbacks: self.counters.cutbacks,
+                    dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
+                    soft: self.soft,
+                    beams: !self.model.elements.is_empty(),
+                },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {
                 Failure::StepTooSmall { at, place: place(&self.model, slot, Vec3::ZERO), error, share }
             }
             NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
-            NewtonFailure::TurnsTooFar { slot, angle } => Failure::Deck(format!(
-                "node \"{}\" turns by {angle:.3} rad at once ({at}), so that its direction cannot be told: use smaller steps",
-                self.model.slots[slot].node
-            )),
+            NewtonFailure::TurnsTooFar { slot, angle } => {
+                Failure::TurnsTooFar { at, node: self.model.slots[slot].node.clone(), angle }
+            }
             NewtonFailure::NotFinite { effect, slot } => {
                 Failure::NonFinite { at, effect, node: self.model.slots[slot].node.clone() }
             }
@@ -510,10 +557,16 @@ impl<'o> Run<'o> {
     pub(super) fn name_mechanism(&self, vector: Option<NullVector>, system: &System) -> Failure {
         let at = self.moment();
         let Some(vector) = vector else { return Failure::Singular { at, place: None } };
-        let mut field = vec![Vec3::ZERO; self.model.slots.len()];
-        system.pattern.equations.scatter(&vector.entries, None, &mut field);
-        let largest = (0..field.len()).fold(0, |best, k| if field[k].norm() > field[best].norm() { k } else { best });
-        Failure::Singular { at, place: Some(place(&self.model, largest, field[largest])) }
+        let field = |entries: &[f64]| {
+            let mut field = vec![Vec3::ZERO; self.model.slots.len()];
+            system.pattern.equations.scatter(entries, None, &mut field);
+            field
+        };
+        // Which slot moves most is told by entries that compare, in which direction by the motion itself.
+        let (compared, motion) = (field(&vector.entries), field(&vector.motion));
+        let larger = |best: usize, k: usize| if compared[k].norm() > compared[best].norm() { k } else { best };
+        let largest = (0..compared.len()).fold(0, larger);
+        Failure::Singular { at, place: Some(place(&self.model, largest, motion[largest])) }
     }
 
     fn describe(&self, error: StageError) -> Failure {

@@ -103,6 +103,14 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         Energy { kinetic: 0.0, strain }
     }
 
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let mut largest = 0.0_f64;
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            largest = largest.max(element.strain_of::<I>(at, field, length));
+        });
+        largest
+    }
+
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free.is_some()) {
             let pull: f64 = element
@@ -182,6 +190,16 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             0.5 * point.weight * (elastic.gamma.dot(stress.n) + elastic.kappa.dot(stress.m))
         };
         self.points.iter().zip(&self.strains_and_stresses::<I>(at)).map(density).sum()
+    }
+
+    /// The largest |dGamma| or |dK| length that increments of the unknowns make.
+    fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let (nodes, change) = (I::nodes(&self.connection, at), I::variation(&self.connection, at, field));
+        let at_point = |point: &StiffnessPoint<N>| {
+            let strain = point.strain_variation(&point.configuration(&nodes), |i| change[i].0, |i| change[i].1);
+            strain.gamma.norm().max(strain.kappa.norm() * length)
+        };
+        self.points.iter().map(at_point).fold(0.0, f64::max)
     }
 
     /// The stress that each point is expected to have after the correction `dq`.

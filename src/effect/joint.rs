@@ -387,6 +387,20 @@ impl Effect for Joints {
         Energy { kinetic: 0.0, strain: self.joints.iter().map(one).sum() }
     }
 
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let one = |joint: &Instance| {
+            let gradient = joint.coordinate(at, &joint.ends(at)).gradient;
+            let ends = joint.nodes.iter().zip([[0, 1], [2, 3]]);
+            let parts = ends.filter_map(|(node, [u, p])| {
+                node.map(|node| gradient[u].dot(field[node.u as usize]) + gradient[p].dot(field[node.p as usize]))
+            });
+            let change = parts.sum::<f64>().abs();
+            if joint.is_prismatic() { change / length } else { change }
+        };
+        let sprung = |joint: &&Instance| joint.drive.motor.is_none() && joint.drive.stiffness != 0.0;
+        self.joints.iter().filter(sprung).map(one).fold(0.0, f64::max)
+    }
+
     fn remember(&self, at: &mut State) {
         for joint in &self.joints {
             if let Some(number) = joint.angle {

@@ -131,4 +131,18 @@ impl Effect for Links {
         };
         Energy { kinetic: 0.0, strain: self.links.iter().map(one).sum() }
     }
+
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let one = |link: &Instance| {
+            let [a, b] = link.nodes.map(|node| field[node.u as usize]);
+            let (d, change) = (link.between(at).0, b - a);
+            let distance = d.norm();
+            let slack = link.tension_only && distance <= link.length;
+            // Ends in one place have no direction of their own.
+            let stretch = if distance == 0.0 { change.norm() } else { d.dot(change).abs() / distance };
+            if slack || link.stiffness == 0.0 { 0.0 } else { stretch / length }
+        };
+        let acting = self.links.iter().filter(|link| at.amplitude[link.amplitude] != 0.0);
+        acting.map(one).fold(0.0, f64::max)
+    }
 }

@@ -113,6 +113,13 @@ pub trait Effect: Send + Sync {
         Energy::default()
     }
 
+    /// The largest strain that a field of small increments of the unknowns makes, curvatures and springs' displacements
+    /// measured by `length`: a number without units, of the size of the field itself where the effect stands in its way,
+    /// zero where not. Strains tell soft from loose where the tangent has lost a stiffness to round-off.
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
     /// Mass and momenta.
     fn momentum(&self, _at: &State) -> Momentum {
         Momentum::ZERO

@@ -88,6 +88,19 @@ impl Effect for Spring {
         };
         Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
     }
+
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let held = |stiffness: Mat3, along: Vec3| {
+            let largest = stiffness.max_abs();
+            if largest == 0.0 { 0.0 } else { (along.dot(stiffness * along) / largest).max(0.0).sqrt() }
+        };
+        let one = |spring: &Instance| {
+            let (u, p) = (field[spring.node.u as usize], field[spring.node.p as usize]);
+            held(spring.translation, u).max(held(spring.rotation, p) * length) / length
+        };
+        let acting = self.springs.iter().filter(|spring| at.amplitude[spring.amplitude] != 0.0);
+        acting.map(one).fold(0.0, f64::max)
+    }
 }
 
 impl Instance {

@@ -3,7 +3,7 @@
 use super::ElementInfo;
 use crate::kernel::seam;
 use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
-use crate::system::{Slot, State};
+use crate::system::{Node, Slot, State};
 use crate::tensor::Vec3;
 use std::f64::consts::PI;
 
@@ -94,6 +94,36 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
         }
     }
     ambiguous
+}
+
+/// The largest relative rotation between neighbouring nodes of elements that interpolate total vectors.
+pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
+    let pairs = elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.nodes.windows(2));
+    let angle = |pair: &[Node]| {
+        let [a, b] = [pair[0], pair[1]].map(|node| Rotation::new(state.q[node.p as usize]).r);
+        relative_angle(a, b)
+    };
+    pairs.map(angle).fold(0.0, f64::max)
+}
+
+/// Neighbours that turned from more than a right angle one way to more than that the other way have leapt over pi: their
+/// relative rotation (element, angle) is what it was and what it has changed by since the state `before`.
+pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<(usize, f64)> {
+    let relative = |state: &State, pair: &[Node]| {
+        let [a, b] = [pair[0], pair[1]].map(|node| state.q[node.p as usize]);
+        // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
+        ((a - b).squared() > 1.0).then(|| log(Rotation::new(a).r.transpose() * Rotation::new(b).r))
+    };
+    for (element, ElementInfo { nodes, .. }) in elements.iter().enumerate() {
+        for pair in nodes.windows(2) {
+            let Some(now) = relative(state, pair).filter(|now| now.norm() > COARSE_WARNING) else { continue };
+            let Some(old) = relative(before, pair).filter(|old| old.norm() > COARSE_WARNING) else { continue };
+            if now.dot(old) < 0.0 {
+                return Some((element, 2.0 * PI - now.norm()));
+            }
+        }
+    }
+    None
 }
 
 /// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle).

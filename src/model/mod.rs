@@ -282,6 +282,11 @@ impl Assembly {
         largest
     }
 
+    /// The largest strain that a field makes, see [`Effect::strain_of`].
+    pub fn strain_of(&self, state: &State, field: &[Vec3], length: f64) -> f64 {
+        self.effects.iter().map(|effect| effect.strain_of(state, field, length)).fold(0.0, f64::max)
+    }
+
     /// The name of the first effect whose forces are not finite, and the slot.
     pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
         for (number, effect) in self.effects.iter().enumerate() {

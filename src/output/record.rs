@@ -57,6 +57,7 @@ fn counters(counters: &Counters) -> Value {
     json!({
         "steps": counters.steps,
         "cutbacks": counters.cutbacks,
+        "uncertainty": counters.work.uncertainty,
         "iterations": counters.work.iterations,
         "factorisations": counters.work.factorisations,
         "chart_switches": counters.work.chart_switches,
@@ -82,13 +83,25 @@ fn numbers(failure: &Failure) -> Value {
         record["unknown"] = json!(format!("{:?}", place.kind).to_lowercase());
     };
     match failure {
-        Failure::NotConverged { at, place: node, residual, force, iterations, cutbacks, dynamic: _ } => {
+        Failure::NotConverged { at, place: node, residual, force, history, tried } => {
             when(at, &mut record);
             place(node, &mut record);
             record["residual"] = json!(residual);
             record["force"] = json!(force);
-            record["iterations"] = json!(iterations);
-            record["cutbacks"] = json!(cutbacks);
+            record["iterations"] = json!(history.len().saturating_sub(1));
+            record["residual_history"] = json!(history);
+            record["cutbacks"] = json!(tried.cutbacks);
+        }
+        Failure::TurnsTooFar { at, node, angle } => {
+            when(at, &mut record);
+            record["node"] = json!(node);
+            record["angle"] = json!(angle);
+        }
+        Failure::LimitPoint { at, goal, increments, end } => {
+            when(at, &mut record);
+            record["goal"] = json!(goal);
+            record["arc_length_increments"] = json!(increments);
+            record["end"] = json!(end.load);
         }
         Failure::StepTooSmall { at, place: node, error, share } => {
             when(at, &mut record);

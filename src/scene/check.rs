@@ -2,7 +2,7 @@
 
 use super::compose::Composition;
 use super::mesh::Mesh;
-use crate::deck::{self, Deck, Diagnostic, MotionWhat, SectionBody, Spanned, StageBody};
+use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
 use crate::model::{StageSet, Support};
 use crate::system::Direction;
 use crate::tensor::{Mat3, Vec3};
@@ -180,7 +180,13 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
 
 /// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
 /// constraint touches are held, so that the tangent stays regular.
-pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {
+pub fn loose_rotations(
+    deck: &Deck,
+    mesh: &Mesh,
+    composition: &Composition,
+    held: &[Support],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<Support> {
     let Composition { bodies, springs, jointed, .. } = composition;
     let on_beams: HashSet<usize> = mesh.beams.iter().flat_map(|beam| beam.nodes.iter().copied()).collect();
     let mut supports = Vec::new();
@@ -200,10 +206,26 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held
         if on_beams.contains(&node) || jointed.contains(&node) || deck.motions.iter().any(moved) {
             continue;
         }
-        let directions = untouched(touched).into_iter().map(|axis| Direction { slot, axis }).collect();
+        let untouched = untouched(touched);
+        refuse_moments(deck, &mesh.nodes[node].name, &untouched, diagnostics);
+        let directions = untouched.into_iter().map(|axis| Direction { slot, axis }).collect();
         supports.push(Support { directions, stages: StageSet::default() });
     }
     supports
+}
+
+/// A moment about an axis that nothing holds, and that has no inertia either, has no answer.
+fn refuse_moments(deck: &Deck, node: &str, untouched: &[Vec3], diagnostics: &mut Vec<Diagnostic>) {
+    for load in &deck.loads {
+        let LoadTarget::At(at) = &load.target else { continue };
+        let Some(moment) = load.moment.as_ref().filter(|_| at.value == node) else { continue };
+        let moment = Vec3(moment.start);
+        if untouched.iter().any(|axis| axis.dot(moment).abs() > 1e-9 * moment.norm()) {
+            let message = format!("a moment turns `{node}` about an axis that has no inertia, and that nothing holds");
+            let help = "give the body `inertia` about it, or hold it by a support or a spring";
+            diagnostics.push(Diagnostic::error(message, load.span.clone()).help(help));
+        }
+    }
 }
 
 /// The directions without an eigenvalue.

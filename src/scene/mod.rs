@@ -151,7 +151,7 @@ fn about(name: &str, table: &str) -> bool {
 }
 
 /// Builds a scene; what is wrong goes to `diagnostics`.
-fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
+pub fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
     let mesh = Mesh::new(deck, diagnostics);
     build_on(deck, mesh, diagnostics)
@@ -176,7 +176,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
-    let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
+    let loose = check::loose_rotations(deck, &mesh, &composition, &supports, diagnostics);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
     let model = Model {

@@ -19,11 +19,13 @@ pub struct LinearSolver {
     factored: bool,
 }
 
-/// An unknown that moves without any force: a mechanism or a loose part.
+/// Unknowns that move without any force, as far as the tangent tells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NullVector {
-    /// One entry an equation; the largest tells what moves.
+    /// One entry an equation, of sizes that compare; the largest tells what moves.
     pub entries: Vec<f64>,
+    /// The unknowns themselves
+    pub motion: Vec<f64>,
 }
 
 /// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
@@ -78,7 +80,7 @@ impl LinearSolver {
         if let Some(empty) = empty_column(system) {
             let mut entries = vec![0.0; system.pattern.equations.count()];
             entries[empty] = 1.0;
-            return Some(NullVector { entries });
+            return Some(NullVector { motion: entries.clone(), entries });
         }
         let scale = scales(system);
         let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
@@ -90,8 +92,8 @@ impl LinearSolver {
             let largest = x.iter().zip(&scale).fold(0.0_f64, |m, (x, s)| m.max((x * s).abs()));
             x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / largest);
         }
-        let unscaled: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
-        (stiffness_of(system, &unscaled) <= NO_STIFFNESS).then_some(NullVector { entries: x })
+        let motion: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
+        (stiffness_of(system, &motion) <= NO_STIFFNESS).then_some(NullVector { entries: x, motion })
     }
 
     /// The same where the factorisation broke down: the diagonal is raised by a little first.
@@ -113,7 +115,7 @@ impl LinearSolver {
             let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             x.iter_mut().for_each(|x| *x /= largest);
         }
-        Some(NullVector { entries: x })
+        Some(NullVector { motion: x.clone(), entries: x })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::convergence::{Convergence, Residual, Verdict, correction};
 use super::linear::{LinearSolver, NullVector};
+use super::mechanism::mechanism;
 use crate::integrate::Method;
 use crate::model::{Assembly, Model, charts};
 use crate::system::{State, System};
@@ -40,8 +41,8 @@ pub enum NewtonFailure {
     NotConverged {
         /// The worst residual of the last iterate
         residual: Residual,
-        /// Iterations spent
-        iterations: usize,
+        /// The largest residual of each iterate, over what is allowed
+        history: Vec<f64>,
     },
     /// A prescribed rotation goes too far at once.
     TurnsTooFar {
@@ -103,6 +104,43 @@ fn size(model: &Model, state: &State) -> f64 {
     correction(model, &state.q)
 }
 
+/// Follows corrections that refine a solution whose residual is round-off.
+#[derive(Default)]
+struct Refinement {
+    before: Vec<Vec3>,
+    /// The last correction over the unknowns; after a change of chart there is none.
+    last: f64,
+    /// The last correction over the one before
+    ratio: f64,
+    /// Whether both go the same way
+    aligned: bool,
+}
+
+impl Refinement {
+    fn look(&mut self, model: &Model, dq: &[Vec3], size: f64) -> &Self {
+        let last = correction(model, dq) / size;
+        self.ratio = if self.before.is_empty() { 0.0 } else { correction(model, dq) / correction(model, &self.before) };
+        let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+        let cosine = dot(dq, &self.before) / (dot(dq, dq) * dot(&self.before, &self.before)).sqrt();
+        self.aligned = cosine > 0.5;
+        self.last = last;
+        self.before = if last.is_finite() { dq.to_vec() } else { Vec::new() };
+        self
+    }
+
+    /// Small enough, or not becoming smaller any more.
+    fn is_done(&self) -> bool {
+        let stalls = self.ratio > if self.aligned { 0.9 } else { 0.5 };
+        self.last <= FINE || (self.last.is_finite() && stalls)
+    }
+
+    /// What is still to come: of corrections that go one way, each `ratio` times the one before, the sum of the series.
+    fn uncertainty(&self) -> f64 {
+        let series = if self.aligned { 1.0 / (1.0 - self.ratio.min(0.99)) } else { 1.0 };
+        if self.last.is_finite() { (self.last * series).min(1.0) } else { 0.0 }
+    }
+}
+
 impl Newton {
     /// For a stage with these unknowns.
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
@@ -125,32 +163,35 @@ impl Newton {
         assembly.forget();
         let noise = assembly.noise(state);
         let mut iterations = 0;
-        let mut before = f64::INFINITY;
+        let mut history = Vec::new();
+        let mut refinement = Refinement::default();
         loop {
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
+            history.push(residual.ratio);
             match verdict {
                 Verdict::Converged if lift.is_none() => return Ok(()),
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
                 Verdict::Noisy if lift.is_none() && iterations > 0 => {
-                    let last = correction(model, &self.dq) / size(model, state);
-                    if last <= FINE || last > 0.5 * before || iterations >= self.max_iterations {
-                        work.uncertainty = work.uncertainty.max(last);
+                    let refined = refinement.look(model, &self.dq, size(model, state));
+                    if refined.is_done() || iterations >= self.max_iterations {
+                        work.uncertainty = work.uncertainty.max(refined.uncertainty());
                         return Ok(());
                     }
-                    before = last;
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
                 _ if iterations >= self.max_iterations => {
-                    return Err(NewtonFailure::NotConverged { residual, iterations });
+                    return Err(NewtonFailure::NotConverged { residual, history });
                 }
                 _ => {}
             }
-            self.find_correction(&assembly.system, lift.take(), work)?;
+            if !self.find_correction(&assembly.system, lift.take(), work) {
+                return Err(NewtonFailure::Singular(mechanism(&mut self.solver, assembly, model, state)));
+            }
             iterations += 1;
             if correction(model, &self.dq) > RUNAWAY {
-                return Err(NewtonFailure::NotConverged { residual, iterations });
+                return Err(NewtonFailure::NotConverged { residual, history });
             }
             assembly.extrapolate(state, &self.dq);
             method.correct(state, &self.dq);
@@ -160,23 +201,17 @@ impl Newton {
         }
     }
 
-    /// Solves J dq = -g; held directions take their part of `lift`.
-    fn find_correction(
-        &mut self,
-        system: &System,
-        lift: Option<&[Vec3]>,
-        work: &mut Work,
-    ) -> Result<(), NewtonFailure> {
+    /// Solves J dq = -g; held directions take their part of `lift`. `false` where there is no solution.
+    fn find_correction(&mut self, system: &System, lift: Option<&[Vec3]>, work: &mut Work) -> bool {
         let Self { solver, right_hand_side, .. } = self;
         system.right_hand_side(right_hand_side);
         work.factorisations += 1;
         work.iterations += 1;
         let solved = timed(&mut work.solve_seconds, || solver.factorise(system) && solver.solve(right_hand_side));
-        if !solved {
-            return Err(NewtonFailure::Singular(solver.null_vector(system)));
+        if solved {
+            system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
         }
-        system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
-        Ok(())
+        solved
     }
 
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn.

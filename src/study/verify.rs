@@ -196,16 +196,20 @@ fn at_time(rows: &[Row], time: f64) -> Option<f64> {
     Some(between(time, (before.time, before.value), (after.time, after.value)))
 }
 
-/// The first crossing of a load factor.
+/// The first crossing of a load factor, from below or above.
 fn at_load(rows: &[Row], load: f64) -> Option<f64> {
     let slack = 1e-12 * load.abs().max(1.0);
-    let reached = rows.iter().position(|row| row.load >= load - slack)?;
-    let after = rows[reached];
-    if reached == 0 || (after.load - load).abs() <= slack {
-        return (after.load <= load + slack).then_some(after.value);
-    }
-    let before = rows[reached - 1];
-    Some(between(load, (before.load, before.value), (after.load, after.value)))
+    let hit = |row: &Row| (row.load - load).abs() <= slack;
+    let first = rows.first().filter(|row| hit(row)).map(|row| row.value);
+    let crossing = |pair: &[Row]| {
+        let [before, after] = [pair[0], pair[1]];
+        let crosses = (before.load - load) * (after.load - load) < 0.0;
+        match hit(&after) {
+            true => Some(after.value),
+            false => crosses.then(|| between(load, (before.load, before.value), (after.load, after.value))),
+        }
+    };
+    first.or_else(|| rows.windows(2).find_map(crossing))
 }
 
 fn between(x: f64, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> f64 {

@@ -272,3 +272,23 @@ fn a_closed_pipe_is_a_quiet_end() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert_eq!(folder.names("results/good"), ["history.csv", "run.json"]);
 }
+
+/// What is written does not depend on the run, nor on how many threads the machine offers.
+#[test]
+fn twenty_runs_give_equal_bytes() {
+    let folder = Folder::new("equal_runs");
+    let deck = concat!(env!("CARGO_MANIFEST_DIR"), "/decks/robot_arm.toml");
+    let history = |number: usize| {
+        let out = format!("out{number}");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_beamsim"));
+        command.args(["run", deck, "--set", "stage.0.end=0.2", "--out", &out]).current_dir(&folder.0);
+        command.env("RAYON_NUM_THREADS", (1 + number % 8).to_string());
+        assert_eq!(status(&command.output().unwrap()), 0);
+        fs::read(folder.0.join(out).join("history.csv")).unwrap()
+    };
+    let first = history(0);
+    assert!(first.len() > 1000);
+    for number in 1..20 {
+        assert!(history(number) == first, "run {number} wrote other bytes");
+    }
+}

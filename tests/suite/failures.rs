@@ -85,8 +85,8 @@ fn too_few_iterations_are_told_with_the_residual() {
          [[stage]]\nkind = \"static\"\nsteps = 1\nadaptive = false\nmax_iterations = 2\n",
     );
     match failure {
-        Failure::NotConverged { at, residual, iterations, .. } => {
-            assert_eq!((at.stage, iterations), (1, 2));
+        Failure::NotConverged { at, residual, history, .. } => {
+            assert_eq!((at.stage, history.len()), (1, 3));
             assert!(residual > 0.0 && residual.is_finite());
         }
         other => panic!("{other}"),

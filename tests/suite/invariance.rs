@@ -353,3 +353,72 @@ steps = 3
         assert_eq!(work, iterations, "{length} {force}");
     }
 }
+
+/// A swinging, damped arm with a body and a spring in units of length, mass and time: the same steps, the same iterations, the same motion.
+#[test]
+fn units_do_not_matter_in_motion() {
+    let run = |length: f64, mass: f64, time: f64| {
+        let deck = format!(
+            r#"
+gravity = [0, "-9.81*l/sec^2", 0]
+[param]
+l = {length:?}
+m = {mass:?}
+sec = {time:?}
+f = "m*l/sec^2"
+[point]
+root = [0, 0, 0]
+tip = ["4*l", 0, 0]
+[section.s]
+EA = "1e5*f"
+GA = "4e4*f"
+GJ = "300*f*l^2"
+EI = "500*f*l^2"
+rhoA = "0.5*m/l"
+rhoJ = ["0.02*m*l", "0.01*m*l", "0.01*m*l"]
+[[beam]]
+name = "a"
+section = "s"
+through = ["root", "tip"]
+elements = 6
+[[support]]
+at = "root"
+fix = "pin"
+[[spring]]
+at = "root"
+stiffness = [0, 0, 0, "40*f*l", "40*f*l", "40*f*l"]
+damping = [0, 0, 0, "2*f*l*sec", "2*f*l*sec", "2*f*l*sec"]
+[[body]]
+at = "tip"
+mass = "2*m"
+inertia = ["0.3*m*l^2", "0.2*m*l^2", "0.1*m*l^2"]
+[[initial]]
+spin = [0, 0, "1.5/sec"]
+[[load]]
+at = "tip"
+force = [0, 0, "20*f"]
+moment = ["10*f*l", 0, 0]
+history = "push"
+[history.push]
+times = [0, "0.5*sec", "1*sec"]
+values = [0, 1, 0]
+[[stage]]
+kind = "dynamic"
+end = "2*sec"
+step = "0.02*sec"
+"#
+        );
+        let simulation = simulate(&deck);
+        (simulation.vector("tip.u").map(|u| u / length), simulation.counters.work.iterations)
+    };
+    let (plain, iterations) = run(1.0, 1.0, 1.0);
+    for factor in [1e6, 1e-6] {
+        for (length, mass, time) in
+            [(factor, 1.0, 1.0), (1.0, factor, 1.0), (1.0, 1.0, factor), (factor, 1.0 / factor, factor)]
+        {
+            let (scaled, work) = run(length, mass, time);
+            assert!(distance(plain, scaled) < 1e-9 * 4.0, "{length} {mass} {time}: {plain:?} against {scaled:?}");
+            assert_eq!(work, iterations, "{length} {mass} {time}");
+        }
+    }
+}

@@ -357,3 +357,37 @@ fn a_vector_without_axis_keeps_the_axis_of_before() {
     }
     assert_eq!(unwound(Vec3::ZERO, Vec3::ZERO), Vec3::ZERO);
 }
+
+/// A million random rotations, and every multiple of pi up to 200 pi with its neighbours in the last digits. Vectors of many turns
+/// are brought to their principal one first, as the program does; they are held against sine and cosine.
+#[test]
+fn the_logarithm_undoes_the_exponential_everywhere() {
+    let mut random = Random::new(10);
+    let mut worst = 0.0_f64;
+    let mut look = |p: Vec3| {
+        let r = Rotation::new(unwound(p, Vec3::ZERO)).r;
+        let back = log(r);
+        assert!(back.is_finite() && back.norm() <= PI * (1.0 + 1e-15), "{p:?} came back as {back:?}");
+        let angle = p.norm();
+        let n = if angle > 0.0 { p * (1.0 / angle) } else { Vec3::ZERO };
+        let exact = Mat3::IDENTITY.scale(libm::cos(angle))
+            + Mat3::skew_mul(n, Mat3::IDENTITY).scale(libm::sin(angle))
+            + n.outer(n).scale(1.0 - libm::cos(angle));
+        let error = (Rotation::new(back).r - r).max_abs().max((r - exact).max_abs());
+        worst = worst.max(error);
+    };
+    for _ in 0..1_000_000 {
+        let angle = random.range(0.0, 4.0 * PI);
+        look(random.vector(angle));
+    }
+    for k in 0..=200 {
+        let angle = f64::from(k) * PI;
+        for near in
+            [angle, angle.next_up(), angle.next_down(), angle * (1.0 + 1e-15), angle - 1e-9, angle + 1e-9, angle + 1e-5]
+        {
+            look(random.vector(near));
+            Vec3::UNIT.into_iter().for_each(|axis| look(axis * near));
+        }
+    }
+    assert!(worst < 1e-12, "{worst:e}");
+}

@@ -1,0 +1,54 @@
+//! Motions that nothing holds: mechanisms and loose parts.
+
+use super::convergence::correction;
+use super::linear::{LinearSolver, NullVector};
+use crate::model::{Assembly, Model};
+use crate::system::State;
+use crate::tensor::Vec3;
+
+/// A motion that has no stiffness in the assembled tangent.
+pub struct Limp {
+    /// The motion
+    pub vector: NullVector,
+    /// The largest strain that it makes, see [`crate::effect::Effect::strain_of`], over the size of the motion
+    pub strain: f64,
+}
+
+/// A motion that something holds strains it by about its own size; what round-off makes of one that nothing holds is smaller
+/// than this, up to condition numbers of 1e13.
+const NO_STRAIN: f64 = 1e-3;
+
+impl Limp {
+    /// Looks for one where `solver` has tried to factorise the tangent.
+    pub fn find(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<Self> {
+        let vector = solver.null_vector(&assembly.system)?;
+        let field = |entries: &[f64]| {
+            let mut field = vec![Vec3::ZERO; state.q.len()];
+            assembly.system.pattern.equations.scatter(entries, None, &mut field);
+            field
+        };
+        let compared = field(&vector.entries);
+        let largest = (0..compared.len()).fold(
+            0,
+            |k: usize, slot| {
+                if compared[slot].norm() > compared[k].norm() { slot } else { k }
+            },
+        );
+        // What moves may be the multiplier of a condition that is said twice: no strain stands in its way.
+        let motion = field(&vector.motion);
+        let size = if model.slots[largest].is_multiplier() { 0.0 } else { correction(model, &motion) };
+        let strain = if size > 0.0 { assembly.strain_of(state, &motion, model.length) / size } else { 0.0 };
+        Some(Self { vector, strain })
+    }
+
+    /// Whether nothing holds it. Very slender beams on fine meshes bend so softly that their stiffness is lost in the tangent,
+    /// but they bend.
+    pub fn is_loose(&self) -> bool {
+        self.strain <= NO_STRAIN
+    }
+}
+
+/// A motion that nothing holds, of a tangent that `solver` has tried to factorise.
+pub fn mechanism(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<NullVector> {
+    Limp::find(solver, assembly, model, state).filter(Limp::is_loose).map(|limp| limp.vector)
+}
