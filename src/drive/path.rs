@@ -432,7 +432,7 @@ impl Path {
 fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
     workshop.assembly.extrapolate(&run.state, dq);
     run.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
-    let switched = charts::switch(&mut run.state, &run.model.rotations, 0.0, None);
+    let switched = charts::switch(&mut run.state, &run.model.rotations, charts::STATIC_BAND, None);
     if switched > 0 {
         run.counters.work.chart_switches += switched as u64;
         charts::freeze(&mut run.state, &run.model.elements);

@@ -24,6 +24,8 @@ pub struct Plan {
     pub interval: Option<f64>,
     /// Whether the energy account is asked for
     pub energy: bool,
+    /// Whether somebody looks at continued rotation vectors
+    pub continued: bool,
 }
 
 /// Velocities given to nodes: velocity + spin x (place - about).
@@ -266,6 +268,8 @@ pub struct Run<'o> {
     warned_coarse: bool,
     /// The uncertainty by round-off that a warning told; below the first value none is worth one.
     warned_uncertainty: f64,
+    /// Whether a continued rotation vector has become ambiguous
+    warned_wound: bool,
     /// The error of total interpolation that a warning told; below the first value none is worth one.
     warned_frame: f64,
     /// Whether round-off takes the stiffness of the softest motion
@@ -307,6 +311,7 @@ impl<'o> Run<'o> {
             started: false,
             warned_coarse: false,
             warned_uncertainty: 1e-7,
+            warned_wound: false,
             warned_frame: 1e-2,
             soft: false,
             subdivided: false,
@@ -450,6 +455,14 @@ impl<'o> Run<'o> {
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.rotations);
+        if let (Some(&slot), true) = (ambiguous.first(), self.plan.continued && !self.warned_wound) {
+            self.warned_wound = true;
+            let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
+            self.observer.warn(&format!(
+                "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
+                 its increments from there on, and depends on the steps (`r` does not)"
+            ));
+        }
         let Some(slot) = ambiguous.into_iter().find(|slot| self.model.sprung.contains(slot)) else { return Ok(()) };
         let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
         Err(Failure::Deck(format!(

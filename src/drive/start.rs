@@ -5,7 +5,7 @@ use super::run::{InitialMotion, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
-use crate::solve::NewtonFailure;
+use crate::solve::{Limp, NewtonFailure};
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -48,7 +48,7 @@ impl Run<'_> {
         workshop.assembly.evaluate(&self.state, Weights::MASS, None);
         self.refuse_open_joints(workshop)?;
         workshop.assembly.system.forget_forces();
-        let impulse = self.solve_with_mass(workshop, &rates)?;
+        let Some(impulse) = self.solve_with_mass(workshop, &rates)? else { return Ok(()) };
         for (slot, _) in self.model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
             self.state.v[slot] += impulse[slot];
         }
@@ -81,7 +81,14 @@ impl Run<'_> {
             let failure = NewtonFailure::not_finite(assembly, &self.state);
             return Err(self.name_failure(failure, &workshop.assembly.system));
         }
-        let solved = self.solve_with_mass(workshop, &rates2)?;
+        let Some(solved) = self.solve_with_mass(workshop, &rates2)? else {
+            self.observer.warn(
+                "mass does not tell how the motion begins (a point mass with an offset and without inertia?): it begins without \
+                 accelerations",
+            );
+            workshop.assembly.evaluate(&self.state, Weights::NONE, None);
+            return Ok(());
+        };
         for (slot, info) in self.model.slots.iter().enumerate() {
             let field = if info.is_multiplier() { &mut self.state.q } else { &mut self.state.a };
             field[slot] += solved[slot];
@@ -91,8 +98,9 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`.
-    fn solve_with_mass(&mut self, workshop: &mut Workshop, gaps: &[Vec3]) -> Result<Vec<Vec3>, Failure> {
+    /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`; `None` where mass alone does not
+    /// tell the solution, but stiffness holds everything.
+    fn solve_with_mass(&mut self, workshop: &mut Workshop, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
         let Workshop { assembly, newton, .. } = workshop;
         let (solver, system) = (&mut newton.solver, &mut assembly.system);
         for &slot in &self.model.multipliers {
@@ -104,11 +112,23 @@ impl Run<'_> {
         self.counters.work.factorisations += 1;
         if !(solver.factorise(system) && solver.solve(&mut right_hand_side)) {
             let vector = solver.null_vector(system);
-            return Err(self.name_mechanism(vector, &workshop.assembly.system));
+            let named = self.name_mechanism(vector, &workshop.assembly.system);
+            return if self.is_held(workshop, &named) { Ok(None) } else { Err(named) };
         }
         let mut solved = vec![Vec3::ZERO; self.state.q.len()];
         system.pattern.equations.scatter(&right_hand_side, None, &mut solved);
-        Ok(solved)
+        Ok(Some(solved))
+    }
+
+    /// Whether stiffness holds what mass does not resist; a condition of joints that is said twice is none of its business.
+    fn is_held(&self, workshop: &mut Workshop, without_mass: &Failure) -> bool {
+        if matches!(without_mass, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
+            return false;
+        }
+        let Workshop { assembly, newton, .. } = workshop;
+        assembly.evaluate(&self.state, Weights::STIFFNESS, None);
+        newton.solver.factorise(&assembly.system)
+            && Limp::find(&mut newton.solver, assembly, &self.model, &self.state).is_none_or(|limp| !limp.is_loose())
     }
 }
 

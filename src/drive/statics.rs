@@ -111,7 +111,7 @@ impl Run<'_> {
         let held = self.state.q.clone();
         self.model.set_clock(&mut self.state, time, 0.0);
         self.state.q = held;
-        charts::switch(&mut self.state, &self.model.rotations, 0.0, None);
+        charts::switch(&mut self.state, &self.model.rotations, charts::STATIC_BAND, None);
         charts::freeze(&mut self.state, &self.model.elements);
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;

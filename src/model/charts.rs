@@ -10,6 +10,9 @@ use std::f64::consts::PI;
 /// The band beyond pi in which a node keeps its chart in dynamics, so that it cannot chatter.
 pub const DYNAMIC_BAND: f64 = 1e-3;
 
+/// The same in statics: nodes that are held at pi itself must not change at every iterate.
+pub const STATIC_BAND: f64 = 1e-9;
+
 /// Most complements taken of one node at once: a node that turned further has no honest direction left.
 const MOST_CHANGES: usize = 10_000;
 

@@ -196,6 +196,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         title: deck.title.clone(),
         plan: Plan {
             energy: expected || watched || probes.iter().any(energy),
+            continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
             model,
             initial: initial.into_iter().rev().collect(),
             stages,

@@ -216,7 +216,7 @@ impl Newton {
 
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn.
     fn change_charts(&mut self, model: &Model, state: &mut State, work: &mut Work) {
-        let switched = charts::switch(state, &model.rotations, 0.0, None);
+        let switched = charts::switch(state, &model.rotations, charts::STATIC_BAND, None);
         if switched > 0 {
             work.chart_switches += switched as u64;
             charts::freeze(state, &model.elements);
