@@ -66,15 +66,15 @@ impl Run<'_> {
     /// A step of the grid at once, or where that fails in halves, and halves of halves. Returns the last of them, which is
     /// not settled yet.
     fn stride(&mut self, workshop: &mut Workshop, whole: Step, before: &mut f64, next: f64) -> Result<Step, Failure> {
-        let mut step = whole;
+        // Parts are counted: the clock is rounded, and late in a run a short step is not much longer than that.
+        let (mut step, mut parts) = (whole, 1);
         loop {
-            let rest = next - self.state.time;
-            let last = step.length >= rest * (1.0 - 1e-9);
-            let target = if last { next } else { self.state.time + step.length };
+            let target = if parts == 1 { next } else { self.state.time + step.length };
             match self.advance(workshop, step, *before, target) {
                 Ok(()) => {
                     *before = step.length;
-                    if last {
+                    parts -= 1;
+                    if parts == 0 {
                         return Ok(step);
                     }
                     self.settle(workshop, &step)?;
@@ -82,6 +82,7 @@ impl Run<'_> {
                 }
                 Err(failure) => {
                     step.length *= 0.5;
+                    parts *= 2;
                     if step.length < SMALLEST_PART * whole.length {
                         return Err(self.give_up(workshop, failure));
                     }
@@ -175,7 +176,8 @@ impl Run<'_> {
             assembly.evaluate(&self.state, Weights::NONE, None);
         }
         let turning = self.model.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
-        turns_within(&self.state, turning, step.length)
+        turns_within(&self.state, turning, step.length)?;
+        self.refuse_leaps()
     }
 
     /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.

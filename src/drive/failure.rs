@@ -33,6 +33,8 @@ pub struct Tried {
     pub cutbacks: u64,
     /// Whether it was a time step
     pub dynamic: bool,
+    /// Whether it was an increment of arc length
+    pub path: bool,
     /// Whether round-off takes the stiffness of the softest motion
     pub soft: bool,
     /// Whether there are beams, whose mesh may be too coarse
@@ -46,11 +48,15 @@ impl Tried {
                 "round-off takes the stiffness of the softest motion (see the warning): use fewer elements of a higher order"
             }
             Self { dynamic: true, beams: true, .. } => {
-                "smaller steps were tried: damp what the step does not resolve (a smaller `rho_inf`), take a smaller `step`, or more \
+                "smaller steps were tried: damp what the step does not resolve (`generalized_alpha` with a smaller `rho_inf`), take a smaller `step`, or more \
                  elements where it turns most"
             }
             Self { dynamic: true, .. } => {
-                "smaller steps were tried: damp what the step does not resolve (a smaller `rho_inf`), or take a smaller `step`"
+                "smaller steps were tried: damp what the step does not resolve (`generalized_alpha` with a smaller `rho_inf`), or take a smaller `step`"
+            }
+            Self { path: true, .. } => {
+                "shorter increments were tried: the mesh may be too coarse where it turns most, or a branch cross the path (a small side \
+                 force chooses one)"
             }
             Self { cutbacks: 1.., .. } => {
                 "smaller load levels and arc length were tried: the mesh may be too coarse where it turns most, or a buckling load \
@@ -185,6 +191,11 @@ impl Failure {
         }
     }
 
+    /// Whether no balance was found: another way to it may find one.
+    pub(super) fn is_of_balance(&self) -> bool {
+        matches!(self, Self::NotConverged { .. } | Self::Singular { .. })
+    }
+
     /// What to try.
     pub fn hint(&self) -> Option<&'static str> {
         match self {
@@ -194,7 +205,8 @@ impl Failure {
                  resolve (a smaller `rho_inf`)",
             ),
             Self::LimitPoint { .. } => Some(
-                "the scene does not carry this load on the path it is on (the rows follow it beyond its limit points): load it less, \
+                "the path it is on does not come to this load (the rows follow it beyond its limit points): more `steps` may keep it on another; else \
+                 load it less, \
                  prescribe a motion in place of the load, or let it move in a dynamic stage",
             ),
             Self::StepTooSmall { .. } => Some(

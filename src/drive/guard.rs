@@ -12,6 +12,7 @@ pub(super) struct EnergyGuard {
     start: Option<f64>,
     largest: f64,
     running: usize,
+    lost: f64,
 }
 
 /// By how much the total has grown, and what that is to be compared with.
@@ -23,7 +24,7 @@ pub(super) struct Growth {
 impl EnergyGuard {
     /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far.
     pub fn new(limit: f64) -> Self {
-        Self { limit, start: None, largest: 0.0, running: 0 }
+        Self { limit, start: None, largest: 0.0, running: 0, lost: 0.0 }
     }
 
     /// The account where the stage begins.
@@ -32,10 +33,17 @@ impl EnergyGuard {
         self.largest = size(ledger);
     }
 
+    /// What the scheme has taken of the energy, as part of the largest, where that is more than may be gained.
+    pub fn loss(&self) -> Option<f64> {
+        let share = self.lost / self.largest;
+        (share > self.limit).then_some(share)
+    }
+
     /// Looks at the account of a step; tells a growth that lasts.
     pub fn judge(&mut self, ledger: Ledger) -> Option<Growth> {
         self.largest = self.largest.max(size(ledger));
         let grown = ledger.total() - self.start?;
+        self.lost = self.lost.max(-grown);
         self.running = if grown > self.limit * self.largest { self.running + 1 } else { 0 };
         (self.running >= RUNNING).then_some(Growth { grown, largest: self.largest })
     }
@@ -62,7 +70,17 @@ mod tests {
         assert!(guard.judge(ledger(1.1)).is_none());
         assert!(guard.judge(ledger(1.3)).is_none());
         assert!(guard.judge(ledger(1.3)).is_none());
+        assert!(guard.loss().is_none());
         let growth = guard.judge(ledger(1.4)).unwrap();
         assert!((growth.grown - 0.4).abs() < 1e-15 && growth.largest == 1.4);
+    }
+
+    #[test]
+    fn what_is_lost_is_told_beyond_the_limit() {
+        let mut guard = EnergyGuard::new(0.2);
+        guard.open(ledger(1.0));
+        assert!(guard.judge(ledger(0.9)).is_none() && guard.loss().is_none());
+        assert!(guard.judge(ledger(0.5)).is_none());
+        assert_eq!(guard.loss(), Some(0.5));
     }
 }

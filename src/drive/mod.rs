@@ -8,6 +8,7 @@ mod failure;
 mod grid;
 mod guard;
 mod ledger;
+mod levels;
 mod modal;
 mod path;
 mod run;
@@ -16,6 +17,7 @@ mod statics;
 
 pub use failure::{Failure, Moment, Place};
 pub use ledger::Ledger;
+pub use levels::Approach;
 pub use run::{
     Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until,
 };

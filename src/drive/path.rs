@@ -12,7 +12,7 @@
 
 use super::direction::Direction;
 use super::failure::Failure;
-use super::run::{Event, EventKind, Run, Workshop};
+use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
 use crate::solve::{NewtonFailure, Pivots, Verdict, mechanism, timed};
@@ -86,6 +86,7 @@ impl Run<'_> {
             let at = self.moment();
             self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
         }
+        self.warn_of_instability(path.here.negative);
         Ok(())
     }
 
@@ -114,7 +115,11 @@ impl Run<'_> {
         let (mut rising, mut working) = (path.here.load_rate > 0.0, path.here.work_rate > 0.0);
         let goal = Target::Load(goal);
         for number in 0..max_steps {
-            self.observer.progress(self.moment(), self.static_progress(number as f64 / max_steps as f64))?;
+            let done = match self.plan.stages[self.stage].work {
+                StageWork::Path { .. } => number as f64 / max_steps as f64,
+                _ => path.begun,
+            };
+            self.observer.progress(self.moment(), self.static_progress(done))?;
             let (next, length) = path.step(self, workshop)?;
             let mut targets = Vec::new();
             if (next.load_rate > 0.0) != rising {
@@ -133,7 +138,11 @@ impl Run<'_> {
                 arrived.negative = behind;
             }
             if targets.contains(&goal) && (target.is_none() || target == Some(goal)) {
-                target = self.hit(workshop, goal, &mut arrived).then_some(goal);
+                if !self.hit(workshop, goal, &mut arrived, path) && path.shorten() {
+                    self.counters.cutbacks += 1;
+                    continue;
+                }
+                target = Some(goal);
             }
             match target {
                 Some(Target::Limit) => rising = !rising,
@@ -151,15 +160,19 @@ impl Run<'_> {
         Ok(Arrival::OutOfSteps)
     }
 
-    /// From a point near it to a load factor itself.
-    fn hit(&mut self, workshop: &mut Workshop, goal: Target, point: &mut Point) -> bool {
+    /// From a point near it to a load factor itself, not further away than an increment.
+    fn hit(&mut self, workshop: &mut Workshop, goal: Target, point: &mut Point, path: &Path) -> bool {
         let Target::Load(load) = goal else { return false };
         self.state.copy_from(&point.state);
-        let hit = self.attempt(workshop, load).is_ok();
-        if hit {
+        if self.attempt(workshop, load).is_err() {
+            return false;
+        }
+        let moved: Vec<Vec3> = self.state.q.iter().zip(&point.state.q).map(|(q, near)| *q - *near).collect();
+        let near = squared(self, &moved) * path.scale <= path.length * path.length;
+        if near {
             point.state.copy_from(&self.state);
         }
-        hit
+        near
     }
 
     /// What follows a point of the path: account, row, and a word where something special happened.
@@ -198,6 +211,8 @@ impl Run<'_> {
 
 /// A path being followed.
 struct Path {
+    /// The load factor at which it was begun
+    begun: f64,
     here: Point,
     length: f64,
     first: f64,
@@ -244,12 +259,20 @@ impl Path {
         let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
         let here = Point { state: run.state.clone(), tangent: rate, load_rate: 1.0, work_rate: 1.0, negative: None };
         Self {
+            begun: run.state.load,
             here,
             length: 0.0,
             first: 0.0,
             scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
             pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers),
         }
+    }
+
+    /// Takes the next increment half as long; `false` where it may not be.
+    fn shorten(&mut self) -> bool {
+        let may = 0.5 * self.length >= SHORTEST * self.first;
+        self.length *= if may { 0.5 } else { 1.0 };
+        may
     }
 
     /// The point at the run's state: its tangent goes on in the direction of `before`.
@@ -273,7 +296,13 @@ impl Path {
             let length = self.length;
             let failure = match self.advance(run, workshop, length) {
                 Ok(iterations) => {
-                    let next = self.look(run, workshop, &self.here.clone())?;
+                    let next = match self.look(run, workshop, &self.here.clone()) {
+                        Ok(next) => next,
+                        Err(failure) => {
+                            run.state.copy_from(&self.here.state);
+                            return Err(failure);
+                        }
+                    };
                     let cosine =
                         dot(run, &next.tangent, &self.here.tangent) * self.scale + next.load_rate * self.here.load_rate;
                     if cosine >= BENT || length <= SHORTEST * self.first {
@@ -449,7 +478,7 @@ fn work_of_loads(run: &Run, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
 }
 
 /// The sum over displacements of squares; rotations follow.
-pub(super) fn squared(run: &Run, field: &[Vec3]) -> f64 {
+fn squared(run: &Run, field: &[Vec3]) -> f64 {
     dot(run, field, field)
 }
 

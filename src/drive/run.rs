@@ -3,6 +3,7 @@
 use super::failure::{Failure, Moment, Tried, place};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
+use super::levels::Approach;
 use crate::integrate::{Increments, Scheme};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
@@ -86,8 +87,8 @@ pub enum StageWork {
     Static {
         /// Their number
         steps: usize,
-        /// Whether a level that fails is approached in smaller steps
-        adaptive: bool,
+        /// What it may do where one is not reached at once
+        approach: Approach,
     },
     /// A path that may pass limit points
     Path {
@@ -272,8 +273,11 @@ pub struct Run<'o> {
     warned_wound: bool,
     /// The error of total interpolation that a warning told; below the first value none is worth one.
     warned_frame: f64,
-    /// Whether round-off takes the stiffness of the softest motion
+    /// Whether round-off takes the stiffness of the softest motion of the stage
     pub(super) soft: bool,
+    warned_soft: bool,
+    /// Of earlier stages
+    cutbacks_before: u64,
     /// Whether a fixed step has been taken in smaller ones
     pub(super) subdivided: bool,
     moving: bool,
@@ -314,6 +318,8 @@ impl<'o> Run<'o> {
             warned_wound: false,
             warned_frame: 1e-2,
             soft: false,
+            warned_soft: false,
+            cutbacks_before: 0,
             subdivided: false,
             moving: false,
         }
@@ -331,7 +337,7 @@ impl<'o> Run<'o> {
             self.stage = number;
             let mut workshop = self.open_stage(stage)?;
             let result = match stage.work {
-                StageWork::Static { steps, adaptive } => self.run_static(&mut workshop, steps, adaptive),
+                StageWork::Static { steps, approach } => self.run_static(&mut workshop, steps, approach),
                 StageWork::Path { steps, max_steps } => self.run_path(&mut workshop, steps, max_steps),
                 StageWork::Modal { modes } => self.run_modal(&mut workshop, modes),
                 StageWork::Buckling { modes } => self.run_buckling(&mut workshop, modes),
@@ -343,6 +349,7 @@ impl<'o> Run<'o> {
             self.count_evaluations(&workshop.assembly);
             self.warn_of_round_off();
             self.warn_of_frame();
+            self.warn_of_loss(&workshop);
             result?;
             self.model.end_stage(&self.state);
         }
@@ -352,6 +359,7 @@ impl<'o> Run<'o> {
     /// Settles loads and constraints of the stage, and analyses the pattern of its unknowns.
     fn open_stage(&mut self, stage: &Stage) -> Result<Workshop, Failure> {
         let kind = stage.work.kind();
+        (self.soft, self.cutbacks_before) = (false, self.counters.cutbacks);
         self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
@@ -473,20 +481,28 @@ impl<'o> Run<'o> {
 
     fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.warned_coarse { charts::COARSE } else { charts::COARSE_WARNING };
-        let elements = &self.model.elements;
-        let coarsest = charts::coarsest(&self.state, elements, limit);
-        let Some((element, angle)) = coarsest.or_else(|| charts::leapt(&self.state, &self.good, elements)) else {
-            return Ok(());
-        };
-        let nodes = &self.model.elements[element].nodes;
-        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
-        let failure = Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle };
+        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
+        let failure = self.name_coarse(element, angle);
         if angle > charts::COARSE {
             return Err(failure);
         }
         self.warned_coarse = true;
         self.observer.warn(&format!("{failure}: more elements would tell the shape better"));
         Ok(())
+    }
+
+    fn name_coarse(&self, element: usize, angle: f64) -> Failure {
+        let nodes = &self.model.elements[element].nodes;
+        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
+        Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
+    }
+
+    /// Between the last good state and this one neighbours may have turned past pi against each other: smaller steps tell.
+    pub(super) fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
+        match charts::leapt(&self.state, &self.good, &self.model.elements) {
+            Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
+            None => Ok(()),
+        }
     }
 
     /// Says where the answer has fewer digits than it shows.
@@ -504,11 +520,24 @@ impl<'o> Run<'o> {
 
     /// The tangent has lost the stiffness of a motion that something holds.
     pub(super) fn warn_of_softness(&mut self) {
-        if !std::mem::replace(&mut self.soft, true) {
+        self.soft = true;
+        if !std::mem::replace(&mut self.warned_soft, true) {
             self.observer.warn(
                 "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
                  all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
             );
+        }
+    }
+
+    /// Energy that a scheme takes is a motion that its steps do not resolve.
+    fn warn_of_loss(&mut self, workshop: &Workshop) {
+        if let Some(share) = workshop.guard.as_ref().and_then(EnergyGuard::loss) {
+            self.observer.warn(&format!(
+                "stage {}: the scheme has taken {:.0} % of the largest energy: its steps do not resolve part of the motion (a smaller \
+                 `step`, or less dissipation)",
+                self.stage + 1,
+                100.0 * share
+            ));
         }
     }
 
@@ -547,7 +576,8 @@ impl<'o> Run<'o> {
                 force: residual.force,
                 history,
                 tried: Tried {
-                    cutbacks: self.counters.cutbacks,
+                    cutbacks: self.counters.cutbacks - self.cutbacks_before,
+                    path: matches!(self.plan.stages[self.stage].work, StageWork::Path { .. }),
                     dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
                     soft: self.soft,
                     beams: !self.model.elements.is_empty(),
@@ -560,6 +590,7 @@ impl<'o> Run<'o> {
             NewtonFailure::TurnsTooFar { slot, angle } => {
                 Failure::TurnsTooFar { at, node: self.model.slots[slot].node.clone(), angle }
             }
+            NewtonFailure::LeapsTooFar { element, angle } => self.name_coarse(element, angle),
             NewtonFailure::NotFinite { effect, slot } => {
                 Failure::NonFinite { at, effect, node: self.model.slots[slot].node.clone() }
             }

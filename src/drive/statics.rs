@@ -1,76 +1,26 @@
 //! Load control: equal levels, approached in smaller steps where Newton fails, and along the path where those fail too.
 
 use super::failure::Failure;
-use super::path::{Arrival, squared};
+use super::levels::{Approach, Levels};
+use super::path::Arrival;
 use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Limp, NewtonFailure, Pivots};
-use crate::system::State;
+use crate::solve::{Limp, NewtonFailure};
 use crate::tensor::Vec3;
-
-/// A level is not approached in steps smaller than this part of it.
-const SMALLEST_PART: f64 = 1.0 / 4096.0;
 
 /// Load increments whose length a detour by arc length begins with.
 const DETOUR: (f64, f64) = (0.01, 0.05);
 
-/// A step over which the number of negative pivots changes is cut back to this part of a level: it may have jumped.
-const CLOSE: f64 = 1.0 / 256.0;
-
-/// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
-const JUMP: f64 = 8.0;
-
-/// Follows the number of negative pivots from step to step.
-struct Stability {
-    pivots: Option<Pivots>,
-    negative: Option<usize>,
-}
-
-impl Stability {
-    /// At the start of a stage.
-    fn new(run: &Run, workshop: &Workshop) -> Self {
-        let system = &workshop.assembly.system;
-        let mut pivots = Pivots::new(system, &run.model.multipliers);
-        // The start was assembled with its stiffness.
-        let negative = pivots.as_mut().and_then(|pivots| pivots.negative(system));
-        Self { pivots, negative }
-    }
-
-    /// The number at the run's state; `None` where it is not known.
-    fn count(&mut self, run: &Run, workshop: &mut Workshop) -> Option<usize> {
-        let pivots = self.pivots.as_mut()?;
-        workshop.assembly.forget();
-        workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
-        let negative = pivots.negative(&workshop.assembly.system);
-        if negative.is_none() {
-            // Not symmetric: neither will the next be.
-            self.pivots = None;
-        }
-        negative
-    }
-
-    fn changes_to(&self, negative: Option<usize>) -> bool {
-        matches!((self.negative, negative), (Some(before), Some(after)) if before != after)
-    }
-
-    /// Says where a limit or branch point lies behind.
-    fn pass(&mut self, run: &mut Run, negative: Option<usize>) {
-        run.tell_stability(None, self.negative, negative);
-        self.negative = negative;
-    }
-}
-
-/// How the levels of a stage are approached.
-struct Levels {
-    /// The state before the first
-    start: State,
-    /// Load factor from one to the next
-    level: f64,
-    /// Where smaller steps are allowed, the next one; else `None`
-    increment: Option<f64>,
-    stability: Stability,
+/// What came of a step.
+enum Tried {
+    /// Balance, with so many negative pivots
+    Good(Option<usize>),
+    /// Balance, perhaps on another branch
+    Jumped(Option<usize>),
+    /// None
+    Failed(NewtonFailure),
 }
 
 /// How a level was reached.
@@ -86,11 +36,14 @@ enum Reached {
 
 impl Run<'_> {
     /// All levels of a static stage.
-    pub(super) fn run_static(&mut self, workshop: &mut Workshop, steps: usize, adaptive: bool) -> Result<(), Failure> {
+    pub(super) fn run_static(
+        &mut self,
+        workshop: &mut Workshop,
+        steps: usize,
+        approach: Approach,
+    ) -> Result<(), Failure> {
         self.start_static(workshop)?;
-        let level = 1.0 / steps as f64;
-        let stability = Stability::new(self, workshop);
-        let mut levels = Levels { start: self.state.clone(), level, increment: adaptive.then_some(level), stability };
+        let mut levels = Levels::new(self, workshop, steps, approach);
         for number in 1..=steps {
             let reached = self.reach(workshop, number as f64 / steps as f64, &mut levels)?;
             if reached == Reached::Level {
@@ -101,7 +54,18 @@ impl Run<'_> {
                 break;
             }
         }
+        self.warn_of_instability(levels.stability.negative);
         Ok(())
+    }
+
+    /// A state that a stage ends in, and that the next begins with.
+    pub(super) fn warn_of_instability(&mut self, negative: Option<usize>) {
+        if let Some(count @ 1..) = negative {
+            let stage = self.stage + 1;
+            self.observer.warn(&format!(
+                "stage {stage} ends in an unstable state, with {count} negative pivot(s): nothing real stays in it"
+            ));
+        }
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
@@ -121,7 +85,14 @@ impl Run<'_> {
             if limp.is_loose() {
                 return Err(self.name_mechanism(Some(limp.vector), &assembly.system));
             }
-            self.warn_of_softness();
+            if limp.is_soft() {
+                self.warn_of_softness();
+            }
+            // At the start of a run cables and strings are meant to be so.
+            if self.stage > 0 && limp.is_held_by_stress() {
+                let named = self.name_mechanism(Some(limp.vector), &assembly.system);
+                self.observer.warn(&format!("but for the stress it is under at the start of the stage: {named}"));
+            }
         }
         self.open_account(workshop)
     }
@@ -130,45 +101,48 @@ impl Run<'_> {
     fn reach(&mut self, workshop: &mut Workshop, target: f64, levels: &mut Levels) -> Result<Reached, Failure> {
         self.good.copy_from(&self.state);
         while self.good.load < target {
-            let rest = target - self.good.load;
-            let increment = levels.increment.unwrap_or(rest);
-            let next = if increment >= rest * (1.0 - 1e-9) { target } else { self.good.load + increment };
+            let next = levels.next(self.good.load, target);
             self.observer.progress(self.moment(), self.static_progress(next))?;
-            let attempt = self.attempt(workshop, next);
-            let negative = if attempt.is_ok() { levels.stability.count(self, workshop) } else { None };
-            if attempt.is_ok() && !self.may_have_jumped(levels, negative) {
-                levels.stability.pass(self, negative);
-                self.accept(workshop)?;
-                self.good.copy_from(&self.state);
-                levels.increment = levels.increment.map(|increment| (2.0 * increment).min(levels.level));
-                continue;
-            }
-            let smaller = 0.5 * increment.min(rest);
-            if levels.increment.is_some() && smaller >= SMALLEST_PART * levels.level {
+            let tried = self.try_step(workshop, next, levels);
+            if let Tried::Good(negative) = tried {
+                self.take_step(workshop, negative, levels)?;
+            } else if levels.halve() {
                 self.counters.cutbacks += 1;
-                levels.increment = Some(smaller);
                 self.state.copy_from(&self.good);
             } else {
-                return self.go_around(workshop, target, attempt.err(), levels);
+                match tried {
+                    // Nothing tells better.
+                    Tried::Good(negative) | Tried::Jumped(negative) if levels.approach != Approach::Path => {
+                        self.take_step(workshop, negative, levels)?;
+                    }
+                    Tried::Good(_) | Tried::Jumped(_) => return self.go_around(workshop, target, None, levels),
+                    Tried::Failed(failure) => return self.go_around(workshop, target, Some(failure), levels),
+                }
             }
         }
         Ok(Reached::Level)
     }
 
-    /// Whether a step that changed the number of negative pivots may have gone to another branch: it is not small, or the
-    /// displacements are not those of a path that goes on.
-    fn may_have_jumped(&self, levels: &Levels, negative: Option<usize>) -> bool {
-        if levels.increment.is_none() || self.soft || !levels.stability.changes_to(negative) {
-            return false;
+    fn try_step(&mut self, workshop: &mut Workshop, next: f64, levels: &mut Levels) -> Tried {
+        if let Err(failure) = self.attempt(workshop, next) {
+            return Tried::Failed(failure);
         }
-        let step = self.state.load - self.good.load;
-        let risen = self.good.load - levels.start.load;
-        let moved = |to: &State, from: &State| {
-            let field: Vec<Vec3> = to.q.iter().zip(&from.q).map(|(to, from)| *to - *from).collect();
-            squared(self, &field).sqrt()
-        };
-        let usual = if risen > 0.0 { moved(&self.good, &levels.start) / risen * step } else { f64::INFINITY };
-        step > CLOSE * levels.level || moved(&self.state, &self.good) > JUMP * usual
+        let negative = levels.stability.count(self, workshop);
+        let jumped = !self.soft && levels.may_have_jumped(&self.model, &self.good, &self.state, negative);
+        if jumped { Tried::Jumped(negative) } else { Tried::Good(negative) }
+    }
+
+    fn take_step(
+        &mut self,
+        workshop: &mut Workshop,
+        negative: Option<usize>,
+        levels: &mut Levels,
+    ) -> Result<(), Failure> {
+        self.accept(workshop)?;
+        levels.stability.pass(self, negative);
+        self.good.copy_from(&self.state);
+        levels.double();
+        Ok(())
     }
 
     /// Where load control stands still the path is followed by arc length until it comes to the level. `failure` is what
@@ -182,11 +156,10 @@ impl Run<'_> {
     ) -> Result<Reached, Failure> {
         let named = failure.map(|failure| self.name_failure(failure, &workshop.assembly.system));
         self.state.copy_from(&self.good);
-        let stuck = matches!(named, None | Some(Failure::NotConverged { .. } | Failure::Singular { .. }));
-        if let Some(named) = &named
-            && (levels.increment.is_none() || !stuck || self.soft)
-        {
-            return Err(named.clone());
+        let hopeless = levels.approach != Approach::Path || self.soft;
+        match named {
+            Some(named) if hopeless || !named.is_of_balance() => return Err(named),
+            _ => {}
         }
         let (at, steps) = (self.moment(), self.counters.steps);
         self.observer
@@ -195,19 +168,26 @@ impl Run<'_> {
         let (end, increments) = (self.moment(), self.counters.steps - steps);
         let limit = Failure::LimitPoint { at, goal: target, increments, end };
         match arrival {
-            Ok(Arrival::Until) => return Ok(Reached::Over),
-            Ok(Arrival::Goal) => {}
-            Ok(Arrival::OutOfSteps) => return Err(limit),
-            Err(Failure::NotConverged { .. } | Failure::Singular { .. }) if increments > 0 => return Err(limit),
-            Err(failure) => return Err(named.unwrap_or(failure)),
+            Ok(Arrival::Until) => Ok(Reached::Over),
+            Ok(Arrival::Goal) => {
+                self.resume(workshop, target, increments, levels);
+                Ok(Reached::Along)
+            }
+            Ok(Arrival::OutOfSteps) => Err(limit),
+            Err(failure) if !failure.is_of_balance() => Err(failure),
+            Err(_) if increments > 0 => Err(limit),
+            Err(failure) => Err(named.unwrap_or(failure)),
         }
+    }
+
+    /// Load control goes on where a detour has come to its level.
+    fn resume(&mut self, workshop: &mut Workshop, target: f64, increments: u64, levels: &mut Levels) {
+        self.good.copy_from(&self.state);
+        levels.stability.negative = levels.stability.count(self, workshop);
+        levels.restart();
         self.observer.warn(&format!(
             "load control goes on at load factor {target}, after {increments} increments of arc length"
         ));
-        self.good.copy_from(&self.state);
-        levels.stability.negative = levels.stability.count(self, workshop);
-        levels.increment = Some(levels.level);
-        Ok(Reached::Along)
     }
 
     /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the
@@ -226,7 +206,8 @@ impl Run<'_> {
         }
         let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
         let work = &mut self.counters.work;
-        newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)
+        newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
+        self.refuse_leaps()
     }
 
     pub(super) fn static_progress(&self, load: f64) -> f64 {

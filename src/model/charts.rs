@@ -129,20 +129,30 @@ pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<
     None
 }
 
-/// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle).
+/// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle). Of elements that take
+/// all their nodes in the chart of the first it is the sum from the first node to the last: beyond pi that chart may be the wrong one.
 pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(usize, f64)> {
+    let vectors = |pair: &[Node]| (state.q[pair[0].p as usize], state.q[pair[1].p as usize]);
+    // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
+    let bound = |pair: &[Node]| (vectors(pair).0 - vectors(pair).1).norm();
+    let angle = |pair: &[Node]| {
+        let (a, b) = vectors(pair);
+        relative_angle(Rotation::new(a).r, Rotation::new(b).r)
+    };
     let mut worst: Option<(usize, f64)> = None;
-    for (element, ElementInfo { nodes, .. }) in elements.iter().enumerate() {
-        for pair in nodes.windows(2) {
-            let (a, b) = (state.q[pair[0].p as usize], state.q[pair[1].p as usize]);
-            // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
-            if (a - b).squared() < limit * limit {
-                continue;
+    let mut look = |element: usize, angle: f64| {
+        if angle > limit && worst.is_none_or(|(_, w)| angle > w) {
+            worst = Some((element, angle));
+        }
+    };
+    for (element, ElementInfo { nodes, in_one_chart }) in elements.iter().enumerate() {
+        let pairs = nodes.windows(2);
+        if *in_one_chart {
+            if pairs.clone().map(bound).sum::<f64>() >= limit {
+                look(element, pairs.map(angle).sum());
             }
-            let angle = relative_angle(Rotation::new(a).r, Rotation::new(b).r);
-            if angle > limit && worst.is_none_or(|(_, w)| angle > w) {
-                worst = Some((element, angle));
-            }
+        } else {
+            pairs.filter(|pair| bound(pair) >= limit).for_each(|pair| look(element, angle(pair)));
         }
     }
     worst

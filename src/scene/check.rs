@@ -121,17 +121,22 @@ fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             StageBody::Buckling { .. } => "a buckling stage",
             _ => continue,
         };
-        let acts = |stages: &Option<Vec<usize>>| stages.as_ref().is_none_or(|stages| stages.contains(&(number + 1)));
-        let loads = deck.loads.iter().filter(|l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
-        let motions = deck.motions.iter().filter(|m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
-        let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|(_, history)| history.as_ref());
-        let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
-        for history in loads.chain(motions).chain(motors).chain(strains) {
+        for history in histories_in(deck, number + 1) {
             let message = format!("{what} refuses histories: its load factor may go back");
             let diagnostic = Diagnostic::error(message, history.span.clone());
             diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
         }
     }
+}
+
+/// The histories that act in a stage, from 1.
+pub fn histories_in(deck: &Deck, stage: usize) -> impl Iterator<Item = &Spanned<String>> {
+    let acts = move |stages: &Option<Vec<usize>>| stages.as_ref().is_none_or(|stages| stages.contains(&stage));
+    let loads = deck.loads.iter().filter(move |l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
+    let motions = deck.motions.iter().filter(move |m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
+    let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|(_, history)| history.as_ref());
+    let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
+    loads.chain(motions).chain(motors).chain(strains)
 }
 
 /// The rotation-aware scheme has no total rotation vectors to interpolate, nor to clamp one component of.
@@ -180,13 +185,7 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
 
 /// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
 /// constraint touches are held, so that the tangent stays regular.
-pub fn loose_rotations(
-    deck: &Deck,
-    mesh: &Mesh,
-    composition: &Composition,
-    held: &[Support],
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<Support> {
+pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {
     let Composition { bodies, springs, jointed, .. } = composition;
     let on_beams: HashSet<usize> = mesh.beams.iter().flat_map(|beam| beam.nodes.iter().copied()).collect();
     let mut supports = Vec::new();
@@ -206,22 +205,25 @@ pub fn loose_rotations(
         if on_beams.contains(&node) || jointed.contains(&node) || deck.motions.iter().any(moved) {
             continue;
         }
-        let untouched = untouched(touched);
-        refuse_moments(deck, &mesh.nodes[node].name, &untouched, diagnostics);
-        let directions = untouched.into_iter().map(|axis| Direction { slot, axis }).collect();
+        let directions = untouched(touched).into_iter().map(|axis| Direction { slot, axis }).collect();
         supports.push(Support { directions, stages: StageSet::default() });
     }
     supports
 }
 
-/// A moment about an axis that nothing holds, and that has no inertia either, has no answer.
-fn refuse_moments(deck: &Deck, node: &str, untouched: &[Vec3], diagnostics: &mut Vec<Diagnostic>) {
+/// A moment about an axis that nothing holds, and that has no inertia either, has no answer; `loose`: see [`loose_rotations`].
+pub fn refuse_moments(deck: &Deck, mesh: &Mesh, loose: &[Support], diagnostics: &mut Vec<Diagnostic>) {
+    let axes = |node: &str| {
+        let slot = mesh.points.get(node).map(|&node| mesh.nodes[node].node.p);
+        let directions = loose.iter().flat_map(|support| &support.directions);
+        directions.filter(move |direction| Some(direction.slot) == slot).map(|direction| direction.axis)
+    };
     for load in &deck.loads {
-        let LoadTarget::At(at) = &load.target else { continue };
-        let Some(moment) = load.moment.as_ref().filter(|_| at.value == node) else { continue };
+        let (LoadTarget::At(at), Some(moment)) = (&load.target, &load.moment) else { continue };
         let moment = Vec3(moment.start);
-        if untouched.iter().any(|axis| axis.dot(moment).abs() > 1e-9 * moment.norm()) {
-            let message = format!("a moment turns `{node}` about an axis that has no inertia, and that nothing holds");
+        if axes(&at.value).any(|axis| axis.dot(moment).abs() > 1e-9 * moment.norm()) {
+            let message =
+                format!("a moment turns `{}` about an axis that has no inertia, and that nothing holds", at.value);
             let help = "give the body `inertia` about it, or hold it by a support or a spring";
             diagnostics.push(Diagnostic::error(message, load.span.clone()).help(help));
         }

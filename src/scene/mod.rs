@@ -15,7 +15,7 @@ pub use mesh::{Mesh, MeshBeam};
 pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
-use crate::drive::{InitialMotion, Plan, Stage, StageWork, Until};
+use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
 use crate::model::{ElementInfo, Model, SlotInfo, SlotKind};
@@ -150,7 +150,8 @@ fn about(name: &str, table: &str) -> bool {
     name.split(['@', ':']).next() == Some(table)
 }
 
-/// Builds a scene; what is wrong goes to `diagnostics`.
+/// Builds a scene from a deck that was read or made; what is wrong, and warnings, go to `diagnostics`. `None` where something is so
+/// wrong that there is no scene.
 pub fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
     let mesh = Mesh::new(deck, diagnostics);
@@ -176,7 +177,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
-    let loose = check::loose_rotations(deck, &mesh, &composition, &supports, diagnostics);
+    let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
+    check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
     let model = Model {
@@ -250,7 +252,16 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
             }
         });
         let work = match stage.body {
-            StageBody::Static { steps, adaptive } => StageWork::Static { steps, adaptive },
+            StageBody::Static { steps, adaptive } => {
+                // Along a path the load factor goes back: only what is linear in it may be followed there.
+                let linear = stage.frame.is_none() && check::histories_in(deck, stages.len() + 1).next().is_none();
+                let approach = match (adaptive, linear) {
+                    (false, _) => Approach::Straight,
+                    (true, false) => Approach::Parts,
+                    (true, true) => Approach::Path,
+                };
+                StageWork::Static { steps, approach }
+            }
             StageBody::Path { steps, max_steps } => StageWork::Path { steps, max_steps },
             StageBody::Modal { modes } => StageWork::Modal { modes },
             StageBody::Buckling { modes } => StageWork::Buckling { modes },

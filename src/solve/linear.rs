@@ -26,6 +26,8 @@ pub struct NullVector {
     pub entries: Vec<f64>,
     /// The unknowns themselves
     pub motion: Vec<f64>,
+    /// Whether the tangent has some stiffness against it after all
+    pub held: bool,
 }
 
 /// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
@@ -71,16 +73,21 @@ impl LinearSolver {
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
-    /// Looks for a direction in which the tangent has no stiffness, by inverse iteration with the last factorisation.
-    /// Unknowns are scaled by their diagonal, so that forces and moments compare.
+    /// A direction in which the tangent has no stiffness.
     pub fn null_vector(&mut self, system: &System) -> Option<NullVector> {
+        self.softest(system).filter(|vector| !vector.held)
+    }
+
+    /// The direction in which the tangent has the least stiffness, by inverse iteration with the last factorisation.
+    /// Unknowns are scaled by their diagonal, so that forces and moments compare.
+    pub fn softest(&mut self, system: &System) -> Option<NullVector> {
         if system.pattern.equations.count() == 0 {
             return None;
         }
         if let Some(empty) = empty_column(system) {
             let mut entries = vec![0.0; system.pattern.equations.count()];
             entries[empty] = 1.0;
-            return Some(NullVector { motion: entries.clone(), entries });
+            return Some(NullVector { motion: entries.clone(), entries, held: false });
         }
         let scale = scales(system);
         let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
@@ -93,7 +100,8 @@ impl LinearSolver {
             x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / largest);
         }
         let motion: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
-        (stiffness_of(system, &motion) <= NO_STIFFNESS).then_some(NullVector { entries: x, motion })
+        let held = stiffness_of(system, &motion) > NO_STIFFNESS;
+        Some(NullVector { entries: x, motion, held })
     }
 
     /// The same where the factorisation broke down: the diagonal is raised by a little first.
@@ -115,7 +123,7 @@ impl LinearSolver {
             let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             x.iter_mut().for_each(|x| *x /= largest);
         }
-        Some(NullVector { motion: x.clone(), entries: x })
+        Some(NullVector { motion: x.clone(), entries: x, held: false })
     }
 }
 

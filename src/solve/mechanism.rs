@@ -6,12 +6,14 @@ use crate::model::{Assembly, Model};
 use crate::system::State;
 use crate::tensor::Vec3;
 
-/// A motion that has no stiffness in the assembled tangent.
+/// The softest motion of a tangent.
 pub struct Limp {
     /// The motion
     pub vector: NullVector,
     /// The largest strain that it makes, see [`crate::effect::Effect::strain_of`], over the size of the motion
     pub strain: f64,
+    /// Whether it is a motion, not the multiplier of a joint
+    moves: bool,
 }
 
 /// A motion that something holds strains it by about its own size; what round-off makes of one that nothing holds is smaller
@@ -19,9 +21,9 @@ pub struct Limp {
 const NO_STRAIN: f64 = 1e-3;
 
 impl Limp {
-    /// Looks for one where `solver` has tried to factorise the tangent.
+    /// The softest motion of the tangent that `solver` has tried to factorise.
     pub fn find(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<Self> {
-        let vector = solver.null_vector(&assembly.system)?;
+        let vector = solver.softest(&assembly.system)?;
         let field = |entries: &[f64]| {
             let mut field = vec![Vec3::ZERO; state.q.len()];
             assembly.system.pattern.equations.scatter(entries, None, &mut field);
@@ -36,15 +38,26 @@ impl Limp {
         );
         // What moves may be the multiplier of a condition that is said twice: no strain stands in its way.
         let motion = field(&vector.motion);
-        let size = if model.slots[largest].is_multiplier() { 0.0 } else { correction(model, &motion) };
+        let moves = !model.slots[largest].is_multiplier();
+        let size = if moves { correction(model, &motion) } else { 0.0 };
         let strain = if size > 0.0 { assembly.strain_of(state, &motion, model.length) / size } else { 0.0 };
-        Some(Self { vector, strain })
+        Some(Self { vector, strain, moves })
     }
 
     /// Whether nothing holds it. Very slender beams on fine meshes bend so softly that their stiffness is lost in the tangent,
     /// but they bend.
     pub fn is_loose(&self) -> bool {
-        self.strain <= NO_STRAIN
+        !self.vector.held && self.strain <= NO_STRAIN
+    }
+
+    /// Whether its stiffness is lost in the tangent, although something holds it.
+    pub fn is_soft(&self) -> bool {
+        !self.vector.held && self.strain > NO_STRAIN
+    }
+
+    /// Whether it strains nothing, and only stress that is there already holds it, as a hanging pendulum.
+    pub fn is_held_by_stress(&self) -> bool {
+        self.vector.held && self.moves && self.strain <= NO_STRAIN
     }
 }
 

@@ -1,6 +1,6 @@
 //! Newton's iteration on one step or load level.
 
-use super::convergence::{Convergence, Residual, Verdict, correction};
+use super::convergence::{Convergence, Residual, Verdict, correction, weighted};
 use super::linear::{LinearSolver, NullVector};
 use super::mechanism::mechanism;
 use crate::integrate::Method;
@@ -22,7 +22,7 @@ pub struct Work {
     pub evaluation_seconds: f64,
     /// Seconds spent on factorising and solving
     pub solve_seconds: f64,
-    /// The largest correction that round-off still made where an iteration ended, relative to the unknowns
+    /// What round-off still leaves to correct where an iteration ended, relative to the unknowns
     pub uncertainty: f64,
 }
 
@@ -49,6 +49,13 @@ pub enum NewtonFailure {
         /// Of this slot
         slot: usize,
         /// Radians
+        angle: f64,
+    },
+    /// Neighbouring nodes turn past pi against each other at once.
+    LeapsTooFar {
+        /// Of this element
+        element: usize,
+        /// What their relative rotation would be
         angle: f64,
     },
     /// The error of the smallest step is above what it may be.
@@ -91,6 +98,8 @@ pub struct Newton {
     pub solver: LinearSolver,
     right_hand_side: Vec<f64>,
     dq: Vec<Vec3>,
+    /// The largest residual of each iterate, over what is allowed
+    history: Vec<f64>,
 }
 
 /// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
@@ -120,7 +129,7 @@ impl Refinement {
     fn look(&mut self, model: &Model, dq: &[Vec3], size: f64) -> &Self {
         let last = correction(model, dq) / size;
         self.ratio = if self.before.is_empty() { 0.0 } else { correction(model, dq) / correction(model, &self.before) };
-        let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+        let dot = |a: &[Vec3], b: &[Vec3]| weighted(model, a, b);
         let cosine = dot(dq, &self.before) / (dot(dq, dq) * dot(&self.before, &self.before)).sqrt();
         self.aligned = cosine > 0.5;
         self.last = last;
@@ -146,7 +155,7 @@ impl Newton {
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
         let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
         let (right_hand_side, dq) = (vec![0.0; equations], vec![Vec3::ZERO; slots]);
-        Self { convergence, max_iterations, solver, right_hand_side, dq }
+        Self { convergence, max_iterations, solver, right_hand_side, dq, history: Vec::new() }
     }
 
     /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
@@ -163,13 +172,13 @@ impl Newton {
         assembly.forget();
         let noise = assembly.noise(state);
         let mut iterations = 0;
-        let mut history = Vec::new();
+        self.history.clear();
         let mut refinement = Refinement::default();
         loop {
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
-            history.push(residual.ratio);
+            self.history.push(residual.ratio);
             match verdict {
                 Verdict::Converged if lift.is_none() => return Ok(()),
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
@@ -181,8 +190,9 @@ impl Newton {
                     }
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
+                Verdict::Continue if iterations < self.max_iterations => refinement = Refinement::default(),
                 _ if iterations >= self.max_iterations => {
-                    return Err(NewtonFailure::NotConverged { residual, history });
+                    return Err(NewtonFailure::NotConverged { residual, history: self.history.clone() });
                 }
                 _ => {}
             }
@@ -191,7 +201,7 @@ impl Newton {
             }
             iterations += 1;
             if correction(model, &self.dq) > RUNAWAY {
-                return Err(NewtonFailure::NotConverged { residual, history });
+                return Err(NewtonFailure::NotConverged { residual, history: self.history.clone() });
             }
             assembly.extrapolate(state, &self.dq);
             method.correct(state, &self.dq);

@@ -16,6 +16,7 @@ pub struct Recorder {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row {
+    stage: usize,
     time: f64,
     load: f64,
     value: f64,
@@ -70,7 +71,12 @@ impl Recorder {
             if let ExpectationKind::Column { probe, component, .. } = &expectation.kind {
                 self.scratch.clear();
                 probe.read(at, &mut self.scratch);
-                rows.push(Row { time: at.state.time, load: at.state.load, value: self.scratch[*component] });
+                rows.push(Row {
+                    stage: at.stage,
+                    time: at.state.time,
+                    load: at.state.load,
+                    value: self.scratch[*component],
+                });
             }
         }
     }
@@ -196,7 +202,7 @@ fn at_time(rows: &[Row], time: f64) -> Option<f64> {
     Some(between(time, (before.time, before.value), (after.time, after.value)))
 }
 
-/// The first crossing of a load factor, from below or above.
+/// The first crossing of a load factor within a stage, from below or above.
 fn at_load(rows: &[Row], load: f64) -> Option<f64> {
     let slack = 1e-12 * load.abs().max(1.0);
     let hit = |row: &Row| (row.load - load).abs() <= slack;
@@ -209,7 +215,9 @@ fn at_load(rows: &[Row], load: f64) -> Option<f64> {
             false => crosses.then(|| between(load, (before.load, before.value), (after.load, after.value))),
         }
     };
-    first.or_else(|| rows.windows(2).find_map(crossing))
+    // From one stage to the next the load factor jumps; what stands at that moment is no crossing.
+    let pairs = rows.windows(2).filter(|pair| pair[0].stage == pair[1].stage || hit(&pair[1]));
+    first.or_else(|| pairs.into_iter().find_map(crossing))
 }
 
 fn between(x: f64, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> f64 {
@@ -221,7 +229,7 @@ mod tests {
     use super::*;
 
     fn rows() -> Vec<Row> {
-        let row = |(time, load, value)| Row { time, load, value };
+        let row = |(time, load, value)| Row { stage: 1, time, load, value };
         [(0.0, 0.0, 1.0), (0.0, 0.5, 3.0), (0.0, 1.0, 4.0), (1.0, 1.0, -6.0), (3.0, 1.0, 0.0)].map(row).to_vec()
     }
 
@@ -246,6 +254,16 @@ mod tests {
         assert_eq!(value(Instant::Load(0.25)), Some(2.0));
         assert_eq!(value(Instant::Load(1.0)), Some(4.0));
         assert_eq!(value(Instant::Load(1.5)), None);
+    }
+
+    #[test]
+    fn loads_are_crossed_from_above_too_but_not_between_stages() {
+        let row = |(stage, load, value)| Row { stage, time: 0.0, load, value };
+        let rows = [(1, 0.0, 1.0), (1, 1.0, 5.0), (2, 0.2, 9.0), (2, -0.2, 7.0)].map(row);
+        assert_eq!(at_load(&rows, 0.5), Some(3.0));
+        assert_eq!(at_load(&rows, 0.0), Some(1.0));
+        assert_eq!(at_load(&rows[1..], 0.5), None);
+        assert_eq!(at_load(&rows[1..], -0.1), Some(7.5));
     }
 
     #[test]

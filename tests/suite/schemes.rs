@@ -606,3 +606,28 @@ fn the_smallest_step_is_not_taken_on_trust() {
     assert_eq!(failure.name(), "not_converged");
     assert!(failure.to_string().contains("the smallest step has an error"), "{failure}");
 }
+
+/// Late on the clock a short step is hardly longer than the clock's round-off: it is still one step.
+#[test]
+fn a_short_step_late_on_the_clock_is_taken_once() {
+    let text = "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\ninertia = [1, 1, 1]\n[[initial]]\nat = \"a\"\nvelocity = [1, 0, 0]\n\
+                [[stage]]\nkind = \"dynamic\"\nend = 1000\nstep = 10\n[[stage]]\nkind = \"dynamic\"\nend = 1000.01\nstep = 1e-5\n";
+    let simulation = simulate(text);
+    assert!((simulation.end("a.ux") - 1000.01).abs() < 1e-9, "{}", simulation.end("a.ux"));
+    assert_eq!(simulation.counters.steps, 1100);
+}
+
+/// Rows of fixed steps stay where they were, and the motion is that of the smaller step.
+#[test]
+fn a_subdivided_step_is_as_good_as_a_smaller_one() {
+    let hit = |step: f64| {
+        let settings = format!("step = {step}\nmax_iterations = 4");
+        simulate(&turned_rod(&settings).replace("force = [0, 0, 1]", "force = [0, 30, 80]"))
+    };
+    let (coarse, fine) = (hit(0.6), hit(0.6 / 64.0));
+    assert!(coarse.counters.cutbacks > 0 && fine.counters.cutbacks == 0);
+    assert_eq!(coarse.rows.len() as u64, coarse.counters.steps + 1);
+    let off = distance(coarse.vector("tip.u"), fine.vector("tip.u"));
+    let size = fine.vector("tip.u").iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+    assert!(off < 0.2 * size, "{off} of {size}");
+}

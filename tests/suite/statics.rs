@@ -50,7 +50,7 @@ nodes = ["loaded"]
 /// The only stable equilibrium in the plane; -92.7277 is that of the continuous frame, integrated independently.
 #[test]
 fn a_limit_point_is_gone_around_with_any_number_of_levels() {
-    for steps in [1, 2, 3, 7, 20] {
+    for steps in [1_u32, 2, 3, 7, 20] {
         let simulation = simulate(&lee(&format!("steps = {steps}")));
         let uy = simulation.end("loaded.uy");
         assert!((uy + 92.7277).abs() < 2e-3, "{steps} levels: {uy}");
@@ -63,8 +63,14 @@ fn a_limit_point_is_gone_around_with_any_number_of_levels() {
             .collect();
         assert_eq!(limits.len(), 2, "{steps} levels: {limits:?}");
         assert!((limits[0] - 0.9279).abs() < 2e-3 && (limits[1] + 0.4707).abs() < 4e-3, "{limits:?}");
-        let levels = simulation.column("load");
-        assert_eq!(levels.last(), Some(&1.0));
+        let loads = simulation.column("load");
+        assert_eq!(loads.last(), Some(&1.0));
+        assert_eq!(loads.len() as u64, simulation.counters.steps + 1);
+        for level in (1..=steps).map(|k| f64::from(k) / f64::from(steps)) {
+            let rows = loads.iter().filter(|&&load| load == level).count();
+            assert!(rows == 1, "{steps} levels: {rows} rows at {level}");
+        }
+        assert!(simulation.rows.windows(2).all(|pair| pair[0] != pair[1]), "a row stands twice");
     }
 }
 
@@ -118,7 +124,52 @@ steps = 10
     let failure = simulation.result.expect_err("20 is the most it carries");
     let Failure::LimitPoint { at, goal, increments, .. } = &failure else { panic!("{failure}") };
     assert!((at.load - 2.0 / 3.0).abs() < 1e-3 && *goal == 0.7 && *increments > 100, "{failure}");
-    assert!(failure.hint().is_some_and(|hint| hint.contains("does not carry this load")));
+    assert!(failure.hint().is_some_and(|hint| hint.contains("does not come to this load")));
     let most = simulation.rows.iter().map(|row| row[0]).fold(0.0, f64::max);
     assert!((most - 2.0 / 3.0).abs() < 1e-4, "the rows go to the limit: {most}");
+}
+
+/// A history of the load factor means nothing where that goes back: load control tells its own failure.
+#[test]
+fn histories_keep_load_control() {
+    let text = lee("steps = 5").replace("force = [0, -2, 0]", "force = [0, -2, 0]\nhistory = \"up\"")
+        + "[history.up]\ntimes = [0, 1]\nvalues = [0, 1]\n";
+    let simulation = attempt(&text);
+    let failure = simulation.result.expect_err("load control ends at the limit point");
+    assert!(matches!(failure, Failure::NotConverged { .. }), "{failure}");
+    assert!(simulation.rows.iter().all(|row| row[0] >= 0.0));
+}
+
+/// A straight shaft twisted by its end: its displacements are round-off, in whatever direction it lies.
+#[test]
+fn round_off_is_no_jump() {
+    let shaft = |end: &str, axis: &str| {
+        simulate(&format!(
+            "[point]\na = [0, 0, 0]\nb = {end}\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 100\nEI = 100\n\
+             [[beam]]\nname = \"m\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 20\n\
+             [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\"]\naxes = [{axis}, [0, 0, 1]]\n\
+             [[motion]]\nat = \"b\"\nrotate = {axis}\nangle = \"4*pi\"\n[[stage]]\nkind = \"static\"\nsteps = 16\n"
+        ))
+        .counters
+    };
+    let along = shaft("[10, 0, 0]", "[1, 0, 0]");
+    let skew = shaft("[6, 8, 0]", "[0.6, 0.8, 0]");
+    assert_eq!((along.steps, along.cutbacks, along.events.len()), (skew.steps, skew.cutbacks, skew.events.len()));
+}
+
+/// Turned back within one level, no element turns further than it did: smaller steps tell.
+#[test]
+fn a_reversal_is_no_leap_over_pi() {
+    for steps in [2, 3, 8] {
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 10\nEI = 10\n\
+             [[beam]]\nname = \"m\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 2\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+             [[load]]\nat = \"b\"\nmoment = [0, 0, 36]\nhistory = \"h\"\n[history.h]\ntimes = [0, 0.5, 1]\nvalues = [0, 1, -1]\n\
+             [[stage]]\nkind = \"static\"\nsteps = {steps}\n"
+        );
+        // Two elements of half a length that turn by 1.8 against each other, the first by 0.9.
+        let exact = -0.5 * (0.9_f64.sin() + 2.7_f64.sin());
+        let uy = simulate(&text).end("b.uy");
+        assert!((uy - exact).abs() < 1e-4, "{steps}: {uy} for {exact}");
+    }
 }

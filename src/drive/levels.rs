@@ -1,0 +1,140 @@
+//! How the levels of a static stage are approached, and how a step to another branch is noticed.
+
+use super::run::{Run, Workshop};
+use crate::kernel::Weights;
+use crate::model::{Model, SlotKind};
+use crate::rotation::{Rotation, relative_angle};
+use crate::solve::Pivots;
+use crate::system::State;
+
+/// A level is not approached in smaller parts than this.
+const SMALLEST_PART: f64 = 1.0 / 4096.0;
+
+/// A step over which the number of negative pivots changes is cut back to this part of a level: it may have jumped.
+const CLOSE: f64 = 1.0 / 256.0;
+
+/// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
+const JUMP: f64 = 8.0;
+
+/// What moves less is round-off: relative to the length of the scene, and in radians.
+const NO_MOTION: f64 = 1e-9;
+
+/// What a stage may do where Newton does not reach a level at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// Nothing
+    Straight,
+    /// Smaller steps
+    Parts,
+    /// Smaller steps, then arc length along the path; only where everything is linear in the load factor
+    Path,
+}
+
+/// Follows the number of negative pivots from step to step.
+pub(super) struct Stability {
+    pivots: Option<Pivots>,
+    pub negative: Option<usize>,
+}
+
+impl Stability {
+    /// At the start of a stage.
+    pub fn new(run: &Run, workshop: &Workshop) -> Self {
+        let system = &workshop.assembly.system;
+        let mut pivots = Pivots::new(system, &run.model.multipliers);
+        // The start was assembled with its stiffness.
+        let negative = pivots.as_mut().and_then(|pivots| pivots.negative(system));
+        Self { pivots, negative }
+    }
+
+    /// The number at the run's state; `None` where it is not known.
+    pub fn count(&mut self, run: &Run, workshop: &mut Workshop) -> Option<usize> {
+        let pivots = self.pivots.as_mut()?;
+        workshop.assembly.forget();
+        workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
+        let negative = pivots.negative(&workshop.assembly.system);
+        if negative.is_none() {
+            // Not symmetric: neither will the next be.
+            self.pivots = None;
+        }
+        negative
+    }
+
+    fn changes_to(&self, negative: Option<usize>) -> bool {
+        matches!((self.negative, negative), (Some(before), Some(after)) if before != after)
+    }
+
+    /// Says where a limit or branch point lies behind.
+    pub fn pass(&mut self, run: &mut Run, negative: Option<usize>) {
+        run.tell_stability(None, self.negative, negative);
+        self.negative = negative;
+    }
+}
+
+/// The levels of a stage.
+pub(super) struct Levels {
+    /// The state before the first
+    pub start: State,
+    /// Load factor from one to the next
+    pub level: f64,
+    pub approach: Approach,
+    pub stability: Stability,
+    increment: f64,
+}
+
+impl Levels {
+    /// From the run's state on.
+    pub fn new(run: &Run, workshop: &Workshop, steps: usize, approach: Approach) -> Self {
+        let (start, level) = (run.state.clone(), 1.0 / steps as f64);
+        Self { start, level, approach, stability: Stability::new(run, workshop), increment: level }
+    }
+
+    /// The next load factor between `load` and `target`.
+    pub fn next(&mut self, load: f64, target: f64) -> f64 {
+        let rest = target - load;
+        if self.approach == Approach::Straight || self.increment >= rest * (1.0 - 1e-9) {
+            self.increment = rest;
+            return target;
+        }
+        load + self.increment
+    }
+
+    /// Takes the next step half as long; `false` where it may not be.
+    pub fn halve(&mut self) -> bool {
+        let smaller = 0.5 * self.increment;
+        let may = self.approach != Approach::Straight && smaller >= SMALLEST_PART * self.level;
+        self.increment = if may { smaller } else { self.increment };
+        may
+    }
+
+    /// After a step that was taken.
+    pub fn double(&mut self) {
+        self.increment = (2.0 * self.increment).min(self.level);
+    }
+
+    /// Load control begins anew.
+    pub fn restart(&mut self) {
+        self.increment = self.level;
+    }
+
+    /// Whether a step that changed the number of negative pivots may have gone to another branch: it is not small, or the
+    /// state has moved further than on a path that goes on.
+    pub fn may_have_jumped(&self, model: &Model, from: &State, to: &State, negative: Option<usize>) -> bool {
+        if self.approach == Approach::Straight || !self.stability.changes_to(negative) {
+            return false;
+        }
+        let (step, risen) = (to.load - from.load, from.load - self.start.load);
+        let moved = distance(model, from, to);
+        let usual = if risen > 0.0 { distance(model, &self.start, from) / risen * step } else { f64::INFINITY };
+        step > CLOSE * self.level || moved > (JUMP * usual).max(NO_MOTION)
+    }
+}
+
+/// The largest difference of two states: displacements over the length of the scene, rotations in radians, whatever their charts.
+fn distance(model: &Model, a: &State, b: &State) -> f64 {
+    let one = |(slot, kind): (usize, SlotKind)| match kind {
+        SlotKind::Displacement => (b.q[slot] - a.q[slot]).norm() / model.length,
+        SlotKind::Rotation => relative_angle(Rotation::new(a.q[slot]).r, Rotation::new(b.q[slot]).r),
+        SlotKind::Force | SlotKind::Moment => 0.0,
+    };
+    model.slots.iter().map(|info| info.kind).enumerate().map(one).fold(0.0, f64::max)
+}
