@@ -10,6 +10,9 @@ use crate::system::State;
 /// A level is not approached in smaller parts than this.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
 
+/// Where round-off takes the stiffness smaller parts hardly help.
+const SMALLEST_SOFT_PART: f64 = 1.0 / 16.0;
+
 /// A step over which the number of negative pivots changes is cut back to this part of a level: it may have jumped.
 const CLOSE: f64 = 1.0 / 256.0;
 
@@ -98,10 +101,11 @@ impl Levels {
         load + self.increment
     }
 
-    /// Takes the next step half as long; `false` where it may not be.
-    pub fn halve(&mut self) -> bool {
+    /// Takes the next step half as long; `false` where it may not be. `soft`: round-off takes the stiffness of the softest motion.
+    pub fn halve(&mut self, soft: bool) -> bool {
         let smaller = 0.5 * self.increment;
-        let may = self.approach != Approach::Straight && smaller >= SMALLEST_PART * self.level;
+        let smallest = if soft { SMALLEST_SOFT_PART } else { SMALLEST_PART };
+        let may = self.approach != Approach::Straight && smaller >= smallest * self.level;
         self.increment = if may { smaller } else { self.increment };
         may
     }

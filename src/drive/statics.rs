@@ -106,7 +106,7 @@ impl Run<'_> {
             let tried = self.try_step(workshop, next, levels);
             if let Tried::Good(negative) = tried {
                 self.take_step(workshop, negative, levels)?;
-            } else if levels.halve() {
+            } else if levels.halve(self.soft) {
                 self.counters.cutbacks += 1;
                 self.state.copy_from(&self.good);
             } else {
