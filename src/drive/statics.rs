@@ -103,21 +103,18 @@ impl Run<'_> {
         while self.good.load < target {
             let next = levels.next(self.good.load, target);
             self.observer.progress(self.moment(), self.static_progress(next))?;
-            let tried = self.try_step(workshop, next, levels);
-            if let Tried::Good(negative) = tried {
-                self.take_step(workshop, negative, levels)?;
-            } else if levels.halve(self.soft) {
-                self.counters.cutbacks += 1;
-                self.state.copy_from(&self.good);
-            } else {
-                match tried {
-                    // Nothing tells better.
-                    Tried::Good(negative) | Tried::Jumped(negative) if levels.approach != Approach::Path => {
-                        self.take_step(workshop, negative, levels)?;
-                    }
-                    Tried::Good(_) | Tried::Jumped(_) => return self.go_around(workshop, target, None, levels),
-                    Tried::Failed(failure) => return self.go_around(workshop, target, Some(failure), levels),
+            match self.try_step(workshop, next, levels) {
+                Tried::Good(negative) => self.take_step(workshop, negative, levels)?,
+                _ if levels.halve(self.soft) => {
+                    self.counters.cutbacks += 1;
+                    self.state.copy_from(&self.good);
                 }
+                // Nothing tells better.
+                Tried::Jumped(negative) if levels.approach != Approach::Path => {
+                    self.take_step(workshop, negative, levels)?;
+                }
+                Tried::Jumped(_) => return self.go_around(workshop, target, None, levels),
+                Tried::Failed(failure) => return self.go_around(workshop, target, Some(failure), levels),
             }
         }
         Ok(Reached::Level)
