@@ -106,13 +106,6 @@ impl Run<'_> {
         self.change_charts(lag);
     }
 
-    fn warn_of_subdivision(&mut self) {
-        if !std::mem::replace(&mut self.subdivided, true) {
-            let at = self.moment();
-            self.observer.warn(&format!("a step fails at {at} and is taken in smaller ones, as are others that fail"));
-        }
-    }
-
     /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller one.
     fn run_adaptive(
         &mut self,

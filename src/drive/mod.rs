@@ -14,6 +14,7 @@ mod path;
 mod run;
 mod start;
 mod statics;
+mod warnings;
 
 pub use failure::{Failure, Moment, Place};
 pub use ledger::Ledger;

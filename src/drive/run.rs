@@ -4,6 +4,7 @@ use super::failure::{Failure, Moment, Tried, place};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use super::levels::Approach;
+use super::warnings::Told;
 use crate::integrate::{Increments, Scheme};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
@@ -248,10 +249,6 @@ pub struct Counters {
     pub evaluations: Vec<(&'static str, u64)>,
 }
 
-/// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
-/// their nodes: measured over 4000 orientations.
-const FRAME_ERROR: f64 = 0.0533;
-
 /// A run in progress.
 pub struct Run<'o> {
     pub(super) model: Model,
@@ -266,20 +263,11 @@ pub struct Run<'o> {
     /// Whether loads act for the first time in this stage
     pub(super) fresh: bool,
     started: bool,
-    warned_coarse: bool,
-    /// The uncertainty by round-off that a warning told; below the first value none is worth one.
-    warned_uncertainty: f64,
-    /// Whether a continued rotation vector has become ambiguous
-    warned_wound: bool,
-    /// The error of total interpolation that a warning told; below the first value none is worth one.
-    warned_frame: f64,
+    pub(super) told: Told,
     /// Whether round-off takes the stiffness of the softest motion of the stage
     pub(super) soft: bool,
-    warned_soft: bool,
     /// Of earlier stages
     cutbacks_before: u64,
-    /// Whether a fixed step has been taken in smaller ones
-    pub(super) subdivided: bool,
     moving: bool,
 }
 
@@ -313,14 +301,9 @@ impl<'o> Run<'o> {
             stage: 0,
             fresh: true,
             started: false,
-            warned_coarse: false,
-            warned_uncertainty: 1e-7,
-            warned_wound: false,
-            warned_frame: 1e-2,
+            told: Told::default(),
             soft: false,
-            warned_soft: false,
             cutbacks_before: 0,
-            subdivided: false,
             moving: false,
         }
     }
@@ -463,13 +446,8 @@ impl<'o> Run<'o> {
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.rotations);
-        if let (Some(&slot), true) = (ambiguous.first(), self.plan.continued && !self.warned_wound) {
-            self.warned_wound = true;
-            let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
-            self.observer.warn(&format!(
-                "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
-                 its increments from there on, and depends on the steps (`r` does not)"
-            ));
+        if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
+            self.warn_of_lost_axis(slot);
         }
         let Some(slot) = ambiguous.into_iter().find(|slot| self.model.sprung.contains(slot)) else { return Ok(()) };
         let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
@@ -480,13 +458,13 @@ impl<'o> Run<'o> {
     }
 
     fn judge_mesh(&mut self) -> Result<(), Failure> {
-        let limit = if self.warned_coarse { charts::COARSE } else { charts::COARSE_WARNING };
+        let limit = if self.told.coarse { charts::COARSE } else { charts::COARSE_WARNING };
         let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
         let failure = self.name_coarse(element, angle);
         if angle > charts::COARSE {
             return Err(failure);
         }
-        self.warned_coarse = true;
+        self.told.coarse = true;
         self.observer.warn(&format!("{failure}: more elements would tell the shape better"));
         Ok(())
     }
@@ -502,57 +480,6 @@ impl<'o> Run<'o> {
         match charts::leapt(&self.state, &self.good, &self.model.elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
             None => Ok(()),
-        }
-    }
-
-    /// Says where the answer has fewer digits than it shows.
-    fn warn_of_round_off(&mut self) {
-        let uncertainty = self.counters.work.uncertainty;
-        if uncertainty > 10.0 * self.warned_uncertainty {
-            self.warned_uncertainty = uncertainty;
-            self.observer.warn(&format!(
-                "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
-                 largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
-                16.0 + uncertainty.log10()
-            ));
-        }
-    }
-
-    /// The tangent has lost the stiffness of a motion that something holds.
-    pub(super) fn warn_of_softness(&mut self) {
-        self.soft = true;
-        if !std::mem::replace(&mut self.warned_soft, true) {
-            self.observer.warn(
-                "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
-                 all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
-            );
-        }
-    }
-
-    /// Energy that a scheme takes is a motion that its steps do not resolve.
-    fn warn_of_loss(&mut self, workshop: &Workshop) {
-        if let Some(share) = workshop.guard.as_ref().and_then(EnergyGuard::loss) {
-            self.observer.warn(&format!(
-                "stage {}: the scheme has taken {:.0} % of the largest energy: its steps do not resolve part of the motion (a smaller \
-                 `step`, or less dissipation)",
-                self.stage + 1,
-                100.0 * share
-            ));
-        }
-    }
-
-    /// Total rotation vectors are interpolated in charts that do not turn with the element: the strains of a turned scene differ.
-    fn warn_of_frame(&mut self) {
-        let angle = charts::widest_in_one_chart(&self.state, &self.model.elements);
-        let error = FRAME_ERROR * angle * angle;
-        if error > self.warned_frame {
-            self.warned_frame = 2.0 * error;
-            self.observer.warn(&format!(
-                "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
-                 two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
-                 the square of the element's length)",
-                100.0 * error
-            ));
         }
     }
 
@@ -601,15 +528,7 @@ impl<'o> Run<'o> {
     pub(super) fn name_mechanism(&self, vector: Option<NullVector>, system: &System) -> Failure {
         let at = self.moment();
         let Some(vector) = vector else { return Failure::Singular { at, place: None } };
-        let field = |entries: &[f64]| {
-            let mut field = vec![Vec3::ZERO; self.model.slots.len()];
-            system.pattern.equations.scatter(entries, None, &mut field);
-            field
-        };
-        // Which slot moves most is told by entries that compare, in which direction by the motion itself.
-        let (compared, motion) = (field(&vector.entries), field(&vector.motion));
-        let larger = |best: usize, k: usize| if compared[k].norm() > compared[best].norm() { k } else { best };
-        let largest = (0..compared.len()).fold(0, larger);
+        let (largest, motion) = vector.by_slot(&system.pattern.equations, self.model.slots.len());
         Failure::Singular { at, place: Some(place(&self.model, largest, motion[largest])) }
     }
 

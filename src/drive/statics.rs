@@ -58,16 +58,6 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// A state that a stage ends in, and that the next begins with.
-    pub(super) fn warn_of_instability(&mut self, negative: Option<usize>) {
-        if let Some(count @ 1..) = negative {
-            let stage = self.stage + 1;
-            self.observer.warn(&format!(
-                "stage {stage} ends in an unstable state, with {count} negative pivot(s): nothing real stays in it"
-            ));
-        }
-    }
-
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
     pub(super) fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
         self.stand_still();

@@ -1,6 +1,7 @@
 //! Sparse linear systems by faer: one symbolic analysis a stage, one numeric factorisation an iteration.
 
-use crate::system::{Pattern, System};
+use crate::system::{Equations, Pattern, System};
+use crate::tensor::Vec3;
 use faer::Conj;
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -28,6 +29,20 @@ pub struct NullVector {
     pub motion: Vec<f64>,
     /// Whether the tangent has some stiffness against it after all
     pub held: bool,
+}
+
+impl NullVector {
+    /// The slot that moves most, told by entries that compare, and the motion of every slot.
+    pub fn by_slot(&self, equations: &Equations, slots: usize) -> (usize, Vec<Vec3>) {
+        let field = |entries: &[f64]| {
+            let mut field = vec![Vec3::ZERO; slots];
+            equations.scatter(entries, None, &mut field);
+            field
+        };
+        let compared = field(&self.entries);
+        let larger = |best: usize, slot: usize| if compared[slot].norm() > compared[best].norm() { slot } else { best };
+        ((0..slots).fold(0, larger), field(&self.motion))
+    }
 }
 
 /// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.

@@ -4,7 +4,6 @@ use super::convergence::correction;
 use super::linear::{LinearSolver, NullVector};
 use crate::model::{Assembly, Model};
 use crate::system::State;
-use crate::tensor::Vec3;
 
 /// The softest motion of a tangent.
 pub struct Limp {
@@ -24,20 +23,8 @@ impl Limp {
     /// The softest motion of the tangent that `solver` has tried to factorise.
     pub fn find(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<Self> {
         let vector = solver.softest(&assembly.system)?;
-        let field = |entries: &[f64]| {
-            let mut field = vec![Vec3::ZERO; state.q.len()];
-            assembly.system.pattern.equations.scatter(entries, None, &mut field);
-            field
-        };
-        let compared = field(&vector.entries);
-        let largest = (0..compared.len()).fold(
-            0,
-            |k: usize, slot| {
-                if compared[slot].norm() > compared[k].norm() { slot } else { k }
-            },
-        );
+        let (largest, motion) = vector.by_slot(&assembly.system.pattern.equations, state.q.len());
         // What moves may be the multiplier of a condition that is said twice: no strain stands in its way.
-        let motion = field(&vector.motion);
         let moves = !model.slots[largest].is_multiplier();
         let size = if moves { correction(model, &motion) } else { 0.0 };
         let strain = if size > 0.0 { assembly.strain_of(state, &motion, model.length) / size } else { 0.0 };

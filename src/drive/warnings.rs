@@ -1,0 +1,112 @@
+//! What a run tells its user beside its results, each thing once.
+
+use super::guard::EnergyGuard;
+use super::run::{Run, Workshop};
+use crate::model::charts;
+use crate::system::Slot;
+
+/// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
+/// their nodes: measured over 4000 orientations.
+const FRAME_ERROR: f64 = 0.0533;
+
+/// What has been told already.
+#[derive(Clone, Debug)]
+pub(super) struct Told {
+    /// That an element turns far from node to node
+    pub coarse: bool,
+    /// How uncertain round-off leaves displacements; below the first value nothing is worth a warning.
+    uncertainty: f64,
+    /// By how much strains depend on the orientation; below the first value nothing is worth a warning.
+    frame: f64,
+    soft: bool,
+    axis: bool,
+    subdivision: bool,
+}
+
+impl Default for Told {
+    fn default() -> Self {
+        Self { coarse: false, uncertainty: 1e-7, frame: 1e-2, soft: false, axis: false, subdivision: false }
+    }
+}
+
+impl Run<'_> {
+    /// Says where the answer has fewer digits than it shows.
+    pub(super) fn warn_of_round_off(&mut self) {
+        let uncertainty = self.counters.work.uncertainty;
+        if uncertainty > 10.0 * self.told.uncertainty {
+            self.told.uncertainty = uncertainty;
+            self.observer.warn(&format!(
+                "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
+                 largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
+                16.0 + uncertainty.log10()
+            ));
+        }
+    }
+
+    /// The tangent has lost the stiffness of a motion that something holds.
+    pub(super) fn warn_of_softness(&mut self) {
+        self.soft = true;
+        if !std::mem::replace(&mut self.told.soft, true) {
+            self.observer.warn(
+                "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
+                 all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
+            );
+        }
+    }
+
+    /// Energy that a scheme takes is a motion that its steps do not resolve.
+    pub(super) fn warn_of_loss(&mut self, workshop: &Workshop) {
+        if let Some(share) = workshop.guard.as_ref().and_then(EnergyGuard::loss) {
+            self.observer.warn(&format!(
+                "stage {}: the scheme has taken {:.0} % of the largest energy: its steps do not resolve part of the motion (a smaller \
+                 `step`, or less dissipation)",
+                self.stage + 1,
+                100.0 * share
+            ));
+        }
+    }
+
+    /// Total rotation vectors are interpolated in charts that do not turn with the element: the strains of a turned scene differ.
+    pub(super) fn warn_of_frame(&mut self) {
+        let angle = charts::widest_in_one_chart(&self.state, &self.model.elements);
+        let error = FRAME_ERROR * angle * angle;
+        if error > self.told.frame {
+            self.told.frame = 2.0 * error;
+            self.observer.warn(&format!(
+                "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
+                 two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
+                 the square of the element's length)",
+                100.0 * error
+            ));
+        }
+    }
+
+    /// A node passed a whole turn aside of its axis.
+    pub(super) fn warn_of_lost_axis(&mut self, slot: Slot) {
+        if !std::mem::replace(&mut self.told.axis, true) {
+            let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
+            self.observer.warn(&format!(
+                "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
+                 its increments from there on, and depends on the steps (`r` does not)"
+            ));
+        }
+    }
+
+    /// A fixed step fails, and is not the last that does.
+    pub(super) fn warn_of_subdivision(&mut self) {
+        if !std::mem::replace(&mut self.told.subdivision, true) {
+            let at = self.moment();
+            self.observer.warn(&format!("a step fails at {at} and is taken in smaller ones, as are others that fail"));
+        }
+    }
+
+    /// A state that a stage ends in, and that the next begins with.
+    pub(super) fn warn_of_instability(&mut self, negative: Option<usize>) {
+        if let Some(count @ 1..) = negative {
+            let stage = self.stage + 1;
+            self.observer.warn(&format!(
+                "stage {stage} ends in an unstable state, with {count} negative pivot(s): nothing real stays in it"
+            ));
+        }
+    }
+}
