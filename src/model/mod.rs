@@ -134,7 +134,8 @@ impl Model {
     fn held_directions(&self, stage: usize) -> Vec<Direction> {
         let supports = self.supports.iter().filter(|support| support.stages.contains(stage));
         let moved = self.motions.iter().filter(|motion| motion.acts());
-        supports.flat_map(|s| s.directions.clone()).chain(moved.flat_map(Motion::directions)).collect()
+        // A prescribed rotation holds all of its node, so that what a joint about the same axis holds is no question any more.
+        moved.flat_map(Motion::directions).chain(supports.flat_map(|s| s.directions.clone())).collect()
     }
 
     /// One or two held components of a rotation vector survive a change of chart only where they are zero.

@@ -201,7 +201,11 @@ impl Newton {
             }
             iterations += 1;
             if correction(model, &self.dq) > RUNAWAY {
-                return Err(NewtonFailure::NotConverged { residual, history: self.history.clone() });
+                // Round-off may have left a stiffness where there is none.
+                return Err(match mechanism(&mut self.solver, assembly, model, state) {
+                    Some(vector) => NewtonFailure::Singular(Some(vector)),
+                    None => NewtonFailure::NotConverged { residual, history: self.history.clone() },
+                });
             }
             assembly.extrapolate(state, &self.dq);
             method.correct(state, &self.dq);

@@ -2,40 +2,49 @@
 
 use crate::decks::decks;
 use crate::random::Random;
-use beamsim::deck::{self, Axes, Deck, Frame, Load, MotionWhat, Path, PointRef, SectionBody, SpringBody};
+use beamsim::deck::{self, Axes, Deck, Diagnostic, Frame, Load, MotionWhat, Path, PointRef, SectionBody, SpringBody};
 use beamsim::drive::{Failure, Observer, Run, Snapshot};
 use beamsim::rotation::Rotation;
 use beamsim::scene;
 use beamsim::tensor::{Mat3, Vec3};
 
-/// What a run came to: its name, the last clock, and place and rotation of each node.
+/// Place and rotation of each node, at one row of the output.
+struct Row {
+    clock: f64,
+    nodes: Vec<(Vec3, Mat3)>,
+}
+
+/// What a run came to: its name, its rows, and the size of the scene.
 struct Outcome {
     name: String,
-    load: f64,
-    nodes: Vec<(Vec3, Mat3)>,
+    rows: Vec<Row>,
     size: f64,
 }
 
-struct Last(Option<Outcome>);
+struct Rows(Outcome);
 
-impl Observer for Last {
+impl Observer for Rows {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
         let slots = &at.model.rotations;
         // The rotation of a node follows its displacement.
         let node = |&p: &u32| (at.state.q[p as usize - 1], Rotation::new(at.state.q[p as usize]).r);
         let nodes: Vec<(Vec3, Mat3)> = slots.iter().map(node).collect();
-        let largest = nodes.iter().map(|(u, _)| u.norm()).fold(at.model.length, f64::max);
-        self.0 = Some(Outcome { name: String::new(), load: at.state.load, nodes, size: largest });
+        self.0.size = nodes.iter().map(|(u, _)| u.norm()).fold(self.0.size.max(at.model.length), f64::max);
+        self.0.rows.push(Row { clock: at.state.load + at.state.time, nodes });
         Ok(())
     }
 }
 
 fn run(deck: &Deck) -> Option<Outcome> {
-    let scene = scene::build(deck, &mut Vec::new())?;
-    let mut last = Last(None);
-    let (result, _) = Run::new(scene.plan, &mut last).finish();
-    let name = result.map_or_else(|failure| failure.name().to_string(), |()| "finished".into());
-    last.0.map(|outcome| Outcome { name, ..outcome })
+    let mut diagnostics = Vec::new();
+    let scene = scene::build(deck, &mut diagnostics)?;
+    if !diagnostics.iter().all(Diagnostic::is_warning) {
+        return None;
+    }
+    let mut rows = Rows(Outcome { name: String::new(), rows: Vec::new(), size: 0.0 });
+    let (result, _) = Run::new(scene.plan, &mut rows).finish();
+    rows.0.name = result.map_or_else(|failure| failure.name().to_string(), |()| "finished".into());
+    (!rows.0.rows.is_empty()).then_some(rows.0)
 }
 
 fn turned(q: Mat3, v: [f64; 3]) -> [f64; 3] {
@@ -55,9 +64,11 @@ fn turn_place(q: Mat3, place: &mut PointRef) {
 
 /// The direction of a piece of a beam.
 fn direction(deck: &Deck, a: &PointRef, b: &PointRef) -> Vec3 {
+    let named = |name: &str| deck.points.iter().find(|(known, _)| known.value == name);
     let place = |point: &PointRef| match point {
         PointRef::Coordinates(x) => Vec3(*x),
-        PointRef::Name(name) => Vec3(deck.points.iter().find(|(known, _)| known.value == *name).unwrap().1),
+        // A name that the deck was refused for stands nowhere.
+        PointRef::Name(name) => named(name).map_or(Vec3::ZERO, |(_, x)| Vec3(*x)),
     };
     place(b) - place(a)
 }
@@ -149,17 +160,103 @@ fn turn_load(q: Mat3, load: &mut Load) {
     }
 }
 
-/// The largest difference between a run and what the plain one turns into, over the size of the scene.
-fn difference(plain: &Outcome, other: &Outcome, q: Mat3) -> f64 {
-    let one = |((u, r), (v, s)): (&(Vec3, Mat3), &(Vec3, Mat3))| {
-        let (moved, turned) = (*v - q * *u, *s - q * *r * q.transpose());
-        (moved.norm() / plain.size).max(turned.max_abs())
-    };
-    plain.nodes.iter().zip(&other.nodes).map(one).fold(0.0, f64::max)
+/// The same deck with each coordinate of its points off by up to two units in its last place.
+fn jittered(mut deck: Deck, random: &mut Random) -> Deck {
+    for (_, x) in &mut deck.points {
+        x.iter_mut().for_each(|x| *x *= 1.0 + 2.0 * f64::EPSILON * random.range(-1.0, 1.0));
+    }
+    deck
 }
 
+/// How far apart two runs are in each of their rows, over the size of the scene, when the second is seen turned back by `q`.
+fn differences(one: &Outcome, other: &Outcome, q: Mat3) -> Vec<f64> {
+    let node = |((u, r), (v, s)): (&(Vec3, Mat3), &(Vec3, Mat3))| {
+        let (moved, turned) = (*v - q * *u, *s - q * *r * q.transpose());
+        (moved.norm() / one.size).max(turned.max_abs())
+    };
+    let row = |(a, b): (&Row, &Row)| a.nodes.iter().zip(&b.nodes).map(node).fold(0.0, f64::max);
+    one.rows.iter().zip(&other.rows).map(row).collect()
+}
+
+/// Whether two runs ended alike, in the same number of rows.
+fn alike(one: &Outcome, other: &Outcome) -> Result<(), String> {
+    let end = |outcome: &Outcome| (outcome.name.clone(), outcome.rows.len(), outcome.rows.last().unwrap().clock);
+    if end(one) == end(other) { Ok(()) } else { Err(format!("{:?}, turned {:?}", end(one), end(other))) }
+}
+
+/// What turning a deck came to, row by row: the worst difference from the plain run, and what two units in the last place of the
+/// points change in a turned one.
+struct Turned {
+    clocks: Vec<f64>,
+    worst: Vec<f64>,
+    round_off: Vec<f64>,
+}
+
+fn raise(worst: &mut [f64], by: &[f64]) {
+    worst.iter_mut().zip(by).for_each(|(worst, &by)| *worst = worst.max(by));
+}
+
+fn turn_one(deck: &Deck, plain: &Outcome, orientations: usize, seed: u64) -> Result<Turned, String> {
+    let mut random = Random::new(seed);
+    let zero = vec![0.0; plain.rows.len()];
+    let clocks = plain.rows.iter().map(|row| row.clock).collect();
+    let mut all = Turned { clocks, worst: zero.clone(), round_off: zero };
+    for k in 0..orientations {
+        let q = Rotation::new(random.vector(3.0)).r;
+        let deck = turn(deck.clone(), q);
+        let other = run(&deck).ok_or("refused when turned")?;
+        alike(plain, &other)?;
+        raise(&mut all.worst, &differences(plain, &other, q));
+        if k < 2 {
+            let off = run(&jittered(deck, &mut random)).ok_or("refused when off by round-off")?;
+            raise(&mut all.round_off, &differences(&other, &off, Mat3::IDENTITY));
+        }
+    }
+    Ok(all)
+}
+
+/// Turns a deck in half of the orientations on each of two threads.
+fn turn_twice(deck: &Deck, plain: &Outcome, orientations: usize) -> Result<Turned, String> {
+    let half = |seed| move || turn_one(deck, plain, orientations / 2, seed);
+    let (one, two) = std::thread::scope(|threads| {
+        let other = threads.spawn(half(12));
+        (half(11)(), other.join().unwrap())
+    });
+    let (mut one, two) = (one?, two?);
+    raise(&mut one.worst, &two.worst);
+    raise(&mut one.round_off, &two.round_off);
+    Ok(one)
+}
+
+/// A deck whose answer depends on round-off more than its tolerance tells.
+struct Sensitive {
+    name: &'static str,
+    /// The ordinary tolerance holds up to this clock,
+    until: f64,
+    /// and this one beyond it; none where the motion is chaotic, which two units in the last place of the points must show.
+    then: Option<f64>,
+}
+
+const SENSITIVE: [Sensitive; 10] = [
+    // Axial stiffness 1e6, 1e7 times the rotary inertia: the round-off of forces turns the beam.
+    Sensitive { name: "d05_beam_own_axis_100_turns", until: 50.0, then: Some(1e-7) },
+    // Axial stiffness 1e10 on a mass of 20: the round-off of forces alone is 3e-6.
+    Sensitive { name: "d08_stiff_pendulum", until: 20.0, then: Some(1e-7) },
+    Sensitive { name: "d08_stiff_pendulum_h01", until: 3.0, then: Some(1e-6) },
+    // Beyond the cliff of the trapezoidal rule
+    Sensitive { name: "d10_spin_up_newmark", until: 10.0, then: None },
+    Sensitive { name: "d10_spin_up_rho_09", until: 15.0, then: None },
+    // A double pendulum, in effect
+    Sensitive { name: "d14_robot_arm_60", until: 18.0, then: None },
+    Sensitive { name: "d14_robot_arm_60_rho_half", until: 18.0, then: None },
+    // A wire compressed a thousand times beyond buckling: what is off its axis grows. By its own unit of time.
+    Sensitive { name: "z08_megametre", until: 3e5, then: Some(1e-6) },
+    Sensitive { name: "z08_micrometre", until: 1.0000003, then: Some(1e-6) },
+    Sensitive { name: "z08_unity", until: 300.0, then: Some(1e-6) },
+];
+
+/// The answer of each deck, in each row, is the turned one to `tolerance`, but for [`SENSITIVE`] ones.
 fn turn_all(families: &str, orientations: usize, tolerance: f64) {
-    let mut random = Random::new(11);
     let mut wrong = Vec::new();
     let mut compared = 0;
     for path in decks("decks/hard") {
@@ -174,28 +271,39 @@ fn turn_all(families: &str, orientations: usize, tolerance: f64) {
         deck.expects.clear();
         let Some(deck) = with_axes(deck) else { continue };
         let Some(plain) = run(&deck) else { continue };
-        let mut worst = 0.0_f64;
-        for _ in 0..orientations {
-            let q = Rotation::new(random.vector(3.0)).r;
-            let Some(other) = run(&turn(deck.clone(), q)) else {
-                wrong.push(format!("{name}: refused when turned"));
-                break;
-            };
-            if other.name != plain.name || other.load != plain.load {
-                wrong
-                    .push(format!("{name}: {} at {}, turned {} at {}", plain.name, plain.load, other.name, other.load));
-                break;
-            }
-            worst = worst.max(difference(&plain, &other, q));
-        }
         compared += 1;
-        eprintln!("{name}: {worst:.1e}");
-        if worst > tolerance {
-            wrong.push(format!("{name}: {worst:.1e}"));
+        match turn_twice(&deck, &plain, orientations) {
+            Ok(turned) => {
+                let (line, holds) = turned.judge(&name, tolerance);
+                eprintln!("{name}: {line}");
+                if !holds {
+                    wrong.push(format!("{name}: {line}"));
+                }
+            }
+            Err(why) => wrong.push(format!("{name}: {why}")),
         }
     }
     assert!(compared > 0);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+impl Turned {
+    fn judge(&self, name: &str, tolerance: f64) -> (String, bool) {
+        let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        let (worst, round_off) = (largest(&self.worst), largest(&self.round_off));
+        let mut line = format!("{worst:.1e}, round-off {round_off:.1e}");
+        if let Some(k) = self.worst.iter().position(|&worst| worst > tolerance) {
+            line += &format!(", beyond {tolerance:.0e} from {} of {}", self.clocks[k], self.clocks.last().unwrap());
+        }
+        let sensitive = SENSITIVE.iter().find(|sensitive| sensitive.name == name);
+        let chaotic = sensitive.is_some_and(|sensitive| sensitive.then.is_none());
+        let limit = |clock: f64| match sensitive {
+            Some(Sensitive { until, then, .. }) if clock > *until => then.unwrap_or(f64::INFINITY),
+            _ => tolerance,
+        };
+        let holds = self.clocks.iter().zip(&self.worst).all(|(&clock, &worst)| worst <= limit(clock));
+        (line, holds && (!chaotic || round_off > tolerance))
+    }
 }
 
 #[test]
