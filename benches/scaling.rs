@@ -40,7 +40,7 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
     let Ok(equations) = model.begin_stage(0, kind, &state) else { return 0.0 };
     let effects = model.acting(&StageContext { number: 0, kind, rotating: false });
     let shapes: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
-    let mut assembly = Assembly::new(effects.clone(), equations, model.slots.len());
+    let mut assembly = Assembly::new(effects.clone(), equations, &model);
     let mut scatter = || {
         let start = Instant::now();
         for (number, (effect, cliques)) in effects.iter().zip(&shapes).enumerate() {

@@ -116,10 +116,10 @@ fn tell_size(scene: &Scene) -> Result<(), String> {
     let begun = model.begin_stage(0, kind, &state);
     let equations = begun.map_err(|error| format!("the first stage cannot begin: {error:?}"))?;
     let (free, slots) = (equations.count(), model.slots.len());
-    let assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, slots);
+    let assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, &model);
     let entries = assembly.system.pattern.nonzeros();
-    // The tangent, about four times as much for its factors, places of the entries, the state and its copies.
-    let bytes = 8 * (entries + 4 * entries) + 4 * 2 * entries + 24 * 12 * slots;
+    // The tangent and its factors, the places of its blocks, the state and its copies.
+    let bytes = 2 * 8 * assembly.system.pattern.values() + 24 * 16 * slots;
     say::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),

@@ -173,7 +173,7 @@ impl Run<'_> {
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let system = &assembly.system;
         self.counters.work.factorisations += 1;
-        if !newton.solver.factorise(system) {
+        if !newton.solver.factorise_surely(system) {
             let vector = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
@@ -281,7 +281,7 @@ impl Operator for Softening<'_> {
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
         let mut out = self.system.multiply(self.varied, x);
         out.iter_mut().for_each(|v| *v = -*v);
-        self.solver.solve(&mut out).then_some(out)
+        self.solver.solve_once(self.system, &mut out).then_some(out)
     }
 
     fn weigh(&mut self, x: &[f64]) -> Vec<f64> {

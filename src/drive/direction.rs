@@ -39,7 +39,7 @@ impl Run<'_> {
         let mut solution = vec![0.0; system.pattern.equations.count()];
         system.right_hand_side_of(&pull, &mut solution);
         self.counters.work.factorisations += 1;
-        if !(newton.solver.factorise(system) && newton.solver.solve(&mut solution)) {
+        if !(newton.solver.factorise(system) && newton.solver.solve(system, &mut solution)) {
             let vector = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }

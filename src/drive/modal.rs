@@ -74,8 +74,7 @@ impl Run<'_> {
         let (moment, done) = (self.moment(), self.static_progress(0.5));
         let Workshop { assembly, newton, .. } = workshop;
         let system = &mut assembly.system;
-        // The last value of each is rubbish.
-        let part = |values: &[f64]| largest(&values[..system.pattern.nonzeros()]);
+        let part = |values: &[f64]| largest(values);
         let (stiffest, heaviest, dampest) = (part(&matrices.stiffness), part(&matrices.mass), part(&matrices.damping));
         if heaviest == 0.0 {
             return Err(Failure::Deck("a modal stage needs mass: nothing that is free to move has any".into()));
@@ -92,7 +91,7 @@ impl Run<'_> {
             let values: Vec<f64> = (0..system.values.len()).map(|k| matrices.combined(k, shift)).collect();
             system.values.copy_from_slice(&values);
             self.counters.work.factorisations += 1;
-            if !newton.solver.factorise(system) {
+            if !newton.solver.factorise_surely(system) {
                 let vector = newton.solver.null_vector(system);
                 return Err(self.name_mechanism(vector, &workshop.assembly.system));
             }
@@ -140,11 +139,9 @@ fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
     let is_multiplier: Vec<bool> = (0..pattern.equations.count())
         .map(|k| model.slots[pattern.equations.direction(k).slot as usize].is_multiplier())
         .collect();
-    for column in 0..is_multiplier.len() {
-        for k in pattern.column_starts[column] as usize..pattern.column_starts[column + 1] as usize {
-            if is_multiplier[column] || is_multiplier[pattern.rows[k] as usize] {
-                values[k] = 0.0;
-            }
+    for (column, &own) in is_multiplier.iter().enumerate() {
+        for entry in pattern.entries(column as u32).filter(|entry| own || is_multiplier[entry.row as usize]) {
+            values[entry.place] = 0.0;
         }
     }
 }
@@ -188,14 +185,14 @@ impl Operator for Motions<'_> {
         let (n, e) = (self.system.pattern.equations.count(), self.shift);
         if self.symmetric {
             let mut out = self.system.multiply(&self.matrices.mass, x);
-            return self.solver.solve(&mut out).then_some(out);
+            return self.solver.solve_once(self.system, &mut out).then_some(out);
         }
         let (r1, r2) = x.split_at(n);
         let scaled: Vec<f64> = r1.iter().zip(r2).map(|(a, b)| e * a + e * b).collect();
         let (mass, damping) =
             (self.system.multiply(&self.matrices.mass, &scaled), self.system.multiply(&self.matrices.damping, r1));
         let mut out: Vec<f64> = mass.iter().zip(&damping).map(|(m, c)| -(m + c)).collect();
-        if !self.solver.solve(&mut out) {
+        if !self.solver.solve_once(self.system, &mut out) {
             return None;
         }
         let second: Vec<f64> = out.iter().zip(r1).map(|(x, r)| x + r / e).collect();

@@ -389,7 +389,7 @@ impl Path {
         work.factorisations += 1;
         work.iterations += 1;
         let solved = timed(&mut work.solve_seconds, || {
-            solver.factorise(system) && solver.solve(&mut back) && solver.solve(&mut along)
+            solver.factorise(system) && solver.solve(system, &mut back) && solver.solve(system, &mut along)
         });
         if !solved {
             return Err(NewtonFailure::Singular(mechanism(solver, assembly, &run.model, &run.state)));

@@ -247,6 +247,8 @@ pub struct Counters {
     pub work: Work,
     /// Evaluations of instances by effect
     pub evaluations: Vec<(&'static str, u64)>,
+    /// The linear solvers that were used
+    pub linear_solvers: Vec<&'static str>,
 }
 
 /// A run in progress.
@@ -330,6 +332,7 @@ impl<'o> Run<'o> {
                 }
             };
             self.count_evaluations(&workshop.assembly);
+            self.note_solver(workshop.newton.solver.name());
             self.warn_of_round_off();
             self.warn_of_frame();
             self.warn_of_loss(&workshop);
@@ -337,6 +340,12 @@ impl<'o> Run<'o> {
             self.model.end_stage(&self.state);
         }
         Ok(())
+    }
+
+    fn note_solver(&mut self, name: &'static str) {
+        if !self.counters.linear_solvers.contains(&name) {
+            self.counters.linear_solvers.push(name);
+        }
     }
 
     /// Settles loads and constraints of the stage, and analyses the pattern of its unknowns.
@@ -347,8 +356,8 @@ impl<'o> Run<'o> {
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
         let slots = self.model.slots.len();
-        let assembly = Assembly::new(self.model.acting(&stage.context(self.stage)), equations, slots);
-        let Some(solver) = LinearSolver::new(&assembly.system.pattern) else {
+        let assembly = Assembly::new(self.model.acting(&stage.context(self.stage)), equations, &self.model);
+        let Some(solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
             return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
         };
         let convergence = Convergence { tolerance: stage.tolerance };

@@ -110,7 +110,7 @@ impl Run<'_> {
         system.right_hand_side(&mut right_hand_side);
         ignore_massless(system, &self.model, &mut right_hand_side);
         self.counters.work.factorisations += 1;
-        if !(solver.factorise(system) && solver.solve(&mut right_hand_side)) {
+        if !(solver.factorise(system) && solver.solve(system, &mut right_hand_side)) {
             let vector = solver.null_vector(system);
             let named = self.name_mechanism(vector, &workshop.assembly.system);
             return if self.is_held(workshop, &named) { Ok(None) } else { Err(named) };

@@ -74,6 +74,10 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         cliques
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn memory_points(&self) -> usize {
         self.elements.two.len() + 2 * self.elements.three.len() + 3 * self.elements.four.len()
     }

@@ -27,6 +27,10 @@ impl Effect for BeamMass {
         self.elements.cliques(Blocks::Displacements)
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         self.elements.add(&Translation, at, weights, out);
     }

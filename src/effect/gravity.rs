@@ -38,6 +38,10 @@ impl Effect for BeamGravity {
         self.elements.any(|inertia| inertia.offset != Vec3::ZERO)
     }
 
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let acceleration = self.acceleration * at.amplitude[self.amplitude];
         self.elements.add(&Weight { acceleration }, at, weights, out);
@@ -72,6 +76,10 @@ impl Effect for BodyGravity {
 
     fn has_tangent(&self) -> bool {
         self.bodies.iter().any(|body| body.inertia.offset != Vec3::ZERO)
+    }
+
+    fn is_symmetric(&self) -> bool {
+        true
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -104,6 +104,10 @@ impl Effect for Links {
         cliques
     }
 
+    fn is_symmetric(&self) -> bool {
+        self.links.iter().all(|link| link.damping == 0.0)
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
         for (k, link) in self.links.iter().enumerate() {

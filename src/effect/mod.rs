@@ -87,6 +87,11 @@ pub trait Effect: Send + Sync {
         true
     }
 
+    /// Whether its tangent is symmetric, whatever the weights.
+    fn is_symmetric(&self) -> bool {
+        !self.has_tangent()
+    }
+
     /// Whether it acts in a stage: inertia and damping do where something moves, inertia not where a rotating frame holds it.
     fn acts(&self, stage: &StageContext) -> bool {
         let moves = matches!(stage.kind, StageKind::Dynamic | StageKind::Modal);

@@ -54,6 +54,12 @@ impl Effect for Spring {
         cliques
     }
 
+    fn is_symmetric(&self) -> bool {
+        self.springs
+            .iter()
+            .all(|spring| spring.translation_damping == Mat3::ZERO && spring.rotation_damping == Mat3::ZERO)
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
         for (k, spring) in self.springs.iter().enumerate() {

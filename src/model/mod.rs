@@ -12,7 +12,7 @@ pub use history::{History, Table};
 
 use crate::effect::{Effect, Energy, Momentum, Noise};
 use crate::kernel::Weights;
-use crate::system::{Direction, Equations, FrameConflict, Memory, Node, Pattern, Slot, State, System};
+use crate::system::{Direction, Equations, FrameConflict, Groups, Memory, Node, Pattern, Slot, State, System};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -176,6 +176,14 @@ impl Model {
         too_far
     }
 
+    /// The rotation of a node shares the tile of its displacement, which it follows.
+    pub fn groups(&self) -> Groups {
+        let kind = |slot: Slot| self.slots[slot as usize].kind;
+        Groups::new(self.slots.len(), |slot| {
+            kind(slot) == SlotKind::Rotation && kind(slot - 1) == SlotKind::Displacement
+        })
+    }
+
     /// The effects that act in a stage.
     pub fn acting(&self, stage: &StageContext) -> Vec<Arc<dyn Effect>> {
         self.effects.iter().filter(|effect| effect.acts(stage)).cloned().collect()
@@ -229,14 +237,15 @@ pub struct Assembly {
 
 impl Assembly {
     /// The system of these effects on these equations.
-    pub fn new(effects: Vec<Arc<dyn Effect>>, equations: Equations, slots: usize) -> Self {
+    pub fn new(effects: Vec<Arc<dyn Effect>>, equations: Equations, model: &Model) -> Self {
         let cliques: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
+        let symmetric = effects.iter().all(|effect| effect.is_symmetric());
         let memory = |e: &Arc<dyn Effect>| Memory { points: vec![[0.0; 6]; e.memory_points()], valid: false };
         Self {
             memories: effects.iter().map(memory).collect(),
             evaluations: effects.iter().map(|effect| (effect.name(), 0)).collect(),
             sizes: cliques.iter().map(|c| c.len() as u64).collect(),
-            system: System::new(Pattern::new(equations, cliques), slots),
+            system: System::new(Pattern::new(equations, model.groups(), cliques), model.slots.len(), symmetric),
             effects,
         }
     }

@@ -63,6 +63,7 @@ fn counters(counters: &Counters) -> Value {
         "chart_switches": counters.work.chart_switches,
         "mixed_elements": counters.mixed_elements,
         "evaluations": evaluations,
+        "linear_solvers": counters.linear_solvers,
     })
 }
 

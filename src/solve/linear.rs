@@ -1,204 +1,125 @@
-//! Sparse linear systems by faer: one symbolic analysis a stage, one numeric factorisation an iteration.
+//! The linear solver: by blocks where that is fast and safe, else in general.
 
-use crate::system::{Equations, Pattern, System};
-use crate::tensor::Vec3;
-use faer::Conj;
-use faer::Par;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::mat::MatMut;
-use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use super::block::BlockSolver;
+use super::general::GeneralSolver;
+use crate::system::{Slot, System};
 
-/// LU with partial pivoting and a fill-reducing column order.
+/// Solves with tangents of one pattern.
 ///
-/// Tangents are unsymmetric as soon as something turns or a moment is fixed in space, and indefinite beyond limit points;
-/// LU serves all of them.
+/// Blocks serve what consists of nodes and is not too much of a net; joints with multipliers, whose diagonal is empty, and
+/// tangents whose pivots fail across blocks are left to LU with partial pivoting.
 pub struct LinearSolver {
-    symbolic: SymbolicLu<u32>,
-    numeric: NumericLu<u32, f64>,
-    memory: MemBuffer,
+    way: Way,
+    /// Whether the last factorisation has come to its end
     factored: bool,
 }
 
-/// Unknowns that move without any force, as far as the tangent tells.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NullVector {
-    /// One entry an equation, of sizes that compare; the largest tells what moves.
-    pub entries: Vec<f64>,
-    /// The unknowns themselves
-    pub motion: Vec<f64>,
-    /// Whether the tangent has some stiffness against it after all
-    pub held: bool,
+enum Way {
+    Blocks(Box<BlockSolver>),
+    General(Box<GeneralSolver>),
 }
 
-impl NullVector {
-    /// The slot that moves most, told by entries that compare, and the motion of every slot.
-    pub fn by_slot(&self, equations: &Equations, slots: usize) -> (usize, Vec<Vec3>) {
-        let field = |entries: &[f64]| {
-            let mut field = vec![Vec3::ZERO; slots];
-            equations.scatter(entries, None, &mut field);
-            field
-        };
-        let compared = field(&self.entries);
-        let larger = |best: usize, slot: usize| if compared[slot].norm() > compared[best].norm() { slot } else { best };
-        ((0..slots).fold(0, larger), field(&self.motion))
-    }
-}
+/// A solution is one of a system whose entries differ by no more than this, relative to each (Oettli and Prager 1964).
+const BACKWARD_ERROR: f64 = 1e-11;
 
-/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
-const NO_STIFFNESS: f64 = 8.0;
+/// What refinement does not bring below this is no solution.
+const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
+
+/// So many corrections
+const REFINEMENTS: usize = 3;
 
 impl LinearSolver {
-    /// Analyses a pattern. `None` where memory for it cannot be had.
-    pub fn new(pattern: &Pattern) -> Option<Self> {
-        let symbolic = factorize_symbolic_lu(structure(pattern), Default::default()).ok()?;
-        let factor = symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default());
-        let solve = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        let memory = MemBuffer::try_new(factor.or(solve)).ok()?;
-        Some(Self { symbolic, numeric: NumericLu::new(), memory, factored: false })
+    /// Analyses the pattern of a system. `None` where memory for it cannot be had.
+    pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
+        let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, system.symmetric)).flatten();
+        let way = match blocks {
+            Some(blocks) => Way::Blocks(Box::new(blocks)),
+            None => Way::General(Box::new(GeneralSolver::new(system)?)),
+        };
+        Some(Self { way, factored: false })
+    }
+
+    /// How it solves, in a few words.
+    pub fn name(&self) -> &'static str {
+        match &self.way {
+            Way::Blocks(blocks) => blocks.name(),
+            Way::General(_) => "sparse LU",
+        }
     }
 
     /// Factorises the tangent; `false` where a pivot cannot be found.
     pub fn factorise(&mut self, system: &System) -> bool {
-        let entries = system.pattern.nonzeros();
-        let matrix = SparseColMatRef::new(structure(&system.pattern), &system.values[..entries]);
-        let stack = MemStack::new(&mut self.memory);
-        let done = self.symbolic.factorize_numeric_lu(&mut self.numeric, matrix, Par::Seq, stack, Default::default());
-        self.factored = done.is_ok();
+        self.factored = match &mut self.way {
+            Way::Blocks(blocks) => blocks.factorise(system) || self.leave_blocks(system),
+            Way::General(general) => general.factorise(system),
+        };
         self.factored
     }
 
+    /// The same for systems whose values do not stay: what it solves is looked at here and now.
+    pub fn factorise_surely(&mut self, system: &System) -> bool {
+        if !self.factorise(system) {
+            return false;
+        }
+        let ones = vec![1.0; system.pattern.equations.count()];
+        let mut x = system.multiply(&system.values, &ones);
+        self.solve(system, &mut x)
+    }
+
+    /// Solves with the last factorisation, which is that of `system`; `false` where there is no solution. What blocks leave
+    /// of the residual is refined.
+    pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
+        if matches!(self.way, Way::General(_)) {
+            return self.solve_once(system, right_hand_side);
+        }
+        let wanted = right_hand_side.to_vec();
+        if self.solve_once(system, right_hand_side) && self.refine(system, &wanted, right_hand_side) {
+            return true;
+        }
+        right_hand_side.copy_from_slice(&wanted);
+        self.factored = self.leave_blocks(system);
+        self.solve_once(system, right_hand_side)
+    }
+
     /// Solves with the last factorisation; `false` where the solution is not finite.
-    pub fn solve(&mut self, right_hand_side: &mut [f64]) -> bool {
+    pub fn solve_once(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
         if right_hand_side.is_empty() {
             return true;
         }
         if !self.factored {
             return false;
         }
-        let n = right_hand_side.len();
-        let lu = LuRef::new_unchecked(&self.symbolic, &self.numeric);
-        let stack = MemStack::new(&mut self.memory);
-        lu.solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(right_hand_side, n, 1),
-            Par::Seq,
-            stack,
-        );
+        match &mut self.way {
+            Way::Blocks(blocks) => blocks.solve(&system.pattern, right_hand_side),
+            Way::General(general) => general.solve(right_hand_side),
+        }
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
-    /// A direction in which the tangent has no stiffness.
-    pub fn null_vector(&mut self, system: &System) -> Option<NullVector> {
-        self.softest(system).filter(|vector| !vector.held)
-    }
-
-    /// The direction in which the tangent has the least stiffness, by inverse iteration with the last factorisation.
-    /// Unknowns are scaled by their diagonal, so that forces and moments compare.
-    pub fn softest(&mut self, system: &System) -> Option<NullVector> {
-        if system.pattern.equations.count() == 0 {
-            return None;
-        }
-        if let Some(empty) = empty_column(system) {
-            let mut entries = vec![0.0; system.pattern.equations.count()];
-            entries[empty] = 1.0;
-            return Some(NullVector { motion: entries.clone(), entries, held: false });
-        }
-        let scale = scales(system);
-        let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
-        for _ in 0..3 {
-            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
-            if !self.solve(&mut x) {
-                return self.null_vector_of_shifted(system);
+    /// Corrects a solution until its residual is round-off; `false` where it stays larger than it may.
+    fn refine(&mut self, system: &System, wanted: &[f64], x: &mut [f64]) -> bool {
+        let mut error = f64::INFINITY;
+        for _ in 0..=REFINEMENTS {
+            let (mut residual, now) = system.residual(wanted, x);
+            // A last correction that made it worse is round-off.
+            if now <= BACKWARD_ERROR || now >= error {
+                error = error.min(now);
+                break;
             }
-            let largest = x.iter().zip(&scale).fold(0.0_f64, |m, (x, s)| m.max((x * s).abs()));
-            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / largest);
-        }
-        let motion: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
-        let held = stiffness_of(system, &motion) > NO_STIFFNESS;
-        Some(NullVector { entries: x, motion, held })
-    }
-
-    /// The same where the factorisation broke down: the diagonal is raised by a little first.
-    fn null_vector_of_shifted(&mut self, system: &System) -> Option<NullVector> {
-        let mut shifted = system.clone();
-        for place in diagonal_places(system).into_iter().flatten() {
-            // Multipliers have no diagonal: they get a little compliance.
-            let value = shifted.values[place];
-            shifted.values[place] = if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
-        }
-        if !self.factorise(&shifted) {
-            return None;
-        }
-        let mut x = vec![1.0; system.pattern.equations.count()];
-        for _ in 0..3 {
-            if !self.solve(&mut x) {
-                return None;
+            error = now;
+            if !self.solve_once(system, &mut residual) {
+                return false;
             }
-            let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            x.iter_mut().for_each(|x| *x /= largest);
+            x.iter_mut().zip(&residual).for_each(|(x, correction)| *x += correction);
         }
-        Some(NullVector { motion: x.clone(), entries: x, held: false })
+        error <= LARGEST_BACKWARD_ERROR
     }
-}
 
-fn structure(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, u32> {
-    let n = pattern.equations.count();
-    SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows)
-}
-
-/// Where the diagonal entry of each column is stored.
-fn diagonal_places(system: &System) -> Vec<Option<usize>> {
-    let pattern = &system.pattern;
-    (0..pattern.equations.count()).map(|k| pattern.find(k as u32, k as u32)).collect()
-}
-
-fn diagonal(system: &System) -> Vec<f64> {
-    diagonal_places(system).into_iter().map(|place| place.map_or(0.0, |place| system.values[place])).collect()
-}
-
-/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column comparable.
-fn scales(system: &System) -> Vec<f64> {
-    let roots: Vec<f64> = diagonal(system).iter().map(|d| d.abs().sqrt()).collect();
-    let starts = &system.pattern.column_starts;
-    let column = |c: usize| {
-        let entries = starts[c] as usize..starts[c + 1] as usize;
-        let compared = entries.map(|k| (system.values[k], roots[system.pattern.rows[k] as usize]));
-        compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
-    };
-    let entry = |c: usize| {
-        let entries = starts[c] as usize..starts[c + 1] as usize;
-        entries.fold(0.0_f64, |m, k| m.max(system.values[k].abs()))
-    };
-    let scale = |c: usize| match (roots[c], column(c)) {
-        (root, _) if root > 0.0 => root,
-        (_, compared) if compared > 0.0 => compared,
-        // Unknowns and multipliers that only meet each other.
-        _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
-    };
-    (0..roots.len()).map(scale).collect()
-}
-
-/// A column without any entry that is not zero.
-fn empty_column(system: &System) -> Option<usize> {
-    let starts = &system.pattern.column_starts;
-    (0..system.pattern.equations.count())
-        .find(|&c| system.values[starts[c] as usize..starts[c + 1] as usize].iter().all(|&v| v == 0.0))
-}
-
-/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated (Neumaier 1974), so that
-/// fine meshes of slender beams, whose softest motions are nearly free, are not taken for mechanisms.
-fn stiffness_of(system: &System, x: &[f64]) -> f64 {
-    let starts = &system.pattern.column_starts;
-    let (mut sum, mut lost, mut squares) = (0.0_f64, 0.0, 0.0);
-    for column in 0..x.len() {
-        for k in starts[column] as usize..starts[column + 1] as usize {
-            let term = x[system.pattern.rows[k] as usize] * system.values[k] * x[column];
-            let next = sum + term;
-            lost += if sum.abs() >= term.abs() { (sum - next) + term } else { (term - next) + sum };
-            sum = next;
-            squares += term * term;
-        }
+    /// From here on in general.
+    fn leave_blocks(&mut self, system: &System) -> bool {
+        let Some(mut general) = GeneralSolver::new(system) else { return false };
+        let done = general.factorise(system);
+        self.way = Way::General(Box::new(general));
+        done
     }
-    if squares == 0.0 { 0.0 } else { (sum + lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }

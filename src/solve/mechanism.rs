@@ -1,7 +1,8 @@
 //! Motions that nothing holds: mechanisms and loose parts.
 
 use super::convergence::correction;
-use super::linear::{LinearSolver, NullVector};
+use super::linear::LinearSolver;
+use super::softest::NullVector;
 use crate::model::{Assembly, Model};
 use crate::system::State;
 

@@ -1,15 +1,22 @@
 //! Newton's iteration: linear solver, stop test, and the failures it can end with.
 
+mod block;
+mod columns;
 mod convergence;
+mod general;
 mod krylov;
 mod linear;
 mod mechanism;
 mod newton;
 mod pivots;
+mod softest;
 
+pub use block::BlockSolver;
 pub use convergence::{Convergence, Residual, Verdict};
+pub use general::GeneralSolver;
 pub use krylov::{Operator, largest_eigenvalues};
-pub use linear::{LinearSolver, NullVector};
+pub use linear::LinearSolver;
 pub use mechanism::{Limp, mechanism};
 pub use newton::{Newton, NewtonFailure, Work, timed};
 pub use pivots::{Pivots, is_symmetric};
+pub use softest::NullVector;

@@ -1,8 +1,9 @@
 //! Newton's iteration on one step or load level.
 
 use super::convergence::{Convergence, Residual, Verdict, correction, weighted};
-use super::linear::{LinearSolver, NullVector};
+use super::linear::LinearSolver;
 use super::mechanism::mechanism;
+use super::softest::NullVector;
 use crate::integrate::Method;
 use crate::model::{Assembly, Model, charts};
 use crate::system::{State, System};
@@ -221,7 +222,8 @@ impl Newton {
         system.right_hand_side(right_hand_side);
         work.factorisations += 1;
         work.iterations += 1;
-        let solved = timed(&mut work.solve_seconds, || solver.factorise(system) && solver.solve(right_hand_side));
+        let solved =
+            timed(&mut work.solve_seconds, || solver.factorise(system) && solver.solve(system, right_hand_side));
         if solved {
             system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
         }

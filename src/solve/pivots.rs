@@ -1,20 +1,29 @@
 //! The number of negative pivots of a symmetric tangent: how many directions have lost their stiffness.
 
-use crate::system::{Pattern, Slot, System};
+use super::block::BlockSolver;
+use super::columns::Columns;
+use crate::system::{Equations, Pattern, Slot, System};
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// LDL^T without pivoting, whose D tells the inertia (Sylvester).
-pub struct Pivots {
+pub enum Pivots {
+    /// By blocks
+    Blocks(Box<BlockSolver>),
+    /// In general
+    Entries(Box<Entries>),
+}
+
+/// Of numbers, by faer.
+pub struct Entries {
     symbolic: SymbolicCholesky<u32>,
+    columns: Columns,
     memory: MemBuffer,
     factor: Vec<f64>,
-    values: Vec<f64>,
     /// Where the diagonal entries of multipliers are stored
     multipliers: Vec<usize>,
 }
@@ -29,45 +38,55 @@ const COMPLIANCE: f64 = 1e-9;
 impl Pivots {
     /// For tangents of this pattern. `None` where memory cannot be had.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
-        let pattern = &system.pattern;
-        let (n, entries) = (pattern.equations.count(), pattern.nonzeros());
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
-            ..Default::default()
-        };
-        let symbolic =
-            factorize_symbolic_cholesky(structure, faer::Side::Lower, SymmetricOrdering::Amd, params).ok()?;
-        let scratch = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
-        let memory = MemBuffer::try_new(scratch).ok()?;
-        let numbers = multipliers.iter().flat_map(|&slot| pattern.equations.of(slot));
-        let multipliers = numbers.filter_map(|number| pattern.find(number, number)).collect();
-        Some(Self { factor: vec![0.0; symbolic.len_val()], values: vec![0.0; entries], symbolic, memory, multipliers })
+        let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, true)).flatten();
+        match blocks {
+            Some(blocks) => Some(Self::Blocks(Box::new(blocks))),
+            None => Some(Self::Entries(Box::new(Entries::new(system, multipliers)?))),
+        }
     }
 
     /// How many pivots of the tangent are negative, those of multipliers left out; `None` where it is not symmetric, or a
     /// pivot is lost.
     pub fn negative(&mut self, system: &System) -> Option<usize> {
-        let pattern = &system.pattern;
-        if !is_symmetric(pattern, &system.values) {
+        if !system.symmetric && !is_symmetric(&system.pattern, &system.values) {
             return None;
         }
-        let entries = self.values.len();
-        self.values.copy_from_slice(&system.values[..entries]);
-        let largest = self.values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        for &place in &self.multipliers {
-            self.values[place] -= COMPLIANCE / largest;
+        match self {
+            Self::Blocks(blocks) => blocks.factorise(system).then(|| blocks.negative()).flatten(),
+            Self::Entries(entries) => entries.negative(system),
         }
-        let n = pattern.equations.count();
-        let structure = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
-        let matrix = SparseColMatRef::new(structure, &self.values[..]);
-        let stack = MemStack::new(&mut self.memory);
-        let regularization = Default::default();
-        let done = self.symbolic.factorize_numeric_ldlt(
-            &mut self.factor,
+    }
+}
+
+impl Entries {
+    fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
+        let columns = Columns::new(&system.pattern);
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
+            ..Default::default()
+        };
+        let (side, order) = (faer::Side::Lower, SymmetricOrdering::Amd);
+        let symbolic = factorize_symbolic_cholesky(columns.structure(), side, order, params).ok()?;
+        let scratch = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+        let memory = MemBuffer::try_new(scratch).ok()?;
+        let numbers = multipliers.iter().flat_map(|&slot| system.pattern.equations.of(slot));
+        let multipliers =
+            numbers.filter(|&n| n != Equations::HELD).filter_map(|number| columns.diagonal(number)).collect();
+        Some(Self { factor: vec![0.0; symbolic.len_val()], symbolic, columns, memory, multipliers })
+    }
+
+    fn negative(&mut self, system: &System) -> Option<usize> {
+        let Self { symbolic, columns, memory, factor, multipliers } = self;
+        let matrix = columns.matrix(system, |values| {
+            let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            multipliers.iter().for_each(|&place| values[place] -= COMPLIANCE / largest);
+        });
+        let (stack, side) = (MemStack::new(memory), faer::Side::Lower);
+        let done = symbolic.factorize_numeric_ldlt(
+            factor,
             matrix,
-            faer::Side::Lower,
-            regularization,
+            side,
+            Default::default(),
             Par::Seq,
             stack,
             Default::default(),
@@ -75,29 +94,27 @@ impl Pivots {
         if done.is_err() {
             return None;
         }
-        let SymbolicCholeskyRaw::Simplicial(simplicial) = self.symbolic.raw() else { return None };
+        let SymbolicCholeskyRaw::Simplicial(simplicial) = symbolic.raw() else { return None };
         let starts = simplicial.col_ptr();
-        let diagonal = (0..n).map(|column| self.factor[starts[column] as usize]);
+        let diagonal = (0..system.pattern.equations.count()).map(|column| factor[starts[column] as usize]);
         let negative = diagonal.filter(|&d| d < 0.0).count();
-        negative.checked_sub(self.multipliers.len())
+        negative.checked_sub(multipliers.len())
     }
 }
 
 /// Whether each entry is what its mirror image is.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
-    let values = &values[..pattern.nonzeros()];
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let root = |k: u32| match pattern.find(k, k).map_or(0.0, |place| values[place].abs().sqrt()) {
         0.0 => largest.sqrt(),
         root => root,
     };
-    let roots: Vec<f64> = (0..pattern.equations.count() as u32).map(root).collect();
-    (0..pattern.equations.count() as u32).all(|column| {
-        let entries =
-            pattern.column_starts[column as usize] as usize..pattern.column_starts[column as usize + 1] as usize;
-        entries.into_iter().all(|k| {
-            let mirror = pattern.find(column, pattern.rows[k]).map_or(0.0, |place| values[place]);
-            (values[k] - mirror).abs() <= SYMMETRY * roots[column as usize] * roots[pattern.rows[k] as usize]
+    let count = pattern.equations.count() as u32;
+    let roots: Vec<f64> = (0..count).map(root).collect();
+    (0..count).all(|column| {
+        pattern.entries(column).all(|entry| {
+            let mirror = pattern.find(column, entry.row).map_or(0.0, |place| values[place]);
+            (values[entry.place] - mirror).abs() <= SYMMETRY * roots[column as usize] * roots[entry.row as usize]
         })
     })
 }

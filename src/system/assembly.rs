@@ -1,7 +1,7 @@
 //! Forces and tangent of the whole scene, and the sink through which one effect adds to them.
 
 use super::equations::Equations;
-use super::pattern::{Pattern, Places};
+use super::pattern::{Pattern, Places, Tile, WIDTH};
 use super::state::Slot;
 use crate::kernel::{ElementSystem, MAX_NODES};
 use crate::tensor::{Mat3, Vec3};
@@ -28,7 +28,9 @@ pub struct System {
     pub pattern: Pattern,
     /// By category and slot
     pub force: [Vec<Vec3>; 4],
-    /// The values of the tangent; one more than the pattern has entries, the last is rubbish.
+    /// Whether each effect's tangent is symmetric, and so their sum
+    pub symmetric: bool,
+    /// The values of the tangent, tile by tile
     pub values: Vec<f64>,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
     lift: Vec<Vec3>,
@@ -38,13 +40,14 @@ pub struct System {
 
 impl System {
     /// A system of zeros.
-    pub fn new(pattern: Pattern, slots: usize) -> Self {
+    pub fn new(pattern: Pattern, slots: usize, symmetric: bool) -> Self {
         let zero = vec![Vec3::ZERO; slots];
-        let (entries, equations) = (pattern.nonzeros() + 1, pattern.equations.count());
+        let (values, equations) = (pattern.values(), pattern.equations.count());
         Self {
             pattern,
+            symmetric,
             force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
-            values: vec![0.0; entries],
+            values: vec![0.0; values],
             lift: zero,
             lifts: false,
             lifted: vec![0.0; equations],
@@ -80,16 +83,51 @@ impl System {
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
+    /// The tangent tile by tile, in the order of the pattern.
+    pub fn tiles(&self) -> &[Tile] {
+        tiles(&self.values)
+    }
+
     /// A x, for a matrix with these values on the pattern of the tangent.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
-        for (column, &value) in x.iter().enumerate() {
-            let entries = self.pattern.column_starts[column] as usize..self.pattern.column_starts[column + 1] as usize;
-            for k in entries {
-                out[self.pattern.rows[k] as usize] += values[k] * value;
+        self.each_line(values, x, |row, line, part| {
+            if let Some(out) = out.get_mut(row) {
+                *out += line.iter().zip(part).map(|(a, x)| a * x).sum::<f64>();
+            }
+        });
+        out
+    }
+
+    /// Shows each line of each tile with its equation and the part of x that it meets; zero where that is none.
+    fn each_line(&self, values: &[f64], x: &[f64], mut show: impl FnMut(usize, &[f64; WIDTH], &[f64; WIDTH])) {
+        let pattern = &self.pattern;
+        for column in 0..pattern.groups.count() {
+            let numbers = pattern.numbers(column);
+            let part = std::array::from_fn(|k| x.get(numbers[k] as usize).copied().unwrap_or(0.0));
+            let first = pattern.column_starts[column] as usize;
+            for (&row, tile) in pattern.rows_of(column).iter().zip(&tiles(values)[first..]) {
+                let lines = pattern.numbers(row as usize).iter().zip(tile);
+                lines.for_each(|(&number, line)| show(number as usize, line, &part));
             }
         }
-        out
+    }
+
+    /// b - A x, and its largest component over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
+    pub fn residual(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
+        let mut residual = b.to_vec();
+        let mut sizes = vec![0.0; b.len()];
+        self.each_line(&self.values, x, |row, line, part| {
+            if row < b.len() {
+                let terms: [f64; WIDTH] = std::array::from_fn(|k| line[k] * part[k]);
+                residual[row] -= terms.iter().sum::<f64>();
+                sizes[row] += terms.iter().map(|term| term.abs()).sum::<f64>();
+            }
+        });
+        // Numbers that small have lost digits of their own.
+        let ratio = |((r, b), size): ((&f64, &f64), &f64)| r.abs() / (size + b.abs()).max(1e-280);
+        let worst = residual.iter().zip(b).zip(&sizes).map(ratio).fold(0.0, f64::max);
+        (residual, worst)
     }
 
     /// The right-hand side of the correction: -g - J lift on the free equations.
@@ -135,6 +173,11 @@ impl System {
     }
 }
 
+/// Values as tiles.
+fn tiles(values: &[f64]) -> &[Tile] {
+    values.as_chunks::<WIDTH>().0.as_chunks::<WIDTH>().0
+}
+
 /// Through this an effect adds the force and tangent of its instances.
 pub struct Sink<'a> {
     places: &'a Places,
@@ -161,8 +204,30 @@ impl Sink<'_> {
         if self.places.special[k] {
             return self.add_special(k, element);
         }
-        for (&place, &value) in self.places.of(k).iter().zip(element.tangent()) {
-            self.values[place as usize] += value;
+        self.add_tangent(k, element);
+    }
+
+    #[inline]
+    fn add_tangent(&mut self, k: usize, element: &ElementSystem) {
+        if self.places.whole {
+            self.add_blocks::<WIDTH>(k, element);
+        } else {
+            self.add_blocks::<3>(k, element);
+        }
+    }
+
+    /// Adds the tangent in blocks of W x W.
+    #[inline]
+    fn add_blocks<const W: usize>(&mut self, k: usize, element: &ElementSystem) {
+        let (rows, tangent) = (element.rows(), element.tangent());
+        let across = rows / W;
+        for (block, &place) in self.places.of(k).iter().enumerate() {
+            let first = block / across * W * rows + block % across * W;
+            for r in 0..W {
+                let (from, to) = (first + r * rows, place as usize + r * WIDTH);
+                let target = &mut self.values[to..to + W];
+                target.iter_mut().zip(&tangent[from..from + W]).for_each(|(sum, value)| *sum += value);
+            }
         }
     }
 
@@ -193,11 +258,24 @@ impl Sink<'_> {
                 local.set_tangent(row, column, block);
             }
         }
-        for (&place, &value) in self.places.of(k).iter().zip(local.tangent()) {
-            self.values[place as usize] += value;
-        }
         if let Some(lift) = self.lift {
             self.add_lift(k, &local, lift);
+        }
+        self.drop_held(slots, &mut local);
+        self.add_tangent(k, &local);
+    }
+
+    /// Rows and columns of held directions are no part of the tangent.
+    fn drop_held(&self, slots: &[Slot], local: &mut ElementSystem) {
+        let free = |slot: &Slot| self.equations.of(*slot).map(|number| number != Equations::HELD);
+        for (row, rows) in slots.iter().map(free).enumerate() {
+            for (column, columns) in slots.iter().map(free).enumerate() {
+                let mut block = local.tangent_block(row, column);
+                for (r, line) in block.0.iter_mut().enumerate() {
+                    line.iter_mut().zip(columns).filter(|(_, free)| !(rows[r] && *free)).for_each(|(x, _)| *x = 0.0);
+                }
+                local.set_tangent(row, column, block);
+            }
         }
     }
 

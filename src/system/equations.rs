@@ -73,6 +73,11 @@ impl Equations {
         self.number[slot as usize]
     }
 
+    /// The slot and the local direction of an equation.
+    pub fn origin(&self, equation: usize) -> (Slot, u8) {
+        self.origin[equation]
+    }
+
     /// The turned axes of a slot as columns.
     #[inline]
     pub fn frame(&self, slot: Slot) -> Option<Mat3> {

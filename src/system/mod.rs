@@ -2,12 +2,14 @@
 
 mod assembly;
 mod equations;
+mod groups;
 mod pattern;
 mod stage;
 mod state;
 
 pub use assembly::{Category, Sink, System};
 pub use equations::{Direction, Equations, FrameConflict};
-pub use pattern::{Cliques, Pattern};
+pub use groups::Groups;
+pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH};
 pub use stage::{StageContext, StageKind, StageSet};
 pub use state::{Memory, Node, RotationRate, Slot, State};

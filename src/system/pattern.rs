@@ -1,7 +1,17 @@
-//! The sparsity pattern of the tangent, and for each element the places its entries go to, worked out once.
+//! The sparsity pattern of the tangent in tiles, and for each element the places its blocks go to, worked out once.
 
 use super::equations::Equations;
+use super::groups::{Groups, SLOTS};
 use super::state::Slot;
+
+/// Rows and columns of a tile.
+pub const WIDTH: usize = 3 * SLOTS;
+
+/// A block of the tangent, by rows.
+pub type Tile = [[f64; WIDTH]; WIDTH];
+
+/// Numbers in a tile.
+const TILE: usize = WIDTH * WIDTH;
 
 /// The slots that meet in each instance of an effect: one clique an element.
 #[derive(Clone, Debug, Default)]
@@ -40,13 +50,16 @@ impl Cliques {
     }
 }
 
-/// Where the entries of one effect's instances go.
+/// Where the blocks of one effect's instances go.
 #[derive(Clone, Debug)]
 pub(super) struct Places {
     pub cliques: Cliques,
-    /// By instance and then by rows: the index of the entry's value, [`Pattern::discard`] for entries of held directions.
+    /// Whether each instance couples whole nodes, whose tiles it adds to in one go
+    pub whole: bool,
+    /// By instance and then by rows of blocks: the index of the block's first value. Blocks are those of whole nodes, or else
+    /// those of slots.
     pub values: Vec<u32>,
-    starts: Vec<usize>,
+    starts: Vec<u32>,
     /// Instances that touch a held direction or turned axes.
     pub special: Vec<bool>,
 }
@@ -54,62 +67,89 @@ pub(super) struct Places {
 impl Places {
     #[inline]
     pub fn of(&self, k: usize) -> &[u32] {
-        &self.values[self.starts[k]..self.starts[k + 1]]
+        &self.values[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 }
 
-/// The tangent in compressed columns, without its values.
+/// The tangent in compressed columns of tiles, without its values. Tiles of a node and itself are always there.
+///
+/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     /// The equations that the rows and columns stand for.
     pub equations: Equations,
-    /// Where each column starts.
+    /// The slots of tiles
+    pub groups: Groups,
+    /// Where each column of tiles starts.
     pub column_starts: Vec<u32>,
-    /// The row of each entry.
+    /// The group of the rows of each tile.
     pub rows: Vec<u32>,
+    /// The equation of each row, [`Equations::HELD`] for those without
+    numbers: Vec<u32>,
+    /// Rows without an equation: group, and row of its tile
+    pub idle: Vec<(u32, u8)>,
     pub(super) places: Vec<Places>,
+}
+
+/// An entry of the tangent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its equation
+    pub row: u32,
+    /// The index of its value
+    pub place: usize,
 }
 
 impl Pattern {
     /// The pattern of several effects, given by the cliques of each.
-    pub fn new(equations: Equations, effects: Vec<Cliques>) -> Self {
-        let (column_starts, rows) = compressed_columns(&equations, &effects);
-        let mut pattern = Self { equations, column_starts, rows, places: Vec::new() };
+    pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>) -> Self {
+        let (column_starts, rows) = compressed_columns(&groups, &effects);
+        let numbers = numbers(&equations, &groups);
+        let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
+        let idle = idle.map(|k| ((k / WIDTH) as u32, (k % WIDTH) as u8)).collect();
+        let mut pattern = Self { equations, groups, column_starts, rows, numbers, idle, places: Vec::new() };
         pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
         pattern
     }
 
-    /// The number of stored entries.
-    pub fn nonzeros(&self) -> usize {
+    /// The number of tiles.
+    pub fn tiles(&self) -> usize {
         self.rows.len()
     }
 
-    /// The index behind the last value: what is added there is dropped.
-    pub fn discard(&self) -> u32 {
-        self.rows.len() as u32
+    /// The number of values: those of all tiles.
+    pub fn values(&self) -> usize {
+        TILE * self.tiles()
     }
 
-    fn places_of(&self, cliques: Cliques) -> Places {
-        let mut places = Places {
-            values: Vec::new(),
-            starts: Vec::with_capacity(cliques.len() + 1),
-            special: Vec::with_capacity(cliques.len()),
-            cliques: Cliques::default(),
-        };
-        for slots in cliques.iter() {
-            places.starts.push(places.values.len());
-            let equations: Vec<u32> = slots.iter().flat_map(|&slot| self.equations.of(slot)).collect();
-            for &row in &equations {
-                places.values.extend(
-                    equations.iter().map(|&column| self.find(row, column).map_or(self.discard(), |k| k as u32)),
-                );
-            }
-            let turned = slots.iter().any(|&slot| self.equations.frame(slot).is_some());
-            places.special.push(turned || equations.contains(&Equations::HELD));
-        }
-        places.starts.push(places.values.len());
-        places.cliques = cliques;
-        places
+    /// The groups of the rows of the tiles in a column.
+    #[inline]
+    pub fn rows_of(&self, column: usize) -> &[u32] {
+        &self.rows[self.column_starts[column] as usize..self.column_starts[column + 1] as usize]
+    }
+
+    /// The equations of a group's rows.
+    #[inline]
+    pub fn numbers(&self, group: usize) -> &[u32] {
+        &self.numbers[WIDTH * group..WIDTH * (group + 1)]
+    }
+
+    /// The entries of an equation's column, by rows.
+    pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
+        let (group, c) = self.row_of(column);
+        let tiles = self.column_starts[group] as usize..self.column_starts[group + 1] as usize;
+        tiles.flat_map(move |tile| {
+            let numbers = self.numbers(self.rows[tile] as usize).iter().enumerate();
+            let held = move |&(_, &row): &(usize, &u32)| row != Equations::HELD;
+            numbers.filter(held).map(move |(r, &row)| Entry { row, place: TILE * tile + WIDTH * r + c })
+        })
+    }
+
+    /// The number of entries between equations.
+    pub fn nonzeros(&self) -> usize {
+        let free = |group: usize| self.numbers(group).iter().filter(|&&n| n != Equations::HELD).count();
+        let column = |c: usize| free(c) * self.rows_of(c).iter().map(|&row| free(row as usize)).sum::<usize>();
+        (0..self.groups.count()).map(column).sum()
     }
 
     /// Where an entry is stored: `None` for held directions, and for pairs that no effect couples.
@@ -117,40 +157,80 @@ impl Pattern {
         if row == Equations::HELD || column == Equations::HELD {
             return None;
         }
-        let start = self.column_starts[column as usize] as usize;
-        let end = self.column_starts[column as usize + 1] as usize;
-        self.rows[start..end].binary_search(&row).ok().map(|k| start + k)
+        let ((i, r), (j, c)) = (self.row_of(row), self.row_of(column));
+        Some(self.tile(i, j)? + WIDTH * r + c)
+    }
+
+    /// The group and the row of the tile of an equation.
+    fn row_of(&self, equation: u32) -> (usize, usize) {
+        let (slot, k) = self.equations.origin(equation as usize);
+        let (group, place) = self.groups.of(slot);
+        (group, 3 * place + k as usize)
+    }
+
+    /// The index of the first value of a tile.
+    fn tile(&self, row: usize, column: usize) -> Option<usize> {
+        let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
+        Some(TILE * (self.column_starts[column] as usize + found))
+    }
+
+    fn places_of(&self, cliques: Cliques) -> Places {
+        let whole = cliques.iter().all(|slots| self.is_whole(slots));
+        let mut places = Places {
+            whole,
+            values: Vec::new(),
+            starts: Vec::with_capacity(cliques.len() + 1),
+            special: Vec::with_capacity(cliques.len()),
+            cliques: Cliques::default(),
+        };
+        for slots in cliques.iter() {
+            places.starts.push(places.values.len() as u32);
+            let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.of(slot));
+            for (i, r) in corners() {
+                // Cliques are what the pattern was made of.
+                let place = |(j, c): (usize, usize)| self.tile(i, j).map(|tile| (tile + 3 * (WIDTH * r + c)) as u32);
+                places.values.extend(corners().filter_map(place));
+            }
+            let turned = slots.iter().any(|&slot| self.equations.frame(slot).is_some());
+            let held = slots.iter().any(|&slot| self.equations.of(slot).contains(&Equations::HELD));
+            places.special.push(turned || held);
+        }
+        places.starts.push(places.values.len() as u32);
+        places.cliques = cliques;
+        places
+    }
+
+    /// Whether these slots are those of nodes, each after the other.
+    fn is_whole(&self, slots: &[Slot]) -> bool {
+        let pair = |pair: &[Slot]| match *pair {
+            [u, p] => self.groups.members(self.groups.of(u).0) == [Some(u), Some(p)],
+            _ => false,
+        };
+        slots.chunks(SLOTS).all(pair)
     }
 }
 
-/// Slot by slot the slots it meets, then column by column the equations of those.
-fn compressed_columns(equations: &Equations, effects: &[Cliques]) -> (Vec<u32>, Vec<u32>) {
-    let slots = 1 + effects.iter().flat_map(|c| c.slots.iter()).max().map_or(0, |&slot| slot as usize);
-    let mut meets: Vec<Vec<Slot>> = vec![Vec::new(); slots];
+/// The equations of the rows of all groups.
+fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
+    let of = |slot: Option<Slot>| slot.map_or([Equations::HELD; 3], |slot| equations.of(slot));
+    (0..groups.count()).flat_map(|group| groups.members(group)).flat_map(of).collect()
+}
+
+/// Column by column the groups that a group meets, itself among them.
+fn compressed_columns(groups: &Groups, effects: &[Cliques]) -> (Vec<u32>, Vec<u32>) {
+    let mut meets: Vec<[u32; 2]> = (0..groups.count() as u32).map(|group| [group; 2]).collect();
     for clique in effects.iter().flat_map(Cliques::iter) {
-        for &slot in clique {
-            for other in clique {
-                let known = &mut meets[slot as usize];
-                if !known.contains(other) {
-                    known.push(*other);
-                }
-            }
+        let group = |&slot: &Slot| groups.of(slot).0 as u32;
+        for a in clique.iter().map(group) {
+            meets.extend(clique.iter().map(|b| [a, group(b)]));
         }
     }
-    let mut column_starts = vec![0; equations.count() + 1];
-    let mut rows = Vec::new();
-    for column in 0..equations.count() {
-        let slot = equations.direction(column).slot as usize;
-        let start = rows.len();
-        if let Some(neighbours) = meets.get(slot).filter(|n| !n.is_empty()) {
-            for &other in neighbours {
-                rows.extend(equations.of(other).into_iter().filter(|&row| row != Equations::HELD));
-            }
-        } else {
-            rows.push(column as u32);
-        }
-        rows[start..].sort_unstable();
-        column_starts[column + 1] = rows.len() as u32;
+    meets.sort_unstable();
+    meets.dedup();
+    let mut column_starts = vec![0; groups.count() + 1];
+    meets.iter().for_each(|&[column, _]| column_starts[column as usize + 1] += 1);
+    for column in 0..groups.count() {
+        column_starts[column + 1] += column_starts[column];
     }
-    (column_starts, rows)
+    (column_starts, meets.into_iter().map(|[_, row]| row).collect())
 }

@@ -12,7 +12,10 @@ const ORDER: [&str; 16] = [
 
 /// Crates that only some places may use; a place is a file or a folder.
 const CRATES: [(&str, &[&str]); 11] = [
-    ("faer", &["src/solve/linear.rs", "src/solve/pivots.rs"]),
+    (
+        "faer",
+        &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/pivots.rs", "src/solve/block/elimination.rs"],
+    ),
     ("toml", &["src/deck/"]),
     ("toml_edit", &["src/deck/"]),
     ("annotate_snippets", &["src/deck/"]),

@@ -19,6 +19,7 @@ mod relative;
 mod rotations;
 mod scenes;
 mod schemes;
+mod solvers;
 mod statics;
 mod tangents;
 mod turned;

@@ -97,7 +97,7 @@ fn set_in_motion(motions: &[InitialMotion], state: &mut State, assembly: &mut As
     assembly.evaluate(state, Weights::MASS, None);
     let mut right_hand_side = vec![0.0; assembly.system.pattern.equations.count()];
     assembly.system.right_hand_side(&mut right_hand_side);
-    assert!(solver.factorise(&assembly.system) && solver.solve(&mut right_hand_side));
+    assert!(solver.factorise(&assembly.system) && solver.solve(&assembly.system, &mut right_hand_side));
     assembly.system.pattern.equations.scatter(&right_hand_side, None, &mut state.a);
     state.algorithmic.copy_from_slice(&state.a);
 }
@@ -108,8 +108,8 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
     let mut model = scene.plan.model;
     let mut state = model.rest();
     let equations = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
-    let mut assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, model.slots.len());
-    let solver = LinearSolver::new(&assembly.system.pattern).unwrap();
+    let mut assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, &model);
+    let solver = LinearSolver::new(&assembly.system, &model.multipliers).unwrap();
     let total = scheme.rotations == Rotations::Totals;
     let increments = (!total).then(|| Increments::new(&model, &assembly.system.pattern.equations));
     let mut newton = Newton::new(Convergence { tolerance: 1e-12 }, 25, solver, &assembly.system);

@@ -1,0 +1,141 @@
+//! The softest motion of a tangent, by inverse iteration.
+
+use super::linear::LinearSolver;
+use crate::system::{Equations, System};
+use crate::tensor::Vec3;
+
+/// Unknowns that move without any force, as far as the tangent tells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NullVector {
+    /// One entry an equation, of sizes that compare; the largest tells what moves.
+    pub entries: Vec<f64>,
+    /// The unknowns themselves
+    pub motion: Vec<f64>,
+    /// Whether the tangent has some stiffness against it after all
+    pub held: bool,
+}
+
+impl NullVector {
+    /// The slot that moves most, told by entries that compare, and the motion of every slot.
+    pub fn by_slot(&self, equations: &Equations, slots: usize) -> (usize, Vec<Vec3>) {
+        let field = |entries: &[f64]| {
+            let mut field = vec![Vec3::ZERO; slots];
+            equations.scatter(entries, None, &mut field);
+            field
+        };
+        let compared = field(&self.entries);
+        let larger = |best: usize, slot: usize| if compared[slot].norm() > compared[best].norm() { slot } else { best };
+        ((0..slots).fold(0, larger), field(&self.motion))
+    }
+}
+
+/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
+const NO_STIFFNESS: f64 = 8.0;
+
+impl LinearSolver {
+    /// A direction in which the tangent has no stiffness.
+    pub fn null_vector(&mut self, system: &System) -> Option<NullVector> {
+        self.softest(system).filter(|vector| !vector.held)
+    }
+
+    /// The direction in which the tangent has the least stiffness, by inverse iteration with the last factorisation.
+    /// Unknowns are scaled by their diagonal, so that forces and moments compare.
+    pub fn softest(&mut self, system: &System) -> Option<NullVector> {
+        if system.pattern.equations.count() == 0 {
+            return None;
+        }
+        if let Some(empty) = empty_column(system) {
+            let mut entries = vec![0.0; system.pattern.equations.count()];
+            entries[empty] = 1.0;
+            return Some(NullVector { motion: entries.clone(), entries, held: false });
+        }
+        let scale = scales(system);
+        let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
+        for _ in 0..3 {
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+            if !self.solve_once(system, &mut x) {
+                return self.null_vector_of_shifted(system);
+            }
+            let largest = x.iter().zip(&scale).fold(0.0_f64, |m, (x, s)| m.max((x * s).abs()));
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / largest);
+        }
+        let motion: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
+        let held = stiffness_of(system, &motion) > NO_STIFFNESS;
+        Some(NullVector { entries: x, motion, held })
+    }
+
+    /// The same where the factorisation broke down: the diagonal is raised by a little first.
+    fn null_vector_of_shifted(&mut self, system: &System) -> Option<NullVector> {
+        let mut shifted = system.clone();
+        for place in diagonal_places(system).into_iter().flatten() {
+            // Multipliers have no diagonal: they get a little compliance.
+            let value = shifted.values[place];
+            shifted.values[place] = if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
+        }
+        if !self.factorise(&shifted) {
+            return None;
+        }
+        let mut x = vec![1.0; system.pattern.equations.count()];
+        for _ in 0..3 {
+            if !self.solve_once(&shifted, &mut x) {
+                return None;
+            }
+            let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            x.iter_mut().for_each(|x| *x /= largest);
+        }
+        Some(NullVector { motion: x.clone(), entries: x, held: false })
+    }
+}
+
+/// Where the diagonal entry of each column is stored.
+fn diagonal_places(system: &System) -> Vec<Option<usize>> {
+    let pattern = &system.pattern;
+    (0..pattern.equations.count()).map(|k| pattern.find(k as u32, k as u32)).collect()
+}
+
+fn diagonal(system: &System) -> Vec<f64> {
+    diagonal_places(system).into_iter().map(|place| place.map_or(0.0, |place| system.values[place])).collect()
+}
+
+/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column comparable.
+fn scales(system: &System) -> Vec<f64> {
+    let roots: Vec<f64> = diagonal(system).iter().map(|d| d.abs().sqrt()).collect();
+    let column = |c: usize| {
+        let compared = entries(system, c).map(|(row, value)| (value, roots[row]));
+        compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
+    };
+    let entry = |c: usize| entries(system, c).fold(0.0_f64, |m, (_, value)| m.max(value.abs()));
+    let scale = |c: usize| match (roots[c], column(c)) {
+        (root, _) if root > 0.0 => root,
+        (_, compared) if compared > 0.0 => compared,
+        // Unknowns and multipliers that only meet each other.
+        _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
+    };
+    (0..roots.len()).map(scale).collect()
+}
+
+/// Row and value of the entries of a column.
+fn entries(system: &System, column: usize) -> impl Iterator<Item = (usize, f64)> {
+    system.pattern.entries(column as u32).map(|entry| (entry.row as usize, system.values[entry.place]))
+}
+
+/// A column without any entry that is not zero.
+fn empty_column(system: &System) -> Option<usize> {
+    (0..system.pattern.equations.count()).find(|&column| entries(system, column).all(|(_, value)| value == 0.0))
+}
+
+/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated (Neumaier 1974), so that
+/// fine meshes of slender beams, whose softest motions are nearly free, are not taken for mechanisms.
+fn stiffness_of(system: &System, x: &[f64]) -> f64 {
+    let (mut sum, mut lost, mut squares) = (0.0_f64, 0.0, 0.0);
+    for column in 0..x.len() {
+        for (row, value) in entries(system, column) {
+            let term = x[row] * value * x[column];
+            let next = sum + term;
+            lost += if sum.abs() >= term.abs() { (sum - next) + term } else { (term - next) + sum };
+            sum = next;
+            squares += term * term;
+        }
+    }
+    if squares == 0.0 { 0.0 } else { (sum + lost).abs() / (f64::EPSILON * squares.sqrt()) }
+}

@@ -1,0 +1,52 @@
+//! Which slots share a tile of the tangent: the displacement and the rotation of a node.
+
+use super::state::Slot;
+
+/// Slots in a tile.
+pub const SLOTS: usize = 2;
+
+/// The slots of a scene in groups of one or two.
+#[derive(Clone, Debug)]
+pub struct Groups {
+    /// For each slot its group, and its place in it
+    places: Vec<(u32, u8)>,
+    /// The slots of each group
+    members: Vec<[Option<Slot>; SLOTS]>,
+}
+
+impl Groups {
+    /// Of so many slots; `joins` tells which of them share the group of the one before.
+    pub fn new(slots: usize, joins: impl Fn(Slot) -> bool) -> Self {
+        let mut out = Self { places: Vec::with_capacity(slots), members: Vec::new() };
+        for slot in 0..slots as Slot {
+            match out.members.last_mut() {
+                Some([Some(_), second @ None]) if joins(slot) => {
+                    *second = Some(slot);
+                    out.places.push((out.members.len() as u32 - 1, 1));
+                }
+                _ => {
+                    out.places.push((out.members.len() as u32, 0));
+                    out.members.push([Some(slot), None]);
+                }
+            }
+        }
+        out
+    }
+
+    /// The number of groups.
+    pub fn count(&self) -> usize {
+        self.members.len()
+    }
+
+    /// The group of a slot, and its place in it.
+    #[inline]
+    pub fn of(&self, slot: Slot) -> (usize, usize) {
+        let (group, place) = self.places[slot as usize];
+        (group as usize, place as usize)
+    }
+
+    /// The slots of a group.
+    pub fn members(&self, group: usize) -> [Option<Slot>; SLOTS] {
+        self.members[group]
+    }
+}

@@ -1,0 +1,213 @@
+//! Factorisations by blocks against faer's, on patterns of every kind, and against eigenvalues.
+
+use crate::decks::decks;
+use crate::random::Random;
+use beamsim::kernel::{ElementSystem, Weights};
+use beamsim::model::Assembly;
+use beamsim::scene;
+use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, is_symmetric};
+use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Pattern, System};
+use beamsim::tensor::{Mat3, Vec3};
+use nalgebra::DMatrix;
+
+/// Pairs of nodes that meet.
+fn chain(nodes: usize) -> Vec<[usize; 2]> {
+    (1..nodes).map(|k| [k - 1, k]).collect()
+}
+
+fn tree(nodes: usize, random: &mut Random) -> Vec<[usize; 2]> {
+    (1..nodes).map(|k| [random.range(0.0, k as f64) as usize, k]).collect()
+}
+
+fn ring(nodes: usize) -> Vec<[usize; 2]> {
+    (0..nodes).map(|k| [k, (k + 1) % nodes]).collect()
+}
+
+fn lattice(across: usize) -> Vec<[usize; 2]> {
+    let right = (0..across * across).filter(|k| k % across + 1 < across).map(|k| [k, k + 1]);
+    right.chain((0..across * (across - 1)).map(|k| [k, k + across])).collect()
+}
+
+/// A tangent of nodes with two slots, each edge an element of two nodes with random blocks, some directions held, some along
+/// turned axes; `shift` of the identity is added at each node.
+fn system(edges: &[[usize; 2]], symmetric: bool, shift: f64, random: &mut Random) -> System {
+    let nodes = 1 + edges.iter().flatten().max().unwrap();
+    let mut cliques = Cliques::default();
+    for [a, b] in edges {
+        cliques.push([a, a, b, b].into_iter().zip([0, 1, 0, 1]).map(|(&node, half)| (2 * node + half) as u32));
+    }
+    let mut own = Cliques::default();
+    (0..2 * nodes as u32).for_each(|slot| own.push([slot]));
+    let slanted = Direction { slot: 3, axis: Vec3([0.6, 0.0, 0.8]) };
+    let held = [Direction { slot: 0, axis: Vec3::UNIT[1] }, slanted];
+    let equations = Equations::new(2 * nodes, &held).unwrap();
+    let groups = Groups::new(2 * nodes, |slot| slot % 2 == 1);
+    let pattern = Pattern::new(equations, groups, vec![cliques, own]);
+    let mut system = System::new(pattern, 2 * nodes, symmetric);
+    system.clear(None);
+    for k in 0..edges.len() {
+        let mut element = ElementSystem::new(4);
+        for (row, column) in (0..4).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            let block = random.tensor(1.0);
+            let block = if row == column && symmetric { block + block.transpose() } else { block };
+            element.set_tangent(row, column, block);
+            if row != column {
+                element.set_tangent(column, row, if symmetric { block.transpose() } else { random.tensor(1.0) });
+            }
+        }
+        system.sink(0, Category::Internal, true).add(k, &element);
+    }
+    for slot in 0..2 * nodes {
+        let mut element = ElementSystem::new(1);
+        element.set_tangent(0, 0, Mat3::IDENTITY.scale(shift));
+        system.sink(1, Category::Internal, true).add(slot, &element);
+    }
+    system
+}
+
+fn dense(system: &System) -> DMatrix<f64> {
+    let n = system.pattern.equations.count();
+    let entry = |i: usize, j: usize| system.pattern.find(i as u32, j as u32).map_or(0.0, |k| system.values[k]);
+    DMatrix::from_fn(n, n, entry)
+}
+
+fn patterns(random: &mut Random) -> Vec<(&'static str, Vec<[usize; 2]>)> {
+    vec![
+        ("pair", chain(2)),
+        ("chain", chain(40)),
+        ("tree", tree(60, random)),
+        ("ring", ring(30)),
+        ("lattice", lattice(5)),
+    ]
+}
+
+#[test]
+fn blocks_solve_what_faer_solves() {
+    let mut random = Random::new(3);
+    for (name, edges) in patterns(&mut random) {
+        for symmetric in [true, false] {
+            for shift in [0.0, 30.0] {
+                let system = system(&edges, symmetric, shift, &mut random);
+                let n = system.pattern.equations.count();
+                let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
+                let (mut by_blocks, mut by_faer) = (wanted.clone(), wanted.clone());
+                let mut blocks = BlockSolver::new(&system.pattern, symmetric).unwrap();
+                assert!(blocks.factorise(&system), "{name}");
+                blocks.solve(&system.pattern, &mut by_blocks);
+                let mut general = GeneralSolver::new(&system).unwrap();
+                assert!(general.factorise(&system), "{name}");
+                general.solve(&mut by_faer);
+                let largest = by_faer.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+                let apart = by_blocks.iter().zip(&by_faer).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                // Without a dominant diagonal pivots that are not looked for across blocks cost digits.
+                let allowed = if shift > 0.0 { 1e-14 } else { 1e-8 };
+                assert!(apart <= allowed * largest, "{name}, symmetric {symmetric}, shift {shift}: {apart:e}");
+                let (_, error) = system.residual(&wanted, &by_faer);
+                assert!(error < 1e-13, "{name}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn negative_pivots_are_negative_eigenvalues() {
+    let mut random = Random::new(4);
+    for (name, edges) in patterns(&mut random) {
+        let system = system(&edges, true, 1.0, &mut random);
+        let eigenvalues = dense(&system).symmetric_eigenvalues();
+        let negative = eigenvalues.iter().filter(|&&value| value < 0.0).count();
+        let mut blocks = BlockSolver::new(&system.pattern, true).unwrap();
+        assert!(blocks.factorise(&system));
+        assert!(negative > 0);
+        assert_eq!(blocks.negative(), Some(negative), "{name}");
+    }
+}
+
+#[test]
+fn what_a_system_multiplies_is_its_matrix() {
+    let mut random = Random::new(5);
+    let system = system(&tree(12, &mut random), false, 2.0, &mut random);
+    let matrix = dense(&system);
+    let x: Vec<f64> = (0..matrix.ncols()).map(|_| random.range(-1.0, 1.0)).collect();
+    let expected = &matrix * nalgebra::DVector::from_column_slice(&x);
+    let product = system.multiply(&system.values, &x);
+    assert!(product.iter().zip(expected.iter()).all(|(a, b)| (a - b).abs() < 1e-14));
+    assert!(system.residual(&product, &x).1 < 1e-15);
+    let nonzeros = matrix.iter().filter(|&&value| value != 0.0).count();
+    assert_eq!(system.pattern.nonzeros(), nonzeros);
+    for column in 0..matrix.ncols() {
+        for entry in system.pattern.entries(column as u32) {
+            assert_eq!(system.values[entry.place], matrix[(entry.row as usize, column)]);
+        }
+    }
+}
+
+/// A zero where a block wants its pivot: blocks give up, the solver goes on in general.
+#[test]
+fn a_lost_pivot_is_no_lost_solution() {
+    let mut random = Random::new(6);
+    let mut system = system(&chain(3), true, 0.0, &mut random);
+    // Nodes that only meet each other: their own tiles are empty.
+    let n = system.pattern.equations.count() as u32;
+    for column in 0..n {
+        for row in 0..n {
+            let node = |k: u32| system.pattern.equations.direction(k as usize).slot / 2;
+            if (node(row), node(column)) == (0, 0) || (node(row), node(column)) == (2, 2) {
+                let place = system.pattern.find(row, column).unwrap();
+                system.values[place] = 0.0;
+            }
+        }
+    }
+    // Two nodes of one tile each hang on one: eleven unknowns on six are singular, so one of them gets stiffness.
+    for k in 0..n {
+        if system.pattern.equations.direction(k as usize).slot / 2 == 2 {
+            let place = system.pattern.find(k, k).unwrap();
+            system.values[place] = 1.0;
+        }
+    }
+    let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
+    let mut solver = LinearSolver::new(&system, &[]).unwrap();
+    assert_eq!(solver.name(), "block LDL^T");
+    let mut x = wanted.clone();
+    assert!(solver.factorise(&system) && solver.solve(&system, &mut x));
+    assert_eq!(solver.name(), "sparse LU");
+    assert!(system.residual(&wanted, &x).1 < 1e-13);
+}
+
+#[test]
+fn nets_are_left_to_faer() {
+    let mut random = Random::new(7);
+    let system = system(&lattice(120), true, 30.0, &mut random);
+    assert!(BlockSolver::new(&system.pattern, true).is_none());
+    assert_eq!(LinearSolver::new(&system, &[]).unwrap().name(), "sparse LU");
+}
+
+/// Effects that call their tangent symmetric are taken at their word by the solver.
+#[test]
+fn what_is_called_symmetric_is() {
+    let mut random = Random::new(8);
+    let mut symmetric = 0;
+    for path in ["decks", "decks/minimal", "decks/peers", "decks/hard", "decks/paths"].map(decks).concat() {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let Ok((scene, _)) = scene::from_text(&text) else { continue };
+        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let mut state = model.rest();
+        let Ok(equations) = model.begin_stage(0, stage.kind, &state) else { continue };
+        if equations.count() == 0 || equations.count() > 600 {
+            continue;
+        }
+        let mut assembly = Assembly::new(model.acting(&stage), equations, &model);
+        if !assembly.system.symmetric {
+            continue;
+        }
+        model.set_clock(&mut state, 0.1, 0.7);
+        for (info, q) in model.slots.iter().zip(&mut state.q) {
+            *q += random.vector(0.1 * model.length / info.arm(model.length));
+        }
+        let weights = Weights { stiffness: 1.0, damping: 0.3, mass: 0.2 };
+        assembly.evaluate(&state, weights, None);
+        assert!(is_symmetric(&assembly.system.pattern, &assembly.system.values), "{}", path.display());
+        symmetric += 1;
+    }
+    assert!(symmetric > 50, "{symmetric}");
+}
