@@ -6,6 +6,7 @@
 
 use super::direction::Direction;
 use super::failure::Failure;
+use super::levels::{NO_MOTION, distance};
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
@@ -22,6 +23,12 @@ const MOST_LOOKS: usize = 80;
 const CLOSED: f64 = 1e-7;
 /// Where pivots cannot be counted: an estimate this near to where it was made; what is left over is its square.
 const NEAR: f64 = 1e-4;
+/// Where load control ends, the tangent must see a critical load this near.
+const SEEN: f64 = 1e-3;
+/// A state that has moved so many times further than the tangent said has come down on another branch.
+const LEAP: f64 = 8.0;
+/// States of one load that lie nearer together than this are one.
+const SAME: f64 = 1e-5;
 /// Imaginary part up to which a critical load counts as real, relative; double ones come apart a little.
 const REAL: f64 = 1e-3;
 
@@ -65,17 +72,30 @@ impl Run<'_> {
     fn follow(&mut self, workshop: &mut Workshop, estimate: f64, before: usize) -> Result<f64, Failure> {
         let way = (estimate - self.state.load).signum();
         let none = self.negative_pivots(workshop);
-        let mut search = Search { here: self.state.clone(), beyond: None, estimate, stretch: 1.0, way };
+        let mut search = Search {
+            here: self.state.clone(),
+            beyond: None,
+            estimate,
+            stretch: 1.0,
+            way,
+            seen: estimate,
+            ended: false,
+        };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
-                return Ok(found);
+                if search.is_a_limit(found) {
+                    return Ok(found);
+                }
+                break;
             }
             let target = search.target();
             self.state.copy_from(&search.here);
             self.good.copy_from(&search.here);
             self.observer.progress(self.moment(), self.static_progress(0.5))?;
-            if !self.continue_path(workshop, target) {
-                break;
+            if !self.continue_path(workshop, target) || self.has_leapt(workshop, &search.here)? {
+                // Load control ends at limit points, or comes down on another branch.
+                search.end_at(target);
+                continue;
             }
             let count = self.negative_pivots(workshop);
             let Some(passed) = none.zip(count).map(|(none, count)| count.saturating_sub(none)) else {
@@ -86,6 +106,7 @@ impl Run<'_> {
             };
             if passed > before {
                 search.beyond = Some(target);
+                search.ended = false;
                 search.stretch = 1.0;
             } else {
                 let ahead = self.critical_loads(workshop, before + 4)?;
@@ -97,6 +118,25 @@ impl Run<'_> {
         }
         self.warn_of_estimate(search.estimate, search.here.load);
         Ok(search.estimate)
+    }
+
+    /// Whether the state is on another branch than one before it: it has moved much further than the path goes there, or does not
+    /// come back to it.
+    fn has_leapt(&mut self, workshop: &mut Workshop, from: &State) -> Result<bool, Failure> {
+        let (to, step) = (self.state.clone(), self.state.load - from.load);
+        self.state.copy_from(from);
+        let direction = self.path_direction(workshop)?;
+        let ahead = direction.map_or(0.0, |Direction { rate, .. }| {
+            let mut ahead = from.clone();
+            ahead.q.iter_mut().zip(&rate).for_each(|(q, rate)| *q += *rate * step);
+            distance(&self.model, from, &ahead)
+        });
+        let far = distance(&self.model, from, &to) > (LEAP * ahead).max(NO_MOTION);
+        self.state.copy_from(&to);
+        let leapt = far || !self.continue_path(workshop, from.load) || distance(&self.model, from, &self.state) > SAME;
+        self.state.copy_from(&to);
+        self.good.copy_from(&to);
+        Ok(leapt)
     }
 
     /// Goes from estimate to estimate, each what the critical load looks like from the last.
@@ -217,6 +257,10 @@ struct Search {
     /// How much farther than the estimate the next look goes: it may fall short again and again
     stretch: f64,
     way: f64,
+    /// What the tangent of the last point before it said
+    seen: f64,
+    /// Whether what lies beyond is known only from load control, which did not get there
+    ended: bool,
 }
 
 impl Search {
@@ -226,6 +270,19 @@ impl Search {
         let between = (self.estimate - from) * self.way > 0.0 && (beyond - self.estimate) * self.way > 0.0;
         let closed = (beyond - from).abs() <= CLOSED * beyond.abs();
         closed.then_some(if between { self.estimate } else { 0.5 * (from + beyond) })
+    }
+
+    /// The path by load control ends before this load.
+    fn end_at(&mut self, load: f64) {
+        self.beyond = Some(load);
+        self.ended = true;
+        self.stretch = 1.0;
+        self.estimate = 0.5 * (self.here.load + load);
+    }
+
+    /// Whether load control ends there for want of stiffness: a limit point looks twice as far away as it is.
+    fn is_a_limit(&self, found: f64) -> bool {
+        !self.ended || (self.seen - found).abs() <= SEEN * found.abs()
     }
 
     /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the
@@ -249,6 +306,7 @@ impl Search {
         let shorter =
             self.beyond.is_none_or(|beyond| (beyond - state.load).abs() < 0.5 * (beyond - self.here.load).abs());
         self.here = state.clone();
+        self.seen = next.unwrap_or(self.seen);
         self.stretch *= 2.0;
         self.estimate = match (next, self.beyond) {
             (Some(next), None) => next,

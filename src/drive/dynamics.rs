@@ -10,6 +10,7 @@ use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::NewtonFailure;
 use crate::system::{Slot, State};
+use crate::tensor::Vec3;
 use std::f64::consts::PI;
 
 /// A fixed step that fails is not taken in smaller parts than this.
@@ -27,8 +28,8 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         workshop.increments = (scheme.rotations == Rotations::Increments)
             .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.equations));
-        self.start_dynamic(workshop)?;
-        workshop.massive = self.slots_with_mass(workshop);
+        self.start_dynamic(workshop, &Step { scheme, length: step })?;
+        self.find_rates(workshop);
         let mut before = step;
         match adaptive {
             None => self.run_fixed(workshop, end, step, scheme, &mut before),
@@ -153,7 +154,10 @@ impl Run<'_> {
     /// One attempt at a step: predict, prescribe, iterate.
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
-        let Workshop { assembly, newton, increments, massive, .. } = workshop;
+        let Workshop { assembly, newton, increments, massive, rateless, .. } = workshop;
+        if !rateless.is_empty() {
+            self.model.steady(&mut self.state);
+        }
         if let Some(increments) = increments {
             increments.begin(&mut self.state, &step, before);
         }
@@ -167,10 +171,25 @@ impl Run<'_> {
             self.counters.work.chart_switches += switched as u64;
             // Forces conjugate to total vectors, for reactions and the energy account.
             assembly.evaluate(&self.state, Weights::NONE, None);
+        } else {
+            // A rule for accelerations makes velocities that nothing resists swing from step to step, more and more.
+            let moved: Vec<Vec3> = rateless.iter().map(|&slot| self.state.q[slot] - self.good.q[slot]).collect();
+            self.state.set_rates(rateless, |k| moved[k] * (1.0 / step.length));
         }
         let turning = self.model.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
+        self.refuse_massless_turns(massive)?;
         self.refuse_leaps()
+    }
+
+    /// Rotations without inertia have no spin to speak of: they go where balance is.
+    fn refuse_massless_turns(&self, massive: &[bool]) -> Result<(), NewtonFailure> {
+        let massless = self.model.rotations.iter().map(|&slot| slot as usize).filter(|&slot| !massive[slot]);
+        let mut turned = massless.map(|slot| (slot, (self.state.q[slot] - self.good.q[slot]).norm()));
+        match turned.find(|&(_, angle)| angle > PI && self.state.turns.is_empty()) {
+            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot, angle }),
+            None => Ok(()),
+        }
     }
 
     /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.

@@ -9,6 +9,7 @@ const RUNNING: usize = 3;
 #[derive(Clone, Debug)]
 pub(super) struct EnergyGuard {
     limit: f64,
+    floor: f64,
     start: Option<f64>,
     largest: f64,
     running: usize,
@@ -22,9 +23,10 @@ pub(super) struct Growth {
 }
 
 impl EnergyGuard {
-    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far.
-    pub fn new(limit: f64) -> Self {
-        Self { limit, start: None, largest: 0.0, running: 0, lost: 0.0 }
+    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far. Energies below `floor` are what
+    /// Newton tolerates.
+    pub fn new(limit: f64, floor: f64) -> Self {
+        Self { limit, floor, start: None, largest: 0.0, running: 0, lost: 0.0 }
     }
 
     /// The account where the stage begins.
@@ -36,7 +38,7 @@ impl EnergyGuard {
     /// What the scheme has taken of the energy, as part of the largest, where that is more than may be gained.
     pub fn loss(&self) -> Option<f64> {
         let share = self.lost / self.largest;
-        (share > self.limit).then_some(share)
+        (share > self.limit && self.largest > self.floor).then_some(share)
     }
 
     /// Looks at the account of a step; tells a growth that lasts.
@@ -44,7 +46,8 @@ impl EnergyGuard {
         self.largest = self.largest.max(size(ledger));
         let grown = ledger.total() - self.start?;
         self.lost = self.lost.max(-grown);
-        self.running = if grown > self.limit * self.largest { self.running + 1 } else { 0 };
+        let grows = grown > self.limit * self.largest && self.largest > self.floor;
+        self.running = if grows { self.running + 1 } else { 0 };
         (self.running >= RUNNING).then_some(Growth { grown, largest: self.largest })
     }
 }
@@ -63,7 +66,7 @@ mod tests {
 
     #[test]
     fn growth_that_lasts_three_steps_is_told() {
-        let mut guard = EnergyGuard::new(0.2);
+        let mut guard = EnergyGuard::new(0.2, 0.0);
         guard.open(ledger(1.0));
         assert!(guard.judge(ledger(1.2)).is_none());
         assert!(guard.judge(ledger(1.3)).is_none());
@@ -77,7 +80,7 @@ mod tests {
 
     #[test]
     fn what_is_lost_is_told_beyond_the_limit() {
-        let mut guard = EnergyGuard::new(0.2);
+        let mut guard = EnergyGuard::new(0.2, 0.0);
         guard.open(ledger(1.0));
         assert!(guard.judge(ledger(0.9)).is_none() && guard.loss().is_none());
         assert!(guard.judge(ledger(0.5)).is_none());

@@ -1,7 +1,8 @@
 //! The energy account: what was stored, and the work that came in.
 
+use crate::model::charts::HALF_TURN;
 use crate::model::{Model, SlotKind};
-use crate::rotation::{Rotation, log};
+use crate::rotation::{Rotation, log, unwound};
 use crate::system::{Category, Equations, Slot, State, System};
 use crate::tensor::Vec3;
 
@@ -30,6 +31,7 @@ impl Ledger {
 pub(super) struct Bookkeeper {
     ledger: Ledger,
     q: Vec<Vec3>,
+    wound: Vec<Vec3>,
     force: Vec<Vec3>,
     drag: Vec<Vec3>,
     drives: Vec<(f64, f64)>,
@@ -38,7 +40,14 @@ pub(super) struct Bookkeeper {
 impl Bookkeeper {
     pub fn new(slots: usize) -> Self {
         let zero = vec![Vec3::ZERO; slots];
-        Self { ledger: Ledger::default(), q: zero.clone(), force: zero.clone(), drag: zero, drives: Vec::new() }
+        Self {
+            ledger: Ledger::default(),
+            q: zero.clone(),
+            wound: zero.clone(),
+            force: zero.clone(),
+            drag: zero,
+            drives: Vec::new(),
+        }
     }
 
     /// Opens a stage: energies are taken, no work is added.
@@ -52,9 +61,10 @@ impl Bookkeeper {
     pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
         for (slot, info) in model.slots.iter().enumerate() {
             let drag = system.force[Category::Damping as usize][slot];
-            self.ledger.damped += work(info.kind, (self.q[slot], self.drag[slot]), (state.q[slot], drag));
+            let wound = state.wound[slot] - self.wound[slot];
+            self.ledger.damped += work(info.kind, (self.q[slot], self.drag[slot]), (state.q[slot], drag), wound);
             let (before, after) = (self.force[slot], outside(system, slot));
-            self.ledger.external += work(info.kind, (self.q[slot], before), (state.q[slot], after));
+            self.ledger.external += work(info.kind, (self.q[slot], before), (state.q[slot], after), wound);
         }
         let drives = model.drives(state);
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
@@ -71,6 +81,7 @@ impl Bookkeeper {
 
     fn remember(&mut self, state: &State, system: &System) {
         self.q.copy_from_slice(&state.q);
+        self.wound.copy_from_slice(&state.wound);
         self.drag.copy_from_slice(&system.force[Category::Damping as usize]);
         for (slot, force) in self.force.iter_mut().enumerate() {
             *force = outside(system, slot);
@@ -89,23 +100,25 @@ fn outside(system: &System, slot: usize) -> Vec3 {
     equations.held_part(slot as Slot, system.total(slot)) - system.force[Category::External as usize][slot]
 }
 
-/// Work of a force over the way from the one place to the other, by the trapezoidal rule.
-fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3)) -> f64 {
+/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A rotation tells by `wound` how far it
+/// has gone.
+fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), wound: Vec3) -> f64 {
     if f0 == Vec3::ZERO && f1 == Vec3::ZERO {
         return 0.0;
     }
     match kind {
         SlotKind::Displacement => 0.5 * (f0 + f1).dot(q1 - q0),
-        SlotKind::Rotation => turning_work(q0, f0, q1, f1),
+        SlotKind::Rotation => turning_work(q0, f0, q1, f1, wound),
         SlotKind::Force | SlotKind::Moment => 0.0,
     }
 }
 
 /// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial moment m = T^-1 f
 /// and the spatial rotation vector from the one state to the other.
-fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3) -> f64 {
+fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3, wound: Vec3) -> f64 {
     let (before, after) = (Rotation::new(p0), Rotation::new(p1));
-    let turned = log(after.r * before.r.transpose());
+    let shortest = log(after.r * before.r.transpose());
+    let turned = if wound.norm() > HALF_TURN { unwound(shortest, wound) } else { shortest };
     let (m0, m1) = (before.t_inverse() * f0, after.t_inverse() * f1);
     0.5 * (m0 + m1).dot(turned)
 }

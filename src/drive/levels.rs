@@ -20,7 +20,7 @@ const CLOSE: f64 = 1.0 / 256.0;
 const JUMP: f64 = 8.0;
 
 /// What moves less is round-off: relative to the length of the scene, and in radians.
-const NO_MOTION: f64 = 1e-9;
+pub(super) const NO_MOTION: f64 = 1e-9;
 
 /// What a stage may do where Newton does not reach a level at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,7 +134,7 @@ impl Levels {
 }
 
 /// The largest difference of two states: displacements over the length of the scene, rotations in radians, whatever their charts.
-fn distance(model: &Model, a: &State, b: &State) -> f64 {
+pub(super) fn distance(model: &Model, a: &State, b: &State) -> f64 {
     let one = |(slot, kind): (usize, SlotKind)| match kind {
         SlotKind::Displacement => (b.q[slot] - a.q[slot]).norm() / model.length,
         SlotKind::Rotation => relative_angle(Rotation::new(a.q[slot]).r, Rotation::new(b.q[slot]).r),

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Model;
-use crate::solve::{Convergence, LinearSolver, Operator, Verdict, is_symmetric, largest_eigenvalues, timed};
+use crate::solve::{Convergence, LinearSolver, Operator, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed};
 use crate::system::System;
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -73,13 +73,12 @@ impl Run<'_> {
     fn find_modes(&mut self, workshop: &mut Workshop, matrices: &Matrices, modes: usize) -> Result<Vec<Mode>, Failure> {
         let (moment, done) = (self.moment(), self.static_progress(0.5));
         let Workshop { assembly, newton, .. } = workshop;
-        let system = &mut assembly.system;
-        let part = |values: &[f64]| largest(values);
-        let (stiffest, heaviest, dampest) = (part(&matrices.stiffness), part(&matrices.mass), part(&matrices.damping));
+        let [stiffest, heaviest, dampest] =
+            [&matrices.stiffness, &matrices.mass, &matrices.damping].map(|v| largest(v));
         if heaviest == 0.0 {
             return Err(Failure::Deck("a modal stage needs mass: nothing that is free to move has any".into()));
         }
-        let mut shift = FIRST_SHIFT * softest_ratio(system, matrices).unwrap_or(stiffest / heaviest).sqrt();
+        let mut shift = FIRST_SHIFT * softest_ratio(&assembly.system, matrices).unwrap_or(stiffest / heaviest).sqrt();
         if shift == 0.0 {
             // Nothing holds anything: every mode is a free motion.
             shift = 1.0;
@@ -88,13 +87,14 @@ impl Run<'_> {
         let mut found = Vec::new();
         for look in 0..2 {
             self.observer.progress(moment, done)?;
-            let values: Vec<f64> = (0..system.values.len()).map(|k| matrices.combined(k, shift)).collect();
-            system.values.copy_from_slice(&values);
+            matrices.combine(shift, &mut assembly.system.values);
             self.counters.work.factorisations += 1;
-            if !newton.solver.factorise_surely(system) {
-                let vector = newton.solver.null_vector(system);
-                return Err(self.name_mechanism(vector, &workshop.assembly.system));
+            let done = newton.solver.factorise_surely(&assembly.system);
+            let loose = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
+            if !done || loose.is_some() {
+                return Err(self.name_mechanism(loose, &assembly.system));
             }
+            let system = &mut assembly.system;
             system.values.copy_from_slice(&matrices.stiffness);
             let symmetric = !damped && is_symmetric(&system.pattern, &system.values);
             let mut operator = Motions { system, matrices, solver: &mut newton.solver, shift, symmetric };
@@ -154,9 +154,12 @@ struct Matrices {
 }
 
 impl Matrices {
-    /// An entry of K + shift C + shift^2 M.
-    fn combined(&self, k: usize, shift: f64) -> f64 {
-        self.stiffness[k] + shift * (self.damping[k] + shift * self.mass[k])
+    /// K + shift C + shift^2 M
+    fn combine(&self, shift: f64, out: &mut [f64]) {
+        let parts = self.stiffness.iter().zip(&self.damping).zip(&self.mass);
+        for (out, ((k, c), m)) in out.iter_mut().zip(parts) {
+            *out = k + shift * (c + shift * m);
+        }
     }
 }
 

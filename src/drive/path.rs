@@ -75,13 +75,18 @@ pub(super) enum Arrival {
     Until,
     /// Neither came in sight
     OutOfSteps,
+    /// There is no path: nothing grows with the load factor
+    Nowhere,
 }
 
 impl Run<'_> {
     /// The path until the load factor first reaches 1, or `until`, or `max_steps`.
     pub(super) fn run_path(&mut self, workshop: &mut Workshop, steps: usize, max_steps: usize) -> Result<(), Failure> {
         self.start_static(workshop)?;
-        let mut path = Path::new(self, workshop, steps)?;
+        let Some(mut path) = Path::new(self, workshop, steps)? else {
+            let message = "control = \"arc_length\" needs a load or a motion that grows with the load factor";
+            return Err(Failure::Deck(message.into()));
+        };
         if self.go_along(workshop, &mut path, 1.0, max_steps)? == Arrival::OutOfSteps {
             let at = self.moment();
             self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
@@ -99,7 +104,7 @@ impl Run<'_> {
         goal: f64,
         increment: f64,
     ) -> Result<Arrival, Failure> {
-        let mut path = Path::onward(self, workshop, from, increment)?;
+        let Some(mut path) = Path::onward(self, workshop, from, increment)? else { return Ok(Arrival::Nowhere) };
         self.go_along(workshop, &mut path, goal, LONGEST_DETOUR)
     }
 
@@ -222,22 +227,19 @@ struct Path {
 }
 
 impl Path {
-    fn new(run: &mut Run, workshop: &mut Workshop, steps: usize) -> Result<Self, Failure> {
-        let Some(Direction { rate: direction, .. }) = run.path_direction(workshop)? else {
-            return Err(Failure::Deck(
-                "control = \"arc_length\" needs a load or a motion that grows with the load factor".into(),
-            ));
-        };
+    /// `None` where nothing grows with the load factor.
+    fn new(run: &mut Run, workshop: &mut Workshop, steps: usize) -> Result<Option<Self>, Failure> {
+        let Some(Direction { rate: direction, .. }) = run.path_direction(workshop)? else { return Ok(None) };
         let mut path = Self::with_measure(run, workshop, direction);
         path.here = path.look(run, workshop, &path.here.clone())?;
         path.first = 1.0 / (steps as f64 * path.here.load_rate.abs());
         path.length = path.first;
-        Ok(path)
+        Ok(Some(path))
     }
 
     /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`: near a limit point the
     /// tangent moves without bounds.
-    fn onward(run: &mut Run, workshop: &mut Workshop, from: &State, increment: f64) -> Result<Self, Failure> {
+    fn onward(run: &mut Run, workshop: &mut Workshop, from: &State, increment: f64) -> Result<Option<Self>, Failure> {
         let risen = run.state.load - from.load;
         if risen <= 0.0 {
             return Self::new(run, workshop, (1.0 / increment).ceil() as usize);
@@ -247,7 +249,7 @@ impl Path {
         path.here = path.look(run, workshop, &path.here.clone())?;
         path.first = std::f64::consts::SQRT_2 * increment;
         path.length = path.first;
-        Ok(path)
+        Ok(Some(path))
     }
 
     /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to go on in.
@@ -365,7 +367,9 @@ impl Path {
     fn predict(&self, run: &mut Run, length: f64) -> f64 {
         let here = &self.here;
         run.state.copy_from(&here.state);
-        run.state.q.iter_mut().zip(&here.tangent).for_each(|(q, t)| *q += *t * length);
+        let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
+        charts::carry(&mut run.state, &ahead, &run.model.rotations);
+        run.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
         here.state.load + here.load_rate * length
     }
 
@@ -460,6 +464,7 @@ impl Path {
 /// Adds a correction; whether nodes changed their charts by it.
 fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
     workshop.assembly.extrapolate(&run.state, dq);
+    charts::carry(&mut run.state, dq, &run.model.rotations);
     run.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
     let switched = charts::switch(&mut run.state, &run.model.rotations, charts::STATIC_BAND, None);
     if switched > 0 {

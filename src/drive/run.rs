@@ -13,6 +13,9 @@ use crate::tensor::Vec3;
 use std::fmt;
 use std::sync::Arc;
 
+/// Strains that may be left where an iteration ends.
+const TOLERATED_STRAIN: f64 = 1e-9;
+
 /// What is to be done.
 #[derive(Clone)]
 pub struct Plan {
@@ -284,6 +287,8 @@ pub(super) struct Workshop {
     pub increments: Option<Increments>,
     /// For each slot whether its accelerations mean something; known in dynamic stages
     pub massive: Vec<bool>,
+    /// The slots whose velocities enter no force: they have neither inertia nor damping; known in dynamic stages
+    pub rateless: Vec<usize>,
     /// Watches the energy of time steps
     pub guard: Option<EnergyGuard>,
 }
@@ -327,7 +332,7 @@ impl<'o> Run<'o> {
                 StageWork::Modal { modes } => self.run_modal(&mut workshop, modes),
                 StageWork::Buckling { modes } => self.run_buckling(&mut workshop, modes),
                 StageWork::Dynamic { end, step, scheme, adaptive, energy_limit } => {
-                    workshop.guard = Some(EnergyGuard::new(energy_limit));
+                    workshop.guard = Some(self.energy_guard(&workshop, energy_limit));
                     self.run_dynamic(&mut workshop, end, step, scheme, adaptive)
                 }
             };
@@ -340,6 +345,12 @@ impl<'o> Run<'o> {
             self.model.end_stage(&self.state);
         }
         Ok(())
+    }
+
+    /// Strains that Newton leaves have an energy of their own, of the stiffest section along the length of the scene.
+    fn energy_guard(&self, workshop: &Workshop, limit: f64) -> EnergyGuard {
+        let stiffest = workshop.assembly.noise(&self.state).force / f64::EPSILON;
+        EnergyGuard::new(limit, stiffest * self.model.length * TOLERATED_STRAIN * TOLERATED_STRAIN)
     }
 
     fn note_solver(&mut self, name: &'static str) {
@@ -363,7 +374,16 @@ impl<'o> Run<'o> {
         let convergence = Convergence { tolerance: stage.tolerance };
         let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
         let (lift, until) = (vec![Vec3::ZERO; slots], stage.until.clone());
-        Ok(Workshop { assembly, newton, lift, until, increments: None, massive: Vec::new(), guard: None })
+        Ok(Workshop {
+            assembly,
+            newton,
+            lift,
+            until,
+            increments: None,
+            massive: Vec::new(),
+            rateless: Vec::new(),
+            guard: None,
+        })
     }
 
     /// The first dynamic stage gives the initial velocities.

@@ -2,10 +2,11 @@
 
 use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
+use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
-use crate::solve::{Limp, NewtonFailure};
+use crate::solve::{Limp, NewtonFailure, mechanism};
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -15,7 +16,7 @@ const LARGEST_GAP: f64 = 1e-6;
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
-    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
         if self.takes_initial_motion() {
             let initial = std::mem::take(&mut self.plan.initial);
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
@@ -29,6 +30,7 @@ impl Run<'_> {
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);
         self.change_charts(None);
+        self.refuse_loose(workshop, method)?;
         self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
         self.state.algorithmic.copy_from_slice(&self.state.a);
@@ -173,17 +175,34 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
 }
 
 impl Run<'_> {
-    /// For each slot whether its accelerations mean something: its unknowns have inertia, or their motion is prescribed.
-    pub(super) fn slots_with_mass(&self, workshop: &mut Workshop) -> Vec<bool> {
-        workshop.assembly.evaluate(&self.state, Weights::MASS, None);
-        let system = &workshop.assembly.system;
-        let has = |slot: usize| {
-            let numbers = system.pattern.equations.of(slot as Slot);
-            numbers.contains(&Equations::HELD) || diagonal_block(system, numbers).max_abs() > 0.0
+    /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already: round-off would move them.
+    fn refuse_loose(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
+        let Workshop { assembly, newton, .. } = &mut *workshop;
+        assembly.forget();
+        assembly.evaluate(&self.state, method.weights(), None);
+        self.counters.work.factorisations += 1;
+        newton.solver.factorise(&assembly.system);
+        let loose = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
+        loose.map_or(Ok(()), |vector| Err(self.name_mechanism(Some(vector), &workshop.assembly.system)))
+    }
+
+    /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their motion is prescribed; and those
+    /// whose velocities do not, either.
+    pub(super) fn find_rates(&self, workshop: &mut Workshop) {
+        let mut touched = |weights: Weights| -> Vec<bool> {
+            workshop.assembly.evaluate(&self.state, weights, None);
+            let system = &workshop.assembly.system;
+            let has = |slot: usize| {
+                let numbers = system.pattern.equations.of(slot as Slot);
+                numbers.contains(&Equations::HELD) || diagonal_block(system, numbers).max_abs() > 0.0
+            };
+            (0..self.model.slots.len()).map(has).collect()
         };
-        let moves = (0..self.model.slots.len()).map(has).collect();
+        let (massive, damped) = (touched(Weights::MASS), touched(Weights::DAMPING));
         workshop.assembly.evaluate(&self.state, Weights::NONE, None);
-        moves
+        let rateless = |&slot: &usize| !(massive[slot] || damped[slot] || self.model.slots[slot].is_multiplier());
+        workshop.rateless = (0..massive.len()).filter(rateless).collect();
+        workshop.massive = massive;
     }
 }
 

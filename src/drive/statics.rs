@@ -161,6 +161,7 @@ impl Run<'_> {
                 Ok(Reached::Along)
             }
             Ok(Arrival::OutOfSteps) => Err(limit),
+            Ok(Arrival::Nowhere) => Err(named.unwrap_or(limit)),
             Err(failure) if !failure.is_of_balance() => Err(failure),
             Err(_) if increments > 0 => Err(limit),
             Err(failure) => Err(named.unwrap_or(failure)),

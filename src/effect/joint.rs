@@ -158,24 +158,29 @@ impl Instance {
     /// Forces, tangent, and the rows of the multipliers.
     fn system(&self, at: &State, weights: Weights, out: &mut ElementSystem) {
         let ends = self.ends(at);
+        self.hold(at, &ends, weights, out);
+        self.add_drive(at, &ends, weights, out);
+    }
+
+    /// What the multipliers do, and their rows.
+    fn hold(&self, at: &State, ends: &[End; 2], weights: Weights, out: &mut ElementSystem) {
         // Without a stiffness in the tangent the multipliers belong to accelerations.
         let couple = if weights.stiffness != 0.0 { weights.stiffness } else { weights.mass };
         let factors = (weights.stiffness, couple);
-        let (along, between) = self.gaps(at, &ends);
+        let (along, between) = self.gaps(at, ends);
         if self.slides_matter() {
             let force = self.multipliers(at, self.along);
-            add_along(&self.axes, &self.arms, &ends, force, factors, out);
+            add_along(&self.axes, &self.arms, ends, force, factors, out);
             out.add_force(block::ALONG, along);
         }
         let multipliers = self.multipliers(at, self.between);
         for (k, pair) in self.pairs().into_iter().enumerate() {
-            add_between(pair, &ends, multipliers.0[k], factors, k, out);
+            add_between(pair, ends, multipliers.0[k], factors, k, out);
         }
         if let Some(row) = self.turning_motor() {
-            self.angle_of(&ends).add_multiplier(multipliers.0[row], factors, row, out);
+            self.angle_of(ends).add_multiplier(multipliers.0[row], factors, row, out);
         }
         out.add_force(block::BETWEEN, between);
-        self.add_drive(at, &ends, weights, out);
     }
 
     /// A spring and a damper on the free direction x: f = (k x + c dx/dt) dx/dq.
@@ -399,6 +404,17 @@ impl Effect for Joints {
         };
         let sprung = |joint: &&Instance| joint.drive.motor.is_none() && joint.drive.stiffness != 0.0;
         self.joints.iter().filter(sprung).map(one).fold(0.0, f64::max)
+    }
+
+    fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3) {
+        let mut sum = (Vec3::ZERO, Vec3::ZERO);
+        for joint in self.joints.iter().filter(|joint| joint.nodes == [None, Some(node)]) {
+            let mut own = ElementSystem::new(block::COUNT);
+            joint.hold(at, &joint.ends(at), Weights::NONE, &mut own);
+            sum.0 += own.force_block(2);
+            sum.1 += own.force_block(3);
+        }
+        sum
     }
 
     fn remember(&self, at: &mut State) {

@@ -15,6 +15,7 @@ pub mod rigid_body;
 pub mod rotary_inertia;
 pub mod rotating_frame;
 pub mod section_inertia;
+pub mod spin_hold;
 pub mod spring;
 pub mod strain_rate_damping;
 mod volume;
@@ -132,6 +133,15 @@ pub trait Effect: Send + Sync {
 
     /// Shows the bodies at nodes with their mass properties.
     fn bodies(&self, _show: &mut dyn FnMut(Node, &Inertia)) {}
+
+    /// What joints to ground beside its supports do to a node in this sign of forces: force, and moment conjugate to its rotation
+    /// vector.
+    fn held_by_ground(&self, _at: &State, _node: Node) -> (Vec3, Vec3) {
+        (Vec3::ZERO, Vec3::ZERO)
+    }
+
+    /// Before a step is predicted from the velocities: takes out of them what nothing but round-off has put there.
+    fn steady(&self, _at: &mut State) {}
 
     /// After each converged state: continues what it keeps in the state, such as turns of joints.
     fn remember(&self, _at: &mut State) {}

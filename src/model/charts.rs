@@ -25,6 +25,9 @@ pub const COARSE_WARNING: f64 = PI / 2.0;
 /// A representative that lies farther than this from where it should be is not the right one.
 const FAR: f64 = PI / 2.0;
 
+/// From here on a rotation may have gone the long way round.
+pub const HALF_TURN: f64 = 3.0;
+
 /// Within this angle of a whole turn the direction of P tells nothing of the axis.
 const NEAR_TURN: f64 = 0.5;
 
@@ -71,8 +74,40 @@ pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     mixed
 }
 
+/// Carries the wound rotation vectors along with a correction that the state is about to take. A node may turn further than half
+/// a turn in a load step; how far, only its corrections tell.
+pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
+    for &slot in rotations {
+        let k = slot as usize;
+        let (old, wound, increment) = (state.q[k], state.wound[k], dq[k]);
+        let p = old + increment;
+        state.wound[k] = match () {
+            () if increment == Vec3::ZERO => wound,
+            () if wound == old => p,
+            () if increment.squared() < 1.0 => continued(p, wound, rotated(old, p)),
+            () => continued(p, wound, Rotation::new(old).t.transpose_mul(increment)),
+        };
+    }
+}
+
+/// The spatial rotation vector that leads from one to the other.
+fn rotated(old: Vec3, p: Vec3) -> Vec3 {
+    log(Rotation::new(p).r * Rotation::new(old).r.transpose())
+}
+
+/// The representative of `p` next to where `turned` carries a wound vector; the carried vector itself near whole turns, where
+/// there is none. See [`wind`].
+fn continued(p: Vec3, wound: Vec3, turned: Vec3) -> Vec3 {
+    let carried = wound + turned;
+    let candidate = unwound(p, carried);
+    let together = (candidate - carried).norm() < FAR;
+    let near_whole_turn = p.norm() < NEAR_TURN && carried.norm() > PI;
+    if together && !near_whole_turn { candidate } else { carried }
+}
+
 /// Continues the wound rotation vectors from the state `before`, and returns the slots where that is ambiguous.
 ///
+/// What corrections have carried them by tells the turns; without any it is less than half a turn.
 /// The wound vector is the one of P + 2 pi k n that lies nearest to the old one carried on by the rotation since. Close to a
 /// whole turn n is no guide: a node that passes it a little aside sees n swing to the other side, and P + 2 pi k n with it.
 /// There the carried one is kept until both come together again; it is ambiguous where they lie far apart.
@@ -81,18 +116,15 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     for &slot in rotations {
         let k = slot as usize;
         let (p, old, wound) = (state.q[k], before.q[k], before.wound[k]);
-        let plain = wound == old && (p - old).squared() < 1.0;
+        let plain = wound == old && state.wound[k] == wound && (p - old).squared() < 1.0;
         if plain {
             state.wound[k] = p;
             continue;
         }
-        let turned = log(Rotation::new(p).r * Rotation::new(old).r.transpose());
-        let carried = wound + turned;
-        let candidate = unwound(p, carried);
-        let together = (candidate - carried).norm() < FAR;
-        let near_whole_turn = p.norm() < NEAR_TURN && carried.norm() > PI;
-        state.wound[k] = if together && !near_whole_turn { candidate } else { carried };
-        if !together {
+        let (shortest, tracked) = (rotated(old, p), state.wound[k] - wound);
+        let turned = if tracked.norm() > HALF_TURN { unwound(shortest, tracked) } else { shortest };
+        state.wound[k] = continued(p, wound, turned);
+        if (unwound(p, state.wound[k]) - state.wound[k]).norm() >= FAR {
             ambiguous.push(slot);
         }
     }

@@ -200,11 +200,22 @@ impl Model {
         sum
     }
 
+    /// What joints to ground do to a node, see [`Effect::held_by_ground`].
+    pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
+        let parts = self.effects.iter().map(|effect| effect.held_by_ground(state, node));
+        parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
+    }
+
     /// What is driven from outside: each coordinate with the derivative of the energy over it.
     pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
         self.effects.iter().for_each(|effect| effect.drives(state, &mut |x, force| all.push((x, force))));
         all
+    }
+
+    /// Before a step is predicted, see [`Effect::steady`].
+    pub fn steady(&self, state: &mut State) {
+        self.effects.iter().for_each(|effect| effect.steady(state));
     }
 
     /// After a converged state: turns of joints are counted, multipliers have no rates.

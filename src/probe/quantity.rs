@@ -109,8 +109,9 @@ impl Probe {
             }
             Quantity::Reaction(node) => {
                 let held = |slot: u32| at.system.pattern.equations.held_part(slot, at.system.total(slot as usize));
-                vector(held(node.u));
-                vector(Rotation::new(state.q[node.p as usize]).t_inverse() * held(node.p));
+                let (force, moment) = at.model.held_by_ground(state, *node);
+                vector(held(node.u) - force);
+                vector(Rotation::new(state.q[node.p as usize]).t_inverse() * (held(node.p) - moment));
             }
             Quantity::Strain(point) => out.extend(point.strain_and_stress(state)[0]),
             Quantity::Resultant(point) => out.extend(point.strain_and_stress(state)[1]),

@@ -209,6 +209,9 @@ impl Newton {
                 });
             }
             assembly.extrapolate(state, &self.dq);
+            if method.changes_charts() {
+                charts::carry(state, &self.dq, &model.rotations);
+            }
             method.correct(state, &self.dq);
             if method.changes_charts() {
                 self.change_charts(model, state, work);

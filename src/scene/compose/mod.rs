@@ -3,6 +3,7 @@
 mod connections;
 mod inertia;
 mod loads;
+mod spins;
 
 use super::joints::FoundJoint;
 use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
@@ -95,6 +96,7 @@ pub fn compose(
     composer.links();
     composer.joints(connections);
     composer.beam_inertia();
+    composer.spin_holds(connections);
     composer.out.bodies = composer.bodies();
     composer.gravity();
     composer.body_inertia();
