@@ -208,7 +208,8 @@ impl Run<'_> {
     /// A scheme that makes energy from nothing ends the run while its results can still be told from noise.
     fn refuse_growth(&self, workshop: &mut Workshop) -> Result<(), Failure> {
         let Some(guard) = &mut workshop.guard else { return Ok(()) };
-        let Some(Growth { grown, largest }) = guard.judge(self.bookkeeper.ledger()) else { return Ok(()) };
+        let moved = self.model.farthest(&self.good, &self.state);
+        let Some(Growth { grown, largest }) = guard.judge(self.bookkeeper.ledger(), moved) else { return Ok(()) };
         Err(Failure::EnergyGrowth { at: self.moment(), grown, largest })
     }
 

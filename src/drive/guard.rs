@@ -10,6 +10,7 @@ const RUNNING: usize = 3;
 pub(super) struct EnergyGuard {
     limit: f64,
     floor: f64,
+    round_off: f64,
     start: Option<f64>,
     largest: f64,
     running: usize,
@@ -24,9 +25,9 @@ pub(super) struct Growth {
 
 impl EnergyGuard {
     /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far. Energies below `floor` are what
-    /// Newton tolerates.
-    pub fn new(limit: f64, floor: f64) -> Self {
-        Self { limit, floor, start: None, largest: 0.0, running: 0, lost: 0.0 }
+    /// Newton tolerates; forces of round-off, `round_off` large, do work on the way.
+    pub fn new(limit: f64, floor: f64, round_off: f64) -> Self {
+        Self { limit, floor, round_off, start: None, largest: 0.0, running: 0, lost: 0.0 }
     }
 
     /// The account where the stage begins.
@@ -41,8 +42,9 @@ impl EnergyGuard {
         (share > self.limit && self.largest > self.floor).then_some(share)
     }
 
-    /// Looks at the account of a step; tells a growth that lasts.
-    pub fn judge(&mut self, ledger: Ledger) -> Option<Growth> {
+    /// Looks at the account of a step over which nodes have moved by `moved` at most; tells a growth that lasts.
+    pub fn judge(&mut self, ledger: Ledger, moved: f64) -> Option<Growth> {
+        self.floor += self.round_off * moved;
         self.largest = self.largest.max(size(ledger));
         let grown = ledger.total() - self.start?;
         self.lost = self.lost.max(-grown);
@@ -66,24 +68,33 @@ mod tests {
 
     #[test]
     fn growth_that_lasts_three_steps_is_told() {
-        let mut guard = EnergyGuard::new(0.2, 0.0);
+        let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
         guard.open(ledger(1.0));
-        assert!(guard.judge(ledger(1.2)).is_none());
-        assert!(guard.judge(ledger(1.3)).is_none());
-        assert!(guard.judge(ledger(1.1)).is_none());
-        assert!(guard.judge(ledger(1.3)).is_none());
-        assert!(guard.judge(ledger(1.3)).is_none());
+        assert!(guard.judge(ledger(1.2), 0.0).is_none());
+        assert!(guard.judge(ledger(1.3), 0.0).is_none());
+        assert!(guard.judge(ledger(1.1), 0.0).is_none());
+        assert!(guard.judge(ledger(1.3), 0.0).is_none());
+        assert!(guard.judge(ledger(1.3), 0.0).is_none());
         assert!(guard.loss().is_none());
-        let growth = guard.judge(ledger(1.4)).unwrap();
+        let growth = guard.judge(ledger(1.4), 0.0).unwrap();
         assert!((growth.grown - 0.4).abs() < 1e-15 && growth.largest == 1.4);
     }
 
     #[test]
+    fn forces_of_round_off_do_work_on_the_way() {
+        let mut guard = EnergyGuard::new(0.2, 0.0, 1e-3);
+        guard.open(ledger(0.0));
+        assert!((1..10).all(|k| guard.judge(ledger(5e-4 * f64::from(k)), 1.0).is_none()));
+        let mut still = guard.clone();
+        assert!((10..14).any(|k| still.judge(ledger(5e-3 * f64::from(k)), 0.0).is_some()));
+    }
+
+    #[test]
     fn what_is_lost_is_told_beyond_the_limit() {
-        let mut guard = EnergyGuard::new(0.2, 0.0);
+        let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
         guard.open(ledger(1.0));
-        assert!(guard.judge(ledger(0.9)).is_none() && guard.loss().is_none());
-        assert!(guard.judge(ledger(0.5)).is_none());
+        assert!(guard.judge(ledger(0.9), 0.0).is_none() && guard.loss().is_none());
+        assert!(guard.judge(ledger(0.5), 0.0).is_none());
         assert_eq!(guard.loss(), Some(0.5));
     }
 }

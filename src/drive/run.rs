@@ -349,8 +349,9 @@ impl<'o> Run<'o> {
 
     /// Strains that Newton leaves have an energy of their own, of the stiffest section along the length of the scene.
     fn energy_guard(&self, workshop: &Workshop, limit: f64) -> EnergyGuard {
-        let stiffest = workshop.assembly.noise(&self.state).force / f64::EPSILON;
-        EnergyGuard::new(limit, stiffest * self.model.length * TOLERATED_STRAIN * TOLERATED_STRAIN)
+        let round_off = workshop.assembly.noise(&self.state).force;
+        let stiffest = round_off / f64::EPSILON;
+        EnergyGuard::new(limit, stiffest * self.model.length * TOLERATED_STRAIN * TOLERATED_STRAIN, round_off)
     }
 
     fn note_solver(&mut self, name: &'static str) {

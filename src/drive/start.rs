@@ -175,14 +175,17 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
 }
 
 impl Run<'_> {
-    /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already: round-off would move them.
+    /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already: round-off would move them. It is
+    /// looked at without velocities, whose forces come and go with them.
     fn refuse_loose(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
         let Workshop { assembly, newton, .. } = &mut *workshop;
+        let mut still = self.state.clone();
+        (still.v, still.a) = (vec![Vec3::ZERO; still.v.len()], vec![Vec3::ZERO; still.a.len()]);
         assembly.forget();
-        assembly.evaluate(&self.state, method.weights(), None);
+        assembly.evaluate(&still, method.weights(), None);
         self.counters.work.factorisations += 1;
         newton.solver.factorise(&assembly.system);
-        let loose = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
+        let loose = mechanism(&mut newton.solver, assembly, &self.model, &still);
         loose.map_or(Ok(()), |vector| Err(self.name_mechanism(Some(vector), &workshop.assembly.system)))
     }
 

@@ -176,6 +176,13 @@ impl Model {
         too_far
     }
 
+    /// The largest displacement of a node from one state to another.
+    pub fn farthest(&self, from: &State, to: &State) -> f64 {
+        let nodes = self.slots.iter().zip(from.q.iter().zip(&to.q));
+        let moved = nodes.filter(|(info, _)| info.kind == SlotKind::Displacement).map(|(_, (a, b))| (*b - *a).norm());
+        moved.fold(0.0, f64::max)
+    }
+
     /// The rotation of a node shares the tile of its displacement, which it follows.
     pub fn groups(&self) -> Groups {
         let kind = |slot: Slot| self.slots[slot as usize].kind;

@@ -25,6 +25,9 @@ const BACKWARD_ERROR: f64 = 1e-11;
 /// What refinement does not bring below this is no solution.
 const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
 
+/// Blocks need more of them.
+const FEW_DIGITS: f64 = 4.0;
+
 /// So many corrections
 const REFINEMENTS: usize = 3;
 
@@ -113,6 +116,16 @@ impl LinearSolver {
             x.iter_mut().zip(&residual).for_each(|(x, correction)| *x += correction);
         }
         error <= LARGEST_BACKWARD_ERROR
+    }
+
+    /// After corrections that led nowhere: from here on in general where few digits of the softest stiffness are left, of which
+    /// pivots save more.
+    pub fn doubt(&mut self, system: &System) {
+        if matches!(self.way, Way::Blocks(_))
+            && self.softest(system).is_none_or(|vector| vector.digits(system) < FEW_DIGITS)
+        {
+            self.factored = self.leave_blocks(system);
+        }
     }
 
     /// From here on in general.

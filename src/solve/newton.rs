@@ -192,9 +192,7 @@ impl Newton {
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
                 Verdict::Continue if iterations < self.max_iterations => refinement = Refinement::default(),
-                _ if iterations >= self.max_iterations => {
-                    return Err(NewtonFailure::NotConverged { residual, history: self.history.clone() });
-                }
+                _ if iterations >= self.max_iterations => return Err(self.not_converged(&assembly.system, residual)),
                 _ => {}
             }
             if !self.find_correction(&assembly.system, lift.take(), work) {
@@ -205,7 +203,7 @@ impl Newton {
                 // Round-off may have left a stiffness where there is none.
                 return Err(match mechanism(&mut self.solver, assembly, model, state) {
                     Some(vector) => NewtonFailure::Singular(Some(vector)),
-                    None => NewtonFailure::NotConverged { residual, history: self.history.clone() },
+                    None => self.not_converged(&assembly.system, residual),
                 });
             }
             assembly.extrapolate(state, &self.dq);
@@ -217,6 +215,12 @@ impl Newton {
                 self.change_charts(model, state, work);
             }
         }
+    }
+
+    /// The next attempt is better off with pivots where round-off has taken most of the softest stiffness.
+    fn not_converged(&mut self, system: &System, residual: Residual) -> NewtonFailure {
+        self.solver.doubt(system);
+        NewtonFailure::NotConverged { residual, history: self.history.clone() }
     }
 
     /// Solves J dq = -g; held directions take their part of `lift`. `false` where there is no solution.

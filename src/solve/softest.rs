@@ -16,6 +16,11 @@ pub struct NullVector {
 }
 
 impl NullVector {
+    /// The decimal digits that round-off leaves of its stiffness in the tangent.
+    pub fn digits(&self, system: &System) -> f64 {
+        stiffness_of(system, &self.motion).max(1.0).log10()
+    }
+
     /// The slot that moves most, told by entries that compare, and the motion of every slot.
     pub fn by_slot(&self, equations: &Equations, slots: usize) -> (usize, Vec<Vec3>) {
         let field = |entries: &[f64]| {

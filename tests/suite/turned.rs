@@ -168,20 +168,32 @@ fn jittered(mut deck: Deck, random: &mut Random) -> Deck {
     deck
 }
 
-/// How far apart two runs are in each of their rows, over the size of the scene, when the second is seen turned back by `q`.
+/// How far apart two runs are in each of their rows, over the size of the scene, when the second is seen turned back by `q`. Where
+/// a path is followed its rows lie where round-off puts them: they are compared where both are at the same load.
 fn differences(one: &Outcome, other: &Outcome, q: Mat3) -> Vec<f64> {
     let node = |((u, r), (v, s)): (&(Vec3, Mat3), &(Vec3, Mat3))| {
         let (moved, turned) = (*v - q * *u, *s - q * *r * q.transpose());
         (moved.norm() / one.size).max(turned.max_abs())
     };
-    let row = |(a, b): (&Row, &Row)| a.nodes.iter().zip(&b.nodes).map(node).fold(0.0, f64::max);
-    one.rows.iter().zip(&other.rows).map(row).collect()
+    let together = |a: &Row, b: &Row| (a.clock - b.clock).abs() <= 1e-12 * a.clock.abs();
+    let row = |(a, b): (&Row, &Row)| match together(a, b) {
+        true => a.nodes.iter().zip(&b.nodes).map(node).fold(0.0, f64::max),
+        false => 0.0,
+    };
+    let mut all: Vec<f64> = one.rows.iter().zip(&other.rows).map(row).collect();
+    // The last rows are at the same load, however many come before.
+    let last = one.rows.last().zip(other.rows.last()).map(row);
+    all.last_mut().zip(last).into_iter().for_each(|(of_row, last)| *of_row = last);
+    all
 }
 
-/// Whether two runs ended alike, in the same number of rows.
+/// Whether two runs ended alike: at the same load or time and, but for paths, in the same number of rows.
 fn alike(one: &Outcome, other: &Outcome) -> Result<(), String> {
     let end = |outcome: &Outcome| (outcome.name.clone(), outcome.rows.len(), outcome.rows.last().unwrap().clock);
-    if end(one) == end(other) { Ok(()) } else { Err(format!("{:?}, turned {:?}", end(one), end(other))) }
+    let ((name, count, clock), (other_name, other_count, other_clock)) = (end(one), end(other));
+    let path = one.rows.iter().zip(&other.rows).any(|(a, b)| a.clock != b.clock);
+    let together = name == other_name && clock == other_clock && (count == other_count || path);
+    if together { Ok(()) } else { Err(format!("{:?}, turned {:?}", end(one), end(other))) }
 }
 
 /// What turning a deck came to, row by row: the worst difference from the plain run, and what two units in the last place of the
@@ -237,7 +249,7 @@ struct Sensitive {
     then: Option<f64>,
 }
 
-const SENSITIVE: [Sensitive; 10] = [
+const SENSITIVE: [Sensitive; 13] = [
     // Axial stiffness 1e6, 1e7 times the rotary inertia: the round-off of forces turns the beam.
     Sensitive { name: "d05_beam_own_axis_100_turns", until: 50.0, then: Some(1e-7) },
     // Axial stiffness 1e10 on a mass of 20: the round-off of forces alone is 3e-6.
@@ -249,6 +261,10 @@ const SENSITIVE: [Sensitive; 10] = [
     // A double pendulum, in effect
     Sensitive { name: "d14_robot_arm_60", until: 18.0, then: None },
     Sensitive { name: "d14_robot_arm_60_rho_half", until: 18.0, then: None },
+    // Rows at the limit point: what the load leaves open by its last digit is open by the root of that in the displacement.
+    Sensitive { name: "s01_lee_one_level", until: 0.9278, then: Some(5e-8) },
+    Sensitive { name: "s01_lee_plain_static", until: 0.9278, then: Some(5e-8) },
+    Sensitive { name: "s01_lee_skew", until: 0.9278, then: Some(5e-8) },
     // A wire compressed a thousand times beyond buckling: what is off its axis grows. By its own unit of time.
     Sensitive { name: "z08_megametre", until: 3e5, then: Some(1e-6) },
     Sensitive { name: "z08_micrometre", until: 1.0000003, then: Some(1e-6) },
