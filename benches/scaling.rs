@@ -4,9 +4,12 @@
 //! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only.
 
 use beamsim::drive::{Failure, Observer, Run, Snapshot};
-use beamsim::kernel::ElementSystem;
+use beamsim::effect::Noise;
+use beamsim::kernel::{ElementSystem, Weights};
 use beamsim::model::{Assembly, Model, StageContext, StageKind};
 use beamsim::scene;
+use beamsim::solve::{Convergence, LinearSolver};
+use beamsim::tensor::Vec3;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -57,6 +60,55 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
     scatter().min(scatter())
 }
 
+/// Seconds of the quickest of several runs of `part`.
+fn quickest(mut part: impl FnMut()) -> f64 {
+    let once = |_| {
+        let start = Instant::now();
+        part();
+        start.elapsed().as_secs_f64()
+    };
+    (0..10).map(once).fold(f64::INFINITY, f64::min)
+}
+
+/// What an iteration is made of, in nanoseconds an element.
+fn parts(elements: usize, dynamic: bool, interpolation: &str) {
+    let (scene, _) =
+        scene::from_text(&deck(elements, dynamic, interpolation)).unwrap_or_else(|_| panic!("the deck is good"));
+    let mut model = scene.plan.model;
+    let state = model.rest();
+    let (kind, weights) = if dynamic {
+        (StageKind::Dynamic, Weights { stiffness: 1.0, damping: 200.0, mass: 4e4 })
+    } else {
+        (StageKind::Static, Weights::STIFFNESS)
+    };
+    let Ok(equations) = model.begin_stage(0, kind, &state) else { return };
+    let effects = model.acting(&StageContext { number: 0, kind, rotating: false });
+    let mut assembly = Assembly::new(effects, equations, &model);
+    let tangent = quickest(|| assembly.evaluate(&state, weights, None));
+    let force = quickest(|| assembly.evaluate(&state, Weights::NONE, None));
+    assembly.evaluate(&state, weights, None);
+    let increments = vec![Vec3([1e-9; 3]); state.q.len()];
+    let extrapolate = quickest(|| assembly.extrapolate(&state, &increments));
+    let Some(mut solver) = LinearSolver::new(&assembly.system, &[]) else { return };
+    let system = &assembly.system;
+    let factorise = quickest(|| assert!(solver.factorise(system)));
+    let mut x = vec![1.0; system.pattern.equations.count()];
+    let solve = quickest(|| assert!(solver.solve_once(system, &mut x)));
+    let b = vec![1.0; x.len()];
+    let residual = quickest(|| {
+        black_box(system.residual(&b, &x));
+    });
+    let convergence = Convergence { tolerance: 1e-8 };
+    let judge = quickest(|| {
+        black_box(convergence.judge(&model, system, Noise::default(), None));
+    });
+    print!("{:<8} {interpolation:<9} {elements:>8}", if dynamic { "dynamic" } else { "static" });
+    for seconds in [tangent, force, extrapolate, factorise, solve, residual, judge] {
+        print!(" {:>9.1}", 1e9 * seconds / elements as f64);
+    }
+    println!();
+}
+
 fn row(elements: usize, dynamic: bool, interpolation: &str) {
     let (scene, _) =
         scene::from_text(&deck(elements, dynamic, interpolation)).unwrap_or_else(|_| panic!("the deck is good"));
@@ -99,5 +151,14 @@ fn main() {
     );
     for (dynamic, interpolation) in [(false, "total"), (false, "relative"), (true, "total"), (true, "relative")] {
         sizes.iter().for_each(|&elements| row(elements, dynamic, interpolation));
+    }
+    println!("\nparts of an iteration, nanoseconds per element");
+    print!("{:<8} {:<9} {:>8}", "stage", "rotations", "elements");
+    ["tangent", "force", "foresight", "factorise", "solve", "residual", "judge"]
+        .iter()
+        .for_each(|name| print!(" {name:>9}"));
+    println!();
+    for (dynamic, interpolation) in [(false, "total"), (false, "relative"), (true, "total"), (true, "relative")] {
+        sizes.iter().skip(1).for_each(|&elements| parts(elements, dynamic, interpolation));
     }
 }

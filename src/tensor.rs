@@ -3,14 +3,27 @@
 //! Every function is `#[inline(always)]`, so that a kernel compiled for a wider instruction set keeps all of its
 //! body there.
 
-use crate::real::Real;
+use crate::real::{LANES, Lanes, Pack, Real, pack};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// [f(0), f(1), f(2)]; unlike the closure of `array::map` it is inlined without fail, which makes kernels several times
-/// faster.
-#[inline(always)]
-fn three<A>(f: impl Fn(usize) -> A) -> [A; 3] {
-    [f(0), f(1), f(2)]
+/// [f(0), f(1), f(2)], written out: no closure that may stay outside of a kernel, no index that may be out of bounds.
+macro_rules! three {
+    (|$i:ident| $f:expr) => {
+        [
+            {
+                let $i = 0;
+                $f
+            },
+            {
+                let $i = 1;
+                $f
+            },
+            {
+                let $i = 2;
+                $f
+            },
+        ]
+    };
 }
 
 /// The largest magnitude; unlike `f64::max` it does not pass over NaN.
@@ -25,6 +38,36 @@ pub struct Vec3<T = f64>(pub [T; 3]);
 /// A tensor of three by three components, stored by rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mat3<T = f64>(pub [[T; 3]; 3]);
+
+impl Pack for Vec3 {
+    type Packed = Vec3<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Vec3<Lanes> {
+        Vec3(pack!(of.0))
+    }
+}
+
+impl Pack for Mat3 {
+    type Packed = Mat3<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Mat3<Lanes> {
+        Mat3(pack!(of.0))
+    }
+}
+
+impl Default for Vec3 {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl Default for Mat3 {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
 
 impl Vec3<f64> {
     /// The vector with three zeros.
@@ -45,11 +88,13 @@ impl Vec3<f64> {
 
     /// |a| without underflow or overflow of squares.
     pub fn size(self) -> f64 {
+        let square = self.squared();
+        if (1e-280..=1e280).contains(&square) {
+            return square.sqrt();
+        }
         let scale = self.max_abs();
         match scale {
-            // Squares are safe.
-            1e-140..=1e140 => self.norm(),
-            // So are reciprocals.
+            // Reciprocals are safe.
             1e-300..=1e300 => self.scale(1.0 / scale).norm() * scale,
             _ => scale,
         }
@@ -71,7 +116,7 @@ impl<T: Real> Vec3<T> {
     /// A constant vector, lifted to this scalar.
     #[inline(always)]
     pub fn constant(v: Vec3<f64>) -> Self {
-        Self(three(|i| T::constant(v.0[i])))
+        Self(three!(|i| T::constant(v.0[i])))
     }
 
     /// a . b
@@ -110,13 +155,13 @@ impl<T: Real> Vec3<T> {
     /// a (x) b, the outer product.
     #[inline(always)]
     pub fn outer(self, other: Self) -> Mat3<T> {
-        Mat3(three(|i| three(|j| self.0[i] * other.0[j])))
+        Mat3(three!(|i| three!(|j| self.0[i] * other.0[j])))
     }
 
     /// The vector times a constant.
     #[inline(always)]
     pub fn scale(self, factor: f64) -> Self {
-        Self(three(|i| self.0[i] * factor))
+        Self(three!(|i| self.0[i] * factor))
     }
 }
 
@@ -153,7 +198,7 @@ impl<T: Real> Mat3<T> {
     /// A constant tensor, lifted to this scalar.
     #[inline(always)]
     pub fn constant(m: Mat3<f64>) -> Self {
-        Self(three(|i| three(|j| T::constant(m.0[i][j]))))
+        Self(three!(|i| three!(|j| T::constant(m.0[i][j]))))
     }
 
     /// The tensor with these diagonal entries.
@@ -166,7 +211,7 @@ impl<T: Real> Mat3<T> {
     /// The tensor with these columns.
     #[inline(always)]
     pub fn from_columns(a: Vec3<T>, b: Vec3<T>, c: Vec3<T>) -> Self {
-        Self(three(|i| [a.0[i], b.0[i], c.0[i]]))
+        Self(three!(|i| [a.0[i], b.0[i], c.0[i]]))
     }
 
     /// Column `j`.
@@ -178,21 +223,21 @@ impl<T: Real> Mat3<T> {
     /// The transpose.
     #[inline(always)]
     pub fn transpose(self) -> Self {
-        Self(three(|i| [self.0[0][i], self.0[1][i], self.0[2][i]]))
+        Self(three!(|i| [self.0[0][i], self.0[1][i], self.0[2][i]]))
     }
 
     /// A^T b, without forming the transpose.
     #[inline(always)]
     pub fn transpose_mul(self, v: Vec3<T>) -> Vec3<T> {
         let m = self.0;
-        Vec3(three(|i| m[0][i] * v.0[0] + m[1][i] * v.0[1] + m[2][i] * v.0[2]))
+        Vec3(three!(|i| m[0][i] * v.0[0] + m[1][i] * v.0[1] + m[2][i] * v.0[2]))
     }
 
     /// A^T B, without forming the transpose.
     #[inline(always)]
     pub fn transpose_matmul(self, other: Self) -> Self {
         let (a, b) = (self.0, other.0);
-        Self(three(|i| three(|j| a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j])))
+        Self(three!(|i| three!(|j| a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j])))
     }
 
     /// a~ B, the product with a skew tensor from the left.
@@ -204,7 +249,7 @@ impl<T: Real> Mat3<T> {
     /// The tensor times a constant.
     #[inline(always)]
     pub fn scale(self, factor: f64) -> Self {
-        Self(three(|i| three(|j| self.0[i][j] * factor)))
+        Self(three!(|i| three!(|j| self.0[i][j] * factor)))
     }
 }
 
@@ -212,7 +257,7 @@ impl<T: Real> Add for Vec3<T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(three(|i| self.0[i] + other.0[i]))
+        Self(three!(|i| self.0[i] + other.0[i]))
     }
 }
 
@@ -220,7 +265,7 @@ impl<T: Real> Sub for Vec3<T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(three(|i| self.0[i] - other.0[i]))
+        Self(three!(|i| self.0[i] - other.0[i]))
     }
 }
 
@@ -228,7 +273,7 @@ impl<T: Real> Neg for Vec3<T> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(three(|i| -self.0[i]))
+        Self(three!(|i| -self.0[i]))
     }
 }
 
@@ -250,7 +295,7 @@ impl<T: Real> Mul<T> for Vec3<T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: T) -> Self {
-        Self(three(|i| self.0[i] * factor))
+        Self(three!(|i| self.0[i] * factor))
     }
 }
 
@@ -258,7 +303,7 @@ impl<T: Real> Add for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(three(|i| three(|j| self.0[i][j] + other.0[i][j])))
+        Self(three!(|i| three!(|j| self.0[i][j] + other.0[i][j])))
     }
 }
 
@@ -266,7 +311,7 @@ impl<T: Real> Sub for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(three(|i| three(|j| self.0[i][j] - other.0[i][j])))
+        Self(three!(|i| three!(|j| self.0[i][j] - other.0[i][j])))
     }
 }
 
@@ -274,7 +319,7 @@ impl<T: Real> Neg for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(three(|i| three(|j| -self.0[i][j])))
+        Self(three!(|i| three!(|j| -self.0[i][j])))
     }
 }
 
@@ -296,7 +341,7 @@ impl<T: Real> Mul<T> for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: T) -> Self {
-        Self(three(|i| three(|j| self.0[i][j] * factor)))
+        Self(three!(|i| three!(|j| self.0[i][j] * factor)))
     }
 }
 
@@ -304,7 +349,7 @@ impl<T: Real> Mul<Vec3<T>> for Mat3<T> {
     type Output = Vec3<T>;
     #[inline(always)]
     fn mul(self, v: Vec3<T>) -> Vec3<T> {
-        Vec3(three(|i| Vec3(self.0[i]).dot(v)))
+        Vec3(three!(|i| Vec3(self.0[i]).dot(v)))
     }
 }
 
@@ -313,7 +358,7 @@ impl<T: Real> Mul for Mat3<T> {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let b = other.0;
-        Self(three(|i| three(|j| self.0[i][0] * b[0][j] + self.0[i][1] * b[1][j] + self.0[i][2] * b[2][j])))
+        Self(three!(|i| three!(|j| self.0[i][0] * b[0][j] + self.0[i][1] * b[1][j] + self.0[i][2] * b[2][j])))
     }
 }
 

@@ -1,10 +1,11 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
-use super::interpolation::{Interpolation, Scratch};
-use super::{ByOrder, Connection, Effect, Energy, Noise, for_each_batch};
+use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
+use super::{ByOrder, Connection, Effect, Energy, Noise, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane, pack};
 use crate::system::{Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
 use std::marker::PhantomData;
@@ -87,14 +88,34 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         let (two, three) = (self.elements.two.len(), 2 * self.elements.three.len());
         let mut parts = [0, two, two + three].map(|start| remembered.get(start..).unwrap_or_default()).into_iter();
         for_each_batch!(self.elements, |first, batch| {
-            add_batch::<I, _, _>(batch, first, parts.next().unwrap_or_default(), at, weights, out);
+            let part = parts.next().unwrap_or_default();
+            let done = Instructions::here().run_side_by_side(
+                #[inline(always)]
+                || add_batch::<I, _, _>(batch, first, part, at, weights, out),
+            );
+            if done.is_none() {
+                let mut work = workspace(batch);
+                let each = batch.iter().enumerate();
+                each.for_each(|(k, element)| {
+                    element.add::<I>(first + k, stresses_of(part, k), at, weights.stiffness, &mut work, out);
+                });
+            }
         });
     }
 
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
-        let mut points = memory.points.iter_mut();
-        for_each_batch!(self.elements, |_first, batch| for element in batch {
-            element.extrapolate::<I>(at, dq, &mut points);
+        let mut start = 0;
+        for_each_batch!(self.elements, |_first, batch| {
+            let end = start + batch.iter().map(|element| element.points.len()).sum::<usize>();
+            let own = &mut memory.points[std::mem::replace(&mut start, end)..end];
+            let done = Instructions::here().run_side_by_side(
+                #[inline(always)]
+                || extrapolate_batch::<I, _, _>(batch, at, dq, own),
+            );
+            if done.is_none() {
+                let each = batch.iter().zip(own.chunks_mut(batch.first().map_or(1, |element| element.points.len())));
+                each.for_each(|(element, stresses)| element.extrapolate::<I>(at, dq, stresses));
+            }
         });
         memory.valid = true;
     }
@@ -141,7 +162,9 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 }
 
-/// Adds the elements of one order, `first` instances after the first one of the effect.
+/// Adds the elements of one order, `first` instances after the first one of the effect; `remembered` are the stresses of
+/// geometric parts.
+#[inline(always)]
 fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
     first: usize,
@@ -150,30 +173,123 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Sink,
 ) {
-    let (mut system, mut scratch) = (ElementSystem::new(2 * N), Scratch::new(N));
-    for (k, element) in batch.iter().enumerate() {
-        let free = element.free_amplitude(at);
-        let stresses = remembered.get(k * G..(k + 1) * G);
-        let kernel = |nodes: &[NodeMotion; N], stiffness: f64, out: &mut ElementSystem| {
-            for (g, point) in element.points.iter().enumerate() {
-                let geometric = stresses.map(|s| unpack(&s[g]));
-                point.add_elastic(nodes, free, geometric.as_ref(), stiffness, out);
-            }
-        };
-        let geometric = stresses.map(|stresses| {
-            move |nodes: &[NodeMotion; N], out: &mut ElementSystem| {
-                for (point, stress) in element.points.iter().zip(stresses) {
-                    point.add_force(&point.configuration(nodes), &unpack(stress), out);
-                }
-            }
+    let stiffness = weights.stiffness;
+    let (mut systems, mut scratch) = (ElementSystem::<Lanes>::new(2 * N), Scratch::<Lanes>::new(N));
+    let mut alone = None;
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
+        systems.clear_for(stiffness);
+        let posture = Posture::side_by_side(each_lane!(|k| &elements[k].connection), at);
+        I::View::new(&posture).add(&sum, stiffness, &mut scratch, &mut systems);
+        let count = LANES.min(batch.len() - start);
+        let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
+        out.add_lanes(first + start, count, &systems, is_mixed, |k, out| {
+            let work = alone.get_or_insert_with(|| workspace(batch));
+            elements[k].add::<I>(first + start + k, stresses_of(remembered, start + k), at, stiffness, work, out);
         });
-        I::evaluate(&element.connection, at, weights.stiffness, &mut scratch, &mut system, kernel, geometric);
-        out.add(first + k, &system);
     }
 }
 
-fn unpack(s: &[f64; 6]) -> Stress {
+/// Element systems to compute with, one element of the batch at a time.
+fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> (ElementSystem, Scratch) {
+    (ElementSystem::new(2 * N), Scratch::new(N))
+}
+
+/// What is remembered of the points of element k.
+fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
+    let own = remembered.get(k * G..(k + 1) * G)?;
+    Some(std::array::from_fn(|g| unpack(&own[g])))
+}
+
+/// The points of an element, or of several side by side, with the stresses that geometric parts are formed with where these are
+/// not the present ones.
+struct Sum<const N: usize, const G: usize, T> {
+    points: [StiffnessPoint<N, T>; G],
+    stresses: Option<[Stress<T>; G]>,
+    free: T,
+}
+
+impl<const N: usize, const G: usize> Sum<N, G, Lanes> {
+    #[inline(always)]
+    fn side_by_side(elements: [&ElasticElement<N, G>; LANES], remembered: &[[f64; 6]], at: &State) -> Self {
+        let points = pack!(elements.points);
+        let free = Lanes(each_lane!(|k| elements[k].free_amplitude(at)));
+        let none = Stress { n: Vec3::zero(), m: Vec3::zero() };
+        let mut stresses = (!remembered.is_empty()).then_some([none; G]);
+        if let Some(stresses) = &mut stresses {
+            for g in 0..G {
+                let stress = |k: usize| &remembered[(k * G + g).min(remembered.len() - 1)];
+                stresses[g] = unpack(&Pack::pack(each_lane!(|k| stress(k))));
+            }
+        }
+        Self { points, stresses, free }
+    }
+}
+
+impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
+    #[inline(always)]
+    fn add(&self, nodes: &[NodeMotion<T>; N], stiffness: f64, out: &mut ElementSystem<T>) {
+        for g in 0..G {
+            let geometric = self.stresses.as_ref().map(|stresses| &stresses[g]);
+            self.points[g].add_elastic(nodes, self.free, geometric, stiffness, out);
+        }
+    }
+
+    #[inline(always)]
+    fn add_geometric(&self, nodes: &[NodeMotion<T>; N], out: &mut ElementSystem<T>) -> bool {
+        let Some(stresses) = &self.stresses else { return false };
+        for g in 0..G {
+            let point = &self.points[g];
+            point.add_force(&point.configuration(nodes), &stresses[g], out);
+        }
+        true
+    }
+}
+
+#[inline(always)]
+fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
     Stress { n: Vec3([s[0], s[1], s[2]]), m: Vec3([s[3], s[4], s[5]]) }
+}
+
+#[inline(always)]
+fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
+    let Stress { n, m } = stress;
+    [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]]
+}
+
+/// The stresses that the points of a batch are expected to have after the correction `dq`.
+#[inline(always)]
+fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let connections = each_lane!(|k| &elements[k].connection);
+        let sum = Sum::side_by_side(elements, &[], at);
+        let view = I::View::new(&Posture::side_by_side(connections, at));
+        let (mut du, mut dp) = ([Vec3::zero(); N], [Vec3::zero(); N]);
+        for i in 0..N {
+            du[i] = at_slots(dq, each_lane!(|k| connections[k].nodes[i].u));
+            dp[i] = at_slots(dq, each_lane!(|k| connections[k].nodes[i].p));
+        }
+        let change = view.variation(&du, &dp);
+        for g in 0..G {
+            let stress = sum.points[g].extrapolated_stress(view.nodes(), sum.free, |i| change[i].0, |i| change[i].1);
+            let stress = packed(&stress);
+            for k in 0..LANES.min(batch.len() - start) {
+                out[(start + k) * G + g] = stress.map(|lanes| lanes.0[k]);
+            }
+        }
+        for (k, element) in elements.iter().enumerate().take(batch.len() - start) {
+            if at.mixed[element.connection.element as usize] != 0 {
+                element.extrapolate::<I>(at, dq, &mut out[(start + k) * G..]);
+            }
+        }
+    }
 }
 
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
@@ -183,8 +299,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// Strain and stress at each integration point (material, global components).
     pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
-        let (nodes, free) = (I::nodes(&self.connection, at), self.free_amplitude(at));
-        self.points.map(|point| point.strain_and_stress(&nodes, free))
+        let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
+        self.points.map(|point| point.strain_and_stress(view.nodes(), free))
     }
 
     fn energy<I: Interpolation>(&self, at: &State) -> f64 {
@@ -198,26 +314,37 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
-        let (nodes, change) = (I::nodes(&self.connection, at), I::variation(&self.connection, at, field));
+        let (view, change) = (I::see(&self.connection, at), I::variation(&self.connection, at, field));
         let at_point = |point: &StiffnessPoint<N>| {
-            let strain = point.strain_variation(&point.configuration(&nodes), |i| change[i].0, |i| change[i].1);
+            let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
         };
         self.points.iter().map(at_point).fold(0.0, f64::max)
     }
 
-    /// The stress that each point is expected to have after the correction `dq`.
-    fn extrapolate<'a, I: Interpolation>(
+    /// Adds the element alone as instance `number`; its nodes may sit in different charts.
+    #[inline(never)]
+    fn add<I: Interpolation>(
         &self,
+        number: usize,
+        stresses: Option<[Stress; G]>,
         at: &State,
-        dq: &[Vec3],
-        points: &mut impl Iterator<Item = &'a mut [f64; 6]>,
+        stiffness: f64,
+        (system, scratch): &mut (ElementSystem, Scratch),
+        out: &mut Sink,
     ) {
-        let (nodes, free) = (I::nodes(&self.connection, at), self.free_amplitude(at));
+        let sum = Sum { points: self.points, stresses, free: self.free_amplitude(at) };
+        I::evaluate(&self.connection, at, stiffness, scratch, system, &sum);
+        out.add(number, system);
+    }
+
+    /// The stress that each point is expected to have after the correction `dq`.
+    #[inline(never)]
+    fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
+        let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
         let change = I::variation(&self.connection, at, dq);
-        for (point, remembered) in self.points.iter().zip(points) {
-            let Stress { n, m } = point.extrapolated_stress(&nodes, free, |i| change[i].0, |i| change[i].1);
-            *remembered = [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]];
+        for (point, remembered) in self.points.iter().zip(out) {
+            *remembered = packed(&point.extrapolated_stress(view.nodes(), free, |i| change[i].0, |i| change[i].1));
         }
     }
 

@@ -1,25 +1,97 @@
 //! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and carries what the kernel
 //! gives back to the nodes of the scene.
 
-use super::{Connection, after_displacement};
+use super::{Connection, after_displacement, motions};
 use crate::kernel::relative::Relative;
-use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::rotation::Rotation;
 use crate::system::State;
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 
-/// Two element systems to compute with, kept between elements.
-pub struct Scratch {
-    local: ElementSystem,
-    geometric: ElementSystem,
+/// Where the nodes of an element are, or those of several elements side by side; rotation vectors all in one chart.
+pub struct Posture<const N: usize, T = f64> {
+    /// Where they started
+    pub places: [Vec3<T>; N],
+    /// Their displacements
+    pub u: [Vec3<T>; N],
+    /// Their rotation vectors
+    pub p: [Vec3<T>; N],
+    /// The rotations that `p` are increments to, where they are no total ones
+    pub base: Option<[Mat3<T>; N]>,
 }
 
-impl Scratch {
+impl<const N: usize> Posture<N> {
+    /// Of an element whose nodes move so.
+    #[inline(always)]
+    pub fn new(connection: &Connection<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
+        let (u, p) = (nodes.map(|node| node.u), nodes.map(|node| node.p));
+        let base = || connection.nodes.map(|node| at.turn(node.p).map_or(Mat3::IDENTITY, |turn| turn.base()));
+        Self { places: connection.places, u, p, base: (!at.turns.is_empty()).then(base) }
+    }
+}
+
+impl<const N: usize> Posture<N, Lanes> {
+    /// Of elements side by side, each node in its own chart.
+    #[inline(always)]
+    pub fn side_by_side(connections: [&Connection<N>; LANES], at: &State) -> Self {
+        let nodes = motions(connections, at);
+        let mut out = Self { places: [Vec3::zero(); N], u: [Vec3::zero(); N], p: [Vec3::zero(); N], base: None };
+        for i in 0..N {
+            out.places[i] = pack!(connections.places[i]);
+            (out.u[i], out.p[i]) = (nodes[i].u, nodes[i].p);
+        }
+        if !at.turns.is_empty() {
+            out.base = Some(bases(connections, at));
+        }
+        out
+    }
+}
+
+#[inline(never)]
+fn bases<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [Mat3<Lanes>; N] {
+    std::array::from_fn(|i| {
+        let base = |c: &Connection<N>| at.turn(c.nodes[i].p).map_or(Mat3::IDENTITY, |turn| turn.base());
+        let all = connections.map(base);
+        Mat3::pack(all.each_ref())
+    })
+}
+
+/// What is summed over the points of an element.
+pub trait PointSum<const N: usize, T: Real> {
+    /// Adds the force and `stiffness` times the tangent, for nodes that the kernel sees so.
+    fn add(&self, nodes: &[NodeMotion<T>; N], stiffness: f64, out: &mut ElementSystem<T>);
+
+    /// Adds the forces that geometric parts are formed with; `false` where they are those of `add`.
+    fn add_geometric(&self, nodes: &[NodeMotion<T>; N], out: &mut ElementSystem<T>) -> bool;
+}
+
+/// Two element systems to compute with, kept between elements.
+pub struct Scratch<T = f64> {
+    local: ElementSystem<T>,
+    geometric: ElementSystem<T>,
+}
+
+impl<T: Real> Scratch<T> {
     /// For elements of `nodes` nodes.
     pub fn new(nodes: usize) -> Self {
         Self { local: ElementSystem::new(2 * nodes), geometric: ElementSystem::new(2 * nodes) }
     }
+}
+
+/// An element as its interpolation sees it.
+pub trait View<const N: usize, T: Real> {
+    /// Sees the element.
+    fn new(posture: &Posture<N, T>) -> Self;
+
+    /// The nodes that the kernel is shown.
+    fn nodes(&self) -> &[NodeMotion<T>; N];
+
+    /// How these vary with displacements and rotation vectors.
+    fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N];
+
+    /// Adds up the points, and adds what they give, carried back to the nodes of the scene, to `out`.
+    fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>);
 }
 
 /// A way to interpolate rotations.
@@ -28,24 +100,40 @@ pub trait Interpolation: Send + Sync + 'static {
     const NAME: &'static str;
     /// What their damping by strain rates is called
     const DAMPING_NAME: &'static str;
+    /// What it makes of an element
+    type View<const N: usize, T: Real>: View<N, T>;
 
-    /// The nodes that the kernel sees.
-    fn nodes<const N: usize>(connection: &Connection<N>, at: &State) -> [NodeMotion; N];
+    /// An element, its nodes in one chart.
+    #[inline(never)]
+    fn see<const N: usize>(connection: &Connection<N>, at: &State) -> Self::View<N, f64> {
+        let nodes = connection.motions_in_one_chart(at);
+        Self::View::new(&Posture::new(connection, &nodes, at))
+    }
 
-    /// How these vary when the unknowns do: displacements and rotation vectors.
-    fn variation<const N: usize>(connection: &Connection<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N];
+    /// How the nodes that the kernel sees vary when the unknowns do by `dq`.
+    #[inline(never)]
+    fn variation<const N: usize>(connection: &Connection<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
+        let (du, dp) = connection.variations_in_one_chart(at, dq);
+        Self::see(connection, at).variation(&du, &dp)
+    }
 
-    /// Evaluates the kernel, which adds the force and `stiffness` times the tangent, on these nodes and carries both back
-    /// into `out`. `geometric` adds the forces that geometric parts are formed with, where they are others.
-    fn evaluate<const N: usize>(
+    /// The sum over an element's points, carried back to the nodes of the scene and to their charts.
+    #[inline(never)]
+    fn evaluate<const N: usize, K: PointSum<N, f64>>(
         connection: &Connection<N>,
         at: &State,
         stiffness: f64,
         scratch: &mut Scratch,
         out: &mut ElementSystem,
-        kernel: impl Fn(&[NodeMotion; N], f64, &mut ElementSystem),
-        geometric: Option<impl Fn(&[NodeMotion; N], &mut ElementSystem)>,
-    );
+        sum: &K,
+    ) {
+        let weights = Weights { stiffness, ..Weights::NONE };
+        let scratch = std::cell::RefCell::new(scratch);
+        connection.evaluate(at, weights, false, after_displacement, out, &|nodes, weights, out| {
+            let view = Self::View::new(&Posture::new(connection, nodes, at));
+            view.add(sum, weights.stiffness, &mut scratch.borrow_mut(), out);
+        });
+    }
 }
 
 /// The paper's: total rotation vectors are interpolated, in the chart of the element's first node.
@@ -55,83 +143,96 @@ pub struct TotalVectors;
 impl Interpolation for TotalVectors {
     const NAME: &'static str = "beam elasticity";
     const DAMPING_NAME: &'static str = "strain-rate damping";
-
-    fn nodes<const N: usize>(connection: &Connection<N>, at: &State) -> [NodeMotion; N] {
-        connection.motions_in_one_chart(at)
-    }
-
-    fn variation<const N: usize>(connection: &Connection<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
-        let converted = Converted::new(&connection.motions(at), at.mixed[connection.element as usize]);
-        std::array::from_fn(|i| {
-            let node = connection.nodes[i];
-            (dq[node.u as usize], converted.variation(i, dq[node.p as usize]))
-        })
-    }
-
-    #[inline]
-    fn evaluate<const N: usize>(
-        connection: &Connection<N>,
-        at: &State,
-        stiffness: f64,
-        _scratch: &mut Scratch,
-        out: &mut ElementSystem,
-        kernel: impl Fn(&[NodeMotion; N], f64, &mut ElementSystem),
-        _geometric: Option<impl Fn(&[NodeMotion; N], &mut ElementSystem)>,
-    ) {
-        let weights = Weights { stiffness, ..Weights::NONE };
-        connection.evaluate(at, weights, false, after_displacement, out, |nodes, weights, out| {
-            kernel(nodes, weights.stiffness, out);
-        });
-    }
+    type View<const N: usize, T: Real> = AsItIs<N, T>;
 }
 
 /// Rotations relative to a frame that turns with the element: strains do not notice rigid rotations, and charts do not matter.
 #[derive(Clone, Copy, Debug)]
 pub struct RelativeVectors;
 
-impl RelativeVectors {
-    fn see<const N: usize>(connection: &Connection<N>, at: &State) -> (Relative<N>, [Rotation; N]) {
-        let rotations = connection.nodes.map(|node| at.rotation(node.p));
-        let u = connection.nodes.map(|node| at.q[node.u as usize]);
-        (Relative::new(&connection.places, &u, &rotations), rotations)
-    }
-}
-
 impl Interpolation for RelativeVectors {
     const NAME: &'static str = "beam elasticity, relative";
     const DAMPING_NAME: &'static str = "strain-rate damping, relative";
+    type View<const N: usize, T: Real> = FromItsFrame<N, T>;
+}
 
-    fn nodes<const N: usize>(connection: &Connection<N>, at: &State) -> [NodeMotion; N] {
-        Self::see(connection, at).0.nodes
+/// An element with the nodes that it has.
+pub struct AsItIs<const N: usize, T> {
+    nodes: [NodeMotion<T>; N],
+}
+
+impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
+    #[inline(always)]
+    fn new(posture: &Posture<N, T>) -> Self {
+        let mut nodes = [NodeMotion::rest(); N];
+        for i in 0..N {
+            (nodes[i].u, nodes[i].p) = (posture.u[i], posture.p[i]);
+        }
+        Self { nodes }
     }
 
-    fn variation<const N: usize>(connection: &Connection<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
-        let (seen, rotations) = Self::see(connection, at);
-        let du = connection.nodes.map(|node| dq[node.u as usize]);
-        let spins = std::array::from_fn(|i| rotations[i].t * dq[connection.nodes[i].p as usize]);
-        seen.variation(&du, &spins)
+    #[inline(always)]
+    fn nodes(&self) -> &[NodeMotion<T>; N] {
+        &self.nodes
     }
 
-    #[inline]
-    fn evaluate<const N: usize>(
-        connection: &Connection<N>,
-        at: &State,
-        stiffness: f64,
-        scratch: &mut Scratch,
-        out: &mut ElementSystem,
-        kernel: impl Fn(&[NodeMotion; N], f64, &mut ElementSystem),
-        geometric: Option<impl Fn(&[NodeMotion; N], &mut ElementSystem)>,
-    ) {
-        let (seen, rotations) = Self::see(connection, at);
-        let Scratch { local, geometric: source } = scratch;
-        local.clear();
-        kernel(&seen.nodes, stiffness, local);
-        let source = geometric.filter(|_| stiffness != 0.0).map(|geometric| {
-            source.clear();
-            geometric(&seen.nodes, source);
-            &*source
-        });
-        out.clear();
-        seen.carry_back(&rotations, local, source, stiffness, out);
+    #[inline(always)]
+    fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N] {
+        let mut out = [(Vec3::zero(), Vec3::zero()); N];
+        for i in 0..N {
+            out[i] = (du[i], dp[i]);
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, _scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+        sum.add(&self.nodes, stiffness, out);
+    }
+}
+
+/// An element seen from its own frame.
+pub struct FromItsFrame<const N: usize, T> {
+    seen: Relative<N, T>,
+    rotations: [Rotation<T>; N],
+}
+
+impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
+    #[inline(always)]
+    fn new(posture: &Posture<N, T>) -> Self {
+        let mut rotations = [Rotation::new(posture.p[0]); N];
+        for i in 1..N {
+            rotations[i] = Rotation::new(posture.p[i]);
+        }
+        if let Some(base) = &posture.base {
+            for i in 0..N {
+                rotations[i] = rotations[i].after(base[i]);
+            }
+        }
+        Self { seen: Relative::new(&posture.places, &posture.u, &rotations), rotations }
+    }
+
+    #[inline(always)]
+    fn nodes(&self) -> &[NodeMotion<T>; N] {
+        &self.seen.nodes
+    }
+
+    #[inline(always)]
+    fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N] {
+        let mut spins = [Vec3::zero(); N];
+        for i in 0..N {
+            spins[i] = self.rotations[i].t * dp[i];
+        }
+        self.seen.variation(du, &spins)
+    }
+
+    #[inline(always)]
+    fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+        let Scratch { local, geometric } = scratch;
+        local.clear_for(stiffness);
+        sum.add(&self.seen.nodes, stiffness, local);
+        geometric.clear_force();
+        let other = stiffness != 0.0 && sum.add_geometric(&self.seen.nodes, geometric);
+        self.seen.carry_back(&self.rotations, local, other.then_some(&*geometric), stiffness, out);
     }
 }

@@ -25,6 +25,7 @@ pub use volume::{VolumeElement, VolumeElements};
 use crate::kernel::inertia::Inertia;
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::real::{LANES, Lanes, Pack, each_lane};
 use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, StageContext, StageKind, State};
 use crate::tensor::{Mat3, Vec3};
 
@@ -194,13 +195,24 @@ impl<const N: usize> Connection<N> {
         }
     }
 
+    /// What increments of the unknowns change in them: displacements and rotation vectors.
+    pub fn variations_in_one_chart(&self, at: &State, dq: &[Vec3]) -> ([Vec3; N], [Vec3; N]) {
+        let (du, dp) = (self.nodes.map(|node| dq[node.u as usize]), self.nodes.map(|node| dq[node.p as usize]));
+        match at.mixed[self.element as usize] {
+            0 => (du, dp),
+            mask => {
+                let converted = Converted::new(&self.motions(at), mask);
+                (du, std::array::from_fn(|i| converted.variation(i, dp[i])))
+            }
+        }
+    }
+
     /// The slots u1, P1, u2, P2, ….
     pub fn slots(&self) -> impl Iterator<Item = u32> {
         self.nodes.into_iter().flat_map(|node| [node.u, node.p])
     }
 
     /// Evaluates the element in one chart, and where its nodes sit in different ones pulls the result back.
-    #[inline]
     fn evaluate(
         &self,
         at: &State,
@@ -208,7 +220,7 @@ impl<const N: usize> Connection<N> {
         rates: bool,
         rotation_block: impl Fn(usize) -> usize,
         out: &mut ElementSystem,
-        kernel: impl Fn(&[NodeMotion; N], Weights, &mut ElementSystem),
+        kernel: &dyn Fn(&[NodeMotion; N], Weights, &mut ElementSystem),
     ) {
         let nodes = self.motions(at);
         let mask = at.mixed[self.element as usize];
@@ -221,8 +233,40 @@ impl<const N: usize> Connection<N> {
         }
         let converted = Converted::new(&nodes, mask);
         let in_one_chart = std::array::from_fn(|i| converted.nodes[i]);
-        converted.pull_back(weights, rates, rotation_block, out, |weights, out| cleared(&in_one_chart, weights, out));
+        converted.pull_back(weights, rates, rotation_block, out, &|weights, out| cleared(&in_one_chart, weights, out));
     }
+}
+
+/// The elements from `start` on that stand side by side; the last one of a batch fills up its row.
+#[inline(always)]
+fn side_by_side<E>(batch: &[E], start: usize) -> [&E; LANES] {
+    let element = |k: usize| &batch[(start + k).min(batch.len() - 1)];
+    each_lane!(|k| element(k))
+}
+
+/// The motions of the nodes of elements side by side, each in its own chart.
+#[inline(always)]
+fn motions<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [NodeMotion<Lanes>; N] {
+    let mut out = [NodeMotion::rest(); N];
+    for i in 0..N {
+        let u: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].u);
+        let p: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].p);
+        out[i] = NodeMotion {
+            u: at_slots(&at.q, u),
+            u_rate: at_slots(&at.v, u),
+            u_rate2: at_slots(&at.a, u),
+            p: at_slots(&at.q, p),
+            p_rate: at_slots(&at.v, p),
+            p_rate2: at_slots(&at.a, p),
+        };
+    }
+    out
+}
+
+/// What a field is at the slots of elements side by side.
+#[inline(always)]
+fn at_slots(field: &[Vec3], slots: [Slot; LANES]) -> Vec3<Lanes> {
+    Vec3::pack(each_lane!(|k| &field[slots[k] as usize]))
 }
 
 /// The block of node j's rotation in elements with displacements and rotations.

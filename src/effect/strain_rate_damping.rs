@@ -11,7 +11,7 @@
 //! b_k and G_k are force and geometric tangent of the elastic element under a unit stress, whatever its interpolation.
 
 use super::beam_elasticity::{BeamElasticity, ElasticElement};
-use super::interpolation::{Interpolation, Scratch};
+use super::interpolation::{Interpolation, PointSum, Scratch};
 use super::{Connection, Effect, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Stiffness, Stress};
@@ -109,6 +109,27 @@ impl<const N: usize> Rates<N> {
     }
 }
 
+/// A point under a stress that does not depend on its strain.
+struct UnitStress<'a, const N: usize> {
+    point: &'a StiffnessPoint<N>,
+    stress: Stress,
+}
+
+impl<const N: usize> PointSum<N, f64> for UnitStress<'_, N> {
+    fn add(&self, nodes: &[NodeMotion; N], stiffness: f64, out: &mut ElementSystem) {
+        let (point, none) = (self.point, Stiffness { cn: Mat3::ZERO, cm: Mat3::ZERO, cc: None });
+        let place = point.configuration(nodes);
+        point.add_force(&place, &self.stress, out);
+        if stiffness != 0.0 {
+            point.add_tangent(&place, &none, &self.stress, stiffness, out);
+        }
+    }
+
+    fn add_geometric(&self, _nodes: &[NodeMotion; N], _out: &mut ElementSystem) -> bool {
+        false
+    }
+}
+
 /// What the six unit stresses of a point give, by block of the element.
 struct UnitStresses<const N: usize> {
     blocks: [Vec<UnitBlock>; 6],
@@ -141,17 +162,8 @@ impl<const N: usize> UnitStresses<N> {
         let blocks = std::array::from_fn(|k| {
             let unit = |part: usize| if k / 3 == part { Vec3::UNIT[k % 3] } else { Vec3::ZERO };
             let stress = Stress { n: unit(0), m: unit(1) };
-            let none = Stiffness { cn: Mat3::ZERO, cm: Mat3::ZERO, cc: None };
-            let kernel = |nodes: &[NodeMotion; N], stiffness: f64, out: &mut ElementSystem| {
-                let place = point.configuration(nodes);
-                point.add_force(&place, &stress, out);
-                if stiffness != 0.0 {
-                    point.add_tangent(&place, &none, &stress, stiffness, out);
-                }
-            };
             let wanted = if weights.stiffness != 0.0 { 1.0 } else { 0.0 };
-            let geometric = None::<fn(&[NodeMotion; N], &mut ElementSystem)>;
-            I::evaluate(connection, at, wanted, scratch, system, kernel, geometric);
+            I::evaluate(connection, at, wanted, scratch, system, &UnitStress { point, stress });
             let block = |b: usize| {
                 let (force, rate) = (system.force_block(b), rates.of_block(b));
                 let bent = (0..2 * N)

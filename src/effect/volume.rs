@@ -1,8 +1,9 @@
 //! Elements over which something per length is integrated: shared by the effects of mass, weight and line loads.
 
-use super::{ByOrder, Connection, for_each_batch};
+use super::{ByOrder, Connection, for_each_batch, motions, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
 use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
+use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
 use crate::system::{Cliques, Sink, State};
 use crate::tensor::Vec3;
 
@@ -34,8 +35,21 @@ impl<Q: Copy> VolumeElements<Q> {
     }
 
     /// Adds forces and tangents of a kernel.
-    pub fn add<K: VolumeKernel<Quantity = Q>>(&self, kernel: &K, at: &State, weights: Weights, out: &mut Sink) {
-        for_each_batch!(self, |first, batch| add_batch(kernel, batch, first, at, weights, out));
+    pub fn add<K>(&self, kernel: &K, at: &State, weights: Weights, out: &mut Sink)
+    where
+        K: VolumeKernel<Quantity = Q>,
+        K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
+    {
+        for_each_batch!(self, |first, batch| {
+            let done = Instructions::here().run_side_by_side(
+                #[inline(always)]
+                || add_batch(kernel, batch, first, at, weights, out),
+            );
+            if done.is_none() {
+                let each = batch.iter().enumerate();
+                each.for_each(|(k, element)| add_alone(kernel, element, first + k, at, weights, out));
+            }
+        });
     }
 
     /// Shows each point's quantity, its weight, its initial place and its motion.
@@ -60,28 +74,56 @@ impl<Q: Copy> VolumeElements<Q> {
 }
 
 /// Adds the elements of one order, `first` instances after the first one of the effect.
-fn add_batch<K: VolumeKernel, const N: usize>(
+#[inline(always)]
+fn add_batch<K, const N: usize>(
     kernel: &K,
     batch: &[VolumeElement<N, K::Quantity>],
     first: usize,
     at: &State,
     weights: Weights,
     out: &mut Sink,
+) where
+    K: VolumeKernel,
+    K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
+{
+    let mut systems = ElementSystem::new(K::BLOCKS.count(N));
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let nodes = motions(each_lane!(|k| &elements[k].connection), at);
+        systems.clear();
+        for g in 0..N {
+            let points = each_lane!(|k| elements[k].points[g].map(|quantity| kernel.at_present(quantity)));
+            VolumePoint::pack(each_lane!(|k| &points[k])).add(kernel, &nodes, weights, &mut systems);
+        }
+        // Displacements know no charts.
+        let charts = K::BLOCKS != Blocks::Displacements;
+        let is_mixed = |k: usize| charts && at.mixed[elements[k].connection.element as usize] != 0;
+        out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, is_mixed, |k, out| {
+            add_alone(kernel, elements[k], first + start + k, at, weights, out);
+        });
+    }
+}
+
+/// The same for one element, whose nodes may sit in different charts.
+#[inline(never)]
+fn add_alone<K: VolumeKernel, const N: usize>(
+    kernel: &K,
+    element: &VolumeElement<N, K::Quantity>,
+    number: usize,
+    at: &State,
+    weights: Weights,
+    out: &mut Sink,
 ) {
     let mut system = ElementSystem::new(K::BLOCKS.count(N));
-    for (k, element) in batch.iter().enumerate() {
-        let sum = |nodes: &[NodeMotion; N], weights: Weights, system: &mut ElementSystem| {
-            for point in &element.points {
-                point.add(kernel, nodes, weights, system);
-            }
-        };
-        if K::BLOCKS == Blocks::Displacements {
-            // Displacements know no charts.
-            system.clear();
-            sum(&element.connection.motions(at), weights, &mut system);
-        } else {
-            element.connection.evaluate(at, weights, K::RATES, |j| K::BLOCKS.rotation(j), &mut system, sum);
+    let sum = |nodes: &[NodeMotion; N], weights: Weights, system: &mut ElementSystem| {
+        for point in &element.points {
+            point.map(|quantity| kernel.at_present(quantity)).add(kernel, nodes, weights, system);
         }
-        out.add(first + k, &system);
+    };
+    if K::BLOCKS == Blocks::Displacements {
+        sum(&element.connection.motions(at), weights, &mut system);
+    } else {
+        element.connection.evaluate(at, weights, K::RATES, |j| K::BLOCKS.rotation(j), &mut system, &sum);
     }
+    out.add(number, &system);
 }

@@ -2,73 +2,105 @@
 
 use super::elastic::{Point, PointTangent, Stiffness, Strain, Stress};
 use super::element::{ElementSystem, NodeMotion};
-use crate::real::Real;
-use crate::tensor::Vec3;
+use crate::real::{LANES, Lanes, Pack, Real, pack};
+use crate::tensor::{Mat3, Vec3};
 
 /// An integration point for internal forces.
 #[derive(Clone, Copy, Debug)]
-pub struct StiffnessPoint<const N: usize> {
+pub struct StiffnessPoint<const N: usize, T = f64> {
     /// Shape functions
-    pub shape: [f64; N],
+    pub shape: [T; N],
     /// Their derivatives over initial arc length
-    pub slope: [f64; N],
+    pub slope: [T; N],
     /// Gauss weight times ds/dxi
-    pub weight: f64,
+    pub weight: T,
     /// E1, the unit tangent of the initial centre line
-    pub tangent: Vec3,
+    pub tangent: Vec3<T>,
     /// The section in global components
-    pub stiffness: Stiffness,
+    pub stiffness: Stiffness<T>,
     /// The strain that makes no stress, where there is one (natural curvature, thermal strain), for an amplitude of one
-    pub free: Option<Strain>,
+    pub free: Option<Strain<T>>,
 }
 
 /// sum_i N_i v_i
 #[inline(always)]
-pub fn interpolate<T: Real, const N: usize>(shape: &[f64; N], value: impl Fn(usize) -> Vec3<T>) -> Vec3<T> {
-    let mut sum = value(0).scale(shape[0]);
-    for (i, &n) in shape.iter().enumerate().skip(1) {
-        sum += value(i).scale(n);
+pub fn interpolate<T: Real, const N: usize>(shape: &[T; N], value: impl Fn(usize) -> Vec3<T>) -> Vec3<T> {
+    let mut sum = value(0) * shape[0];
+    for i in 1..N {
+        sum += value(i) * shape[i];
     }
     sum
 }
 
 impl<const N: usize> StiffnessPoint<N> {
+    /// The same point for another scalar.
+    pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T> {
+        let strain = |s: Strain| Strain { gamma: Vec3::constant(s.gamma), kappa: Vec3::constant(s.kappa) };
+        StiffnessPoint {
+            shape: self.shape.map(T::constant),
+            slope: self.slope.map(T::constant),
+            weight: T::constant(self.weight),
+            tangent: Vec3::constant(self.tangent),
+            stiffness: Stiffness {
+                cn: Mat3::constant(self.stiffness.cn),
+                cm: Mat3::constant(self.stiffness.cm),
+                cc: self.stiffness.cc.map(Mat3::constant),
+            },
+            free: self.free.map(strain),
+        }
+    }
+}
+
+impl<const N: usize> Pack for StiffnessPoint<N> {
+    type Packed = StiffnessPoint<N, Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        StiffnessPoint {
+            shape: pack!(of.shape),
+            slope: pack!(of.slope),
+            weight: pack!(of.weight),
+            tangent: pack!(of.tangent),
+            stiffness: pack!(of.stiffness),
+            free: pack!(of.free),
+        }
+    }
+}
+
+impl<const N: usize, T: Real> StiffnessPoint<N, T> {
     /// The configuration at this point; x' = E1 + sum N_i' u_i.
     #[inline(always)]
-    pub fn configuration<T: Real>(&self, nodes: &[NodeMotion<T>; N]) -> Point<T> {
+    pub fn configuration(&self, nodes: &[NodeMotion<T>; N]) -> Point<T> {
         let p = interpolate(&self.shape, |i| nodes[i].p);
         let p_slope = interpolate(&self.slope, |i| nodes[i].p);
-        let x_slope = Vec3::constant(self.tangent) + interpolate(&self.slope, |i| nodes[i].u);
+        let x_slope = self.tangent + interpolate(&self.slope, |i| nodes[i].u);
         Point::new(p, p_slope, x_slope)
     }
 
     /// Strain and stress at this point; `free` is the amplitude of the free strain.
-    pub fn strain_and_stress<T: Real>(&self, nodes: &[NodeMotion<T>; N], free: f64) -> (Strain<T>, Stress<T>) {
+    pub fn strain_and_stress(&self, nodes: &[NodeMotion<T>; N], free: T) -> (Strain<T>, Stress<T>) {
         let strain = self.configuration(nodes).strain(self.tangent);
         (strain, self.stress(&strain, free))
     }
 
     /// The stress of a strain, less its free part.
     #[inline(always)]
-    pub fn stress<T: Real>(&self, strain: &Strain<T>, free: f64) -> Stress<T> {
+    pub fn stress(&self, strain: &Strain<T>, free: T) -> Stress<T> {
         self.stiffness.stress(&self.elastic_part(strain, free))
     }
 
     /// The strain less its free part.
     #[inline(always)]
-    pub fn elastic_part<T: Real>(&self, strain: &Strain<T>, free: f64) -> Strain<T> {
+    pub fn elastic_part(&self, strain: &Strain<T>, free: T) -> Strain<T> {
         match &self.free {
             None => *strain,
-            Some(own) => Strain {
-                gamma: strain.gamma - Vec3::constant(own.gamma * free),
-                kappa: strain.kappa - Vec3::constant(own.kappa * free),
-            },
+            Some(own) => Strain { gamma: strain.gamma - own.gamma * free, kappa: strain.kappa - own.kappa * free },
         }
     }
 
     /// How the strain varies with the nodes.
     #[inline(always)]
-    pub fn strain_variation<T: Real>(
+    pub fn strain_variation(
         &self,
         at: &Point<T>,
         du: impl Fn(usize) -> Vec3<T>,
@@ -80,10 +112,10 @@ impl<const N: usize> StiffnessPoint<N> {
 
     /// The stress that a correction of the nodes is expected to lead to: C (strain + B dq).
     #[inline(always)]
-    pub fn extrapolated_stress<T: Real>(
+    pub fn extrapolated_stress(
         &self,
         nodes: &[NodeMotion<T>; N],
-        free: f64,
+        free: T,
         du: impl Fn(usize) -> Vec3<T>,
         dp: impl Fn(usize) -> Vec3<T>,
     ) -> Stress<T> {
@@ -97,10 +129,10 @@ impl<const N: usize> StiffnessPoint<N> {
     /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the
     /// stress of the geometric part, if it is not the present one.
     #[inline(always)]
-    pub fn add_elastic<T: Real>(
+    pub fn add_elastic(
         &self,
         nodes: &[NodeMotion<T>; N],
-        free: f64,
+        free: T,
         geometric: Option<&Stress<T>>,
         weight: f64,
         out: &mut ElementSystem<T>,
@@ -115,21 +147,21 @@ impl<const N: usize> StiffnessPoint<N> {
 
     /// Adds the force of a stress.
     #[inline(always)]
-    pub fn add_force<T: Real>(&self, at: &Point<T>, stress: &Stress<T>, out: &mut ElementSystem<T>) {
+    pub fn add_force(&self, at: &Point<T>, stress: &Stress<T>, out: &mut ElementSystem<T>) {
         let (force, w) = (at.force(stress), self.weight);
         for i in 0..N {
             let (n, s) = (self.shape[i] * w, self.slope[i] * w);
-            out.add_force(2 * i, force.x_slope.scale(s));
-            out.add_force(2 * i + 1, force.p.scale(n) + force.p_slope.scale(s));
+            out.add_force(2 * i, force.x_slope * s);
+            out.add_force(2 * i + 1, force.p * n + force.p_slope * s);
         }
     }
 
     /// Adds `weight` times the tangent of a stiffness and of the geometric part of a stress.
     #[inline(always)]
-    pub fn add_tangent<T: Real>(
+    pub fn add_tangent(
         &self,
         at: &Point<T>,
-        stiffness: &Stiffness,
+        stiffness: &Stiffness<T>,
         stress: &Stress<T>,
         weight: f64,
         out: &mut ElementSystem<T>,
@@ -139,24 +171,24 @@ impl<const N: usize> StiffnessPoint<N> {
 
     /// Adds w times the blocks of every pair of nodes, using the symmetry of the stiffness.
     #[inline(always)]
-    fn add_stiffness<T: Real>(&self, k: &PointTangent<T>, w: f64, out: &mut ElementSystem<T>) {
+    fn add_stiffness(&self, k: &PointTangent<T>, w: T, out: &mut ElementSystem<T>) {
         let (n, s) = (&self.shape, &self.slope);
         for i in 0..N {
             for j in 0..N {
-                let mut up = k.xp.scale(w * s[i] * n[j]);
+                let mut up = k.xp * (w * s[i] * n[j]);
                 if let Some(xs) = k.xs {
-                    up += xs.scale(w * s[i] * s[j]);
+                    up += xs * (w * s[i] * s[j]);
                 }
                 out.add_tangent(2 * i, 2 * j + 1, up);
                 out.add_tangent(2 * j + 1, 2 * i, up.transpose());
                 if j < i {
                     continue;
                 }
-                let uu = k.xx.scale(w * s[i] * s[j]);
-                let pp = k.ss.scale(w * s[i] * s[j])
-                    + k.sp.scale(w * s[i] * n[j])
-                    + k.sp.transpose().scale(w * n[i] * s[j])
-                    + k.pp.scale(w * n[i] * n[j]);
+                let uu = k.xx * (w * s[i] * s[j]);
+                let pp = k.ss * (w * s[i] * s[j])
+                    + k.sp * (w * s[i] * n[j])
+                    + k.sp.transpose() * (w * n[i] * s[j])
+                    + k.pp * (w * n[i] * n[j]);
                 out.add_tangent(2 * i, 2 * j, uu);
                 out.add_tangent(2 * i + 1, 2 * j + 1, pp);
                 if j > i {

@@ -3,19 +3,19 @@
 //! All tensors are material, with global components: P is measured from the initial placement, so that
 //! K = T P' already is the change of curvature of an initially curved or twisted beam.
 
-use crate::real::Real;
+use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 
 /// The stiffness of a section in global components: N = Cn Gamma + Cc K, M = Cc^T Gamma + Cm K.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stiffness {
+pub struct Stiffness<T = f64> {
     /// Cn = R0 diag(EA, GA2, GA3) R0^T, force
-    pub cn: Mat3,
+    pub cn: Mat3<T>,
     /// Cm = R0 diag(GJ, EI2, EI3) R0^T, force times length squared
-    pub cm: Mat3,
+    pub cm: Mat3<T>,
     /// Cc, the coupling of strain and curvature, where there is one; force times length
-    pub cc: Option<Mat3>,
+    pub cc: Option<Mat3<T>>,
 }
 
 /// Gamma (translational strain, 1) and K (change of curvature, 1/length), both material.
@@ -36,14 +36,37 @@ pub struct Stress<T = f64> {
     pub m: Vec3<T>,
 }
 
-impl Stiffness {
+impl Pack for Stiffness {
+    type Packed = Stiffness<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        let (cn, cm) = (pack!(of.cn), pack!(of.cm));
+        Stiffness { cn, cm, cc: pack!(of.cc) }
+    }
+}
+
+impl Pack for Strain {
+    type Packed = Strain<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        Strain { gamma: pack!(of.gamma), kappa: pack!(of.kappa) }
+    }
+}
+
+impl Default for Strain {
+    fn default() -> Self {
+        Self { gamma: Vec3::ZERO, kappa: Vec3::ZERO }
+    }
+}
+
+impl<T: Real> Stiffness<T> {
     /// The stress resultants of a strain.
     #[inline(always)]
-    pub fn stress<T: Real>(&self, strain: &Strain<T>) -> Stress<T> {
-        let (cn, cm) = (Mat3::constant(self.cn), Mat3::constant(self.cm));
-        let mut stress = Stress { n: cn * strain.gamma, m: cm * strain.kappa };
+    pub fn stress(&self, strain: &Strain<T>) -> Stress<T> {
+        let mut stress = Stress { n: self.cn * strain.gamma, m: self.cm * strain.kappa };
         if let Some(cc) = self.cc {
-            let cc = Mat3::constant(cc);
             stress.n += cc * strain.kappa;
             stress.m += cc.transpose_mul(strain.gamma);
         }
@@ -102,8 +125,8 @@ impl<T: Real> Point<T> {
 
     /// The strains; `e1` is the unit tangent of the initial centre line.
     #[inline(always)]
-    pub fn strain(&self, e1: Vec3) -> Strain<T> {
-        Strain { gamma: self.y - Vec3::constant(e1), kappa: self.rotation.t * self.p_slope }
+    pub fn strain(&self, e1: Vec3<T>) -> Strain<T> {
+        Strain { gamma: self.y - e1, kappa: self.rotation.t * self.p_slope }
     }
 
     /// Their variation: dGamma = R^T du' + y~ T dP, dK = T dP' + C1 dP.
@@ -127,10 +150,10 @@ impl<T: Real> Point<T> {
     /// The stiffness, (78)–(80). `stress` is what the geometric part is formed with: the stress of this configuration
     /// for the exact tangent, the extrapolated one for the mixed-integration-point tangent.
     #[inline(always)]
-    pub fn tangent(&self, stiffness: &Stiffness, stress: &Stress<T>) -> PointTangent<T> {
+    pub fn tangent(&self, stiffness: &Stiffness<T>, stress: &Stress<T>) -> PointTangent<T> {
         let (rotation, c1) = (&self.rotation, self.c1);
         let (r, t) = (rotation.r, rotation.t);
-        let (cn, cm) = (Mat3::constant(stiffness.cn), Mat3::constant(stiffness.cm));
+        let (cn, cm) = (stiffness.cn, stiffness.cm);
         let a = Mat3::skew_mul(self.y, t);
         let (cn_a, cm_c1) = (cn * a, cm * c1);
         let n_y_t = Mat3::skew_mul(stress.n, a);
@@ -147,7 +170,6 @@ impl<T: Real> Point<T> {
                 + t.transpose_matmul(n_y_t),
         };
         if let Some(cc) = stiffness.cc {
-            let cc = Mat3::constant(cc);
             let mixed = a.transpose_matmul(cc * c1);
             tangent.xs = Some(r * cc * t);
             tangent.xp += r * (cc * c1);

@@ -1,11 +1,10 @@
 //! What a kernel reads and writes: the motion of a node, weights, and the force and tangent of one element.
 
-use crate::real::Real;
+use crate::real::{Lanes, Real};
 use crate::tensor::{Mat3, Vec3};
 
 /// Most nodes an element has.
 pub const MAX_NODES: usize = 4;
-const MAX_ROWS: usize = 6 * MAX_NODES;
 
 /// The weights of J = s K + d C + m M. A weight of zero means: do not compute it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,73 +56,136 @@ impl<T: Real> NodeMotion<T> {
 /// The force g and the tangent J of one element, in 3-vectors and 3x3 blocks.
 ///
 /// Elements with displacements and rotations order their blocks node by node: u1, P1, u2, P2, …; elements with one kind
-/// of unknown: u1, u2, … or P1, P2, ….
+/// of unknown: u1, u2, … or P1, P2, …. The tangent is kept in tiles of two blocks by two, which are those of nodes.
 #[derive(Clone, Debug)]
 pub struct ElementSystem<T = f64> {
-    rows: usize,
-    force: [T; MAX_ROWS],
-    tangent: [T; MAX_ROWS * MAX_ROWS],
+    blocks: usize,
+    force: [[T; 3]; 2 * MAX_NODES],
+    tangent: [[T; TILE]; MAX_NODES * MAX_NODES],
+}
+
+/// Rows of a tile
+pub const WIDTH: usize = 6;
+const TILE: usize = WIDTH * WIDTH;
+
+impl ElementSystem<Lanes> {
+    /// The system of one of the elements that stand side by side.
+    pub fn lane(&self, k: usize) -> ElementSystem {
+        let mut out = ElementSystem::new(self.blocks);
+        for (one, all) in out.force.iter_mut().zip(&self.force) {
+            *one = all.map(|lanes| lanes.0[k]);
+        }
+        for (one, all) in out.tangent.iter_mut().zip(self.tiles()) {
+            *one = all.map(|lanes| lanes.0[k]);
+        }
+        out
+    }
 }
 
 impl<T: Real> ElementSystem<T> {
     /// Zero, of `blocks` 3-vectors.
+    #[inline(always)]
     pub fn new(blocks: usize) -> Self {
-        assert!(3 * blocks <= MAX_ROWS, "an element has at most {MAX_NODES} nodes");
-        Self { rows: 3 * blocks, force: [T::zero(); MAX_ROWS], tangent: [T::zero(); MAX_ROWS * MAX_ROWS] }
+        assert!(blocks <= 2 * MAX_NODES, "an element has at most {MAX_NODES} nodes");
+        let zero = T::zero();
+        Self { blocks, force: [[zero; 3]; 2 * MAX_NODES], tangent: [[zero; TILE]; MAX_NODES * MAX_NODES] }
     }
 
     /// Sets force and tangent to zero.
-    #[inline]
+    #[inline(always)]
     pub fn clear(&mut self) {
-        self.force[..self.rows].fill(T::zero());
-        self.tangent[..self.rows * self.rows].fill(T::zero());
+        self.clear_force();
+        let tiles = self.across() * self.across();
+        for tile in &mut self.tangent[..tiles] {
+            *tile = [T::zero(); TILE];
+        }
     }
 
-    /// The number of scalar rows.
-    #[inline]
-    pub fn rows(&self) -> usize {
-        self.rows
+    /// Sets the force alone to zero.
+    #[inline(always)]
+    pub fn clear_force(&mut self) {
+        for force in &mut self.force[..self.blocks] {
+            *force = [T::zero(); 3];
+        }
+    }
+
+    /// Sets to zero what is going to be added to with this weight of the tangent.
+    #[inline(always)]
+    pub fn clear_for(&mut self, weight: f64) {
+        if weight == 0.0 { self.clear_force() } else { self.clear() }
+    }
+
+    /// The number of 3-vectors.
+    #[inline(always)]
+    pub fn blocks(&self) -> usize {
+        self.blocks
+    }
+
+    /// Tiles side by side
+    #[inline(always)]
+    fn across(&self) -> usize {
+        self.blocks.div_ceil(2)
     }
 
     /// The force, one entry a row.
-    #[inline]
+    #[inline(always)]
     pub fn force(&self) -> &[T] {
-        &self.force[..self.rows]
+        self.forces().as_flattened()
     }
 
-    /// The tangent by rows.
-    #[inline]
-    pub fn tangent(&self) -> &[T] {
-        &self.tangent[..self.rows * self.rows]
+    /// The force, block by block.
+    #[inline(always)]
+    pub fn forces(&self) -> &[[T; 3]] {
+        &self.force[..self.blocks]
+    }
+
+    /// The tangent tile by tile, those of one row of tiles after the other; each by its columns. The last tiles of an odd number of
+    /// blocks are not full.
+    #[inline(always)]
+    pub fn tiles(&self) -> &[[T; TILE]] {
+        &self.tangent[..self.across() * self.across()]
+    }
+
+    /// The tangent by its rows.
+    pub fn tangent(&self) -> Vec<T> {
+        let row = |i: usize| (0..self.blocks).flat_map(move |j| self.tangent_block(i / 3, j).0[i % 3]);
+        (0..3 * self.blocks).flat_map(row).collect()
     }
 
     /// Adds to the force of a block.
     #[inline(always)]
     pub fn add_force(&mut self, block: usize, f: Vec3<T>) {
         for i in 0..3 {
-            self.force[3 * block + i] += f.0[i];
+            self.force[block][i] += f.0[i];
         }
     }
 
     /// The force of a block.
     #[inline(always)]
     pub fn force_block(&self, block: usize) -> Vec3<T> {
-        Vec3([self.force[3 * block], self.force[3 * block + 1], self.force[3 * block + 2]])
+        Vec3(self.force[block])
     }
 
     /// Replaces the force of a block.
     #[inline(always)]
     pub fn set_force(&mut self, block: usize, f: Vec3<T>) {
-        self.force[3 * block..3 * block + 3].copy_from_slice(&f.0);
+        self.force[block] = f.0;
+    }
+
+    /// The tile of a block, and where it begins there.
+    #[inline(always)]
+    fn place(&self, row: usize, column: usize) -> (usize, usize) {
+        (row / 2 * self.across() + column / 2, column % 2 * 3 * WIDTH + row % 2 * 3)
     }
 
     /// Adds to a block of the tangent.
     #[inline(always)]
     pub fn add_tangent(&mut self, row: usize, column: usize, m: Mat3<T>) {
+        let (tile, start) = self.place(row, column);
+        let tile = &mut self.tangent[tile];
         for i in 0..3 {
-            let start = (3 * row + i) * self.rows + 3 * column;
             for j in 0..3 {
-                self.tangent[start + j] += m.0[i][j];
+                tile[start + j * WIDTH + i] += m.0[i][j];
             }
         }
     }
@@ -131,11 +193,15 @@ impl<T: Real> ElementSystem<T> {
     /// A block of the tangent.
     #[inline(always)]
     pub fn tangent_block(&self, row: usize, column: usize) -> Mat3<T> {
-        let line = |i: usize| {
-            let start = (3 * row + i) * self.rows + 3 * column;
-            [self.tangent[start], self.tangent[start + 1], self.tangent[start + 2]]
-        };
-        Mat3([line(0), line(1), line(2)])
+        let (tile, start) = self.place(row, column);
+        let tile = &self.tangent[tile];
+        let mut out = Mat3::zero();
+        for i in 0..3 {
+            for j in 0..3 {
+                out.0[i][j] = tile[start + j * WIDTH + i];
+            }
+        }
+        out
     }
 
     /// The system of these blocks alone, in their order.
@@ -153,9 +219,12 @@ impl<T: Real> ElementSystem<T> {
     /// Replaces a block of the tangent.
     #[inline(always)]
     pub fn set_tangent(&mut self, row: usize, column: usize, m: Mat3<T>) {
+        let (tile, start) = self.place(row, column);
+        let tile = &mut self.tangent[tile];
         for i in 0..3 {
-            let start = (3 * row + i) * self.rows + 3 * column;
-            self.tangent[start..start + 3].copy_from_slice(&m.0[i]);
+            for j in 0..3 {
+                tile[start + j * WIDTH + i] = m.0[i][j];
+            }
         }
     }
 }

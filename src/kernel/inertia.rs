@@ -2,24 +2,39 @@
 
 use super::element::{NodeMotion, Weights};
 use super::volume::{Blocks, VolumeForce, VolumeKernel};
-use crate::real::Real;
+use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 
 /// Mass properties in global components of the initial placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inertia {
+pub struct Inertia<T = f64> {
     /// m: mass, or mass per length
-    pub mass: f64,
+    pub mass: T,
     /// d: the mass centre as seen from the node or the centre line
-    pub offset: Vec3,
+    pub offset: Vec3<T>,
     /// J0: the inertia about the node or the centre line (not about the mass centre)
-    pub about_node: Mat3,
+    pub about_node: Mat3<T>,
+}
+
+impl Pack for Inertia {
+    type Packed = Inertia<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        Inertia { mass: pack!(of.mass), offset: pack!(of.offset), about_node: pack!(of.about_node) }
+    }
 }
 
 impl Inertia {
     /// Of nothing.
     pub const NONE: Self = Self { mass: 0.0, offset: Vec3::ZERO, about_node: Mat3::ZERO };
+
+    /// The same for another scalar.
+    pub fn lifted<T: Real>(&self) -> Inertia<T> {
+        let (offset, about_node) = (Vec3::constant(self.offset), Mat3::constant(self.about_node));
+        Inertia { mass: T::constant(self.mass), offset, about_node }
+    }
 
     /// Together with another body at the same node.
     pub fn with(&self, other: &Self) -> Self {
@@ -143,8 +158,7 @@ impl<T: Real> Spin<T> {
 /// J_PP = T^T [J dAcc + G dOmega] + s C2(h),  G = Omega~ J - (J Omega)~
 /// ```
 #[inline(always)]
-pub fn rotary<T: Real>(j: Mat3, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, Mat3<T>) {
-    let j = Mat3::constant(j);
+pub fn rotary<T: Real>(j: Mat3<T>, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, Mat3<T>) {
     let (rotation, omega) = (&spin.rotation, spin.omega);
     let momentum = j * omega;
     let h = j * spin.acceleration + omega.cross(momentum);
@@ -167,16 +181,16 @@ pub fn rotary<T: Real>(j: Mat3, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, M
 /// f_u = m (u'' + R s),  f_P = T^T h
 /// ```
 #[inline(always)]
-pub fn body<T: Real>(inertia: &Inertia, u_rate2: Vec3<T>, spin: &Spin<T>, weights: Weights) -> VolumeForce<T> {
+pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, weights: Weights) -> VolumeForce<T> {
     let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
-    let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
+    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
     let momentum = j0 * omega;
     let pull = r.transpose_mul(u_rate2);
     let omega_d = omega.cross(d);
     let s = spin.acceleration.cross(d) + omega.cross(omega_d);
-    let h = j0 * spin.acceleration + omega.cross(momentum) + d.cross(pull).scale(m);
+    let h = j0 * spin.acceleration + omega.cross(momentum) + d.cross(pull) * m;
     let mut out = VolumeForce::zero();
-    out.u = (u_rate2 + r * s).scale(m);
+    out.u = (u_rate2 + r * s) * m;
     out.p = t.transpose_mul(h);
     if weights == Weights::NONE {
         return out;
@@ -188,11 +202,11 @@ pub fn body<T: Real>(inertia: &Inertia, u_rate2: Vec3<T>, spin: &Spin<T>, weight
     let mut pp = j0 * d_acceleration + gyroscopic * d_omega;
     if weights.stiffness != 0.0 {
         up -= Mat3::skew_mul(s, t).scale(weights.stiffness);
-        pp += Mat3::skew_mul(d, Mat3::skew_mul(pull, t)).scale(m * weights.stiffness);
+        pp += Mat3::skew_mul(d, Mat3::skew_mul(pull, t)) * (m * weights.stiffness);
     }
-    out.uu = Mat3::identity().scale(m * weights.mass);
-    out.up = (r * up).scale(m);
-    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())).scale(m * weights.mass);
+    out.uu = Mat3::identity() * (m * weights.mass);
+    out.up = (r * up) * m;
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())) * (m * weights.mass);
     out.pp = t.transpose_matmul(pp);
     if weights.stiffness != 0.0 {
         out.pp += spin.rotation.c2(h).scale(weights.stiffness);
@@ -207,28 +221,28 @@ pub fn body<T: Real>(inertia: &Inertia, u_rate2: Vec3<T>, spin: &Spin<T>, weight
 /// ```
 #[inline(always)]
 pub fn drag<T: Real>(
-    inertia: &Inertia,
+    inertia: &Inertia<T>,
     velocity: Vec3<T>,
     spin: &Spin<T>,
     alpha: f64,
     weights: Weights,
 ) -> VolumeForce<T> {
     let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
-    let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
+    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
     let (carried, pull) = (omega.cross(d), r.transpose_mul(velocity));
-    let h = (j0 * omega + d.cross(pull).scale(m)).scale(alpha);
+    let h = (j0 * omega + d.cross(pull) * m).scale(alpha);
     let mut out = VolumeForce::zero();
-    out.u = (velocity + r * carried).scale(alpha * m);
+    out.u = (velocity + r * carried) * (m * alpha);
     out.p = t.transpose_mul(h);
     if weights.stiffness == 0.0 && weights.damping == 0.0 {
         return out;
     }
     let (s, d_omega) = (weights.stiffness, spin.omega_derivative(weights));
     let turned = Mat3::skew_mul(carried, t).scale(s);
-    out.uu = Mat3::identity().scale(alpha * m * weights.damping);
-    out.up = -(r * (Mat3::skew_mul(d, d_omega) + turned)).scale(alpha * m);
-    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())).scale(alpha * m * weights.damping);
-    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)).scale(m * s);
+    out.uu = Mat3::identity() * (m * (alpha * weights.damping));
+    out.up = -(r * (Mat3::skew_mul(d, d_omega) + turned)) * (m * alpha);
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())) * (m * (alpha * weights.damping));
+    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)) * (m * s);
     out.pp = t.transpose_matmul((j0 * d_omega + pulled).scale(alpha)) + spin.rotation.c2(h).scale(s);
     out
 }
@@ -241,11 +255,16 @@ pub struct Drag {
 
 impl VolumeKernel for Drag {
     type Quantity = Inertia;
+    type Present<T: Real> = Inertia<T>;
     const BLOCKS: Blocks = Blocks::Both;
     const RATES: bool = true;
 
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+    fn evaluate<T: Real>(&self, inertia: &Inertia<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
         let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
         drag(inertia, motion.u_rate, &spin, self.factor, weights)
     }
@@ -259,20 +278,20 @@ impl VolumeKernel for Drag {
 /// ```
 #[inline(always)]
 pub fn steadily_turned<T: Real>(
-    inertia: &Inertia,
+    inertia: &Inertia<T>,
     (spin, from_axis): (Vec3<T>, Vec3<T>),
     rotation: &Rotation<T>,
     weights: Weights,
 ) -> VolumeForce<T> {
     let (r, t) = (rotation.r, rotation.t);
-    let (d, j0, m) = (Vec3::constant(inertia.offset), Mat3::constant(inertia.about_node), inertia.mass);
+    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
     let (w, w_skew) = (r.transpose_mul(spin), spin.skew());
     let a = spin.cross(spin.cross(from_axis));
     let (pull, w_d, momentum) = (r.transpose_mul(a), w.cross(d), j0 * w);
     let s = w.cross(w_d);
-    let h = w.cross(momentum) + d.cross(pull).scale(m);
+    let h = w.cross(momentum) + d.cross(pull) * m;
     let mut out = VolumeForce::zero();
-    out.u = (a + r * s).scale(m);
+    out.u = (a + r * s) * m;
     out.p = t.transpose_mul(h);
     if weights == Weights::NONE {
         return out;
@@ -284,10 +303,10 @@ pub fn steadily_turned<T: Real>(
     let gyroscopic = Mat3::skew_mul(w, j0) - momentum.skew();
     let coriolis = w_d.skew() + Mat3::skew_mul(w, d.skew());
     let ds = -(Mat3::skew_mul(d, d_acc) + coriolis * d_omega + Mat3::skew_mul(s, t).scale(stiffness));
-    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)).scale(m * stiffness);
-    out.uu = da.scale(m);
-    out.up = (r * ds).scale(m);
-    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose() * da)).scale(m);
+    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)) * (m * stiffness);
+    out.uu = da * m;
+    out.up = (r * ds) * m;
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose() * da)) * m;
     out.pp = t.transpose_matmul(j0 * d_acc + gyroscopic * d_omega + pulled) + rotation.c2(h).scale(stiffness);
     out
 }
@@ -302,17 +321,22 @@ pub struct SteadilyTurned {
 
 impl VolumeKernel for SteadilyTurned {
     type Quantity = (Inertia, Vec3);
+    type Present<T: Real> = (Inertia<T>, Vec3<T>);
     const BLOCKS: Blocks = Blocks::Both;
     const RATES: bool = false;
+
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
 
     #[inline(always)]
     fn evaluate<T: Real>(
         &self,
-        (inertia, place): &(Inertia, Vec3),
+        (inertia, place): &(Inertia<T>, Vec3<T>),
         motion: &NodeMotion<T>,
         weights: Weights,
     ) -> VolumeForce<T> {
-        let from_axis = Vec3::constant(*place - self.about) + motion.u;
+        let from_axis = *place - Vec3::constant(self.about) + motion.u;
         steadily_turned(inertia, (Vec3::constant(self.spin), from_axis), &Rotation::new(motion.p), weights)
     }
 }
@@ -322,13 +346,18 @@ pub struct Translation;
 
 impl VolumeKernel for Translation {
     type Quantity = f64;
+    type Present<T: Real> = T;
     const BLOCKS: Blocks = Blocks::Displacements;
     const RATES: bool = false;
 
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, mass: &f64, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        let u = motion.u_rate2.scale(*mass);
-        VolumeForce { u, uu: Mat3::identity().scale(mass * weights.mass), ..VolumeForce::zero() }
+    fn evaluate<T: Real>(&self, mass: &T, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let u = motion.u_rate2 * *mass;
+        VolumeForce { u, uu: Mat3::diagonal([*mass * weights.mass; 3]), ..VolumeForce::zero() }
     }
 }
 
@@ -337,11 +366,16 @@ pub struct Rotary;
 
 impl VolumeKernel for Rotary {
     type Quantity = Mat3;
+    type Present<T: Real> = Mat3<T>;
     const BLOCKS: Blocks = Blocks::Rotations;
     const RATES: bool = true;
 
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, j: &Mat3, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+    fn evaluate<T: Real>(&self, j: &Mat3<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
         let (p, pp) = rotary(*j, &Spin::new(motion.p, motion.p_rate, motion.p_rate2), weights);
         VolumeForce { p, pp, ..VolumeForce::zero() }
     }
@@ -352,11 +386,16 @@ pub struct Eccentric;
 
 impl VolumeKernel for Eccentric {
     type Quantity = Inertia;
+    type Present<T: Real> = Inertia<T>;
     const BLOCKS: Blocks = Blocks::Both;
     const RATES: bool = true;
 
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+    fn evaluate<T: Real>(&self, inertia: &Inertia<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
         body(inertia, motion.u_rate2, &Spin::new(motion.p, motion.p_rate, motion.p_rate2), weights)
     }
 }

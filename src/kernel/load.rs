@@ -48,10 +48,12 @@ pub struct Intensity {
 }
 
 impl Intensity {
+    /// Force and, where there is one, moment.
     #[inline(always)]
-    fn at<T: Real>(&self, amplitudes: &[f64]) -> (Vec3<T>, Vec3<T>) {
+    fn at(&self, amplitudes: &[f64]) -> (Vec3, Option<Vec3>) {
         let amplitude = amplitudes[self.amplitude];
-        (Vec3::constant(self.force * amplitude), Vec3::constant(self.moment * amplitude))
+        let moment = (self.moment != Vec3::ZERO).then_some(self.moment * amplitude);
+        (self.force * amplitude, moment)
     }
 }
 
@@ -63,14 +65,23 @@ pub struct SpatialLine<'a> {
 
 impl VolumeKernel for SpatialLine<'_> {
     type Quantity = Intensity;
+    type Present<T: Real> = (Vec3<T>, Option<Vec3<T>>);
     const BLOCKS: Blocks = Blocks::Both;
     const RATES: bool = false;
 
+    fn at_present(&self, load: &Intensity) -> (Vec3, Option<Vec3>) {
+        load.at(self.amplitudes)
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, load: &Intensity, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        let (force, moment) = load.at::<T>(self.amplitudes);
+    fn evaluate<T: Real>(
+        &self,
+        &(force, moment): &(Vec3<T>, Option<Vec3<T>>),
+        motion: &NodeMotion<T>,
+        weights: Weights,
+    ) -> VolumeForce<T> {
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
-        if load.moment != Vec3::ZERO {
+        if let Some(moment) = moment {
             let (p, pp) = spatial_moment(&Rotation::new(motion.p), moment);
             (out.p, out.pp) = (p, pp.scale(weights.stiffness));
         }
@@ -86,16 +97,29 @@ pub struct MaterialLine<'a> {
 
 impl VolumeKernel for MaterialLine<'_> {
     type Quantity = Intensity;
+    type Present<T: Real> = (Vec3<T>, Option<Vec3<T>>);
     const BLOCKS: Blocks = Blocks::Both;
     const RATES: bool = false;
 
+    fn at_present(&self, load: &Intensity) -> (Vec3, Option<Vec3>) {
+        load.at(self.amplitudes)
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, load: &Intensity, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        let (force, moment) = load.at::<T>(self.amplitudes);
-        let rotation = Rotation::new(motion.p);
-        let ((u, up), (p, pp)) = (material_force(&rotation, force), material_moment(&rotation, moment));
-        let s = weights.stiffness;
-        VolumeForce { u, p, up: up.scale(s), pp: pp.scale(s), ..VolumeForce::zero() }
+    fn evaluate<T: Real>(
+        &self,
+        &(force, moment): &(Vec3<T>, Option<Vec3<T>>),
+        motion: &NodeMotion<T>,
+        weights: Weights,
+    ) -> VolumeForce<T> {
+        let (rotation, s) = (Rotation::new(motion.p), weights.stiffness);
+        let (u, up) = material_force(&rotation, force);
+        let mut out = VolumeForce { u, up: up.scale(s), ..VolumeForce::zero() };
+        if let Some(moment) = moment {
+            let (p, pp) = material_moment(&rotation, moment);
+            (out.p, out.pp) = (p, pp.scale(s));
+        }
+        out
     }
 }
 
@@ -107,15 +131,24 @@ pub struct Weight {
 
 impl VolumeKernel for Weight {
     type Quantity = Inertia;
+    type Present<T: Real> = (Vec3<T>, Option<Vec3<T>>);
     const BLOCKS: Blocks = Blocks::Both;
     const RATES: bool = false;
 
+    fn at_present(&self, inertia: &Inertia) -> (Vec3, Option<Vec3>) {
+        (self.acceleration * inertia.mass, (inertia.offset != Vec3::ZERO).then_some(inertia.offset))
+    }
+
     #[inline(always)]
-    fn evaluate<T: Real>(&self, inertia: &Inertia, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        let force = Vec3::constant(self.acceleration * inertia.mass);
+    fn evaluate<T: Real>(
+        &self,
+        &(force, offset): &(Vec3<T>, Option<Vec3<T>>),
+        motion: &NodeMotion<T>,
+        weights: Weights,
+    ) -> VolumeForce<T> {
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
-        if inertia.offset != Vec3::ZERO {
-            let (p, pp) = offset_force(&Rotation::new(motion.p), Vec3::constant(inertia.offset), force);
+        if let Some(offset) = offset {
+            let (p, pp) = offset_force(&Rotation::new(motion.p), offset, force);
             (out.p, out.pp) = (p, pp.scale(weights.stiffness));
         }
         out

@@ -50,6 +50,7 @@ const fn carriers(nodes: usize) -> (usize, usize) {
 }
 
 impl<T: Real> Half<T> {
+    #[inline(always)]
     fn new(h: Vec3<T>) -> Self {
         let [_, f1, f2, f3, f4, ..] = Series::at(h.squared()).0;
         // 2 df_m/dz = m f_{m+2} - f_{m+1}
@@ -61,48 +62,34 @@ impl<T: Real> Half<T> {
 
 impl<const N: usize, T: Real> Relative<N, T> {
     /// The element with nodes that started at `places`, have moved by `u` and turned by `rotations`.
-    #[inline]
-    pub fn new(places: &[Vec3; N], u: &[Vec3<T>; N], rotations: &[Rotation<T>; N]) -> Self {
+    #[inline(always)]
+    pub fn new(places: &[Vec3<T>; N], u: &[Vec3<T>; N], rotations: &[Rotation<T>; N]) -> Self {
         let (first, last) = carriers(N);
         let (a, b) = (rotations[first].r, rotations[last].r);
         let h = if first == last { Vec3::zero() } else { log(a.transpose_matmul(b)).scale(0.5) };
         let half = Half::new(h);
         let frame = if first == last { a } else { a * half.rotation.r };
-        let theta: [Vec3<T>; N] = std::array::from_fn(|i| {
-            if first == last && i == first {
-                Vec3::zero()
-            } else if i == first {
-                -h
-            } else if i == last {
-                h
-            } else {
-                log(frame.transpose_matmul(rotations[i].r))
-            }
-        });
-        let arms = std::array::from_fn(|i| {
-            let start = Vec3::constant(places[i] - places[first]);
-            frame.transpose_mul(start + (u[i] - u[first]))
-        });
         // The two nodes that carry the frame stand h away from it on either side.
-        let turned: [Rotation<T>; N] = std::array::from_fn(|i| match i {
-            _ if i == last => half.rotation,
-            _ if i == first => half.rotation.reversed(),
-            _ => Rotation::new(theta[i]),
-        });
-        let inverse = half.rotation.t_inverse();
-        let back = std::array::from_fn(|i| match i {
-            _ if i == last => inverse,
-            _ if i == first => inverse.transpose(),
-            _ => turned[i].t_inverse(),
-        });
-        let node = |i: usize| {
-            let start = Vec3::constant(places[i] - places[first]);
-            NodeMotion { u: arms[i] - start, p: theta[i], ..NodeMotion::rest() }
-        };
-        Self { nodes: std::array::from_fn(node), frame, arms, back, turned, half }
+        let (mut turned, inverse) = ([half.rotation; N], half.rotation.t_inverse());
+        let mut back = [inverse; N];
+        let (mut nodes, mut arms) = ([NodeMotion::rest(); N], [Vec3::zero(); N]);
+        for i in 0..N {
+            if i != first && i != last {
+                turned[i] = Rotation::new(log(frame.transpose_matmul(rotations[i].r)));
+                back[i] = turned[i].t_inverse();
+            } else if i != last {
+                turned[i] = half.rotation.reversed();
+                back[i] = inverse.transpose();
+            }
+            let start = places[i] - places[first];
+            arms[i] = frame.transpose_mul(start + (u[i] - u[first]));
+            (nodes[i].u, nodes[i].p) = (arms[i] - start, turned[i].p);
+        }
+        Self { nodes, frame, arms, turned, back, half }
     }
 
     /// F_i: how the frame follows node i.
+    #[inline(always)]
     fn follows(&self, i: usize) -> Option<Mat3<T>> {
         let (first, last) = carriers(N);
         if i != first && i != last {
@@ -118,6 +105,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
     }
 
     /// What the frame sees when the nodes move by `du` and spin by `spins` (material): variations of u and Theta.
+    #[inline(always)]
     pub fn variation(&self, du: &[Vec3<T>; N], spins: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N] {
         let (first, _) = carriers(N);
         let mut frame_spin = Vec3::zero();
@@ -126,10 +114,12 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 frame_spin += follows * spin;
             }
         }
-        std::array::from_fn(|i| {
+        let mut out = [(Vec3::zero(), Vec3::zero()); N];
+        for i in 0..N {
             let moved = self.frame.transpose_mul(du[i] - du[first]) + self.arms[i].cross(frame_spin);
-            (moved, self.back[i] * spins[i] - self.back[i].transpose_mul(frame_spin))
-        })
+            out[i] = (moved, self.back[i] * spins[i] - self.back[i].transpose_mul(frame_spin));
+        }
+        out
     }
 
     /// The rotation at the shape functions `shape`: R_r exp(sum N_i Theta_i).
@@ -142,6 +132,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
     ///
     /// `stiffness` is the weight of the tangent, zero where there is none. `geometric` holds the forces in the frame that
     /// geometric parts are formed with, if they are not those of `local`.
+    #[inline(always)]
     pub fn carry_back(
         &self,
         rotations: &[Rotation<T>; N],
@@ -166,25 +157,28 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// ```text
     /// m_i = A_i^T f_Theta_i,   m = sum f_xi_i x xi_i - A_i f_Theta_i,   f_x_i = R_r f_xi_i,   f_t_i = m_i + F_i^T m
     /// ```
+    #[inline(always)]
     fn spin_forces(&self, local: &ElementSystem<T>) -> SpinForces<N, T> {
-        let mut frame = Vec3::zero();
-        let mut own = [Vec3::zero(); N];
+        let none = [Vec3::zero(); N];
+        let mut out = SpinForces { displacement: none, spin: none, own: none, frame: Vec3::zero() };
         for i in 0..N {
             let (force, moment) = (local.force_block(2 * i), local.force_block(2 * i + 1));
-            own[i] = self.back[i].transpose_mul(moment);
-            frame += force.cross(self.arms[i]) - self.back[i] * moment;
+            out.displacement[i] = self.frame * force;
+            out.own[i] = self.back[i].transpose_mul(moment);
+            out.frame += force.cross(self.arms[i]) - self.back[i] * moment;
         }
-        let spin = |i: usize| self.follows(i).map_or(own[i], |follows| own[i] + follows.transpose_mul(frame));
-        SpinForces {
-            displacement: std::array::from_fn(|i| self.frame * local.force_block(2 * i)),
-            spin: std::array::from_fn(spin),
-            own,
-            frame,
+        for i in 0..N {
+            out.spin[i] = out.own[i];
+            if let Some(follows) = self.follows(i) {
+                out.spin[i] += follows.transpose_mul(out.frame);
+            }
         }
+        out
     }
 
     /// The second variation, first in displacements and spins of the nodes and of the frame, then with the spin of the frame
     /// taken from the nodes; at last T_i takes spins to rotation vectors.
+    #[inline(always)]
     fn carry_tangent_back(
         &self,
         rotations: &[Rotation<T>; N],
@@ -197,14 +191,20 @@ impl<const N: usize, T: Real> Relative<N, T> {
         let over = self.over_frame(local, source, forces, s);
         let drift = self.drift(rotations, forces.frame, s);
         // What each node's rotation vector does: dTheta_i = own_i dP_i - ..., t = following_i dP_i.
-        let own: [Mat3<T>; N] = std::array::from_fn(|i| self.back[i] * rotations[i].t);
-        let following: [Option<Mat3<T>>; N] = std::array::from_fn(|i| self.follows(i).map(|f| f * rotations[i].t));
-        let spin: [Mat3<T>; N] = std::array::from_fn(|i| rotations[i].t.transpose_matmul(over.spin[i]));
-        // The row of the frame over each rotation vector, with what comes back through the frame itself.
-        let row: [Mat3<T>; N] = std::array::from_fn(|j| {
-            let through = following[j].map_or(Mat3::zero(), |following| over.frame * following);
-            over.row[j] * rotations[j].t + through
-        });
+        let (mut own, mut spin, mut row) = (self.back, over.spin, over.row);
+        let mut following = [None; N];
+        for i in 0..N {
+            let t = rotations[i].t;
+            own[i] = self.back[i] * t;
+            spin[i] = t.transpose_matmul(over.spin[i]);
+            // The row of the frame over each rotation vector, with what comes back through the frame itself.
+            row[i] = over.row[i] * t;
+            if let Some(follows) = self.follows(i) {
+                let follows = follows * t;
+                row[i] += over.frame * follows;
+                following[i] = Some(follows);
+            }
+        }
         for i in 0..N {
             for j in 0..N {
                 let mut xp = self.frame * (local.tangent_block(2 * i, 2 * j + 1) * own[j]);
@@ -224,7 +224,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if let Some(following) = following[i] {
                     pp += following.transpose_matmul(row[j]);
                 }
-                if let Some(drift) = drift(i, j) {
+                if let Some(drift) = drift.between(i, j) {
                     pp += drift;
                 }
                 if i == j {
@@ -247,6 +247,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// x_i,t: R_r (Z_xi - f_xi~)      t_i,t: A_i^T (Z_Theta + C2(m_i) A_i^T)      t,t_j: Z_Theta^T A_j + A_j C1(A_j f) A_j
     /// t,t:   sum -xi_i~ Z_xi + f_xi~ xi_i~ - A_i Z_Theta - A_i C1(A_i f) A_i^T   Theta_i,Theta_i: - C2(m_i) (own)
     /// ```
+    #[inline(always)]
     fn over_frame(
         &self,
         local: &ElementSystem<T>,
@@ -286,12 +287,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// ```text
     /// F_1^T m = exp(h) (m/2 - c h x m),   F_2^T m = exp(h)^T (m/2 + c h x m),   2 dh = T(2h)^-1 t_2 - T(2h)^-T t_1
     /// ```
-    fn drift(
-        &self,
-        rotations: &[Rotation<T>; N],
-        m: Vec3<T>,
-        s: f64,
-    ) -> impl Fn(usize, usize) -> Option<Mat3<T>> + use<N, T> {
+    #[inline(always)]
+    fn drift(&self, rotations: &[Rotation<T>; N], m: Vec3<T>, s: f64) -> Drift<N, T> {
         let (first, last) = carriers(N);
         let Half { rotation: Rotation { r, t, p: h, .. }, c, c_slope } = self.half;
         let across = h.cross(m);
@@ -305,11 +302,23 @@ impl<const N: usize, T: Real> Relative<N, T> {
         // T(2h)^-1
         let inverse = Rotation::new(h.scale(2.0)).t_inverse().scale(0.5 * s);
         let columns = [-(inverse.transpose() * t1), inverse * t2];
-        move |i, j| {
-            let carries = |k: usize| k == first || k == last;
-            let both = first != last && carries(i) && carries(j);
-            both.then(|| rows[usize::from(i == last)] * columns[usize::from(j == last)])
-        }
+        Drift { rows, columns }
+    }
+}
+
+/// See [`Relative::drift`].
+struct Drift<const N: usize, T> {
+    rows: [Mat3<T>; 2],
+    columns: [Mat3<T>; 2],
+}
+
+impl<const N: usize, T: Real> Drift<N, T> {
+    /// The block between two nodes that carry the frame.
+    #[inline(always)]
+    fn between(&self, i: usize, j: usize) -> Option<Mat3<T>> {
+        let (first, last) = carriers(N);
+        let both = first != last && (i == first || i == last) && (j == first || j == last);
+        both.then(|| self.rows[usize::from(i == last)] * self.columns[usize::from(j == last)])
     }
 }
 

@@ -78,7 +78,7 @@ impl<T: Real> Converted<T> {
         rates: bool,
         rotation_block: impl Fn(usize) -> usize,
         out: &mut ElementSystem<T>,
-        evaluate: impl Fn(Weights, &mut ElementSystem<T>),
+        evaluate: &dyn Fn(Weights, &mut ElementSystem<T>),
     ) {
         evaluate(weights, out);
         let needs_rates = rates && (weights.stiffness != 0.0 || weights.damping != 0.0);
@@ -88,7 +88,7 @@ impl<T: Real> Converted<T> {
             evaluate(Weights::MASS, &mut mass);
             (damping, mass)
         });
-        let blocks = out.rows() / 3;
+        let blocks = out.blocks();
         for (j, change) in self.change.iter().enumerate() {
             let Some(change) = change else { continue };
             let column = rotation_block(j);

@@ -2,16 +2,16 @@
 
 use super::beam::interpolate;
 use super::element::{ElementSystem, NodeMotion, Weights};
-use crate::real::Real;
+use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
 
 /// An integration point for such a quantity.
 #[derive(Clone, Copy, Debug)]
-pub struct VolumePoint<const N: usize, Q> {
+pub struct VolumePoint<const N: usize, Q, T = f64> {
     /// Shape functions
-    pub shape: [f64; N],
+    pub shape: [T; N],
     /// Gauss weight times ds/dxi
-    pub weight: f64,
+    pub weight: T,
     /// What is integrated, per initial length
     pub quantity: Q,
 }
@@ -77,32 +77,62 @@ impl Blocks {
 pub trait VolumeKernel {
     /// What it needs to know of the point.
     type Quantity: Copy;
+    /// The same at this moment, for any scalar.
+    type Present<T: Real>: Copy;
     /// The unknowns it couples
     const BLOCKS: Blocks;
     /// Whether it depends on rates of P
     const RATES: bool;
 
+    /// What a point's quantity is at this moment.
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Present<f64>;
+
     /// Force per length, and the tangent of the weights that are not zero.
-    fn evaluate<T: Real>(&self, quantity: &Self::Quantity, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T>;
+    fn evaluate<T: Real>(&self, present: &Self::Present<T>, motion: &NodeMotion<T>, weights: Weights)
+    -> VolumeForce<T>;
 }
 
 impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
+    /// The point with what `change` makes of its quantity.
+    #[inline(always)]
+    pub fn map<P>(&self, change: impl Fn(&Q) -> P) -> VolumePoint<N, P> {
+        VolumePoint { shape: self.shape, weight: self.weight, quantity: change(&self.quantity) }
+    }
+
+    /// The same point for another scalar, with its quantity lifted by `lift`.
+    pub fn lifted<T: Real, P>(&self, lift: impl Fn(&Q) -> P) -> VolumePoint<N, P, T> {
+        let (shape, weight) = (self.shape.map(T::constant), T::constant(self.weight));
+        VolumePoint { shape, weight, quantity: lift(&self.quantity) }
+    }
+}
+
+impl<const N: usize, Q: Pack> Pack for VolumePoint<N, Q> {
+    type Packed = VolumePoint<N, Q::Packed, Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        VolumePoint { shape: pack!(of.shape), weight: pack!(of.weight), quantity: pack!(of.quantity) }
+    }
+}
+
+impl<const N: usize, Q: Copy, T: Real> VolumePoint<N, Q, T> {
     /// The motion at this point.
     #[inline(always)]
-    pub fn motion<T: Real>(&self, nodes: &[NodeMotion<T>; N]) -> NodeMotion<T> {
+    pub fn motion(&self, nodes: &[NodeMotion<T>; N]) -> NodeMotion<T> {
+        let shape = &self.shape;
         NodeMotion {
-            u: interpolate(&self.shape, |i| nodes[i].u),
-            u_rate: interpolate(&self.shape, |i| nodes[i].u_rate),
-            u_rate2: interpolate(&self.shape, |i| nodes[i].u_rate2),
-            p: interpolate(&self.shape, |i| nodes[i].p),
-            p_rate: interpolate(&self.shape, |i| nodes[i].p_rate),
-            p_rate2: interpolate(&self.shape, |i| nodes[i].p_rate2),
+            u: interpolate(shape, |i| nodes[i].u),
+            u_rate: interpolate(shape, |i| nodes[i].u_rate),
+            u_rate2: interpolate(shape, |i| nodes[i].u_rate2),
+            p: interpolate(shape, |i| nodes[i].p),
+            p_rate: interpolate(shape, |i| nodes[i].p_rate),
+            p_rate2: interpolate(shape, |i| nodes[i].p_rate2),
         }
     }
 
     /// Adds the force of `kernel`, and its tangent where a weight is not zero.
     #[inline(always)]
-    pub fn add<T: Real, K: VolumeKernel<Quantity = Q>>(
+    pub fn add<K: VolumeKernel<Present<T> = Q>>(
         &self,
         kernel: &K,
         nodes: &[NodeMotion<T>; N],
@@ -113,11 +143,11 @@ impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
         for i in 0..N {
             let w = self.weight * self.shape[i];
             match K::BLOCKS {
-                Blocks::Displacements => out.add_force(i, force.u.scale(w)),
-                Blocks::Rotations => out.add_force(i, force.p.scale(w)),
+                Blocks::Displacements => out.add_force(i, force.u * w),
+                Blocks::Rotations => out.add_force(i, force.p * w),
                 Blocks::Both => {
-                    out.add_force(2 * i, force.u.scale(w));
-                    out.add_force(2 * i + 1, force.p.scale(w));
+                    out.add_force(2 * i, force.u * w);
+                    out.add_force(2 * i + 1, force.p * w);
                 }
             }
             if weights == Weights::NONE {
@@ -126,13 +156,13 @@ impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
             for j in 0..N {
                 let w = w * self.shape[j];
                 match K::BLOCKS {
-                    Blocks::Displacements => out.add_tangent(i, j, force.uu.scale(w)),
-                    Blocks::Rotations => out.add_tangent(i, j, force.pp.scale(w)),
+                    Blocks::Displacements => out.add_tangent(i, j, force.uu * w),
+                    Blocks::Rotations => out.add_tangent(i, j, force.pp * w),
                     Blocks::Both => {
-                        out.add_tangent(2 * i, 2 * j, force.uu.scale(w));
-                        out.add_tangent(2 * i, 2 * j + 1, force.up.scale(w));
-                        out.add_tangent(2 * i + 1, 2 * j, force.pu.scale(w));
-                        out.add_tangent(2 * i + 1, 2 * j + 1, force.pp.scale(w));
+                        out.add_tangent(2 * i, 2 * j, force.uu * w);
+                        out.add_tangent(2 * i, 2 * j + 1, force.up * w);
+                        out.add_tangent(2 * i + 1, 2 * j, force.pu * w);
+                        out.add_tangent(2 * i + 1, 2 * j + 1, force.pp * w);
                     }
                 }
             }

@@ -268,9 +268,13 @@ impl Assembly {
         }
     }
 
-    /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`].
+    /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`]. Without weights the tangent is left as
+    /// it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
-        self.system.clear(lift);
+        match weights {
+            Weights::NONE => self.system.clear_forces(),
+            _ => self.system.clear(lift),
+        }
         for (number, effect) in self.effects.iter().enumerate() {
             let with_tangent = weights != Weights::NONE && effect.has_tangent();
             let mut sink = self.system.sink(number, effect.category(), with_tangent);

@@ -78,7 +78,7 @@ impl Place {
             Vec3(std::array::from_fn(|k| Jet { value: m.p.0[k], rate: m.p_rate.0[k], rate2: m.p_rate2.0[k] }))
         };
         let rotations: [Rotation<Jet>; N] = std::array::from_fn(|i| Rotation::new(jet(&motions[i])));
-        let places = std::array::from_fn(|i| self.nodes[i].1);
+        let places = std::array::from_fn(|i| Vec3::constant(self.nodes[i].1));
         Relative::new(&places, &[Vec3::zero(); N], &rotations).rotation(|i| self.nodes[i].2)
     }
 

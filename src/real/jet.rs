@@ -106,6 +106,10 @@ impl Real for Jet {
     fn largest(self) -> f64 {
         self.value
     }
+
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
+        if self.value > limit { then } else { otherwise }
+    }
 }
 
 #[cfg(test)]

@@ -2,8 +2,11 @@
 //! against automatic differentiation, lanes of several elements where speed asks for it.
 
 mod jet;
+mod lanes;
 
 pub use jet::Jet;
+pub use lanes::{Instructions, LANES, Lanes, Pack};
+pub(crate) use lanes::{each_lane, pack};
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -29,8 +32,11 @@ pub trait Real:
     /// The angle in (-pi, pi] whose tangent is `self` / `x`, by the sign of both.
     fn atan2(self, x: Self) -> Self;
 
-    /// The value itself; of several lanes the largest. It may choose an algorithm, never enter a result.
+    /// The value itself; of several lanes the largest. It may tell whether an algorithm is needed at all, never enter a result.
     fn largest(self) -> f64;
+
+    /// `then` where the value is above `limit`, else `otherwise`; each lane for itself.
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self;
 
     /// Zero.
     #[inline(always)]
@@ -64,5 +70,10 @@ impl Real for f64 {
     #[inline(always)]
     fn largest(self) -> f64 {
         self
+    }
+
+    #[inline(always)]
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
+        if self > limit { then } else { otherwise }
     }
 }

@@ -48,7 +48,7 @@ impl<T: Real> Rotation<T> {
 
     /// The same vector as an increment that follows the rotation `base`: R = base exp(P). T and the derivative tensors are
     /// those of the increment, since they speak of material spins.
-    #[inline]
+    #[inline(always)]
     pub fn after(self, base: Mat3<T>) -> Self {
         Self { r: base * self.r, ..self }
     }
@@ -60,6 +60,7 @@ impl<T: Real> Rotation<T> {
     }
 
     /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation elsewhere.
+    #[inline(always)]
     pub fn t_inverse(&self) -> Mat3<T> {
         let (p, z) = (self.p, self.p.squared());
         let [_, f1, f2, f3, ..] = Series::at(z * 0.25).0;

@@ -61,18 +61,25 @@ impl<T: Real> Series<T> {
     /// entire functions, so a Newton iterate may land anywhere, beyond 2 pi too.
     #[cold]
     fn by_doubling(z: T) -> Self {
+        let quarter = |z: T| z.above(LARGEST_ARGUMENT, z * 0.25, z);
         let mut small = z;
         let mut doublings = 0;
-        while small.largest() > LARGEST_ARGUMENT && doublings < 512 {
-            small = small * 0.25;
+        while small.largest() > LARGEST_ARGUMENT && doublings < 500 {
+            small = quarter(small);
             doublings += 1;
         }
         let mut f = Self::by_horner(small);
-        for _ in 0..doublings {
-            small = small * 4.0;
-            f = f.doubled(small);
+        for k in (0..doublings).rev() {
+            // Exact, as all powers of two are.
+            let argument = z * 0.25_f64.powi(k);
+            f = Self::chosen(argument, f.doubled(argument), f);
         }
         f
+    }
+
+    /// `doubled` where the argument is too large for the series.
+    fn chosen(argument: T, doubled: Self, f: Self) -> Self {
+        Self(std::array::from_fn(|m| argument.above(LARGEST_ARGUMENT, doubled.0[m], f.0[m])))
     }
 
     /// The functions at four times the argument, which is `z`.

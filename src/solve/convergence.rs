@@ -101,9 +101,7 @@ fn largest_force(model: &Model, system: &System) -> f64 {
         let total = system.total(slot);
         let held = total - free_part(&system.pattern.equations, slot as Slot, total);
         let [a, b, c, d] = system.force.each_ref().map(|force| force[slot]);
-        let parts = [a, b, c, d, held];
-        let size = parts.iter().map(|f| f.size()).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
-        let force = size / info.arm(model.length);
+        let force = largest_size([a, b, c, d, held]) / info.arm(model.length);
         if force > largest || force.is_nan() {
             largest = force;
         }
@@ -111,10 +109,20 @@ fn largest_force(model: &Model, system: &System) -> f64 {
     largest
 }
 
+/// The size of the largest of these; NaN if one is.
+fn largest_size(forces: [Vec3; 5]) -> f64 {
+    let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+    let square = forces.iter().map(|f| f.squared()).fold(0.0, larger);
+    match square {
+        // Neither has it overflowed, nor has anything that counts been lost.
+        1e-280..=1e280 => square.sqrt(),
+        _ => forces.iter().map(|f| f.size()).fold(0.0, larger),
+    }
+}
+
 /// The part of a force in the free directions of its slot, in local components.
 fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
-    let held = equations.held_part(slot, force);
-    force - held
+    if equations.is_free(slot) { force } else { force - equations.held_part(slot, force) }
 }
 
 /// The largest correction, displacements over the length of the scene.

@@ -5,6 +5,7 @@ use super::linear::LinearSolver;
 use super::mechanism::mechanism;
 use super::softest::NullVector;
 use crate::integrate::Method;
+use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
@@ -106,6 +107,9 @@ pub struct Newton {
 /// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
 const FINE: f64 = 1e-8;
 
+/// The ratio of a residual to what is allowed that is expected to become one in balance.
+const EXPECTED: f64 = 0.1;
+
 /// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
 const RUNAWAY: f64 = 1e6;
 
@@ -176,7 +180,10 @@ impl Newton {
         self.history.clear();
         let mut refinement = Refinement::default();
         loop {
-            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), lift));
+            // Where balance is expected the tangent is left for when it is needed after all.
+            let expected = lift.is_none() && iterations < self.max_iterations && self.expects_balance();
+            let weights = if expected { Weights::NONE } else { method.weights() };
+            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
             self.history.push(residual.ratio);
@@ -194,6 +201,9 @@ impl Newton {
                 Verdict::Continue if iterations < self.max_iterations => refinement = Refinement::default(),
                 _ if iterations >= self.max_iterations => return Err(self.not_converged(&assembly.system, residual)),
                 _ => {}
+            }
+            if expected {
+                timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), None));
             }
             if !self.find_correction(&assembly.system, lift.take(), work) {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, assembly, model, state)));
@@ -221,6 +231,14 @@ impl Newton {
     fn not_converged(&mut self, system: &System, residual: Residual) -> NewtonFailure {
         self.solver.doubt(system);
         NewtonFailure::NotConverged { residual, history: self.history.clone() }
+    }
+
+    /// Whether residuals have fallen so fast that the next one will do: by the last factor once more, and a little.
+    fn expects_balance(&self) -> bool {
+        match self.history[..] {
+            [.., before, last] => last * last < EXPECTED * before,
+            _ => false,
+        }
     }
 
     /// Solves J dq = -g; held directions take their part of `lift`. `false` where there is no solution.

@@ -4,6 +4,7 @@ use super::equations::Equations;
 use super::pattern::{Pattern, Places, Tile, WIDTH};
 use super::state::Slot;
 use crate::kernel::{ElementSystem, MAX_NODES};
+use crate::real::{Instructions, LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
 
 /// What a force is; the stop test of Newton and the energy account look at them apart.
@@ -57,9 +58,8 @@ impl System {
     /// Sets forces and tangent to zero. `lift` holds increments of the held directions that the next correction
     /// shall take with it.
     pub fn clear(&mut self, lift: Option<&[Vec3]>) {
-        self.force.iter_mut().for_each(|f| f.fill(Vec3::ZERO));
+        self.clear_forces();
         self.values.fill(0.0);
-        self.lifted.fill(0.0);
         self.lifts = lift.is_some();
         if let Some(lift) = lift {
             self.lift.copy_from_slice(lift);
@@ -70,6 +70,13 @@ impl System {
     #[inline]
     pub fn total(&self, slot: usize) -> Vec3 {
         self.force[0][slot] + self.force[1][slot] + self.force[2][slot] + self.force[3][slot]
+    }
+
+    /// Sets forces to zero for a new evaluation, without prescribed increments; the tangent is left as it is.
+    pub fn clear_forces(&mut self) {
+        self.forget_forces();
+        self.lifted.fill(0.0);
+        self.lifts = false;
     }
 
     /// Drops all forces and keeps the tangent.
@@ -83,7 +90,7 @@ impl System {
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
-    /// The tangent tile by tile, in the order of the pattern.
+    /// The tangent tile by tile, in the order of the pattern; each by its columns.
     pub fn tiles(&self) -> &[Tile] {
         tiles(&self.values)
     }
@@ -91,42 +98,54 @@ impl System {
     /// A x, for a matrix with these values on the pattern of the tangent.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
-        self.each_line(values, x, |row, line, part| {
-            if let Some(out) = out.get_mut(row) {
-                *out += line.iter().zip(part).map(|(a, x)| a * x).sum::<f64>();
+        let mut sums = vec![[0.0; WIDTH]; self.pattern.groups.count()];
+        let parts = self.pattern.apart(x);
+        self.each_tile(values, |row, column, tile| {
+            for (line, &x) in tile.iter().zip(&parts[column]) {
+                sums[row].iter_mut().zip(line).for_each(|(sum, value)| *sum += value * x);
             }
         });
+        self.pattern.join(&sums, &mut out);
         out
     }
 
-    /// Shows each line of each tile with its equation and the part of x that it meets; zero where that is none.
-    fn each_line(&self, values: &[f64], x: &[f64], mut show: impl FnMut(usize, &[f64; WIDTH], &[f64; WIDTH])) {
-        let pattern = &self.pattern;
-        for column in 0..pattern.groups.count() {
-            let numbers = pattern.numbers(column);
-            let part = std::array::from_fn(|k| x.get(numbers[k] as usize).copied().unwrap_or(0.0));
-            let first = pattern.column_starts[column] as usize;
-            for (&row, tile) in pattern.rows_of(column).iter().zip(&tiles(values)[first..]) {
-                let lines = pattern.numbers(row as usize).iter().zip(tile);
-                lines.for_each(|(&number, line)| show(number as usize, line, &part));
+    /// Shows each tile with the groups of its rows and of its columns.
+    #[inline(always)]
+    fn each_tile(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile)) {
+        let mut tiles = tiles(values).iter();
+        for column in 0..self.pattern.groups.count() {
+            for (&row, tile) in self.pattern.rows_of(column).iter().zip(&mut tiles) {
+                show(row as usize, column, tile);
             }
         }
     }
 
     /// b - A x, and its largest component over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
     pub fn residual(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        let mut residual = b.to_vec();
-        let mut sizes = vec![0.0; b.len()];
-        self.each_line(&self.values, x, |row, line, part| {
-            if row < b.len() {
-                let terms: [f64; WIDTH] = std::array::from_fn(|k| line[k] * part[k]);
-                residual[row] -= terms.iter().sum::<f64>();
-                sizes[row] += terms.iter().map(|term| term.abs()).sum::<f64>();
-            }
-        });
+        let parts = self.pattern.apart(x);
+        let mut residuals = self.pattern.apart(b);
+        let mut sizes: Vec<_> = residuals.iter().map(|part| part.map(f64::abs)).collect();
+        Instructions::here().run(
+            #[inline(always)]
+            || {
+                self.each_tile(&self.values, |row, column, tile| {
+                    let (mut residual, mut size) = (residuals[row], sizes[row]);
+                    for (line, &x) in tile.iter().zip(&parts[column]) {
+                        for r in 0..WIDTH {
+                            let term = line[r] * x;
+                            residual[r] -= term;
+                            size[r] += term.abs();
+                        }
+                    }
+                    (residuals[row], sizes[row]) = (residual, size);
+                });
+            },
+        );
         // Numbers that small have lost digits of their own.
-        let ratio = |((r, b), size): ((&f64, &f64), &f64)| r.abs() / (size + b.abs()).max(1e-280);
-        let worst = residual.iter().zip(b).zip(&sizes).map(ratio).fold(0.0, f64::max);
+        let ratio = |(r, size): (&f64, &f64)| r.abs() / size.max(1e-280);
+        let worst = residuals.as_flattened().iter().zip(sizes.as_flattened()).map(ratio).fold(0.0, f64::max);
+        let mut residual = vec![0.0; b.len()];
+        self.pattern.join(&residuals, &mut residual);
         (residual, worst)
     }
 
@@ -173,6 +192,20 @@ impl System {
     }
 }
 
+/// The tiles of elements side by side, each for itself.
+#[inline(always)]
+fn apart(tile: &[Lanes; WIDTH * WIDTH]) -> [[f64; WIDTH * WIDTH]; LANES] {
+    let mut out = [[0.0; WIDTH * WIDTH]; LANES];
+    for start in (0..WIDTH * WIDTH).step_by(LANES) {
+        for lane in 0..LANES {
+            for k in 0..LANES {
+                out[lane][start + k] = tile[start + k].0[lane];
+            }
+        }
+    }
+    out
+}
+
 /// Values as tiles.
 fn tiles(values: &[f64]) -> &[Tile] {
     values.as_chunks::<WIDTH>().0.as_chunks::<WIDTH>().0
@@ -194,9 +227,9 @@ impl Sink<'_> {
     /// Adds instance `k`; the blocks of `element` are in the order of the slots of its clique.
     #[inline]
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
-        let slots = self.places.cliques.get(k);
-        for (block, &slot) in slots.iter().enumerate() {
-            self.force[self.category as usize][slot as usize] += element.force_block(block);
+        let forces = &mut self.force[self.category as usize];
+        for (force, &slot) in element.forces().iter().zip(self.places.cliques.get(k)) {
+            forces[slot as usize] += Vec3(*force);
         }
         if !self.with_tangent {
             return;
@@ -207,26 +240,87 @@ impl Sink<'_> {
         self.add_tangent(k, element);
     }
 
-    #[inline]
-    fn add_tangent(&mut self, k: usize, element: &ElementSystem) {
-        if self.places.whole {
-            self.add_blocks::<WIDTH>(k, element);
-        } else {
-            self.add_blocks::<3>(k, element);
+    /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
+    /// beside whom. An instance that `is_apart` is left to `alone`.
+    #[inline(always)]
+    pub fn add_lanes(
+        &mut self,
+        first: usize,
+        count: usize,
+        elements: &ElementSystem<Lanes>,
+        is_apart: impl Fn(usize) -> bool,
+        mut alone: impl FnMut(usize, &mut Self),
+    ) {
+        let special = |sink: &Self, lane: usize| sink.with_tangent && sink.places.special[first + lane];
+        if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
+            return self.add_plain(first, elements, each_lane!(|lane| lane < count));
+        }
+        for lane in 0..count {
+            if is_apart(lane) {
+                alone(lane, self);
+            } else {
+                self.add(first + lane, &elements.lane(lane));
+            }
         }
     }
 
-    /// Adds the tangent in blocks of W x W.
+    /// Adds those of the instances in lanes that are `wanted`; none touches a held direction or turned axes.
+    #[inline(always)]
+    fn add_plain(&mut self, first: usize, elements: &ElementSystem<Lanes>, wanted: [bool; LANES]) {
+        let forces = &mut self.force[self.category as usize];
+        for lane in (0..LANES).filter(|&lane| wanted[lane]) {
+            for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(first + lane)) {
+                forces[slot as usize] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
+            }
+        }
+        if !self.with_tangent {
+            return;
+        }
+        if self.places.whole {
+            return self.add_whole(first, elements, wanted);
+        }
+        for lane in (0..LANES).filter(|&lane| wanted[lane]) {
+            self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
+        }
+    }
+
+    /// Adds the tangents of elements of whole nodes, tile by tile.
+    #[inline(always)]
+    fn add_whole(&mut self, first: usize, elements: &ElementSystem<Lanes>, wanted: [bool; LANES]) {
+        for (number, tile) in elements.tiles().iter().enumerate() {
+            let apart = apart(tile);
+            for lane in 0..LANES {
+                if wanted[lane] {
+                    let place = self.places.of(first + lane)[number] as usize;
+                    let target = &mut self.values[place..place + WIDTH * WIDTH];
+                    target.iter_mut().zip(&apart[lane]).for_each(|(sum, value)| *sum += value);
+                }
+            }
+        }
+    }
+
     #[inline]
-    fn add_blocks<const W: usize>(&mut self, k: usize, element: &ElementSystem) {
-        let (rows, tangent) = (element.rows(), element.tangent());
-        let across = rows / W;
-        for (block, &place) in self.places.of(k).iter().enumerate() {
-            let first = block / across * W * rows + block % across * W;
-            for r in 0..W {
-                let (from, to) = (first + r * rows, place as usize + r * WIDTH);
-                let target = &mut self.values[to..to + W];
-                target.iter_mut().zip(&tangent[from..from + W]).for_each(|(sum, value)| *sum += value);
+    fn add_tangent(&mut self, k: usize, element: &ElementSystem) {
+        if !self.places.whole {
+            return self.add_blocks(k, element.blocks(), element.tiles(), |value| *value);
+        }
+        for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
+            let target = &mut self.values[place as usize..place as usize + WIDTH * WIDTH];
+            target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
+        }
+    }
+
+    /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
+    #[inline(always)]
+    fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; WIDTH * WIDTH]], pick: impl Fn(&T) -> f64) {
+        for (number, &place) in self.places.of(k).iter().enumerate() {
+            let (row, column) = (number / blocks, number % blocks);
+            let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
+            for c in 0..3 {
+                let (from, to) = ((column % 2 * 3 + c) * WIDTH + row % 2 * 3, place as usize + c * WIDTH);
+                for r in 0..3 {
+                    self.values[to + r] += pick(&tile[from + r]);
+                }
             }
         }
     }
@@ -239,6 +333,8 @@ impl Sink<'_> {
     }
 
     /// As [`Sink::add`], for instances with turned axes or held directions.
+    #[cold]
+    #[inline(never)]
     fn add_special(&mut self, k: usize, element: &ElementSystem) {
         let slots = self.places.cliques.get(k);
         let mut local = element.clone();

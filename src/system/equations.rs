@@ -116,6 +116,12 @@ impl Equations {
         }
     }
 
+    /// Whether every direction of a slot is free.
+    #[inline]
+    pub fn is_free(&self, slot: Slot) -> bool {
+        self.number[slot as usize].iter().all(|&number| number != Self::HELD)
+    }
+
     /// The held part of a value at a slot.
     pub fn held_part(&self, slot: Slot, value: Vec3) -> Vec3 {
         let mut local = self.to_local(slot, value);

@@ -7,7 +7,7 @@ use super::state::Slot;
 /// Rows and columns of a tile.
 pub const WIDTH: usize = 3 * SLOTS;
 
-/// A block of the tangent, by rows.
+/// A block of the tangent, by columns.
 pub type Tile = [[f64; WIDTH]; WIDTH];
 
 /// Numbers in a tile.
@@ -134,6 +134,21 @@ impl Pattern {
         &self.numbers[WIDTH * group..WIDTH * (group + 1)]
     }
 
+    /// One number an equation as one part a group; zero where a row has no equation.
+    pub fn apart(&self, x: &[f64]) -> Vec<[f64; WIDTH]> {
+        let part = |numbers: &[u32; WIDTH]| numbers.map(|number| x.get(number as usize).copied().unwrap_or(0.0));
+        self.numbers.as_chunks().0.iter().map(part).collect()
+    }
+
+    /// The reverse of [`Pattern::apart`].
+    pub fn join(&self, parts: &[[f64; WIDTH]], out: &mut [f64]) {
+        for (&number, &value) in self.numbers.iter().zip(parts.as_flattened()) {
+            if let Some(out) = out.get_mut(number as usize) {
+                *out = value;
+            }
+        }
+    }
+
     /// The entries of an equation's column, by rows.
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
         let (group, c) = self.row_of(column);
@@ -141,7 +156,7 @@ impl Pattern {
         tiles.flat_map(move |tile| {
             let numbers = self.numbers(self.rows[tile] as usize).iter().enumerate();
             let held = move |&(_, &row): &(usize, &u32)| row != Equations::HELD;
-            numbers.filter(held).map(move |(r, &row)| Entry { row, place: TILE * tile + WIDTH * r + c })
+            numbers.filter(held).map(move |(r, &row)| Entry { row, place: TILE * tile + WIDTH * c + r })
         })
     }
 
@@ -158,7 +173,7 @@ impl Pattern {
             return None;
         }
         let ((i, r), (j, c)) = (self.row_of(row), self.row_of(column));
-        Some(self.tile(i, j)? + WIDTH * r + c)
+        Some(self.tile(i, j)? + WIDTH * c + r)
     }
 
     /// The group and the row of the tile of an equation.
@@ -188,7 +203,7 @@ impl Pattern {
             let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.of(slot));
             for (i, r) in corners() {
                 // Cliques are what the pattern was made of.
-                let place = |(j, c): (usize, usize)| self.tile(i, j).map(|tile| (tile + 3 * (WIDTH * r + c)) as u32);
+                let place = |(j, c): (usize, usize)| self.tile(i, j).map(|tile| (tile + 3 * (WIDTH * c + r)) as u32);
                 places.values.extend(corners().filter_map(place));
             }
             let turned = slots.iter().any(|&slot| self.equations.frame(slot).is_some());

@@ -292,3 +292,30 @@ fn twenty_runs_give_equal_bytes() {
         assert!(history(number) == first, "run {number} wrote other bytes");
     }
 }
+
+/// Elements side by side do what elements alone do, in the same order: equal bytes whatever the instructions.
+#[test]
+fn histories_do_not_depend_on_instructions() {
+    let decks = [
+        "robot_arm.toml",
+        "hard/r06_mixed_elements.toml",
+        "hard/r03_half_circle_skew.toml",
+        "hard/d07_flying_3d.toml",
+        "minimal/section_6x6.toml",
+        "minimal/free_strain.toml",
+        "minimal/line_load_follower.toml",
+        "minimal/lie_generalized_alpha.toml",
+    ];
+    let folder = Folder::new("instructions");
+    for deck in decks {
+        let deck = Path::new(env!("CARGO_MANIFEST_DIR")).join("decks").join(deck);
+        let history = |instructions: &str| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_beamsim"));
+            command.current_dir(&folder.0).env("BEAMSIM_INSTRUCTIONS", instructions);
+            let output = command.arg("run").arg(&deck).args(["--out", instructions]).output().unwrap();
+            assert_eq!(status(&output), 0, "{deck:?} with {instructions}: {}", last_line(&output));
+            fs::read(folder.0.join(instructions).join("history.csv")).unwrap()
+        };
+        assert!(history("baseline") == history("widest"), "{deck:?}");
+    }
+}

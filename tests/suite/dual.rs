@@ -113,6 +113,10 @@ impl<const N: usize> Real for Dual<N> {
     fn largest(self) -> f64 {
         self.value
     }
+
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
+        if self.value > limit { then } else { otherwise }
+    }
 }
 
 /// The components of `v` as variables number `first`, `first + 1`, `first + 2`.

@@ -176,7 +176,7 @@ fn elastic<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(2 * N);
     for point in points {
-        point.add_elastic(nodes, 0.0, None, weight, &mut out);
+        point.lifted().add_elastic(nodes, T::zero(), None, weight, &mut out);
     }
     out
 }
@@ -188,7 +188,7 @@ fn rotary<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(N);
     for point in points {
-        point.add(&Rotary, nodes, weights, &mut out);
+        point.lifted(|j| Mat3::constant(*j)).add(&Rotary, nodes, weights, &mut out);
     }
     out
 }
@@ -200,7 +200,7 @@ fn body<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(2 * N);
     for point in points {
-        point.add(&Eccentric, nodes, weights, &mut out);
+        point.lifted(Inertia::lifted).add(&Eccentric, nodes, weights, &mut out);
     }
     out
 }
@@ -209,7 +209,7 @@ fn body<T: Real, const N: usize>(
 fn strain_energy<const N: usize>(points: &[StiffnessPoint<N>], nodes: &[NodeMotion<Wide>; N]) -> Wide {
     let mut sum = Wide::zero();
     for point in points {
-        let (strain, stress) = point.strain_and_stress(nodes, 0.0);
+        let (strain, stress) = point.lifted().strain_and_stress(nodes, Wide::zero());
         sum += (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)) * (0.5 * point.weight);
     }
     sum
@@ -219,7 +219,7 @@ fn strain_energy<const N: usize>(points: &[StiffnessPoint<N>], nodes: &[NodeMoti
 fn kinetic_energy<const N: usize>(points: &[VolumePoint<N, Inertia>], nodes: &[NodeMotion<Wide>; N]) -> Wide {
     let mut sum = Wide::zero();
     for point in points {
-        let motion = point.motion(nodes);
+        let motion = point.lifted::<Wide, _>(Inertia::lifted::<Wide>).motion(nodes);
         let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
         let d: Vec3<Wide> = Vec3::constant(point.quantity.offset);
         let j: Mat3<Wide> = Mat3::constant(point.quantity.about_node);
@@ -236,7 +236,7 @@ fn kinetic_energy<const N: usize>(points: &[VolumePoint<N, Inertia>], nodes: &[N
 fn momenta<T: Real, const N: usize>(points: &[VolumePoint<N, Inertia>], nodes: &[NodeMotion<T>; N]) -> Vec<Vec3<T>> {
     let mut sum = vec![Vec3::<T>::zero(); 2 * N];
     for point in points {
-        let motion = point.motion(nodes);
+        let motion = point.lifted::<T, _>(Inertia::lifted::<T>).motion(nodes);
         let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
         let d: Vec3<T> = Vec3::constant(point.quantity.offset);
         let j: Mat3<T> = Mat3::constant(point.quantity.about_node);
@@ -272,11 +272,11 @@ fn elasticity_holds<const N: usize>() {
             for f in &force {
                 exact.extend_from_slice(&f.partials[..6 * N]);
             }
-            agree(&format!("tangent, {what}"), system.tangent(), &exact, 1e-12);
-            symmetric(&what, system.tangent(), 1e-13);
+            agree(&format!("tangent, {what}"), &system.tangent(), &exact, 1e-12);
+            symmetric(&what, &system.tangent(), 1e-13);
             let weighted = elastic(&points, &nodes, 0.25);
             let quarter: Vec<f64> = exact.iter().map(|e| 0.25 * e).collect();
-            agree(&format!("weighted tangent, {what}"), weighted.tangent(), &quarter, 1e-12);
+            agree(&format!("weighted tangent, {what}"), &weighted.tangent(), &quarter, 1e-12);
         }
     }
 }
@@ -314,7 +314,7 @@ fn the_extrapolated_stress_is_linear_in_the_correction() {
             });
             for point in &points {
                 let got = point.extrapolated_stress(&nodes, 0.0, |i| du[i], |i| dp[i]);
-                let (_, stress) = point.strain_and_stress(&moving, 0.0);
+                let (_, stress) = point.lifted().strain_and_stress(&moving, Dual::zero());
                 let n = values(stress.n) + vector_rate(stress.n);
                 let m = values(stress.m) + vector_rate(stress.m);
                 let what = format!("extrapolated stress around |P| = {base}, coupled: {coupled}, nodes {nodes:?}");
@@ -337,9 +337,9 @@ fn rotary_inertia_holds<const N: usize>() {
         for weights in WEIGHTS {
             let what = format!("rotary inertia, {N} nodes around |P| = {base}, {weights:?}, nodes {nodes:?}");
             let system = rotary(&points, &nodes, weights);
-            agree(&what, system.tangent(), &exact_tangent(&forces, weights, &rotation_blocks(N)), 1e-12);
+            agree(&what, &system.tangent(), &exact_tangent(&forces, weights, &rotation_blocks(N)), 1e-12);
             if weights == Weights::MASS {
-                symmetric(&what, system.tangent(), 1e-13);
+                symmetric(&what, &system.tangent(), 1e-13);
             }
         }
         // It is a body without mass: the force follows from the kinetic energy there.
@@ -378,9 +378,9 @@ fn body_holds<const N: usize>() {
         for weights in WEIGHTS {
             let what = format!("eccentric inertia, {N} nodes around |P| = {base}, {weights:?}, nodes {nodes:?}");
             let system = body(&points, &nodes, weights);
-            agree(&what, system.tangent(), &exact_tangent(&forces, weights, &both_blocks(N)), 1e-12);
+            agree(&what, &system.tangent(), &exact_tangent(&forces, weights, &both_blocks(N)), 1e-12);
             if weights == Weights::MASS {
-                symmetric(&what, system.tangent(), 1e-13);
+                symmetric(&what, &system.tangent(), 1e-13);
             }
         }
         // Lagrange: f = d/dt dT/dv - dT/dq
@@ -540,13 +540,13 @@ fn seam_holds<const N: usize>(
     for weights in WEIGHTS {
         let what = format!("{what}, {N} nodes, mask {mask:b}, {weights:?}, nodes {nodes:?}");
         let mut out: ElementSystem = ElementSystem::new(blocks.len());
-        converted.pull_back(weights, rates, rotation_block, &mut out, |weights, system| {
+        converted.pull_back(weights, rates, rotation_block, &mut out, &|weights, system| {
             evaluate(&one_chart, weights, system);
         });
         agree(&format!("force, {what}"), out.force(), &exact_force, 1e-12);
-        agree(&format!("tangent, {what}"), out.tangent(), &exact_tangent(&forces, weights, blocks), 1e-12);
+        agree(&format!("tangent, {what}"), &out.tangent(), &exact_tangent(&forces, weights, blocks), 1e-12);
         if weights == Weights::MASS || (weights == Weights::STIFFNESS && !rates) {
-            symmetric(&what, out.tangent(), 1e-12);
+            symmetric(&what, &out.tangent(), 1e-12);
         }
     }
 }
@@ -578,15 +578,9 @@ fn elastic_seam_holds<const N: usize>() {
             let converted = Converted::new(&nodes, mask);
             let one_chart: [NodeMotion; N] = from_fn(|i| converted.nodes[i]);
             let mut out: ElementSystem = ElementSystem::new(2 * N);
-            converted.pull_back(
-                Weights::NONE,
-                false,
-                |j| 2 * j + 1,
-                &mut out,
-                |_, system| {
-                    *system = elastic(&points, &one_chart, 0.0);
-                },
-            );
+            converted.pull_back(Weights::NONE, false, |j| 2 * j + 1, &mut out, &|_, system| {
+                *system = elastic(&points, &one_chart, 0.0);
+            });
             let what = format!("force against energy, {what}, {N} nodes, mask {mask:b}, nodes {nodes:?}");
             agree(&what, out.force(), &energy.partials[..6 * N], 1e-12);
         }

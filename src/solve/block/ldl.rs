@@ -20,6 +20,7 @@ impl Ldl {
     }
 
     /// Factorises; `false` where a pivot is zero or no number.
+    #[inline(always)]
     pub fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
         load(elimination, system, &mut self.diagonal, &mut self.upper, None);
         self.negative = 0;
@@ -47,6 +48,7 @@ impl Ldl {
     }
 
     /// Solves with the last factorisation.
+    #[inline(always)]
     pub fn solve(&self, elimination: &Elimination, x: &mut [Part]) {
         for (row, factor) in self.diagonal.iter().enumerate() {
             let mut part = x[row];

@@ -22,6 +22,7 @@ impl Lu {
     }
 
     /// Factorises; `false` where a pivot is zero or no number.
+    #[inline(always)]
     pub fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
         load(elimination, system, &mut self.diagonal, &mut self.upper, Some(&mut self.lower));
         let mut target = 0;
@@ -52,6 +53,7 @@ impl Lu {
     }
 
     /// Solves with the last factorisation.
+    #[inline(always)]
     pub fn solve(&self, elimination: &Elimination, x: &mut [Part]) {
         for (row, factor) in self.diagonal.iter().enumerate() {
             let mut part = x[row];

@@ -8,6 +8,7 @@ mod ldl;
 mod lu;
 mod tile;
 
+use crate::real::Instructions;
 use crate::system::{Pattern, System};
 use elimination::{Elimination, Place};
 use ldl::Ldl;
@@ -50,10 +51,14 @@ impl BlockSolver {
 
     /// Factorises; `false` where a pivot is zero or no number.
     pub fn factorise(&mut self, system: &System) -> bool {
-        match &mut self.factor {
-            Factor::Symmetric(ldl) => ldl.factorise(&self.elimination, system),
-            Factor::General(lu) => lu.factorise(&self.elimination, system),
-        }
+        let Self { elimination, factor, .. } = self;
+        Instructions::here().run(
+            #[inline(always)]
+            || match factor {
+                Factor::Symmetric(ldl) => ldl.factorise(elimination, system),
+                Factor::General(lu) => lu.factorise(elimination, system),
+            },
+        )
     }
 
     /// How many pivots of the last factorisation are negative: as many as the matrix has negative eigenvalues (Sylvester).
@@ -73,10 +78,13 @@ impl BlockSolver {
                 *entry = x.get(number as usize).copied().unwrap_or(0.0);
             }
         }
-        match factor {
-            Factor::Symmetric(ldl) => ldl.solve(elimination, parts),
-            Factor::General(lu) => lu.solve(elimination, parts),
-        }
+        Instructions::here().run(
+            #[inline(always)]
+            || match factor {
+                Factor::Symmetric(ldl) => ldl.solve(elimination, parts),
+                Factor::General(lu) => lu.solve(elimination, parts),
+            },
+        );
         for (part, &group) in parts.iter().zip(&elimination.order) {
             for (entry, &number) in part.iter().zip(pattern.numbers(group as usize)) {
                 if let Some(x) = x.get_mut(number as usize) {
@@ -95,7 +103,9 @@ fn tiles(count: usize) -> Option<Vec<Tile>> {
     Some(out)
 }
 
-/// The tiles of the tangent in the order of the elimination. Directions that are no equations get a one on the diagonal.
+/// The tiles of the tangent in the order of the elimination, by rows; what stands left of the diagonal is transposed. Directions
+/// that are no equations get a one on the diagonal.
+#[inline(always)]
 fn load(
     elimination: &Elimination,
     system: &System,
@@ -108,15 +118,15 @@ fn load(
     if let Some(lower) = lower.as_deref_mut() {
         lower.fill(ZERO);
     }
-    for (tile, place) in system.tiles().iter().zip(&elimination.places) {
-        match *place {
-            Place::Diagonal(row) => diagonal[row as usize] = *tile,
-            Place::Upper(k) => upper[k as usize] = *tile,
-            Place::Lower(k) => {
-                if let Some(lower) = lower.as_deref_mut() {
-                    lower[k as usize] = tile::transposed(tile);
-                }
-            }
+    for (columns, place) in system.tiles().iter().zip(&elimination.places) {
+        match (*place, lower.as_deref_mut()) {
+            // Of a symmetric tangent the one half is the other one's transpose.
+            (Place::Diagonal(row), None) => diagonal[row as usize] = *columns,
+            (Place::Lower(k), None) => upper[k as usize] = *columns,
+            (Place::Upper(_), None) => {}
+            (Place::Diagonal(row), Some(_)) => diagonal[row as usize] = tile::transposed(columns),
+            (Place::Upper(k), Some(_)) => upper[k as usize] = tile::transposed(columns),
+            (Place::Lower(k), Some(lower)) => lower[k as usize] = *columns,
         }
     }
     for &(group, direction) in &system.pattern.idle {
