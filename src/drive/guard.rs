@@ -24,8 +24,8 @@ pub(super) struct Growth {
 }
 
 impl EnergyGuard {
-    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far. Energies below `floor` are what
-    /// Newton tolerates; forces of round-off, `round_off` large, do work on the way.
+    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far. Energies below `floor` are
+    /// round-off: what Newton tolerates, and on the way the work of forces as large as `round_off`.
     pub fn new(limit: f64, floor: f64, round_off: f64) -> Self {
         Self { limit, floor, round_off, start: None, largest: 0.0, running: 0, lost: 0.0 }
     }

@@ -281,7 +281,7 @@ impl Path {
     fn look(&mut self, run: &mut Run, workshop: &mut Workshop, before: &Point) -> Result<Point, Failure> {
         let slots = run.state.q.len();
         let Direction { rate, pull } = run.path_direction(workshop)?.unwrap_or_else(|| Direction::none(slots));
-        // The tangent that was just factorised tells the pivots.
+        // The tangent of the last evaluation tells the pivots.
         let negative = self.pivots.as_mut().and_then(|pivots| pivots.negative(&workshop.assembly.system));
         let along = dot(run, &rate, &before.tangent) * self.scale + before.load_rate;
         let size = (squared(run, &rate) * self.scale + 1.0).sqrt();

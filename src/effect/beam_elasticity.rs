@@ -6,7 +6,7 @@ use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane, pack};
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Apart, Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
 use std::marker::PhantomData;
 
@@ -175,7 +175,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
 ) {
     let stiffness = weights.stiffness;
     let (mut systems, mut scratch) = (ElementSystem::<Lanes>::new(2 * N), Scratch::<Lanes>::new(N));
-    let mut alone = None;
+    let (mut apart, mut alone) = (Apart::default(), None);
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
@@ -184,7 +184,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         I::View::new(&posture).add(&sum, stiffness, &mut scratch, &mut systems);
         let count = LANES.min(batch.len() - start);
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
-        out.add_lanes(first + start, count, &systems, is_mixed, |k, out| {
+        out.add_lanes(first + start, count, &systems, &mut apart, is_mixed, |k, out| {
             let work = alone.get_or_insert_with(|| workspace(batch));
             elements[k].add::<I>(first + start + k, stresses_of(remembered, start + k), at, stiffness, work, out);
         });

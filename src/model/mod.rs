@@ -272,7 +272,10 @@ impl Assembly {
     /// it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
         match weights {
-            Weights::NONE => self.system.clear_forces(),
+            Weights::NONE => {
+                debug_assert!(lift.is_none(), "prescribed increments act through the tangent");
+                self.system.clear_forces();
+            }
             _ => self.system.clear(lift),
         }
         for (number, effect) in self.effects.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::block::BlockSolver;
 use super::general::GeneralSolver;
+use super::softest::NullVector;
 use crate::system::{Slot, System};
 
 /// Solves with tangents of one pattern.
@@ -121,9 +122,9 @@ impl LinearSolver {
     /// After corrections that led nowhere: from here on in general where few digits of the softest stiffness are left, of which
     /// pivots save more.
     pub fn doubt(&mut self, system: &System) {
-        if matches!(self.way, Way::Blocks(_))
-            && self.softest(system).is_none_or(|vector| vector.digits(system) < FEW_DIGITS)
-        {
+        let few = |vector: NullVector| vector.digits(system) < FEW_DIGITS;
+        // The factorisation may be that of the iterate before.
+        if matches!(self.way, Way::Blocks(_)) && self.factorise(system) && self.softest(system).is_none_or(few) {
             self.factored = self.leave_blocks(system);
         }
     }

@@ -164,7 +164,8 @@ impl Newton {
     }
 
     /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
-    /// in with the first correction, so that the rest of the structure follows them linearly.
+    /// in with the first correction, so that the rest of the structure follows them linearly. The forces of the system are then those of
+    /// the state; its tangent need not be.
     pub fn solve(
         &mut self,
         model: &Model,
@@ -179,14 +180,16 @@ impl Newton {
         let mut iterations = 0;
         self.history.clear();
         let mut refinement = Refinement::default();
+        let mut noisy = false;
         loop {
             // Where balance is expected the tangent is left for when it is needed after all.
-            let expected = lift.is_none() && iterations < self.max_iterations && self.expects_balance();
+            let expected = lift.is_none() && !noisy && iterations < self.max_iterations && self.expects_balance();
             let weights = if expected { Weights::NONE } else { method.weights() };
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
             self.history.push(residual.ratio);
+            noisy = verdict == Verdict::Noisy;
             match verdict {
                 Verdict::Converged if lift.is_none() => return Ok(()),
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.

@@ -4,7 +4,7 @@ use super::equations::Equations;
 use super::pattern::{Pattern, Places, Tile, WIDTH};
 use super::state::Slot;
 use crate::kernel::{ElementSystem, MAX_NODES};
-use crate::real::{Instructions, LANES, Lanes, each_lane};
+use crate::real::{Instructions, LANES, Lanes};
 use crate::tensor::{Mat3, Vec3};
 
 /// What a force is; the stop test of Newton and the energy account look at them apart.
@@ -31,7 +31,7 @@ pub struct System {
     pub force: [Vec<Vec3>; 4],
     /// Whether each effect's tangent is symmetric, and so their sum
     pub symmetric: bool,
-    /// The values of the tangent, tile by tile
+    /// The values of the tangent, tile by tile: that of the last evaluation with weights
     pub values: Vec<f64>,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
     lift: Vec<Vec3>,
@@ -194,7 +194,7 @@ impl System {
 
 /// The tiles of elements side by side, each for itself.
 #[inline(always)]
-fn apart(tile: &[Lanes; WIDTH * WIDTH]) -> [[f64; WIDTH * WIDTH]; LANES] {
+fn lanes_apart(tile: &[Lanes; WIDTH * WIDTH]) -> [[f64; WIDTH * WIDTH]; LANES] {
     let mut out = [[0.0; WIDTH * WIDTH]; LANES];
     for start in (0..WIDTH * WIDTH).step_by(LANES) {
         for lane in 0..LANES {
@@ -209,6 +209,16 @@ fn apart(tile: &[Lanes; WIDTH * WIDTH]) -> [[f64; WIDTH * WIDTH]; LANES] {
 /// Values as tiles.
 fn tiles(values: &[f64]) -> &[Tile] {
     values.as_chunks::<WIDTH>().0.as_chunks::<WIDTH>().0
+}
+
+/// Room to take the tangents of elements side by side apart, tile by tile.
+pub struct Apart([[[f64; WIDTH * WIDTH]; LANES]; MAX_NODES * MAX_NODES]);
+
+impl Default for Apart {
+    #[inline(always)]
+    fn default() -> Self {
+        Self([[[0.0; WIDTH * WIDTH]; LANES]; MAX_NODES * MAX_NODES])
+    }
 }
 
 /// Through this an effect adds the force and tangent of its instances.
@@ -241,19 +251,20 @@ impl Sink<'_> {
     }
 
     /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
-    /// beside whom. An instance that `is_apart` is left to `alone`.
+    /// beside whom. `apart` is scratch. An instance that `is_apart` is left to `alone`.
     #[inline(always)]
     pub fn add_lanes(
         &mut self,
         first: usize,
         count: usize,
         elements: &ElementSystem<Lanes>,
+        apart: &mut Apart,
         is_apart: impl Fn(usize) -> bool,
         mut alone: impl FnMut(usize, &mut Self),
     ) {
         let special = |sink: &Self, lane: usize| sink.with_tangent && sink.places.special[first + lane];
         if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
-            return self.add_plain(first, elements, each_lane!(|lane| lane < count));
+            return self.add_plain(first, count, elements, apart);
         }
         for lane in 0..count {
             if is_apart(lane) {
@@ -264,11 +275,11 @@ impl Sink<'_> {
         }
     }
 
-    /// Adds those of the instances in lanes that are `wanted`; none touches a held direction or turned axes.
+    /// The same where none touches a held direction or turned axes.
     #[inline(always)]
-    fn add_plain(&mut self, first: usize, elements: &ElementSystem<Lanes>, wanted: [bool; LANES]) {
+    fn add_plain(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>, apart: &mut Apart) {
         let forces = &mut self.force[self.category as usize];
-        for lane in (0..LANES).filter(|&lane| wanted[lane]) {
+        for lane in 0..count {
             for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(first + lane)) {
                 forces[slot as usize] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
             }
@@ -277,24 +288,23 @@ impl Sink<'_> {
             return;
         }
         if self.places.whole {
-            return self.add_whole(first, elements, wanted);
+            return self.add_whole(first, count, elements, apart);
         }
-        for lane in (0..LANES).filter(|&lane| wanted[lane]) {
+        for lane in 0..count {
             self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
         }
     }
 
-    /// Adds the tangents of elements of whole nodes, tile by tile.
+    /// Adds the tangents of elements of whole nodes, one element after the other.
     #[inline(always)]
-    fn add_whole(&mut self, first: usize, elements: &ElementSystem<Lanes>, wanted: [bool; LANES]) {
-        for (number, tile) in elements.tiles().iter().enumerate() {
-            let apart = apart(tile);
-            for lane in 0..LANES {
-                if wanted[lane] {
-                    let place = self.places.of(first + lane)[number] as usize;
-                    let target = &mut self.values[place..place + WIDTH * WIDTH];
-                    target.iter_mut().zip(&apart[lane]).for_each(|(sum, value)| *sum += value);
-                }
+    fn add_whole(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>, apart: &mut Apart) {
+        for (lanes, tile) in apart.0.iter_mut().zip(elements.tiles()) {
+            *lanes = lanes_apart(tile);
+        }
+        for lane in 0..count {
+            for (lanes, &place) in apart.0.iter().zip(self.places.of(first + lane)) {
+                let target = &mut self.values[place as usize..place as usize + WIDTH * WIDTH];
+                target.iter_mut().zip(&lanes[lane]).for_each(|(sum, value)| *sum += value);
             }
         }
     }

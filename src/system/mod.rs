@@ -7,7 +7,7 @@ mod pattern;
 mod stage;
 mod state;
 
-pub use assembly::{Category, Sink, System};
+pub use assembly::{Apart, Category, Sink, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use groups::Groups;
 pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH};

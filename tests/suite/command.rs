@@ -305,6 +305,9 @@ fn histories_do_not_depend_on_instructions() {
         "minimal/free_strain.toml",
         "minimal/line_load_follower.toml",
         "minimal/lie_generalized_alpha.toml",
+        "minimal/section_mass.toml",
+        "paths/ring_pressure_quarter.toml",
+        "hard/d14_robot_arm_60.toml",
     ];
     let folder = Folder::new("instructions");
     for deck in decks {
