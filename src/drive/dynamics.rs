@@ -173,8 +173,10 @@ impl Run<'_> {
             assembly.evaluate(&self.state, Weights::NONE, None);
         } else {
             // A rule for accelerations makes velocities that nothing resists swing from step to step, more and more.
-            let moved: Vec<Vec3> = rateless.iter().map(|&slot| self.state.q[slot] - self.good.q[slot]).collect();
-            self.state.set_rates(rateless, |k| moved[k] * (1.0 / step.length));
+            for &slot in rateless.iter() {
+                self.state.v[slot] = (self.state.q[slot] - self.good.q[slot]) * (1.0 / step.length);
+                (self.state.a[slot], self.state.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO);
+            }
         }
         let turning = self.model.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;

@@ -179,7 +179,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
-        systems.clear_for(stiffness);
+        systems.clear_for(Weights { stiffness, ..Weights::NONE });
         let posture = Posture::side_by_side(each_lane!(|k| &elements[k].connection), at);
         I::View::new(&posture).add(&sum, stiffness, &mut scratch, &mut systems);
         let count = LANES.min(batch.len() - start);

@@ -26,7 +26,7 @@ impl<const N: usize> Posture<N> {
     #[inline(always)]
     pub fn new(connection: &Connection<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
         let (u, p) = (nodes.map(|node| node.u), nodes.map(|node| node.p));
-        let base = || connection.nodes.map(|node| at.turn(node.p).map_or(Mat3::IDENTITY, |turn| turn.base()));
+        let base = || std::array::from_fn(|i| base_of(connection, i, at));
         Self { places: connection.places, u, p, base: (!at.turns.is_empty()).then(base) }
     }
 }
@@ -48,11 +48,15 @@ impl<const N: usize> Posture<N, Lanes> {
     }
 }
 
+/// The rotation that the vector of node i is an increment to.
+fn base_of<const N: usize>(connection: &Connection<N>, i: usize, at: &State) -> Mat3 {
+    at.turn(connection.nodes[i].p).map_or(Mat3::IDENTITY, |turn| turn.base())
+}
+
 #[inline(never)]
 fn bases<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [Mat3<Lanes>; N] {
     std::array::from_fn(|i| {
-        let base = |c: &Connection<N>| at.turn(c.nodes[i].p).map_or(Mat3::IDENTITY, |turn| turn.base());
-        let all = connections.map(base);
+        let all = connections.map(|connection| base_of(connection, i, at));
         Mat3::pack(all.each_ref())
     })
 }
@@ -229,7 +233,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
     #[inline(always)]
     fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
         let Scratch { local, geometric } = scratch;
-        local.clear_for(stiffness);
+        local.clear_for(Weights { stiffness, ..Weights::NONE });
         sum.add(&self.seen.nodes, stiffness, local);
         geometric.clear_force();
         let other = stiffness != 0.0 && sum.add_geometric(&self.seen.nodes, geometric);

@@ -3,7 +3,7 @@
 use super::Effect;
 use super::volume::VolumeElements;
 use crate::kernel::Weights;
-use crate::kernel::load::{Intensity, MaterialLine, SpatialLine};
+use crate::kernel::load::{Intensity, Line};
 use crate::kernel::volume::Blocks;
 use crate::system::{Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
@@ -49,8 +49,8 @@ impl Effect for LineLoad {
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let amplitudes = &at.amplitude[..];
         match self.kind {
-            LineLoadKind::Spatial => self.elements.add(&SpatialLine { amplitudes }, at, weights, out),
-            LineLoadKind::Material => self.elements.add(&MaterialLine { amplitudes }, at, weights, out),
+            LineLoadKind::Spatial => self.elements.add(&Line::<false> { amplitudes }, at, weights, out),
+            LineLoadKind::Material => self.elements.add(&Line::<true> { amplitudes }, at, weights, out),
         }
     }
 }

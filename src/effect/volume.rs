@@ -90,7 +90,7 @@ fn add_batch<K, const N: usize>(
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let nodes = motions(each_lane!(|k| &elements[k].connection), at);
-        systems.clear();
+        systems.clear_for(weights);
         for g in 0..N {
             let points = each_lane!(|k| elements[k].points[g].map(|quantity| kernel.at_present(quantity)));
             VolumePoint::pack(each_lane!(|k| &points[k])).add(kernel, &nodes, weights, &mut systems);

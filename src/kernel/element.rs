@@ -64,9 +64,11 @@ pub struct ElementSystem<T = f64> {
     tangent: [[T; TILE]; MAX_NODES * MAX_NODES],
 }
 
-/// Rows of a tile
+/// Rows and columns of a tile: two blocks of three
 pub const WIDTH: usize = 6;
-const TILE: usize = WIDTH * WIDTH;
+
+/// Numbers in a tile
+pub const TILE: usize = WIDTH * WIDTH;
 
 impl ElementSystem<Lanes> {
     /// The system of one of the elements that stand side by side.
@@ -109,10 +111,10 @@ impl<T: Real> ElementSystem<T> {
         }
     }
 
-    /// Sets to zero what is going to be added to with this weight of the tangent.
+    /// Sets to zero what is going to be added to with these weights.
     #[inline(always)]
-    pub fn clear_for(&mut self, weight: f64) {
-        if weight == 0.0 { self.clear_force() } else { self.clear() }
+    pub fn clear_for(&mut self, weights: Weights) {
+        if weights == Weights::NONE { self.clear_force() } else { self.clear() }
     }
 
     /// The number of 3-vectors.

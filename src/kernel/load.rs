@@ -57,13 +57,13 @@ impl Intensity {
     }
 }
 
-/// Line loads fixed in space.
-pub struct SpatialLine<'a> {
+/// Line loads: fixed in space, or turning with the section where they follow it.
+pub struct Line<'a, const FOLLOWS: bool> {
     /// The amplitudes of the state
     pub amplitudes: &'a [f64],
 }
 
-impl VolumeKernel for SpatialLine<'_> {
+impl<const FOLLOWS: bool> VolumeKernel for Line<'_, FOLLOWS> {
     type Quantity = Intensity;
     type Present<T: Real> = (Vec3<T>, Option<Vec3<T>>);
     const BLOCKS: Blocks = Blocks::Both;
@@ -80,43 +80,16 @@ impl VolumeKernel for SpatialLine<'_> {
         motion: &NodeMotion<T>,
         weights: Weights,
     ) -> VolumeForce<T> {
+        let s = weights.stiffness;
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
-        if let Some(moment) = moment {
-            let (p, pp) = spatial_moment(&Rotation::new(motion.p), moment);
-            (out.p, out.pp) = (p, pp.scale(weights.stiffness));
+        if FOLLOWS {
+            let (u, up) = material_force(&Rotation::new(motion.p), force);
+            (out.u, out.up) = (u, up.scale(s));
         }
-        out
-    }
-}
-
-/// Line loads that turn with the section.
-pub struct MaterialLine<'a> {
-    /// The amplitudes of the state
-    pub amplitudes: &'a [f64],
-}
-
-impl VolumeKernel for MaterialLine<'_> {
-    type Quantity = Intensity;
-    type Present<T: Real> = (Vec3<T>, Option<Vec3<T>>);
-    const BLOCKS: Blocks = Blocks::Both;
-    const RATES: bool = false;
-
-    fn at_present(&self, load: &Intensity) -> (Vec3, Option<Vec3>) {
-        load.at(self.amplitudes)
-    }
-
-    #[inline(always)]
-    fn evaluate<T: Real>(
-        &self,
-        &(force, moment): &(Vec3<T>, Option<Vec3<T>>),
-        motion: &NodeMotion<T>,
-        weights: Weights,
-    ) -> VolumeForce<T> {
-        let (rotation, s) = (Rotation::new(motion.p), weights.stiffness);
-        let (u, up) = material_force(&rotation, force);
-        let mut out = VolumeForce { u, up: up.scale(s), ..VolumeForce::zero() };
         if let Some(moment) = moment {
-            let (p, pp) = material_moment(&rotation, moment);
+            let rotation = Rotation::new(motion.p);
+            let turning = if FOLLOWS { material_moment } else { spatial_moment };
+            let (p, pp) = turning(&rotation, moment);
             (out.p, out.pp) = (p, pp.scale(s));
         }
         out

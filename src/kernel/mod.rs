@@ -15,4 +15,4 @@ pub mod shape;
 pub mod turn;
 pub mod volume;
 
-pub use element::{ElementSystem, MAX_NODES, NodeMotion, Weights};
+pub use element::{ElementSystem, MAX_NODES, NodeMotion, TILE, WIDTH, Weights};

@@ -1,7 +1,7 @@
 //! Forces and tangent of the whole scene, and the sink through which one effect adds to them.
 
 use super::equations::Equations;
-use super::pattern::{Pattern, Places, Tile, WIDTH};
+use super::pattern::{Pattern, Places, TILE, Tile, WIDTH};
 use super::state::Slot;
 use crate::kernel::{ElementSystem, MAX_NODES};
 use crate::real::{Instructions, LANES, Lanes};
@@ -194,9 +194,9 @@ impl System {
 
 /// The tiles of elements side by side, each for itself.
 #[inline(always)]
-fn lanes_apart(tile: &[Lanes; WIDTH * WIDTH]) -> [[f64; WIDTH * WIDTH]; LANES] {
-    let mut out = [[0.0; WIDTH * WIDTH]; LANES];
-    for start in (0..WIDTH * WIDTH).step_by(LANES) {
+fn lanes_apart(tile: &[Lanes; TILE]) -> [[f64; TILE]; LANES] {
+    let mut out = [[0.0; TILE]; LANES];
+    for start in (0..TILE).step_by(LANES) {
         for lane in 0..LANES {
             for k in 0..LANES {
                 out[lane][start + k] = tile[start + k].0[lane];
@@ -212,12 +212,12 @@ fn tiles(values: &[f64]) -> &[Tile] {
 }
 
 /// Room to take the tangents of elements side by side apart, tile by tile.
-pub struct Apart([[[f64; WIDTH * WIDTH]; LANES]; MAX_NODES * MAX_NODES]);
+pub struct Apart([[[f64; TILE]; LANES]; MAX_NODES * MAX_NODES]);
 
 impl Default for Apart {
     #[inline(always)]
     fn default() -> Self {
-        Self([[[0.0; WIDTH * WIDTH]; LANES]; MAX_NODES * MAX_NODES])
+        Self([[[0.0; TILE]; LANES]; MAX_NODES * MAX_NODES])
     }
 }
 
@@ -303,7 +303,7 @@ impl Sink<'_> {
         }
         for lane in 0..count {
             for (lanes, &place) in apart.0.iter().zip(self.places.of(first + lane)) {
-                let target = &mut self.values[place as usize..place as usize + WIDTH * WIDTH];
+                let target = &mut self.values[place as usize..place as usize + TILE];
                 target.iter_mut().zip(&lanes[lane]).for_each(|(sum, value)| *sum += value);
             }
         }
@@ -315,14 +315,14 @@ impl Sink<'_> {
             return self.add_blocks(k, element.blocks(), element.tiles(), |value| *value);
         }
         for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
-            let target = &mut self.values[place as usize..place as usize + WIDTH * WIDTH];
+            let target = &mut self.values[place as usize..place as usize + TILE];
             target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
         }
     }
 
     /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
     #[inline(always)]
-    fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; WIDTH * WIDTH]], pick: impl Fn(&T) -> f64) {
+    fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
         for (number, &place) in self.places.of(k).iter().enumerate() {
             let (row, column) = (number / blocks, number % blocks);
             let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];

@@ -3,15 +3,13 @@
 use super::equations::Equations;
 use super::groups::{Groups, SLOTS};
 use super::state::Slot;
+pub use crate::kernel::{TILE, WIDTH};
 
-/// Rows and columns of a tile.
-pub const WIDTH: usize = 3 * SLOTS;
+/// A tile is that of an element's two blocks.
+const _: () = assert!(WIDTH == 3 * SLOTS);
 
 /// A block of the tangent, by columns.
 pub type Tile = [[f64; WIDTH]; WIDTH];
-
-/// Numbers in a tile.
-const TILE: usize = WIDTH * WIDTH;
 
 /// The slots that meet in each instance of an effect: one clique an element.
 #[derive(Clone, Debug, Default)]

@@ -88,14 +88,6 @@ impl State {
         self.turns.clone_from(&other.turns);
     }
 
-    /// Sets the velocities of some slots, by their place in the list, without acceleration.
-    pub fn set_rates(&mut self, slots: &[usize], velocity: impl Fn(usize) -> Vec3) {
-        for (k, &slot) in slots.iter().enumerate() {
-            self.v[slot] = velocity(k);
-            (self.a[slot], self.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO);
-        }
-    }
-
     /// The step that a rotation is in, where its unknown is an increment.
     #[inline]
     pub fn turn(&self, slot: Slot) -> Option<&Turn> {
