@@ -71,7 +71,7 @@ fn element<const N: usize, const G: usize>(criterion: &mut Criterion) {
     criterion.bench_function(&format!("rotary inertia with tangents, {N} nodes"), |bencher| {
         let fill = |mut out: ElementSystem| {
             for point in &volume {
-                point.add(&Rotary, black_box(&nodes), weights, &mut out);
+                point.add(&Rotary { gyroscopic: true }, black_box(&nodes), weights, &mut out);
             }
             out
         };

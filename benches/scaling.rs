@@ -21,8 +21,12 @@ impl Observer for Silent {
     }
 }
 
+/// How rotations are interpolated in space, and the plane, where that does not matter.
+const WAYS: [&str; 3] = ["total", "relative", "planar"];
+
 /// A cantilever under a force across, in statics or starting to swing.
-fn deck(elements: usize, dynamic: bool, interpolation: &str) -> String {
+fn deck(elements: usize, dynamic: bool, way: &str) -> String {
+    let (interpolation, planar) = if way == "planar" { ("relative", true) } else { (way, false) };
     let (stage, force) = if dynamic {
         ("kind = \"dynamic\"\nend = 0.05\nstep = 0.01", "[0, 0, 5]")
     } else {
@@ -32,7 +36,8 @@ fn deck(elements: usize, dynamic: bool, interpolation: &str) -> String {
         "[point]\nroot = [0, 0, 0]\ntip = [10, 0, 0]\n\
          [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [2, 1, 1]\n\
          [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = {elements}\n\
-         interpolation = \"{interpolation}\"\n[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = {force}\n[[stage]]\n{stage}\n"
+         interpolation = \"{interpolation}\"\n[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = {force}\n[[stage]]\n{stage}\n\
+         [effects]\nplanar = {planar}\n"
     )
 }
 
@@ -41,9 +46,10 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
     let mut model = model.clone();
     let state = model.rest();
     let Ok(equations) = model.begin_stage(0, kind, &state) else { return 0.0 };
-    let effects = model.acting(&StageContext { number: 0, kind, rotating: false });
+    let stage = StageContext { number: 0, kind, rotating: false };
+    let effects = model.acting(&stage, equations.plane());
     let shapes: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
-    let mut assembly = Assembly::new(effects.clone(), equations, &model);
+    let mut assembly = Assembly::new(&stage, equations, &model);
     let mut scatter = || {
         let start = Instant::now();
         for (number, (effect, cliques)) in effects.iter().zip(&shapes).enumerate() {
@@ -82,8 +88,7 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
         (StageKind::Static, Weights::STIFFNESS)
     };
     let Ok(equations) = model.begin_stage(0, kind, &state) else { return };
-    let effects = model.acting(&StageContext { number: 0, kind, rotating: false });
-    let mut assembly = Assembly::new(effects, equations, &model);
+    let mut assembly = Assembly::new(&StageContext { number: 0, kind, rotating: false }, equations, &model);
     let tangent = quickest(|| assembly.evaluate(&state, weights, None));
     let force = quickest(|| assembly.evaluate(&state, Weights::NONE, None));
     assembly.evaluate(&state, weights, None);
@@ -128,7 +133,8 @@ fn row(elements: usize, dynamic: bool, interpolation: &str) {
         // Each converged step is evaluated once more than it is solved.
         evaluations += counters.work.iterations + counters.steps;
     }
-    let scatter = assembly_seconds(&model, kind);
+    // In a plane elements are not scattered one by one.
+    let scatter = if interpolation == "planar" { 0.0 } else { assembly_seconds(&model, kind) };
     let micro = 1e6 / elements as f64;
     let (evaluation, solve) = (evaluation * micro / evaluations as f64, solve * micro / iterations as f64);
     let assembly = scatter * micro;
@@ -149,7 +155,7 @@ fn main() {
         "{:<8} {:<9} {:>8} {:>11} {:>9} {:>9} {:>9}",
         "stage", "rotations", "elements", "evaluation", "assembly", "solve", "all"
     );
-    for (dynamic, interpolation) in [(false, "total"), (false, "relative"), (true, "total"), (true, "relative")] {
+    for (dynamic, interpolation) in [false, true].into_iter().flat_map(|dynamic| WAYS.map(|way| (dynamic, way))) {
         sizes.iter().for_each(|&elements| row(elements, dynamic, interpolation));
     }
     println!("\nparts of an iteration, nanoseconds per element");
@@ -158,7 +164,7 @@ fn main() {
         .iter()
         .for_each(|name| print!(" {name:>9}"));
     println!();
-    for (dynamic, interpolation) in [(false, "total"), (false, "relative"), (true, "total"), (true, "relative")] {
+    for (dynamic, interpolation) in [false, true].into_iter().flat_map(|dynamic| WAYS.map(|way| (dynamic, way))) {
         sizes.iter().skip(1).for_each(|&elements| parts(elements, dynamic, interpolation));
     }
 }

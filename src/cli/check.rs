@@ -1,7 +1,7 @@
 //! `beamsim check`
 
 use super::{Status, Verdict, load, say};
-use crate::model::Assembly;
+use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Scene};
 use crate::tensor::{Mat3, Vec3};
 use std::path::PathBuf;
@@ -27,13 +27,20 @@ fn tell(scene: &Scene) -> Result<(), String> {
     tell_beams(&scene.mesh);
     tell_mass(scene);
     let size = tell_size(scene);
+    let shares = size.as_ref().map_or(&[][..], |shares| shares);
     say::line("effects");
     let width = scene.reasons.iter().map(|r| r.name.len()).max().unwrap_or(0);
     for reason in &scene.reasons {
         let mark = if reason.active { "on " } else { "off" };
-        say::line(&format!("  {mark} {:<width$}  {}", reason.name, reason.reason));
+        let share = shares.iter().find(|share| reason.active && share.name == reason.name);
+        let added = share.map_or(String::new(), |Share { instances, unknowns, entries, .. }| {
+            format!(
+                " ({instances} in the first stage, for which alone there are {unknowns} unknowns and {entries} entries)"
+            )
+        });
+        say::line(&format!("  {mark} {:<width$}  {}{added}", reason.name, reason.reason));
     }
-    size
+    size.map(|_| ())
 }
 
 fn tell_beams(mesh: &Mesh) {
@@ -108,15 +115,17 @@ fn tell_mass(scene: &Scene) {
     say::line(&format!("inertia about the centre {:?}", inertia.0));
 }
 
-/// Unknowns, entries of the tangent, memory; and whether the first stage can begin.
-fn tell_size(scene: &Scene) -> Result<(), String> {
+/// Unknowns, entries of the tangent, memory, and what each effect adds to them; and whether the first stage can begin.
+fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let mut model = scene.plan.model.clone();
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
     let begun = model.begin_stage(0, kind, &state);
     let equations = begun.map_err(|error| format!("the first stage cannot begin: {error:?}"))?;
     let (free, slots) = (equations.count(), model.slots.len());
-    let assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, &model);
+    let context = scene.plan.stages[0].context(0);
+    let shares = model.shares(&context, &equations);
+    let assembly = Assembly::new(&context, equations, &model);
     let entries = assembly.system.pattern.nonzeros();
     // The tangent and its factors, the places of its blocks, the state and its copies.
     let bytes = 2 * 8 * assembly.system.pattern.values() + 24 * 16 * slots;
@@ -127,5 +136,5 @@ fn tell_size(scene: &Scene) -> Result<(), String> {
         3 * slots,
         bytes as f64 / 1e6
     ));
-    Ok(())
+    Ok(shares)
 }

@@ -1,7 +1,7 @@
 //! From the path of a deck to a scene, with every message on the way.
 
 use super::{Status, say};
-use crate::deck::{self, Diagnostic, ExpectBody, Severity};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity};
 use crate::scene::{self, Scene};
 use std::fs::File;
 use std::io::Read;
@@ -32,16 +32,22 @@ impl Refusal {
 
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
 pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Refusal> {
+    deck(path, settings).map(|(_, scene)| scene)
+}
+
+/// The same, with the deck itself.
+pub fn deck(path: &Path, settings: &[String]) -> Result<(Deck, Scene), Refusal> {
     let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::new(Status::Wrong, "deck", why))?;
     // Settings may have moved lines.
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());
-    match scene::from_text(&text) {
-        Ok((scene, warnings)) => {
+    let read = scene::from_text(&text).and_then(|(scene, warnings)| Ok((deck::read(&text)?.0, scene, warnings)));
+    match read {
+        Ok((deck, scene, warnings)) => {
             if !warnings.is_empty() {
                 say::note(&render(&label, &text, &warnings));
             }
-            Ok(scene)
+            Ok((deck, scene))
         }
         Err(diagnostics) => {
             let errors: Vec<_> = diagnostics.iter().filter(|d| !d.is_warning()).collect();

@@ -2,6 +2,7 @@
 
 mod check;
 mod compare;
+mod effects;
 mod load;
 mod progress;
 mod run;
@@ -74,9 +75,17 @@ enum Command {
     /// What accuracy costs in time (not supported yet)
     #[command(hide = true)]
     Cost(Rest),
-    /// Which effects act and what each costs (not supported yet)
-    #[command(hide = true)]
-    Effects(Rest),
+    /// Take each effect out in turn and tell what it changes and costs
+    Effects {
+        #[command(flatten)]
+        input: DeckArguments,
+        /// Largest change of any output that leaving effects out may make, relative to the largest value of its kind
+        #[arg(long, default_value_t = 1e-3)]
+        tolerance: f64,
+        /// Folder of the results (default: results/<deck name>)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Many runs of one deck (not supported yet)
     #[command(hide = true)]
     Sweep(Rest),
@@ -161,7 +170,9 @@ pub fn main() -> ExitCode {
         Command::Verify { input, out } => verify::verify(&input.decks, &input.set, out.as_deref()),
         Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),
         Command::Cost(rest) => not_yet("cost", &rest),
-        Command::Effects(rest) => not_yet("effects", &rest),
+        Command::Effects { input, tolerance, out } => {
+            effects::effects(&input.decks, &input.set, tolerance, out.as_deref())
+        }
         Command::Sweep(rest) => not_yet("sweep", &rest),
         Command::Schema(rest) => not_yet("schema", &rest),
         Command::Completions(rest) => not_yet("completions", &rest),

@@ -70,14 +70,18 @@ pub struct Finished {
 impl Finished {
     /// The exit status that belongs to it.
     pub fn status(&self) -> Status {
-        match &self.result {
-            Ok(()) => Status::Fine,
-            Err(Failure::Deck(_) | Failure::Limit(_)) => Status::Wrong,
-            Err(Failure::Io(_)) => Status::Io,
-            Err(Failure::Interrupted { signal: 15, .. }) => Status::Terminated,
-            Err(Failure::Interrupted { .. }) => Status::Interrupted,
-            Err(_) => Status::GaveUp,
-        }
+        self.result.as_ref().map_or_else(status_of, |()| Status::Fine)
+    }
+}
+
+/// The exit status that belongs to a failure.
+pub fn status_of(failure: &Failure) -> Status {
+    match failure {
+        Failure::Deck(_) | Failure::Limit(_) => Status::Wrong,
+        Failure::Io(_) => Status::Io,
+        Failure::Interrupted { signal: 15, .. } => Status::Terminated,
+        Failure::Interrupted { .. } => Status::Interrupted,
+        _ => Status::GaveUp,
     }
 }
 
@@ -190,7 +194,9 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
         say::line(&format!("{name}: {title}"));
     }
     let unknowns = scene.plan.model.slots.len() * 3;
-    let acting = scene.reasons.iter().filter(|r| r.active).map(|r| r.name).collect::<Vec<_>>().join(", ");
+    let planar = scene.reasons.iter().filter(|r| r.active && r.name == "planar").map(|r| r.name);
+    let evaluated = counters.evaluations.iter().filter(|(_, count)| *count > 0).map(|(name, _)| *name);
+    let acting = planar.chain(evaluated).collect::<Vec<_>>().join(", ");
     say::line(&format!("  {} elements, {unknowns} unknowns; {acting}", scene.mesh.elements.len()));
     say::line(&format!(
         "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s",

@@ -4,6 +4,7 @@
 
 mod action;
 mod diagnostic;
+mod effects;
 mod expression;
 mod geometry;
 mod overrides;
@@ -17,6 +18,7 @@ pub use action::{
     LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,
 };
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
+pub use effects::{EffectWord, Effects};
 pub use expression::{Expression, Jet};
 pub use geometry::{
     Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape,
@@ -24,8 +26,8 @@ pub use geometry::{
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use procedure::{
-    Effects, Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage,
-    StageBody, Until,
+    Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage, StageBody,
+    Until,
 };
 
 use reader::{Context, Table};
@@ -168,7 +170,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         initials: listed(&top, "initial", action::read_initial),
         histories,
         stages: listed(&top, "stage", procedure::read_stage),
-        effects: procedure::read_effects(&top),
+        effects: Effects::read(&top),
         output: procedure::read_output(&top),
         expects: listed(&top, "expect", procedure::read_expect),
         parameters: Parameters::default(),

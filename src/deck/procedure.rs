@@ -1,4 +1,4 @@
-//! What is done with a scene: stages, output, expectations, effects forced on or off.
+//! What is done with a scene: stages, output, expectations.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
 use super::geometry::{PointRef, read_point};
@@ -95,13 +95,6 @@ pub struct Until {
     pub below: Option<f64>,
     /// Ends above this
     pub above: Option<f64>,
-}
-
-/// `[effects]`
-#[derive(Clone, Debug, Default)]
-pub struct Effects {
-    /// Forces rotary inertia on or off.
-    pub rotary_inertia: Option<Spanned<bool>>,
 }
 
 /// `[output]`
@@ -405,18 +398,6 @@ fn read_until<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Until> {
         return context.wrong(table.span.clone(), "`until` needs `below` or `above`");
     }
     Some(Until { column: column?, below, above })
-}
-
-pub(super) fn read_effects(top: &Table) -> Effects {
-    let Some(item) = top.get("effects") else { return Effects::default() };
-    let keys = ["rotary_inertia", "planar"];
-    let Some(table) = Table::new(top.context, item, "[effects]", &keys, &[]) else { return Effects::default() };
-    if table.flag("planar") == Some(true) {
-        let message = "planar = true is not supported yet: every scene is simulated in three dimensions";
-        top.context.report(Diagnostic::error(message, table.key_span("planar")));
-    }
-    let rotary = table.flag("rotary_inertia");
-    Effects { rotary_inertia: rotary.map(|value| Spanned { value, span: table.key_span("rotary_inertia") }) }
 }
 
 pub(super) fn read_output(top: &Table) -> Output {

@@ -178,6 +178,9 @@ impl Run<'_> {
                 (self.state.a[slot], self.state.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO);
             }
         }
+        if self.is_linear() {
+            return Ok(());
+        }
         let turning = self.model.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
         self.refuse_massless_turns(massive)?;
@@ -224,6 +227,9 @@ impl Run<'_> {
 
     /// Between steps, nodes beyond pi change their chart, and elements settle theirs. `lag`: see [`charts::switch`].
     pub(super) fn change_charts(&mut self, lag: Option<f64>) {
+        if self.is_linear() {
+            return;
+        }
         let switched = charts::switch(&mut self.state, &self.model.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
         charts::freeze(&mut self.state, &self.model.elements);

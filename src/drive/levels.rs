@@ -1,5 +1,6 @@
 //! How the levels of a static stage are approached, and how a step to another branch is noticed.
 
+use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
@@ -46,7 +47,8 @@ impl Stability {
         let mut pivots = Pivots::new(system, &run.model.multipliers);
         // The start was assembled with its stiffness.
         let negative = pivots.as_mut().and_then(|pivots| pivots.negative(system));
-        Self { pivots, negative }
+        // What is linear keeps its tangent.
+        Self { pivots: pivots.filter(|_| !run.is_linear()), negative }
     }
 
     /// The number at the run's state; `None` where it is not known.
@@ -67,9 +69,9 @@ impl Stability {
     }
 
     /// Says where a limit or branch point lies behind.
-    pub fn pass(&mut self, run: &mut Run, negative: Option<usize>) {
-        run.tell_stability(None, self.negative, negative);
-        self.negative = negative;
+    pub fn pass(&mut self, run: &mut Run, negative: Option<usize>) -> Result<(), Failure> {
+        let before = std::mem::replace(&mut self.negative, negative);
+        run.tell_stability(None, before, negative)
     }
 }
 

@@ -12,6 +12,7 @@ mod levels;
 mod modal;
 mod path;
 mod run;
+mod space;
 mod start;
 mod statics;
 mod warnings;

@@ -6,7 +6,6 @@ use crate::kernel::Weights;
 use crate::model::Model;
 use crate::solve::{Convergence, LinearSolver, Operator, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed};
 use crate::system::System;
-use crate::tensor::Vec3;
 use nalgebra::Complex;
 
 /// Part of the lowest frequencies at which the first look is taken.
@@ -41,9 +40,7 @@ impl Run<'_> {
 
     /// No velocities: modes and paths are looked at from rest.
     pub(super) fn stand_still(&mut self) {
-        self.state.v.fill(Vec3::ZERO);
-        self.state.a.fill(Vec3::ZERO);
-        self.state.algorithmic.fill(Vec3::ZERO);
+        self.state.stand_still();
     }
 
     pub(super) fn warn_out_of_balance(&mut self, workshop: &mut Workshop) {

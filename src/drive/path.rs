@@ -92,7 +92,7 @@ impl Run<'_> {
             self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
         }
         self.warn_of_instability(path.here.negative);
-        Ok(())
+        self.look_out_of_plane(path.here.negative)
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
@@ -198,19 +198,25 @@ impl Run<'_> {
             Some(Target::Turning) => Some(EventKind::Turning),
             _ => None,
         };
-        self.tell_stability(kind, path.here.negative, point.negative);
+        self.tell_stability(kind, path.here.negative, point.negative)?;
         path.here = Point { state: self.state.clone(), ..point };
         self.show(workshop)
     }
 
     /// Names limit and turning points, and branches that were passed: where the number of negative pivots changed.
-    pub(super) fn tell_stability(&mut self, kind: Option<EventKind>, before: Option<usize>, after: Option<usize>) {
+    pub(super) fn tell_stability(
+        &mut self,
+        kind: Option<EventKind>,
+        before: Option<usize>,
+        after: Option<usize>,
+    ) -> Result<(), Failure> {
         let changed = matches!((before, after), (Some(before), Some(after)) if before != after);
         let kind = kind.or_else(|| changed.then_some(EventKind::Branch));
-        let Some(kind) = kind else { return };
+        let Some(kind) = kind else { return Ok(()) };
         let event = Event { at: self.moment(), kind, negative_pivots: after };
         self.observer.warn(&event.to_string());
         self.counters.events.push(event);
+        self.look_out_of_plane(after)
     }
 }
 

@@ -8,7 +8,7 @@ use super::warnings::Told;
 use crate::integrate::{Increments, Scheme};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
-use crate::system::{Node, State, System};
+use crate::system::{Node, Plane, State, System};
 use crate::tensor::Vec3;
 use std::fmt;
 use std::sync::Arc;
@@ -271,6 +271,8 @@ pub struct Run<'o> {
     pub(super) told: Told,
     /// Whether round-off takes the stiffness of the softest motion of the stage
     pub(super) soft: bool,
+    /// The plane that the stage is treated in
+    pub(super) plane: Option<Plane>,
     /// Of earlier stages
     cutbacks_before: u64,
     moving: bool,
@@ -310,6 +312,7 @@ impl<'o> Run<'o> {
             started: false,
             told: Told::default(),
             soft: false,
+            plane: None,
             cutbacks_before: 0,
             moving: false,
         }
@@ -332,7 +335,8 @@ impl<'o> Run<'o> {
                 StageWork::Modal { modes } => self.run_modal(&mut workshop, modes),
                 StageWork::Buckling { modes } => self.run_buckling(&mut workshop, modes),
                 StageWork::Dynamic { end, step, scheme, adaptive, energy_limit } => {
-                    workshop.guard = Some(self.energy_guard(&workshop, energy_limit));
+                    // The energy of the full theory is not that of the linear one.
+                    workshop.guard = (!self.is_linear()).then(|| self.energy_guard(&workshop, energy_limit));
                     self.run_dynamic(&mut workshop, end, step, scheme, adaptive)
                 }
             };
@@ -368,7 +372,12 @@ impl<'o> Run<'o> {
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
         let slots = self.model.slots.len();
-        let assembly = Assembly::new(self.model.acting(&stage.context(self.stage)), equations, &self.model);
+        self.plane = equations.plane().copied();
+        let mut assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
+        if self.is_linear() {
+            let linear = assembly.linearise(&self.model, &self.state);
+            linear.map_err(|conflict| self.describe(StageError::Conflict(conflict)))?;
+        }
         let Some(solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
             return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
         };
@@ -385,6 +394,11 @@ impl<'o> Run<'o> {
             rateless: Vec::new(),
             guard: None,
         })
+    }
+
+    /// Whether the stage is linear about the state in which it begins.
+    pub(super) fn is_linear(&self) -> bool {
+        self.model.linear && matches!(self.plan.stages[self.stage].work.kind(), StageKind::Static | StageKind::Dynamic)
     }
 
     /// The first dynamic stage gives the initial velocities.
@@ -475,6 +489,13 @@ impl<'o> Run<'o> {
 
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
+        if self.is_linear() {
+            // Rotations of any size, without charts.
+            for &slot in &self.model.rotations {
+                self.state.wound[slot as usize] = self.state.q[slot as usize];
+            }
+            return Ok(());
+        }
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
@@ -488,6 +509,9 @@ impl<'o> Run<'o> {
     }
 
     fn judge_mesh(&mut self) -> Result<(), Failure> {
+        if self.is_linear() {
+            return Ok(());
+        }
         let limit = if self.told.coarse { charts::COARSE } else { charts::COARSE_WARNING };
         let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
         let failure = self.name_coarse(element, angle);
@@ -507,6 +531,9 @@ impl<'o> Run<'o> {
 
     /// Between the last good state and this one neighbours may have turned past pi against each other: smaller steps tell.
     pub(super) fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
+        if self.is_linear() {
+            return Ok(());
+        }
         match charts::leapt(&self.state, &self.good, &self.model.elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
             None => Ok(()),
@@ -562,7 +589,7 @@ impl<'o> Run<'o> {
         Failure::Singular { at, place: Some(place(&self.model, largest, motion[largest])) }
     }
 
-    fn describe(&self, error: StageError) -> Failure {
+    pub(super) fn describe(&self, error: StageError) -> Failure {
         let node = |slot: u32| &self.model.slots[slot as usize].node;
         let stage = self.stage + 1;
         Failure::Deck(match error {

@@ -31,6 +31,7 @@ impl Run<'_> {
         self.model.set_clock(&mut self.state, time, 1.0);
         self.change_charts(None);
         self.refuse_loose(workshop, method)?;
+        self.refuse_loose_in_space(method.weights())?;
         self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
         self.state.algorithmic.copy_from_slice(&self.state.a);
@@ -180,7 +181,7 @@ impl Run<'_> {
     fn refuse_loose(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
         let Workshop { assembly, newton, .. } = &mut *workshop;
         let mut still = self.state.clone();
-        (still.v, still.a) = (vec![Vec3::ZERO; still.v.len()], vec![Vec3::ZERO; still.a.len()]);
+        still.stand_still();
         assembly.forget();
         assembly.evaluate(&still, method.weights(), None);
         self.counters.work.factorisations += 1;
@@ -197,7 +198,7 @@ impl Run<'_> {
             let system = &workshop.assembly.system;
             let has = |slot: usize| {
                 let numbers = system.pattern.equations.of(slot as Slot);
-                numbers.contains(&Equations::HELD) || diagonal_block(system, numbers).max_abs() > 0.0
+                !system.pattern.equations.is_plain(slot as Slot) || diagonal_block(system, numbers).max_abs() > 0.0
             };
             (0..self.model.slots.len()).map(has).collect()
         };
@@ -217,5 +218,6 @@ fn diagonal_block(system: &System, numbers: [u32; 3]) -> Mat3 {
 fn add_entry(system: &mut System, row: u32, column: u32, value: f64) {
     if let Some(place) = system.pattern.find(row, column) {
         system.values[place] += value;
+        system.revision += 1;
     }
 }

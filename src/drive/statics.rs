@@ -55,7 +55,7 @@ impl Run<'_> {
             }
         }
         self.warn_of_instability(levels.stability.negative);
-        Ok(())
+        self.look_out_of_plane(levels.stability.negative)
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
@@ -65,8 +65,10 @@ impl Run<'_> {
         let held = self.state.q.clone();
         self.model.set_clock(&mut self.state, time, 0.0);
         self.state.q = held;
-        charts::switch(&mut self.state, &self.model.rotations, charts::STATIC_BAND, None);
-        charts::freeze(&mut self.state, &self.model.elements);
+        if !self.is_linear() {
+            charts::switch(&mut self.state, &self.model.rotations, charts::STATIC_BAND, None);
+            charts::freeze(&mut self.state, &self.model.elements);
+        }
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
         if newton.solver.factorise(&assembly.system)
@@ -84,6 +86,7 @@ impl Run<'_> {
                 self.observer.warn(&format!("but for the stress it is under at the start of the stage: {named}"));
             }
         }
+        self.refuse_loose_in_space(Weights::STIFFNESS)?;
         self.open_account(workshop)
     }
 
@@ -126,7 +129,7 @@ impl Run<'_> {
         levels: &mut Levels,
     ) -> Result<(), Failure> {
         self.accept(workshop)?;
-        levels.stability.pass(self, negative);
+        levels.stability.pass(self, negative)?;
         self.good.copy_from(&self.state);
         levels.double();
         Ok(())

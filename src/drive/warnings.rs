@@ -21,11 +21,21 @@ pub(super) struct Told {
     soft: bool,
     axis: bool,
     subdivision: bool,
+    /// The stage in which the plane would be left
+    pub unstable: Option<usize>,
 }
 
 impl Default for Told {
     fn default() -> Self {
-        Self { coarse: false, uncertainty: 1e-7, frame: 1e-2, soft: false, axis: false, subdivision: false }
+        Self {
+            coarse: false,
+            uncertainty: 1e-7,
+            frame: 1e-2,
+            soft: false,
+            axis: false,
+            subdivision: false,
+            unstable: None,
+        }
     }
 }
 
@@ -68,6 +78,10 @@ impl Run<'_> {
 
     /// Total rotation vectors are interpolated in charts that do not turn with the element: the strains of a turned scene differ.
     pub(super) fn warn_of_frame(&mut self) {
+        // Rotations about one axis are interpolated without any error.
+        if self.plane.is_some() {
+            return;
+        }
         let angle = charts::widest_in_one_chart(&self.state, &self.model.elements);
         let error = FRAME_ERROR * angle * angle;
         if error > self.told.frame {
@@ -79,6 +93,15 @@ impl Run<'_> {
                 100.0 * error
             ));
         }
+    }
+
+    /// The plane would be left.
+    pub(super) fn warn_out_of_plane(&mut self, count: usize) {
+        self.told.unstable = Some(self.stage);
+        let at = self.moment();
+        self.observer.warn(&format!(
+            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in;              what it would do is seen with a small load or imperfection out of the plane"
+        ));
     }
 
     /// A node passed a whole turn aside of its axis.

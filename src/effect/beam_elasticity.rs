@@ -1,14 +1,16 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
 use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
+use super::planar_elasticity::PlanarElasticity;
 use super::{ByOrder, Connection, Effect, Energy, Noise, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane, pack};
-use crate::system::{Apart, Category, Cliques, Memory, Sink, State};
+use crate::system::{Apart, Aspect, Category, Cliques, Memory, Plane, Sink, State};
 use crate::tensor::Vec3;
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 /// An element of N nodes with G = N - 1 points for internal forces.
 #[derive(Clone, Debug)]
@@ -29,13 +31,36 @@ pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, E
 pub struct BeamElasticity<I> {
     /// The elements
     pub elements: ElasticElements,
+    /// The stress that geometric parts of the tangent are formed with, where that is not the scene's: none
+    unstressed: Option<Vec<[f64; 6]>>,
+    /// Point by point
+    rounding: Vec<Rounding>,
     way: PhantomData<I>,
 }
 
-impl<I> BeamElasticity<I> {
+impl<I: Interpolation> BeamElasticity<I> {
     /// Of these elements.
     pub fn new(elements: ElasticElements) -> Self {
-        Self { elements, way: PhantomData }
+        let mut rounding = Vec::new();
+        for_each_batch!(elements, |_first, batch| {
+            rounding.extend(batch.iter().flat_map(|element| &element.points).map(Rounding::of));
+        });
+        Self { elements, unstressed: None, rounding, way: PhantomData }
+    }
+
+    /// Leaves out of the tangent what stress brings to it.
+    pub fn without_geometric_stiffness(mut self) -> Self {
+        self.unstressed = Some(vec![[0.0; 6]; self.memory_points()]);
+        self
+    }
+
+    /// The stresses of geometric parts; empty where they are the present ones.
+    pub(super) fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
+        match &self.unstressed {
+            Some(none) => none,
+            None if memory.valid => &memory.points,
+            None => &[],
+        }
     }
 }
 
@@ -79,12 +104,34 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         true
     }
 
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            element.connection.places.iter().for_each(|&place| show(Aspect::Place(place)));
+            for point in &element.points {
+                show(Aspect::Vector(point.tangent));
+                show(Aspect::Tensor(point.stiffness.cn));
+                show(Aspect::Tensor(point.stiffness.cm));
+                if let Some(cc) = point.stiffness.cc {
+                    show(Aspect::Coupling(cc));
+                }
+                if let Some(free) = point.free {
+                    show(Aspect::Vector(free.gamma));
+                    show(Aspect::Axial(free.kappa));
+                }
+            }
+        });
+    }
+
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Arc<dyn Effect>> {
+        Some(Arc::new(PlanarElasticity::new(self, *plane)))
+    }
+
     fn memory_points(&self) -> usize {
         self.elements.two.len() + 2 * self.elements.three.len() + 3 * self.elements.four.len()
     }
 
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
-        let remembered: &[[f64; 6]] = if memory.valid { &memory.points } else { &[] };
+        let remembered = self.remembered(memory);
         let (two, three) = (self.elements.two.len(), 2 * self.elements.three.len());
         let mut parts = [0, two, two + three].map(|start| remembered.get(start..).unwrap_or_default()).into_iter();
         for_each_batch!(self.elements, |first, batch| {
@@ -152,13 +199,44 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn noise(&self, at: &State) -> Noise {
-        let mut largest = Noise::default();
+        let (mut largest, mut points) = (Noise::default(), self.rounding.iter());
         for_each_batch!(self.elements, |_first, batch| for element in batch {
-            let noise = element.noise(at);
-            largest.force = largest.force.max(noise.force);
-            largest.moment = largest.moment.max(noise.moment);
+            let nodes = element.connection.nodes.iter();
+            let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
+            for point in points.by_ref().take(element.points.len()) {
+                let force = point.at_rest + point.over_displacement * u;
+                largest.force = largest.force.max(force);
+                largest.moment = largest.moment.max(point.bending + force * point.weight);
+            }
         });
         largest
+    }
+}
+
+/// What round-off may leave of the force of a point: displacements u and rotations P carry a relative error of one unit in the last
+/// place; strains divide it by the element's length, and stiff sections multiply it.
+#[derive(Clone, Copy, Debug)]
+struct Rounding {
+    /// Force without displacements
+    at_rest: f64,
+    /// Force over the largest displacement
+    over_displacement: f64,
+    /// Moment without forces
+    bending: f64,
+    /// Its weight
+    weight: f64,
+}
+
+impl Rounding {
+    fn of<const N: usize>(point: &StiffnessPoint<N>) -> Self {
+        let steepest = point.slope.iter().fold(0.0_f64, |s, d| s.max(d.abs()));
+        let at_rest = f64::EPSILON * point.stiffness.cn.max_abs();
+        Self {
+            at_rest,
+            over_displacement: at_rest * steepest,
+            bending: f64::EPSILON * point.stiffness.cm.max_abs() * std::f64::consts::PI * steepest,
+            weight: point.weight,
+        }
     }
 }
 
@@ -192,12 +270,12 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
 }
 
 /// Element systems to compute with, one element of the batch at a time.
-fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> (ElementSystem, Scratch) {
+pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> (ElementSystem, Scratch) {
     (ElementSystem::new(2 * N), Scratch::new(N))
 }
 
 /// What is remembered of the points of element k.
-fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
+pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
     let own = remembered.get(k * G..(k + 1) * G)?;
     Some(std::array::from_fn(|g| unpack(&own[g])))
 }
@@ -248,12 +326,12 @@ impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
 }
 
 #[inline(always)]
-fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
+pub(super) fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
     Stress { n: Vec3([s[0], s[1], s[2]]), m: Vec3([s[3], s[4], s[5]]) }
 }
 
 #[inline(always)]
-fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
+pub(super) fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
     let Stress { n, m } = stress;
     [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]]
 }
@@ -293,7 +371,7 @@ fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
 }
 
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
-    fn free_amplitude(&self, at: &State) -> f64 {
+    pub(super) fn free_amplitude(&self, at: &State) -> f64 {
         self.free.map_or(0.0, |number| at.amplitude[number])
     }
 
@@ -324,7 +402,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// Adds the element alone as instance `number`; its nodes may sit in different charts.
     #[inline(never)]
-    fn add<I: Interpolation>(
+    pub(super) fn add<I: Interpolation>(
         &self,
         number: usize,
         stresses: Option<[Stress; G]>,
@@ -346,20 +424,5 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         for (point, remembered) in self.points.iter().zip(out) {
             *remembered = packed(&point.extrapolated_stress(view.nodes(), free, |i| change[i].0, |i| change[i].1));
         }
-    }
-
-    /// Displacements u and rotations P carry a relative error of one unit in the last place; strains divide it by the
-    /// element's length, and stiff sections multiply it.
-    fn noise(&self, at: &State) -> Noise {
-        let u = self.connection.nodes.iter().map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
-        let mut noise = Noise::default();
-        for point in &self.points {
-            let steepest = point.slope.iter().fold(0.0_f64, |s, d| s.max(d.abs()));
-            let force = f64::EPSILON * point.stiffness.cn.max_abs() * (1.0 + u * steepest);
-            let bending = f64::EPSILON * point.stiffness.cm.max_abs() * std::f64::consts::PI * steepest;
-            noise.force = noise.force.max(force);
-            noise.moment = noise.moment.max(bending + force * point.weight);
-        }
-        noise
     }
 }

@@ -5,7 +5,7 @@ use super::{Effect, Energy, Momentum};
 use crate::kernel::Weights;
 use crate::kernel::inertia::Translation;
 use crate::kernel::volume::Blocks;
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 
 /// All beam elements with mass on their centre line, by their mass per length.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +29,10 @@ impl Effect for BeamMass {
 
     fn is_symmetric(&self) -> bool {
         true
+    }
+
+    fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {
+        // On the centre line, which the beams' elasticity shows.
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -1,13 +1,13 @@
 //! Weight of beams and bodies: forces fixed in space at the mass centres.
 
-use super::Effect;
 use super::rigid_body::Body;
 use super::volume::VolumeElements;
+use super::{Effect, inertia_aspects};
 use crate::kernel::inertia::Inertia;
 use crate::kernel::load::{Weight, offset_force};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
 
 /// The weight of all beams. Elements with their mass on the centre line need no rotation and no tangent.
@@ -40,6 +40,11 @@ impl Effect for BeamGravity {
 
     fn is_symmetric(&self) -> bool {
         true
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        show(Aspect::Vector(self.acceleration));
+        self.elements.each_quantity(|inertia| inertia_aspects(inertia, show));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
@@ -80,6 +85,11 @@ impl Effect for BodyGravity {
 
     fn is_symmetric(&self) -> bool {
         true
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        show(Aspect::Vector(self.acceleration));
+        self.bodies.iter().for_each(|body| inertia_aspects(&body.inertia, show));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

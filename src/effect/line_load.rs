@@ -5,7 +5,7 @@ use super::volume::VolumeElements;
 use crate::kernel::Weights;
 use crate::kernel::load::{Intensity, Line};
 use crate::kernel::volume::Blocks;
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 use crate::tensor::Vec3;
 
 /// Whether the components are spatial or turn with the section.
@@ -24,6 +24,8 @@ pub struct LineLoad {
     pub kind: LineLoadKind,
     /// The loaded elements
     pub elements: VolumeElements<Intensity>,
+    /// Whether the tangent knows how they turn
+    pub tangent: bool,
 }
 
 impl Effect for LineLoad {
@@ -43,7 +45,15 @@ impl Effect for LineLoad {
     }
 
     fn has_tangent(&self) -> bool {
-        self.kind == LineLoadKind::Material || self.elements.any(|intensity| intensity.moment != Vec3::ZERO)
+        let turns = self.kind == LineLoadKind::Material || self.elements.any(|line| line.moment != Vec3::ZERO);
+        self.tangent && turns
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.elements.each_quantity(|intensity| {
+            show(Aspect::Vector(intensity.force));
+            show(Aspect::Axial(intensity.moment));
+        });
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -7,7 +7,7 @@
 use super::{Effect, Energy};
 use crate::kernel::{ElementSystem, Weights};
 use crate::real::Real;
-use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// One of them.
@@ -106,6 +106,10 @@ impl Effect for Links {
 
     fn is_symmetric(&self) -> bool {
         self.links.iter().all(|link| link.damping == 0.0)
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.links.iter().flat_map(|link| link.places).for_each(|place| show(Aspect::Place(place)));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

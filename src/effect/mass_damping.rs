@@ -1,11 +1,11 @@
 //! The mass part of Rayleigh damping: alpha M qd, on beams and bodies.
 
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements};
+use super::{Effect, VolumeElements, inertia_aspects};
 use crate::kernel::inertia::{Drag, Inertia, drag};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 
 /// The damping of beams by the mass of their sections.
 #[derive(Clone, Debug)]
@@ -27,6 +27,10 @@ impl Effect for BeamMassDamping {
 
     fn cliques(&self) -> Cliques {
         self.elements.cliques(Blocks::Both)
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.elements.each_quantity(|inertia| inertia_aspects(inertia, show));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
@@ -56,6 +60,10 @@ impl Effect for BodyMassDamping {
         let mut cliques = Cliques::default();
         self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
         cliques
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.bodies.iter().for_each(|body| inertia_aspects(&body.inertia, show));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

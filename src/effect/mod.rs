@@ -11,6 +11,7 @@ pub mod line_load;
 pub mod link;
 pub mod mass_damping;
 pub mod node_load;
+pub mod planar_elasticity;
 pub mod rigid_body;
 pub mod rotary_inertia;
 pub mod rotating_frame;
@@ -26,8 +27,9 @@ use crate::kernel::inertia::Inertia;
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{LANES, Lanes, Pack, each_lane};
-use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, StageContext, StageKind, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, Slot, StageContext, StageKind, State};
 use crate::tensor::{Mat3, Vec3};
+use std::sync::Arc;
 
 /// Stored energy of one state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -102,6 +104,16 @@ pub trait Effect: Send + Sync {
             Category::Damping => moves,
             Category::Internal | Category::External => true,
         }
+    }
+
+    /// Shows what of it decides whether the scene lies in a plane. Unless it does, the scene is never treated in one.
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        show(Aspect::Spatial);
+    }
+
+    /// What does its work in a plane that it lies in, where that is less than in space.
+    fn in_plane(self: Arc<Self>, _plane: &Plane) -> Option<Arc<dyn Effect>> {
+        None
     }
 
     /// Points it needs memory for.
@@ -320,6 +332,12 @@ macro_rules! for_each_batch {
     }};
 }
 pub(crate) use for_each_batch;
+
+/// What of mass properties decides whether they lie in a plane.
+fn inertia_aspects(inertia: &Inertia, show: &mut dyn FnMut(Aspect)) {
+    show(Aspect::Vector(inertia.offset));
+    show(Aspect::Tensor(inertia.about_node));
+}
 
 /// v . J v / 2
 fn quadratic(j: Mat3, v: Vec3) -> f64 {

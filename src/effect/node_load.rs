@@ -3,7 +3,7 @@
 use super::Effect;
 use crate::kernel::load::{material_force, material_moment, spatial_moment};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, State};
 use crate::tensor::Vec3;
 
 /// What a load at a node is.
@@ -37,6 +37,8 @@ pub struct NodeLoad {
     pub kind: NodeLoadKind,
     /// The loads
     pub loads: Vec<Instance>,
+    /// Whether the tangent knows how they turn
+    pub tangent: bool,
 }
 
 impl Effect for NodeLoad {
@@ -66,7 +68,16 @@ impl Effect for NodeLoad {
     }
 
     fn has_tangent(&self) -> bool {
-        self.kind != NodeLoadKind::SpatialForce
+        self.tangent && self.kind != NodeLoadKind::SpatialForce
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        for load in &self.loads {
+            show(match self.kind {
+                NodeLoadKind::SpatialForce | NodeLoadKind::MaterialForce => Aspect::Vector(load.vector),
+                NodeLoadKind::SpatialMoment | NodeLoadKind::MaterialMoment => Aspect::Axial(load.vector),
+            });
+        }
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

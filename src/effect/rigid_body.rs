@@ -1,9 +1,9 @@
 //! Rigid bodies at nodes, with their mass centre at an offset.
 
-use super::{Effect, Energy, Momentum, quadratic};
+use super::{Effect, Energy, Momentum, inertia_aspects, quadratic};
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::system::{Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, State};
 use crate::tensor::Vec3;
 
 /// A body.
@@ -24,6 +24,8 @@ pub struct RigidBody {
     pub name: &'static str,
     /// The bodies
     pub bodies: Vec<Body>,
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
 }
 
 impl Effect for RigidBody {
@@ -41,10 +43,18 @@ impl Effect for RigidBody {
         cliques
     }
 
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        for body in &self.bodies {
+            show(Aspect::Place(body.place));
+            inertia_aspects(&body.inertia, show);
+        }
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
         for (k, body) in self.bodies.iter().enumerate() {
-            let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &at.spin(body.node.p), weights);
+            let spin = at.spin(body.node.p).with_gyroscopic_forces(self.gyroscopic);
+            let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &spin, weights);
             system.clear();
             force.write(&mut system);
             out.add(k, &system);

@@ -5,7 +5,7 @@ use super::{Effect, Energy, Momentum, quadratic};
 use crate::kernel::inertia::{Rotary, Spin};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{NodeMotion, Weights};
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// All beam elements whose sections have rotary inertia, by J per length in global components of the initial placement.
@@ -13,6 +13,8 @@ use crate::tensor::{Mat3, Vec3};
 pub struct RotaryInertia {
     /// The elements
     pub elements: VolumeElements<Mat3>,
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
 }
 
 impl Effect for RotaryInertia {
@@ -28,8 +30,12 @@ impl Effect for RotaryInertia {
         self.elements.cliques(Blocks::Rotations)
     }
 
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.elements.each_quantity(|j| show(Aspect::Tensor(*j)));
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        self.elements.add(&Rotary, at, weights, out);
+        self.elements.add(&Rotary { gyroscopic: self.gyroscopic }, at, weights, out);
     }
 
     fn energy(&self, at: &State) -> Energy {

@@ -3,11 +3,11 @@
 //! It stands for all inertia of its stage: of steady states, and of small motions about them.
 
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements};
+use super::{Effect, VolumeElements, inertia_aspects};
 use crate::kernel::inertia::{Inertia, SteadilyTurned, steadily_turned};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Category, Cliques, Memory, Sink, StageContext, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, StageContext, State};
 use crate::tensor::Vec3;
 
 /// All mass of the scene in one stage's frame.
@@ -44,6 +44,12 @@ impl Effect for RotatingFrame {
 
     fn acts(&self, stage: &StageContext) -> bool {
         stage.number == self.stage
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        show(Aspect::Axial(self.spin));
+        self.elements.each_quantity(|(inertia, _)| inertia_aspects(inertia, show));
+        self.bodies.iter().for_each(|body| inertia_aspects(&body.inertia, show));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -1,17 +1,19 @@
 //! Inertia of beam sections with a full 6x6 mass: the mass centre lies off the centre line, or J couples.
 
 use super::volume::VolumeElements;
-use super::{Effect, Energy, Momentum, rigid_body};
+use super::{Effect, Energy, Momentum, inertia_aspects, rigid_body};
 use crate::kernel::Weights;
 use crate::kernel::inertia::{Eccentric, Inertia};
 use crate::kernel::volume::Blocks;
-use crate::system::{Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 
 /// All beam elements with eccentric mass, by their mass properties per length.
 #[derive(Clone, Debug, Default)]
 pub struct SectionInertia {
     /// The elements
     pub elements: VolumeElements<Inertia>,
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
 }
 
 impl Effect for SectionInertia {
@@ -27,8 +29,12 @@ impl Effect for SectionInertia {
         self.elements.cliques(Blocks::Both)
     }
 
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.elements.each_quantity(|inertia| inertia_aspects(inertia, show));
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        self.elements.add(&Eccentric, at, weights, out);
+        self.elements.add(&Eccentric { gyroscopic: self.gyroscopic }, at, weights, out);
     }
 
     fn energy(&self, at: &State) -> Energy {

@@ -3,7 +3,7 @@
 
 use super::Effect;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
 use crate::tensor::Vec3;
 
 /// One beam.
@@ -57,6 +57,10 @@ impl Effect for SpinHold {
 
     fn acts(&self, stage: &StageContext) -> bool {
         matches!(stage.kind, StageKind::Dynamic | StageKind::Modal)
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        self.beams.iter().for_each(|beam| show(Aspect::Line(beam.axis)));
     }
 
     fn steady(&self, at: &mut State) {

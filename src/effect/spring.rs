@@ -8,7 +8,7 @@ use super::{Effect, Energy};
 use crate::kernel::{ElementSystem, Weights};
 use crate::real::Real;
 use crate::rotation::{Complement, Rotation, log, nearest_turn, unwound};
-use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
@@ -58,6 +58,15 @@ impl Effect for Spring {
         self.springs
             .iter()
             .all(|spring| spring.translation_damping == Mat3::ZERO && spring.rotation_damping == Mat3::ZERO)
+    }
+
+    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        for spring in &self.springs {
+            let Instance { translation, rotation, translation_damping, rotation_damping, .. } = *spring;
+            for tensor in [translation, rotation, translation_damping, rotation_damping] {
+                show(Aspect::Tensor(tensor));
+            }
+        }
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -16,7 +16,7 @@ use super::{Connection, Effect, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Stiffness, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::system::{Category, Cliques, Memory, RotationRate, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, RotationRate, Sink, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -39,6 +39,10 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
 
     fn cliques(&self) -> Cliques {
         self.elasticity.cliques()
+    }
+
+    fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {
+        // Of the elasticity, which shows itself.
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

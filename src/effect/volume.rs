@@ -63,6 +63,13 @@ impl<Q: Copy> VolumeElements<Q> {
         });
     }
 
+    /// Shows the quantity of each point.
+    pub fn each_quantity(&self, mut show: impl FnMut(&Q)) {
+        for_each_batch!(self, |_first, batch| {
+            batch.iter().flat_map(|element| &element.points).for_each(|point| show(&point.quantity));
+        });
+    }
+
     /// Whether any point has a quantity of this kind.
     pub fn any(&self, is: impl Fn(&Q) -> bool) -> bool {
         let mut found = false;

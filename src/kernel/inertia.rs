@@ -104,6 +104,16 @@ impl<T: Real> Spin<T> {
         Self { rotation, omega, acceleration, rates: Rates::OfUnknown(over) }
     }
 
+    /// The same spin, or one whose forces are those of its acceleration alone.
+    #[inline(always)]
+    pub fn with_gyroscopic_forces(mut self, they_count: bool) -> Self {
+        if !they_count {
+            // All of them are products of the spin with itself.
+            self.omega = Vec3::zero();
+        }
+        self
+    }
+
     /// The derivatives over the one unknown, where there is but one.
     pub fn over_unknown(&self) -> Option<&Derivatives<T>> {
         match &self.rates {
@@ -362,7 +372,10 @@ impl VolumeKernel for Translation {
 }
 
 /// Rotary inertia per length, see [`rotary`].
-pub struct Rotary;
+pub struct Rotary {
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
+}
 
 impl VolumeKernel for Rotary {
     type Quantity = Mat3;
@@ -376,13 +389,17 @@ impl VolumeKernel for Rotary {
 
     #[inline(always)]
     fn evaluate<T: Real>(&self, j: &Mat3<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        let (p, pp) = rotary(*j, &Spin::new(motion.p, motion.p_rate, motion.p_rate2), weights);
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2).with_gyroscopic_forces(self.gyroscopic);
+        let (p, pp) = rotary(*j, &spin, weights);
         VolumeForce { p, pp, ..VolumeForce::zero() }
     }
 }
 
 /// Eccentric mass per length, see [`body`].
-pub struct Eccentric;
+pub struct Eccentric {
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
+}
 
 impl VolumeKernel for Eccentric {
     type Quantity = Inertia;
@@ -396,6 +413,7 @@ impl VolumeKernel for Eccentric {
 
     #[inline(always)]
     fn evaluate<T: Real>(&self, inertia: &Inertia<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        body(inertia, motion.u_rate2, &Spin::new(motion.p, motion.p_rate, motion.p_rate2), weights)
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2).with_gyroscopic_forces(self.gyroscopic);
+        body(inertia, motion.u_rate2, &spin, weights)
     }
 }

@@ -9,6 +9,7 @@ pub mod element;
 pub mod inertia;
 pub mod joint;
 pub mod load;
+pub mod planar;
 pub mod relative;
 pub mod seam;
 pub mod shape;
@@ -16,3 +17,4 @@ pub mod turn;
 pub mod volume;
 
 pub use element::{ElementSystem, MAX_NODES, NodeMotion, TILE, WIDTH, Weights};
+pub use planar::PlanarSystem;

@@ -1,9 +1,9 @@
 //! What acts on the state instead of the forces: supports and prescribed motions.
 
 use super::history::History;
-use crate::system::{Direction, Slot, State};
+use crate::system::{Aspect, Direction, Slot, State};
 use crate::system::{StageKind, StageSet};
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -14,6 +14,16 @@ pub struct Support {
     pub directions: Vec<Direction>,
     /// When it is there
     pub stages: StageSet,
+}
+
+impl Support {
+    /// What of it decides whether the scene lies in a plane: the directions that it holds at each slot.
+    pub fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+        for at_slot in self.directions.chunk_by(|a, b| a.slot == b.slot) {
+            let held = at_slot.iter().fold(Mat3::ZERO, |sum, direction| sum + direction.axis.outer(direction.axis));
+            show(Aspect::Tensor(held));
+        }
+    }
 }
 
 /// What a motion prescribes.
@@ -139,6 +149,15 @@ impl Motion {
     /// Whether it acts in the present stage.
     pub fn acts(&self) -> bool {
         !matches!(self.course, Course::Off)
+    }
+
+    /// What of it decides whether the scene lies in a plane.
+    pub fn aspect(&self) -> Aspect {
+        match self.kind {
+            MotionKind::Translation if self.value == 0.0 => Aspect::Line(self.axis),
+            MotionKind::Translation => Aspect::Vector(self.axis),
+            MotionKind::Rotation => Aspect::Axial(self.axis * self.value),
+        }
     }
 
     /// The directions that it prescribes.

@@ -4,6 +4,7 @@ mod amplitude;
 pub mod charts;
 mod constraint;
 mod history;
+mod linear;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
 pub use amplitude::Amplitude;
@@ -12,12 +13,19 @@ pub use history::{History, Table};
 
 use crate::effect::{Effect, Energy, Momentum, Noise};
 use crate::kernel::Weights;
-use crate::system::{Direction, Equations, FrameConflict, Groups, Memory, Node, Pattern, Slot, State, System};
+use crate::system::{
+    Aspect, Cliques, Direction, Equations, FrameConflict, Groups, Layout, Memory, Node, Pattern, Plane, Slot, State,
+    System,
+};
 use crate::tensor::Vec3;
+use linear::Linear;
 use std::sync::Arc;
 
 /// A prescribed rotation may go this far in one step or load increment.
 const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
+
+/// A state that is out of a plane by less, relative to the largest motion, is in it.
+const OUT_OF_PLANE: f64 = 1e-12;
 
 /// What a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +38,11 @@ pub enum SlotKind {
     Force,
     /// Multipliers of gaps between directions: moments
     Moment,
+}
+
+impl SlotKind {
+    /// All of them, in their order
+    pub const ALL: [Self; 4] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment];
 }
 
 /// A slot, and the node that it is named after.
@@ -58,10 +71,28 @@ impl SlotInfo {
         matches!(self.kind, SlotKind::Force | SlotKind::Moment)
     }
 
+    /// What its unknowns are compared with: a length for displacements, 1 for rotations.
+    pub fn scale(&self, length: f64) -> f64 {
+        if self.kind == SlotKind::Displacement { length } else { 1.0 }
+    }
+
     /// What turns the forces of this slot into forces that compare: a length for moments, 1 for forces.
     pub fn arm(&self, length: f64) -> f64 {
         if self.kind == SlotKind::Rotation { length } else { 1.0 }
     }
+}
+
+/// What an effect adds to a system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// The effect
+    pub name: &'static str,
+    /// How many of it there are: elements, loads, …
+    pub instances: usize,
+    /// Unknowns that nothing else touches
+    pub unknowns: usize,
+    /// Entries of the tangent that are there for it alone
+    pub entries: usize,
 }
 
 /// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
@@ -87,6 +118,10 @@ pub struct Model {
     pub supports: Vec<Support>,
     /// Prescribed motions
     pub motions: Vec<Motion>,
+    /// The plane that the scene lies in, where it is treated in one
+    pub plane: Option<Plane>,
+    /// Whether static and dynamic stages are linear in the displacements
+    pub linear: bool,
     /// The length to which displacements are compared: the diagonal of the scene's box, or 1
     pub length: f64,
 }
@@ -117,8 +152,48 @@ impl Model {
             motion.begin_stage(stage, kind, state, self.length, fresh).map_err(jump)?;
         }
         let held = self.held_directions(stage);
-        self.refuse_turned_hinges(&held, state)?;
-        Equations::new(self.slots.len(), &held).map_err(StageError::Conflict)
+        let plane = self
+            .plane
+            .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
+        if plane.is_none() {
+            self.refuse_turned_hinges(&held, state)?;
+        }
+        self.number(stage, plane)
+    }
+
+    /// The unknowns that are free in a stage that has begun, in a plane or in space.
+    pub fn number(&self, stage: usize, plane: Option<Plane>) -> Result<Equations, StageError> {
+        let (slots, held) = (self.slots.len(), self.held_directions(stage));
+        let turns = |slot: Slot| self.slots[slot as usize].kind == SlotKind::Rotation;
+        let numbered = match plane {
+            None => Equations::new(slots, &held),
+            Some(plane) => Equations::planar(slots, &held, plane, turns),
+        };
+        numbered.map_err(StageError::Conflict)
+    }
+
+    /// Shows what decides whether the scene lies in a plane, each with a name.
+    pub fn aspects(&self, show: &mut dyn FnMut(&'static str, Aspect)) {
+        for effect in &self.effects {
+            effect.aspects(&mut |aspect| show(effect.name(), aspect));
+        }
+        self.supports.iter().for_each(|support| support.aspects(&mut |aspect| show("supports", aspect)));
+        self.motions.iter().for_each(|motion| show("motions", motion.aspect()));
+    }
+
+    /// Whether a state lies in a plane and moves in it, but for round-off.
+    fn keeps(&self, state: &State, plane: &Plane) -> bool {
+        let normal = plane.normal();
+        let aside = |(info, value): (&SlotInfo, &Vec3)| match info.kind {
+            SlotKind::Rotation => (*value - normal * value.dot(normal)).norm(),
+            _ => value.dot(normal).abs() / self.length,
+        };
+        let size = |(info, value): (&SlotInfo, &Vec3)| value.norm() / info.scale(self.length);
+        [&state.q, &state.v, &state.a].iter().all(|field| {
+            let largest = self.slots.iter().zip(*field).map(size).fold(0.0, f64::max);
+            let farthest = self.slots.iter().zip(*field).map(aside).fold(0.0, f64::max);
+            farthest <= OUT_OF_PLANE * largest
+        })
     }
 
     /// Whether loads or motions without a history act for the first time in this stage.
@@ -184,16 +259,43 @@ impl Model {
     }
 
     /// The rotation of a node shares the tile of its displacement, which it follows.
-    pub fn groups(&self) -> Groups {
+    pub fn groups(&self, layout: Layout) -> Groups {
         let kind = |slot: Slot| self.slots[slot as usize].kind;
-        Groups::new(self.slots.len(), |slot| {
+        Groups::new(self.slots.len(), layout, |slot| {
             kind(slot) == SlotKind::Rotation && kind(slot - 1) == SlotKind::Displacement
         })
     }
 
-    /// The effects that act in a stage.
-    pub fn acting(&self, stage: &StageContext) -> Vec<Arc<dyn Effect>> {
-        self.effects.iter().filter(|effect| effect.acts(stage)).cloned().collect()
+    /// The effects that act in a stage, as they do in a plane or in space.
+    pub fn acting(&self, stage: &StageContext, plane: Option<&Plane>) -> Vec<Arc<dyn Effect>> {
+        let form = |effect: &Arc<dyn Effect>| match plane {
+            None => effect.clone(),
+            Some(plane) => effect.clone().in_plane(plane).unwrap_or_else(|| effect.clone()),
+        };
+        self.effects.iter().filter(|effect| effect.acts(stage)).map(form).collect()
+    }
+
+    /// What each effect that acts in a stage adds to the system of these equations.
+    pub fn shares(&self, stage: &StageContext, equations: &Equations) -> Vec<Share> {
+        let effects = self.acting(stage, None);
+        let layout = if equations.plane().is_some() { Layout::Planar } else { Layout::Spatial };
+        let cliques: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
+        let size_without = |left_out: Option<usize>| {
+            let others = cliques.iter().enumerate().filter(|(k, _)| Some(*k) != left_out).map(|(_, own)| own.clone());
+            let others: Vec<Cliques> = others.collect();
+            let mut touched = vec![false; self.slots.len()];
+            others.iter().flat_map(Cliques::iter).flatten().for_each(|&slot| touched[slot as usize] = true);
+            let free = |slot: usize| equations.of(slot as Slot).iter().filter(|&&n| n != Equations::HELD).count();
+            let unknowns = (0..touched.len()).filter(|&slot| touched[slot]).map(free).sum::<usize>();
+            (unknowns, Pattern::new(equations.clone(), self.groups(layout), others).nonzeros())
+        };
+        let (unknowns, entries) = size_without(None);
+        let share = |(k, effect): (usize, &Arc<dyn Effect>)| {
+            let without = size_without(Some(k));
+            let (unknowns, entries) = (unknowns - without.0, entries - without.1);
+            Share { name: effect.name(), instances: cliques[k].len(), unknowns, entries }
+        };
+        effects.iter().enumerate().map(share).collect()
     }
 
     /// The stored energy.
@@ -251,11 +353,15 @@ pub struct Assembly {
     /// Evaluations of each effect's instances so far, by name
     pub evaluations: Vec<(&'static str, u64)>,
     sizes: Vec<u64>,
+    /// In linear stages
+    linear: Option<Box<Linear>>,
 }
 
 impl Assembly {
-    /// The system of these effects on these equations.
-    pub fn new(effects: Vec<Arc<dyn Effect>>, equations: Equations, model: &Model) -> Self {
+    /// The system of what acts in a stage on these equations.
+    pub fn new(stage: &StageContext, equations: Equations, model: &Model) -> Self {
+        let effects = model.acting(stage, equations.plane());
+        let layout = if equations.plane().is_some() { Layout::Planar } else { Layout::Spatial };
         let cliques: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
         let symmetric = effects.iter().all(|effect| effect.is_symmetric());
         let memory = |e: &Arc<dyn Effect>| Memory { points: vec![[0.0; 6]; e.memory_points()], valid: false };
@@ -263,14 +369,46 @@ impl Assembly {
             memories: effects.iter().map(memory).collect(),
             evaluations: effects.iter().map(|effect| (effect.name(), 0)).collect(),
             sizes: cliques.iter().map(|c| c.len() as u64).collect(),
-            system: System::new(Pattern::new(equations, model.groups(), cliques), model.slots.len(), symmetric),
+            system: System::new(Pattern::new(equations, model.groups(layout), cliques), model.slots.len(), symmetric),
             effects,
+            linear: None,
         }
+    }
+
+    /// From here on everything is linear about a state.
+    pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
+        self.linear = Some(Box::new(Linear::new(&self.effects, model, about)?));
+        Ok(())
     }
 
     /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`]. Without weights the tangent is left as
     /// it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+        match self.linear.take() {
+            None => self.evaluate_effects(state, weights, lift),
+            Some(mut linear) => {
+                self.evaluate_linear(&mut linear, state, weights, lift);
+                self.linear = Some(linear);
+            }
+        }
+    }
+
+    /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
+    fn evaluate_linear(&mut self, linear: &mut Linear, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+        linear.follow(state);
+        let known =
+            weights == Weights::NONE || (lift.is_none() && linear.formed == Some((weights, self.system.revision)));
+        if known {
+            self.evaluate_effects(&linear.about, Weights::NONE, None);
+        } else {
+            self.forget();
+            self.evaluate_effects(&linear.about, weights, lift);
+            linear.formed = Some((weights, self.system.revision));
+        }
+        linear.add_forces(state, &mut self.system.force);
+    }
+
+    fn evaluate_effects(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
         match weights {
             Weights::NONE => {
                 debug_assert!(lift.is_none(), "prescribed increments act through the tangent");
@@ -289,6 +427,9 @@ impl Assembly {
 
     /// Lets effects remember what the next tangent is formed with, before the state is corrected by `dq`.
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
+        if self.linear.is_some() {
+            return;
+        }
         for (effect, memory) in self.effects.iter().zip(&mut self.memories).filter(|(e, _)| e.memory_points() > 0) {
             effect.extrapolate(state, dq, memory);
         }

@@ -225,7 +225,7 @@ impl Mesh {
             let message = format!("`elements` has {counts} entries, beam `{}` has {pieces} piece(s)", beam.name.value);
             return Err(Diagnostic::error(message, beam.elements.span.clone()));
         }
-        Ok((line, section))
+        Ok((line, section.forced(&deck.effects)))
     }
 
     fn add_beam(

@@ -3,11 +3,13 @@
 mod check;
 mod compose;
 mod constraints;
+mod forced;
 mod joints;
 mod mesh;
 mod names;
 mod output;
 mod path;
+mod planar;
 mod section;
 
 pub use compose::Reason;
@@ -154,11 +156,13 @@ fn about(name: &str, table: &str) -> bool {
 /// wrong that there is no scene.
 pub fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
+    forced::refuse_impossible(deck, diagnostics);
     let mesh = Mesh::new(deck, diagnostics);
     build_on(deck, mesh, diagnostics)
 }
 
 fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
+    let deck = &*forced::deck(deck);
     let complete = mesh.beams.len() == deck.beams.len();
     let histories = constraints::histories(deck);
     let mut found = Vec::new();
@@ -181,7 +185,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
-    let model = Model {
+    let mut model = Model {
         slots: [slots(&mesh), composition.multipliers].concat(),
         rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
@@ -192,22 +196,27 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
+        plane: None,
+        linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
         length: check::diagonal(&mesh),
     };
+    let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
+    let (plane, planar) = planar::plane(deck, &model, &initial, diagnostics);
+    model.plane = plane;
     Some(Scene {
         title: deck.title.clone(),
         plan: Plan {
             energy: expected || watched || probes.iter().any(energy),
             continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
             model,
-            initial: initial.into_iter().rev().collect(),
+            initial,
             stages,
             interval: deck.output.interval,
         },
         probes,
         every: deck.output.every,
         expectations,
-        reasons: composition.reasons,
+        reasons: [vec![planar], composition.reasons].concat(),
         mesh,
         bodies: composition.bodies,
         resolved: deck.resolved.clone(),

@@ -1,6 +1,6 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
-use crate::deck::{self, Diagnostic, SectionBody, Shape, Span, Spanned};
+use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned};
 use crate::kernel::elastic::Stiffness;
 use crate::kernel::inertia::Inertia;
 use crate::tensor::{Mat3, Vec3};
@@ -43,7 +43,13 @@ pub enum SectionCourse {
     },
     /// Each entry linear in arc length
     Blended([SectionMatrices; 2]),
+    /// Another course, so stiff against these of its strains that they vanish
+    Rigid(Box<SectionCourse>, [bool; 6]),
 }
+
+/// How much stiffer a strain is made that shall vanish: a hundredth of it is left. Much stiffer, and time steps that resolve everything else
+/// would not resolve it.
+const RIGID: f64 = 1e2;
 
 impl SectionCourse {
     /// The section at the fraction `s` of the arc length.
@@ -59,7 +65,24 @@ impl SectionCourse {
                 shaped(shape, material, factor)
             }
             Self::Blended([a, b]) => blend(a, b, s),
+            Self::Rigid(course, strains) => {
+                let section = course.at(s);
+                // D C D scales what the flexibility C^-1 has of these strains, and what it couples them with.
+                let scale = strains.map(|rigid| if rigid { RIGID.sqrt() } else { 1.0 });
+                let entry = |i: usize, j: usize| section.stiffness[i][j] * scale[i] * scale[j];
+                let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+                SectionMatrices { stiffness, ..section }
+            }
         }
+    }
+
+    /// The course as `[effects]` wants it.
+    pub fn forced(self, effects: &Effects) -> Self {
+        let (shear, extension) = (effects.allow(EffectWord::Shear), effects.allow(EffectWord::Extension));
+        if shear && extension {
+            return self;
+        }
+        Self::Rigid(Box::new(self), [!extension, !shear, !shear, false, false, false])
     }
 }
 

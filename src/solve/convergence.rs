@@ -71,58 +71,107 @@ impl Convergence {
     }
 
     fn residual(&self, model: &Model, system: &System, noise: Noise) -> Residual {
-        let force = largest_force(model, system);
+        let squares = Peaks::of(model, system, Vec3::squared);
+        let peaks = match squares.largest() {
+            // Neither has a square overflowed, nor has anything that counts been lost.
+            1e-280..=1e280 => squares.map(f64::sqrt),
+            _ => Peaks::of(model, system, Vec3::size),
+        };
+        let force = peaks.force.max_or_nan(peaks.moment / model.length);
         let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force, noisy: false };
-        for (slot, info) in model.slots.iter().enumerate() {
-            let value = free_part(&system.pattern.equations, slot as Slot, system.total(slot));
-            let noise = if info.kind == SlotKind::Rotation { noise.moment } else { noise.force };
-            let tolerated = match info.kind {
+        for (kind, peak) in SlotKind::ALL.into_iter().zip(peaks.residuals) {
+            let tolerated = match kind {
                 SlotKind::Force => GAP * self.tolerance * model.length,
                 SlotKind::Moment => GAP * self.tolerance,
-                _ => self.tolerance * force * info.arm(model.length),
+                SlotKind::Displacement => self.tolerance * force,
+                SlotKind::Rotation => self.tolerance * force * model.length,
             };
-            let allowed = if info.is_multiplier() { tolerated } else { tolerated.max(NOISE_FACTOR * noise) };
-            let size = value.size();
-            worst.noisy |= size > tolerated;
-            let ratio = if size == 0.0 { 0.0 } else { size / allowed };
+            let allowed = match kind {
+                SlotKind::Force | SlotKind::Moment => tolerated,
+                SlotKind::Displacement => tolerated.max(NOISE_FACTOR * noise.force),
+                SlotKind::Rotation => tolerated.max(NOISE_FACTOR * noise.moment),
+            };
+            worst.noisy |= peak.size > tolerated;
+            let ratio = if peak.size == 0.0 { 0.0 } else { peak.size / allowed };
             // NaN compares with nothing, so it is let in by hand.
             if ratio > worst.ratio || ratio.is_nan() {
-                worst = Residual { ratio, slot: slot as Slot, value, ..worst };
+                let value = free_part(&system.pattern.equations, peak.slot, system.total(peak.slot as usize));
+                worst = Residual { ratio, slot: peak.slot, value, ..worst };
             }
         }
         worst
     }
 }
 
-/// F: the largest nodal force, or moment over the length, among all categories and what constraints hold.
-fn largest_force(model: &Model, system: &System) -> f64 {
-    let mut largest = 0.0_f64;
-    for (slot, info) in model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
-        let total = system.total(slot);
-        let held = total - free_part(&system.pattern.equations, slot as Slot, total);
-        let [a, b, c, d] = system.force.each_ref().map(|force| force[slot]);
-        let force = largest_size([a, b, c, d, held]) / info.arm(model.length);
-        if force > largest || force.is_nan() {
-            largest = force;
-        }
-    }
-    largest
+/// The largest of some vectors, and where it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Peak {
+    size: f64,
+    slot: Slot,
 }
 
-/// The size of the largest of these; NaN if one is.
-fn largest_size(forces: [Vec3; 5]) -> f64 {
-    let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-    let square = forces.iter().map(|f| f.squared()).fold(0.0, larger);
-    match square {
-        // Neither has it overflowed, nor has anything that counts been lost.
-        1e-280..=1e280 => square.sqrt(),
-        _ => forces.iter().map(|f| f.size()).fold(0.0, larger),
+impl Peak {
+    #[inline(always)]
+    fn see(&mut self, size: f64, slot: usize) {
+        // NaN is larger than anything, and stays.
+        if size > self.size || (size.is_nan() && !self.size.is_nan()) {
+            *self = Self { size, slot: slot as Slot };
+        }
+    }
+}
+
+/// The largest forces and residuals.
+#[derive(Clone, Copy, Debug)]
+struct Peaks {
+    /// The largest nodal force among all categories and what constraints hold, and the largest moment
+    force: f64,
+    moment: f64,
+    /// By kind of slot
+    residuals: [Peak; 4],
+}
+
+impl Peaks {
+    /// In this measure of vectors.
+    fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64) -> Self {
+        let (mut forces, mut residuals) = ([Peak::default(); 4], [Peak::default(); 4]);
+        for (slot, info) in model.slots.iter().enumerate() {
+            let parts = system.force.each_ref().map(|force| force[slot]);
+            let total = system.total(slot);
+            let free = free_part(&system.pattern.equations, slot as Slot, total);
+            let kind = info.kind as usize;
+            parts.into_iter().chain([total - free]).for_each(|part| forces[kind].see(measure(part), slot));
+            residuals[kind].see(measure(free), slot);
+        }
+        let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize].size);
+        Self { force, moment, residuals }
+    }
+
+    /// The largest of all; NaN if one is.
+    fn largest(&self) -> f64 {
+        let residuals = self.residuals.iter().fold(0.0, |largest: f64, peak| largest.max_or_nan(peak.size));
+        self.force.max_or_nan(self.moment).max_or_nan(residuals)
+    }
+
+    fn map(self, change: impl Fn(f64) -> f64) -> Self {
+        let residuals = self.residuals.map(|peak| Peak { size: change(peak.size), ..peak });
+        Self { force: change(self.force), moment: change(self.moment), residuals }
+    }
+}
+
+/// The larger of two numbers; NaN if one is.
+trait MaxOrNan {
+    fn max_or_nan(self, other: Self) -> Self;
+}
+
+impl MaxOrNan for f64 {
+    fn max_or_nan(self, other: Self) -> Self {
+        if other > self || other.is_nan() { other } else { self }
     }
 }
 
 /// The part of a force in the free directions of its slot, in local components.
 fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
-    if equations.is_free(slot) { force } else { force - equations.held_part(slot, force) }
+    if equations.is_plain(slot) { force } else { force - equations.held_part(slot, force) }
 }
 
 /// The largest correction, displacements over the length of the scene.

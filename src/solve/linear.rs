@@ -13,6 +13,8 @@ pub struct LinearSolver {
     way: Way,
     /// Whether the last factorisation has come to its end
     factored: bool,
+    /// That of the tangent that Newton has factorised last
+    revision: Option<u64>,
 }
 
 enum Way {
@@ -40,7 +42,7 @@ impl LinearSolver {
             Some(blocks) => Way::Blocks(Box::new(blocks)),
             None => Way::General(Box::new(GeneralSolver::new(system)?)),
         };
-        Some(Self { way, factored: false })
+        Some(Self { way, factored: false, revision: None })
     }
 
     /// How it solves, in a few words.
@@ -51,8 +53,20 @@ impl LinearSolver {
         }
     }
 
+    /// Factorises the tangent where it is another one than the last; whether there is a factorisation, and whether it is new.
+    pub fn factorise_new(&mut self, system: &System) -> (bool, bool) {
+        if self.factored && self.revision == Some(system.revision) {
+            return (true, false);
+        }
+        let done = self.factorise(system);
+        self.revision = Some(system.revision);
+        (done, true)
+    }
+
     /// Factorises the tangent; `false` where a pivot cannot be found.
     pub fn factorise(&mut self, system: &System) -> bool {
+        // Its values may not stay.
+        self.revision = None;
         self.factored = match &mut self.way {
             Way::Blocks(blocks) => blocks.factorise(system) || self.leave_blocks(system),
             Way::General(general) => general.factorise(system),

@@ -220,11 +220,12 @@ impl Newton {
                 });
             }
             assembly.extrapolate(state, &self.dq);
-            if method.changes_charts() {
+            let changes_charts = method.changes_charts() && !model.linear;
+            if changes_charts {
                 charts::carry(state, &self.dq, &model.rotations);
             }
             method.correct(state, &self.dq);
-            if method.changes_charts() {
+            if changes_charts {
                 self.change_charts(model, state, work);
             }
         }
@@ -248,10 +249,12 @@ impl Newton {
     fn find_correction(&mut self, system: &System, lift: Option<&[Vec3]>, work: &mut Work) -> bool {
         let Self { solver, right_hand_side, .. } = self;
         system.right_hand_side(right_hand_side);
-        work.factorisations += 1;
         work.iterations += 1;
-        let solved =
-            timed(&mut work.solve_seconds, || solver.factorise(system) && solver.solve(system, right_hand_side));
+        let solved = timed(&mut work.solve_seconds, || {
+            let (done, new) = solver.factorise_new(system);
+            work.factorisations += u64::from(new);
+            done && solver.solve(system, right_hand_side)
+        });
         if solved {
             system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
         }

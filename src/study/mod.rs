@@ -1,5 +1,6 @@
 //! What is done with whole runs.
 
+pub mod ablation;
 mod compare;
 mod verify;
 

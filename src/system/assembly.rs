@@ -2,8 +2,9 @@
 
 use super::equations::Equations;
 use super::pattern::{Pattern, Places, TILE, Tile, WIDTH};
+use super::plane::Plane;
 use super::state::Slot;
-use crate::kernel::{ElementSystem, MAX_NODES};
+use crate::kernel::{ElementSystem, MAX_NODES, PlanarSystem};
 use crate::real::{Instructions, LANES, Lanes};
 use crate::tensor::{Mat3, Vec3};
 
@@ -33,6 +34,8 @@ pub struct System {
     pub symmetric: bool,
     /// The values of the tangent, tile by tile: that of the last evaluation with weights
     pub values: Vec<f64>,
+    /// Counts how often the tangent has become another one
+    pub revision: u64,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
     lift: Vec<Vec3>,
     lifts: bool,
@@ -49,6 +52,7 @@ impl System {
             symmetric,
             force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
             values: vec![0.0; values],
+            revision: 0,
             lift: zero,
             lifts: false,
             lifted: vec![0.0; equations],
@@ -59,6 +63,7 @@ impl System {
     /// shall take with it.
     pub fn clear(&mut self, lift: Option<&[Vec3]>) {
         self.clear_forces();
+        self.revision += 1;
         self.values.fill(0.0);
         self.lifts = lift.is_some();
         if let Some(lift) = lift {
@@ -90,17 +95,21 @@ impl System {
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
-    /// The tangent tile by tile, in the order of the pattern; each by its columns.
-    pub fn tiles(&self) -> &[Tile] {
+    /// The tangent tile by tile, in the order of the pattern; each by its columns. `W` is the width of the pattern.
+    pub fn tiles<const W: usize>(&self) -> &[Tile<W>] {
         tiles(&self.values)
     }
 
     /// A x, for a matrix with these values on the pattern of the tangent.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
+        if self.pattern.width() == WIDTH { self.product::<WIDTH>(values, x) } else { self.product::<3>(values, x) }
+    }
+
+    fn product<const W: usize>(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
-        let mut sums = vec![[0.0; WIDTH]; self.pattern.groups.count()];
-        let parts = self.pattern.apart(x);
-        self.each_tile(values, |row, column, tile| {
+        let mut sums = vec![[0.0; W]; self.pattern.groups.count()];
+        let parts = self.pattern.apart::<W>(x);
+        self.each_tile::<W>(values, |row, column, tile| {
             for (line, &x) in tile.iter().zip(&parts[column]) {
                 sums[row].iter_mut().zip(line).for_each(|(sum, value)| *sum += value * x);
             }
@@ -111,7 +120,7 @@ impl System {
 
     /// Shows each tile with the groups of its rows and of its columns.
     #[inline(always)]
-    fn each_tile(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile)) {
+    fn each_tile<const W: usize>(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile<W>)) {
         let mut tiles = tiles(values).iter();
         for column in 0..self.pattern.groups.count() {
             for (&row, tile) in self.pattern.rows_of(column).iter().zip(&mut tiles) {
@@ -122,16 +131,20 @@ impl System {
 
     /// b - A x, and its largest component over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
     pub fn residual(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        let parts = self.pattern.apart(x);
-        let mut residuals = self.pattern.apart(b);
+        if self.pattern.width() == WIDTH { self.residual_of::<WIDTH>(b, x) } else { self.residual_of::<3>(b, x) }
+    }
+
+    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
+        let parts = self.pattern.apart::<W>(x);
+        let mut residuals = self.pattern.apart::<W>(b);
         let mut sizes: Vec<_> = residuals.iter().map(|part| part.map(f64::abs)).collect();
         Instructions::here().run(
             #[inline(always)]
             || {
-                self.each_tile(&self.values, |row, column, tile| {
+                self.each_tile::<W>(&self.values, |row, column, tile| {
                     let (mut residual, mut size) = (residuals[row], sizes[row]);
                     for (line, &x) in tile.iter().zip(&parts[column]) {
-                        for r in 0..WIDTH {
+                        for r in 0..W {
                             let term = line[r] * x;
                             residual[r] -= term;
                             size[r] += term.abs();
@@ -207,8 +220,8 @@ fn lanes_apart(tile: &[Lanes; TILE]) -> [[f64; TILE]; LANES] {
 }
 
 /// Values as tiles.
-fn tiles(values: &[f64]) -> &[Tile] {
-    values.as_chunks::<WIDTH>().0.as_chunks::<WIDTH>().0
+fn tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
+    values.as_chunks::<W>().0.as_chunks::<W>().0
 }
 
 /// Room to take the tangents of elements side by side apart, tile by tile.
@@ -244,6 +257,12 @@ impl Sink<'_> {
         if !self.with_tangent {
             return;
         }
+        if self.equations.plane().is_some() {
+            if let Some(lift) = self.lift {
+                self.add_lift(k, &self.in_local_axes(k, element), lift);
+            }
+            return self.add_in_plane(k, element.tiles(), |value| *value);
+        }
         if self.places.special[k] {
             return self.add_special(k, element);
         }
@@ -262,7 +281,12 @@ impl Sink<'_> {
         is_apart: impl Fn(usize) -> bool,
         mut alone: impl FnMut(usize, &mut Self),
     ) {
-        let special = |sink: &Self, lane: usize| sink.with_tangent && sink.places.special[first + lane];
+        // In a plane all are special, and none is but where increments are prescribed.
+        let special = |sink: &Self, lane: usize| {
+            let special =
+                if sink.equations.plane().is_some() { sink.lift.is_some() } else { sink.places.special[first + lane] };
+            sink.with_tangent && special
+        };
         if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
             return self.add_plain(first, count, elements, apart);
         }
@@ -287,6 +311,12 @@ impl Sink<'_> {
         if !self.with_tangent {
             return;
         }
+        if self.equations.plane().is_some() {
+            for lane in 0..count {
+                self.add_in_plane(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
+            }
+            return;
+        }
         if self.places.whole {
             return self.add_whole(first, count, elements, apart);
         }
@@ -309,6 +339,55 @@ impl Sink<'_> {
         }
     }
 
+    /// Adds instances that lie in the plane, as [`Sink::add_lanes`] does those in space; each couples whole nodes.
+    #[inline(always)]
+    pub fn add_planar<const N: usize>(
+        &mut self,
+        plane: &Plane,
+        first: usize,
+        count: usize,
+        elements: &PlanarSystem<N, Lanes>,
+        is_apart: impl Fn(usize) -> bool,
+        mut alone: impl FnMut(usize, &mut Self),
+    ) {
+        let forces = elements.forces_in_space(plane.axes());
+        for lane in 0..count {
+            if is_apart(lane) || (self.with_tangent && self.places.special[first + lane]) {
+                alone(lane, self);
+                continue;
+            }
+            let all = &mut self.force[self.category as usize];
+            for (force, &slot) in forces.as_flattened().iter().zip(self.places.cliques.get(first + lane)) {
+                all[slot as usize] += Vec3(force.0.map(|component| component.0[lane]));
+            }
+            if !self.with_tangent {
+                continue;
+            }
+            if !self.places.whole {
+                self.add_planar_parts(first + lane, elements, lane);
+                continue;
+            }
+            for (tile, &place) in elements.tangent.as_flattened().iter().zip(self.places.of(first + lane)) {
+                let target = &mut self.values[place as usize..place as usize + tile.len()];
+                target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value.0[lane]);
+            }
+        }
+    }
+
+    /// Adds the tangent of one lane where nodes may share displacements: each entry of a tile goes to where those of its slots meet.
+    fn add_planar_parts<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
+        let places = self.places.of(k);
+        let slot = |node: usize, direction: usize| 2 * node + direction / 2;
+        for (i, tiles) in elements.tangent.iter().enumerate() {
+            for (j, tile) in tiles.iter().enumerate() {
+                for (entry, value) in tile.iter().enumerate() {
+                    let (row, column) = (slot(i, entry % 3), slot(j, entry / 3));
+                    self.values[places[2 * N * row + column] as usize + entry] += value.0[lane];
+                }
+            }
+        }
+    }
+
     #[inline]
     fn add_tangent(&mut self, k: usize, element: &ElementSystem) {
         if !self.places.whole {
@@ -317,6 +396,33 @@ impl Sink<'_> {
         for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
             let target = &mut self.values[place as usize..place as usize + TILE];
             target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
+        }
+    }
+
+    /// Adds to the tiles of a plane what the tangent of an element in space has there; `pick` takes the instance's number from each entry.
+    #[inline(always)]
+    fn add_in_plane<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
+        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
+        let (shared, across) = if self.places.whole { (2, slots.len() / 2) } else { (1, slots.len()) };
+        for (row, &i) in slots.iter().enumerate() {
+            for (column, &j) in slots.iter().enumerate() {
+                let (from_rows, from_columns) = (self.equations.of(i), self.equations.of(j));
+                let tile = &tiles[row / 2 * slots.len().div_ceil(2) + column / 2];
+                let entry = |r: usize, c: usize| pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
+                let mut block = Mat3([0, 1, 2].map(|r| [0, 1, 2].map(|c| entry(r, c))));
+                if let Some(frame) = self.equations.frame(i) {
+                    block = frame.transpose_matmul(block);
+                }
+                if let Some(frame) = self.equations.frame(j) {
+                    block = block * frame;
+                }
+                let place = places[row / shared * across + column / shared] as usize;
+                for c in (0..3).filter(|&c| from_columns[c] != Equations::HELD) {
+                    for r in (0..3).filter(|&r| from_rows[r] != Equations::HELD) {
+                        self.values[place + 3 * c + r] += block.0[r][c];
+                    }
+                }
+            }
         }
     }
 
@@ -346,6 +452,16 @@ impl Sink<'_> {
     #[cold]
     #[inline(never)]
     fn add_special(&mut self, k: usize, element: &ElementSystem) {
+        let mut local = self.in_local_axes(k, element);
+        if let Some(lift) = self.lift {
+            self.add_lift(k, &local, lift);
+        }
+        self.drop_held(self.places.cliques.get(k), &mut local);
+        self.add_tangent(k, &local);
+    }
+
+    /// The tangent in the axes of its slots.
+    fn in_local_axes(&self, k: usize, element: &ElementSystem) -> ElementSystem {
         let slots = self.places.cliques.get(k);
         let mut local = element.clone();
         let mut frames: [Option<Mat3>; 2 * MAX_NODES] = [None; 2 * MAX_NODES];
@@ -364,11 +480,7 @@ impl Sink<'_> {
                 local.set_tangent(row, column, block);
             }
         }
-        if let Some(lift) = self.lift {
-            self.add_lift(k, &local, lift);
-        }
-        self.drop_held(slots, &mut local);
-        self.add_tangent(k, &local);
+        local
     }
 
     /// Rows and columns of held directions are no part of the tangent.

@@ -1,5 +1,6 @@
 //! Which unknowns are free: the numbering of the equations, and turned axes at constrained slots.
 
+use super::plane::Plane;
 use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
 
@@ -28,6 +29,9 @@ pub struct Equations {
     frame: Vec<Option<Mat3>>,
     /// Slot and local direction of each equation.
     origin: Vec<(Slot, u8)>,
+    /// The slots in which a direction is held, in planar scenes one that does not leave the plane anyway
+    constrained: Vec<bool>,
+    plane: Option<Plane>,
 }
 
 impl Equations {
@@ -36,30 +40,64 @@ impl Equations {
 
     /// Numbers the free directions of `slots` slots, slot by slot.
     pub fn new(slots: usize, held: &[Direction]) -> Result<Self, FrameConflict> {
-        let mut axes: Vec<Vec<Vec3>> = vec![Vec::new(); slots];
-        for direction in held {
-            let known = &mut axes[direction.slot as usize];
-            let spans = known.len() == 3;
-            if spans || known.iter().any(|a| a.dot(direction.axis).abs() > 1.0 - 1e-9) {
-                continue;
-            }
-            if known.iter().any(|a| a.dot(direction.axis).abs() > 1e-9) {
-                return Err(FrameConflict { slot: direction.slot });
-            }
-            known.push(direction.axis);
-        }
-        let mut out = Self { number: Vec::with_capacity(slots), frame: Vec::with_capacity(slots), origin: Vec::new() };
-        for (slot, known) in axes.iter().enumerate() {
+        let mut out = Self::empty(slots, None);
+        for (slot, known) in by_slot(slots, held)?.iter().enumerate() {
             let (frame, is_held) = local_axes(known);
-            let mut number = [Self::HELD; 3];
-            for k in (0..3).filter(|&k| !is_held[k]) {
-                number[k] = out.origin.len() as u32;
-                out.origin.push((slot as Slot, k as u8));
-            }
-            out.number.push(number);
-            out.frame.push(frame);
+            out.push(slot, frame, is_held, !known.is_empty());
         }
         Ok(out)
+    }
+
+    /// The same in a plane: displacements stay in it, and rotation vectors, where a slot `turns`, along its normal, the third local
+    /// direction of every slot.
+    pub fn planar(
+        slots: usize,
+        held: &[Direction],
+        plane: Plane,
+        turns: impl Fn(Slot) -> bool,
+    ) -> Result<Self, FrameConflict> {
+        let (normal, own) = (plane.normal(), (!plane.is_global()).then_some(*plane.axes()));
+        let mut out = Self::empty(slots, Some(plane));
+        for (slot, known) in by_slot(slots, held)?.iter().enumerate() {
+            // What leaves the plane is held by the plane.
+            let along = |axis: &Vec3| normal * normal.dot(*axis);
+            let inside = |axis: &Vec3| if turns(slot as Slot) { along(axis) } else { *axis - along(axis) };
+            let known = spanned(known.iter().map(inside));
+            let turned = |axis: &Vec3| Mat3::from_columns(*axis, normal.cross(*axis), normal);
+            let (frame, is_held) = match (turns(slot as Slot), &known[..]) {
+                (true, held) => (own, [true, true, !held.is_empty()]),
+                (false, []) => (own, [false, false, true]),
+                (false, [axis, rest @ ..]) => match [0, 1].into_iter().find(|&k| is_axis(&plane, k, *axis)) {
+                    Some(0) => (own, [true, !rest.is_empty(), true]),
+                    Some(_) => (own, [!rest.is_empty(), true, true]),
+                    None => (Some(turned(axis)), [true, !rest.is_empty(), true]),
+                },
+            };
+            out.push(slot, frame, is_held, !known.is_empty());
+        }
+        Ok(out)
+    }
+
+    fn empty(slots: usize, plane: Option<Plane>) -> Self {
+        let (number, frame) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
+        Self { number, frame, origin: Vec::new(), constrained: Vec::with_capacity(slots), plane }
+    }
+
+    fn push(&mut self, slot: usize, frame: Option<Mat3>, is_held: [bool; 3], constrained: bool) {
+        let mut number = [Self::HELD; 3];
+        for k in (0..3).filter(|&k| !is_held[k]) {
+            number[k] = self.origin.len() as u32;
+            self.origin.push((slot as Slot, k as u8));
+        }
+        self.number.push(number);
+        self.frame.push(frame);
+        self.constrained.push(constrained);
+    }
+
+    /// The plane that everything stays in, if there is one.
+    #[inline]
+    pub fn plane(&self) -> Option<&Plane> {
+        self.plane.as_ref()
     }
 
     /// The number of equations.
@@ -116,10 +154,10 @@ impl Equations {
         }
     }
 
-    /// Whether every direction of a slot is free.
+    /// Whether no direction of a slot is held but those that leave the plane.
     #[inline]
-    pub fn is_free(&self, slot: Slot) -> bool {
-        self.number[slot as usize].iter().all(|&number| number != Self::HELD)
+    pub fn is_plain(&self, slot: Slot) -> bool {
+        !self.constrained[slot as usize]
     }
 
     /// The held part of a value at a slot.
@@ -138,6 +176,39 @@ impl Equations {
     pub fn to_local(&self, slot: Slot, value: Vec3) -> Vec3 {
         self.frame[slot as usize].map_or(value, |frame| frame.transpose_mul(value))
     }
+}
+
+/// The held axes of each slot, of each direction once.
+fn by_slot(slots: usize, held: &[Direction]) -> Result<Vec<Vec<Vec3>>, FrameConflict> {
+    let mut axes: Vec<Vec<Vec3>> = vec![Vec::new(); slots];
+    for direction in held {
+        let axis = direction.axis;
+        let known = &mut axes[direction.slot as usize];
+        let spans = known.len() == 3;
+        if spans || known.iter().any(|a| a.dot(axis).abs() > 1.0 - 1e-9) {
+            continue;
+        }
+        if known.iter().any(|a| a.dot(axis).abs() > 1e-9) {
+            return Err(FrameConflict { slot: direction.slot });
+        }
+        known.push(axis);
+    }
+    Ok(axes)
+}
+
+/// Orthogonal unit vectors that span the same.
+fn spanned(vectors: impl Iterator<Item = Vec3>) -> Vec<Vec3> {
+    let mut out: Vec<Vec3> = Vec::new();
+    for vector in vectors {
+        let rest = out.iter().fold(vector, |rest, known| rest - *known * known.dot(rest));
+        out.extend(rest.normalized().filter(|_| rest.norm() > 1e-9));
+    }
+    out
+}
+
+/// Whether an axis is the k-th of a plane.
+fn is_axis(plane: &Plane, k: usize, axis: Vec3) -> bool {
+    plane.axes().column(k).dot(axis).abs() > 1.0 - 1e-15
 }
 
 /// Completes held directions to three; no frame where all of them are global axes.
@@ -178,6 +249,26 @@ mod tests {
     fn a_direction_that_is_neither_new_nor_orthogonal_is_a_conflict() {
         let held = [Direction { slot: 0, axis: Vec3::UNIT[0] }, Direction { slot: 0, axis: Vec3([0.6, 0.8, 0.0]) }];
         assert_eq!(Equations::new(1, &held).unwrap_err(), FrameConflict { slot: 0 });
+    }
+
+    #[test]
+    fn in_a_plane_a_node_has_three_unknowns() {
+        let plane = Plane::normal_to(Vec3([0.36, 0.48, 0.8])).unwrap();
+        let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+        let turns = |slot: Slot| slot % 2 == 1;
+        let slanted = a * 0.6 + b * 0.8;
+        let held = [(2, slanted), (3, e), (4, b), (4, e), (5, a)].map(|(slot, axis)| Direction { slot, axis });
+        let equations = Equations::planar(6, &held, plane, turns).unwrap();
+        let free = |slot: Slot| equations.of(slot).map(|number| number != Equations::HELD);
+        assert_eq!((free(0), free(1)), ([true, true, false], [false, false, true]));
+        assert_eq!((free(2), free(3)), ([false, true, false], [false; 3]));
+        assert_eq!((free(4), free(5)), ([true, false, false], [false, false, true]));
+        assert!((equations.frame(2).unwrap().column(0) - slanted).norm() < 1e-15);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| equations.is_plain(slot)), [true, true, false, false, false, true]);
+        let all = Vec3::UNIT.map(|axis| Direction { slot: 0, axis });
+        assert_eq!(Equations::planar(2, &all, plane, turns).unwrap().count(), 1);
+        let flat = Equations::planar(2, &[], Plane::normal_to(Vec3::UNIT[2]).unwrap(), turns).unwrap();
+        assert!(flat.frame(0).is_none() && flat.frame(1).is_none());
     }
 
     #[test]

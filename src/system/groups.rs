@@ -1,4 +1,4 @@
-//! Which slots share a tile of the tangent: the displacement and the rotation of a node.
+//! Which slots share a tile of the tangent, the displacement and the rotation of a node, and which rows of it are theirs.
 
 use super::state::Slot;
 
@@ -12,12 +12,22 @@ pub struct Groups {
     places: Vec<(u32, u8)>,
     /// The slots of each group
     members: Vec<[Option<Slot>; SLOTS]>,
+    layout: Layout,
+}
+
+/// Which rows of a tile belong to the directions of its slots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Three for each slot
+    Spatial,
+    /// Three in all: displacements keep to the first two directions of their slot, rotation vectors to the third.
+    Planar,
 }
 
 impl Groups {
     /// Of so many slots; `joins` tells which of them share the group of the one before.
-    pub fn new(slots: usize, joins: impl Fn(Slot) -> bool) -> Self {
-        let mut out = Self { places: Vec::with_capacity(slots), members: Vec::new() };
+    pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
+        let mut out = Self { places: Vec::with_capacity(slots), members: Vec::new(), layout };
         for slot in 0..slots as Slot {
             match out.members.last_mut() {
                 Some([Some(_), second @ None]) if joins(slot) => {
@@ -36,6 +46,24 @@ impl Groups {
     /// The number of groups.
     pub fn count(&self) -> usize {
         self.members.len()
+    }
+
+    /// The rows of a tile.
+    pub fn width(&self) -> usize {
+        match self.layout {
+            Layout::Spatial => 3 * SLOTS,
+            Layout::Planar => 3,
+        }
+    }
+
+    /// The group of a slot, and the row of its first direction in the group's tiles.
+    #[inline]
+    pub fn row(&self, slot: Slot) -> (usize, usize) {
+        let (group, place) = self.of(slot);
+        match self.layout {
+            Layout::Spatial => (group, 3 * place),
+            Layout::Planar => (group, 0),
+        }
     }
 
     /// The group of a slot, and its place in it.

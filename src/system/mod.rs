@@ -4,12 +4,14 @@ mod assembly;
 mod equations;
 mod groups;
 mod pattern;
+mod plane;
 mod stage;
 mod state;
 
 pub use assembly::{Apart, Category, Sink, System};
 pub use equations::{Direction, Equations, FrameConflict};
-pub use groups::Groups;
-pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH};
+pub use groups::{Groups, Layout};
+pub use pattern::{Cliques, Entry, Pattern, Tile};
+pub use plane::{Aspect, Plane};
 pub use stage::{StageContext, StageKind, StageSet};
 pub use state::{Memory, Node, RotationRate, Slot, State};

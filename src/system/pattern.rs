@@ -5,11 +5,11 @@ use super::groups::{Groups, SLOTS};
 use super::state::Slot;
 pub use crate::kernel::{TILE, WIDTH};
 
-/// A tile is that of an element's two blocks.
+/// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
 
 /// A block of the tangent, by columns.
-pub type Tile = [[f64; WIDTH]; WIDTH];
+pub type Tile<const W: usize> = [[f64; W]; W];
 
 /// The slots that meet in each instance of an effect: one clique an element.
 #[derive(Clone, Debug, Default)]
@@ -102,9 +102,9 @@ impl Pattern {
     /// The pattern of several effects, given by the cliques of each.
     pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>) -> Self {
         let (column_starts, rows) = compressed_columns(&groups, &effects);
-        let numbers = numbers(&equations, &groups);
+        let (numbers, width) = (numbers(&equations, &groups), groups.width());
         let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
-        let idle = idle.map(|k| ((k / WIDTH) as u32, (k % WIDTH) as u8)).collect();
+        let idle = idle.map(|k| ((k / width) as u32, (k % width) as u8)).collect();
         let mut pattern = Self { equations, groups, column_starts, rows, numbers, idle, places: Vec::new() };
         pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
         pattern
@@ -115,9 +115,15 @@ impl Pattern {
         self.rows.len()
     }
 
+    /// The rows of a tile.
+    #[inline]
+    pub fn width(&self) -> usize {
+        self.groups.width()
+    }
+
     /// The number of values: those of all tiles.
     pub fn values(&self) -> usize {
-        TILE * self.tiles()
+        self.width() * self.width() * self.tiles()
     }
 
     /// The groups of the rows of the tiles in a column.
@@ -129,17 +135,17 @@ impl Pattern {
     /// The equations of a group's rows.
     #[inline]
     pub fn numbers(&self, group: usize) -> &[u32] {
-        &self.numbers[WIDTH * group..WIDTH * (group + 1)]
+        &self.numbers[self.width() * group..self.width() * (group + 1)]
     }
 
     /// One number an equation as one part a group; zero where a row has no equation.
-    pub fn apart(&self, x: &[f64]) -> Vec<[f64; WIDTH]> {
-        let part = |numbers: &[u32; WIDTH]| numbers.map(|number| x.get(number as usize).copied().unwrap_or(0.0));
+    pub fn apart<const W: usize>(&self, x: &[f64]) -> Vec<[f64; W]> {
+        let part = |numbers: &[u32; W]| numbers.map(|number| x.get(number as usize).copied().unwrap_or(0.0));
         self.numbers.as_chunks().0.iter().map(part).collect()
     }
 
     /// The reverse of [`Pattern::apart`].
-    pub fn join(&self, parts: &[[f64; WIDTH]], out: &mut [f64]) {
+    pub fn join<const W: usize>(&self, parts: &[[f64; W]], out: &mut [f64]) {
         for (&number, &value) in self.numbers.iter().zip(parts.as_flattened()) {
             if let Some(out) = out.get_mut(number as usize) {
                 *out = value;
@@ -149,12 +155,12 @@ impl Pattern {
 
     /// The entries of an equation's column, by rows.
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
-        let (group, c) = self.row_of(column);
+        let ((group, c), width) = (self.row_of(column), self.width());
         let tiles = self.column_starts[group] as usize..self.column_starts[group + 1] as usize;
         tiles.flat_map(move |tile| {
             let numbers = self.numbers(self.rows[tile] as usize).iter().enumerate();
             let held = move |&(_, &row): &(usize, &u32)| row != Equations::HELD;
-            numbers.filter(held).map(move |(r, &row)| Entry { row, place: TILE * tile + WIDTH * c + r })
+            numbers.filter(held).map(move |(r, &row)| Entry { row, place: width * (width * tile + c) + r })
         })
     }
 
@@ -171,20 +177,20 @@ impl Pattern {
             return None;
         }
         let ((i, r), (j, c)) = (self.row_of(row), self.row_of(column));
-        Some(self.tile(i, j)? + WIDTH * c + r)
+        Some(self.tile(i, j)? + self.width() * c + r)
     }
 
     /// The group and the row of the tile of an equation.
     fn row_of(&self, equation: u32) -> (usize, usize) {
         let (slot, k) = self.equations.origin(equation as usize);
-        let (group, place) = self.groups.of(slot);
-        (group, 3 * place + k as usize)
+        let (group, first) = self.groups.row(slot);
+        (group, first + k as usize)
     }
 
     /// The index of the first value of a tile.
     fn tile(&self, row: usize, column: usize) -> Option<usize> {
         let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
-        Some(TILE * (self.column_starts[column] as usize + found))
+        Some(self.width() * self.width() * (self.column_starts[column] as usize + found))
     }
 
     fn places_of(&self, cliques: Cliques) -> Places {
@@ -198,15 +204,13 @@ impl Pattern {
         };
         for slots in cliques.iter() {
             places.starts.push(places.values.len() as u32);
-            let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.of(slot));
+            let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.row(slot));
             for (i, r) in corners() {
                 // Cliques are what the pattern was made of.
-                let place = |(j, c): (usize, usize)| self.tile(i, j).map(|tile| (tile + 3 * (WIDTH * c + r)) as u32);
+                let place = |(j, c): (usize, usize)| self.tile(i, j).map(|tile| (tile + self.width() * c + r) as u32);
                 places.values.extend(corners().filter_map(place));
             }
-            let turned = slots.iter().any(|&slot| self.equations.frame(slot).is_some());
-            let held = slots.iter().any(|&slot| self.equations.of(slot).contains(&Equations::HELD));
-            places.special.push(turned || held);
+            places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
         }
         places.starts.push(places.values.len() as u32);
         places.cliques = cliques;
@@ -225,8 +229,13 @@ impl Pattern {
 
 /// The equations of the rows of all groups.
 fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
-    let of = |slot: Option<Slot>| slot.map_or([Equations::HELD; 3], |slot| equations.of(slot));
-    (0..groups.count()).flat_map(|group| groups.members(group)).flat_map(of).collect()
+    let mut out = vec![Equations::HELD; groups.width() * groups.count()];
+    for equation in 0..equations.count() {
+        let (slot, k) = equations.origin(equation);
+        let (group, first) = groups.row(slot);
+        out[groups.width() * group + first + k as usize] = equation as u32;
+    }
+    out
 }
 
 /// Column by column the groups that a group meets, itself among them.

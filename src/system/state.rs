@@ -72,6 +72,13 @@ impl State {
         }
     }
 
+    /// Takes all velocities and accelerations away.
+    pub fn stand_still(&mut self) {
+        self.v.fill(Vec3::ZERO);
+        self.a.fill(Vec3::ZERO);
+        self.algorithmic.fill(Vec3::ZERO);
+    }
+
     /// Takes over another state of the same scene without allocating.
     pub fn copy_from(&mut self, other: &Self) {
         self.time = other.time;

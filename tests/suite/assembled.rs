@@ -88,7 +88,7 @@ fn scene_of(text: &str) -> (Model, State, Assembly) {
     let mut model = scene.plan.model;
     let mut state = model.rest();
     let equations = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
-    let assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, &model);
+    let assembly = Assembly::new(&scene.plan.stages[0].context(0), equations, &model);
     model.set_clock(&mut state, 0.3, 1.0);
     (model, state, assembly)
 }

@@ -202,7 +202,7 @@ fn wrong_decks_and_missing_files_have_their_status() {
     assert_eq!(status(&huge), 2);
     assert!(last_line(&huge).starts_with("error[limit]: "));
     assert_eq!(status(&folder.beamsim(&["frobnicate"])), 2);
-    for command in ["cost", "effects", "sweep", "schema"] {
+    for command in ["cost", "sweep", "schema"] {
         let refused = folder.beamsim(&[command, "bad.toml"]);
         assert_eq!(status(&refused), 2);
         assert!(last_line(&refused).contains("not supported yet"));
@@ -219,9 +219,31 @@ fn check_tells_what_would_be_simulated() {
     let output = folder.beamsim(&["check", "good.toml"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(status(&output), 0);
-    for words in ["5 nodes, 4 elements, 24 free unknowns", "mass 1,", "on  beam elasticity", "off gravity on beams"] {
+    for words in [
+        "5 nodes, 4 elements, 12 free unknowns",
+        "on  planar",
+        "mass 1,",
+        "on  beam elasticity",
+        "off gravity on beams",
+    ] {
         assert!(text.contains(words), "{words:?} is missing in\n{text}");
     }
+}
+
+#[test]
+fn effects_writes_its_table_and_tells_what_may_go() {
+    let folder = Folder::new("effects");
+    folder.write("good.toml", GOOD);
+    let output = folder.beamsim(&["effects", "good.toml", "--out", "out", "--tolerance", "0.5"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(status(&output), 0, "{text}");
+    for words in ["all effects: ", "large_rotations ", "not in this scene: ", "within 0.5: "] {
+        assert!(text.contains(words), "{words:?} is missing in\n{text}");
+    }
+    assert_eq!(folder.names("out"), ["effects.csv"]);
+    assert_eq!(status(&folder.beamsim(&["effects", "good.toml", "--tolerance", "-1"])), 2);
+    folder.write("bad.toml", "[point]\na = 1\n");
+    assert_eq!(status(&folder.beamsim(&["effects", "bad.toml"])), 2);
 }
 
 /// A run of a billion steps, stopped by a signal after its first rows.

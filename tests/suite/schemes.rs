@@ -108,7 +108,7 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
     let mut model = scene.plan.model;
     let mut state = model.rest();
     let equations = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
-    let mut assembly = Assembly::new(model.acting(&scene.plan.stages[0].context(0)), equations, &model);
+    let mut assembly = Assembly::new(&scene.plan.stages[0].context(0), equations, &model);
     let solver = LinearSolver::new(&assembly.system, &model.multipliers).unwrap();
     let total = scheme.rotations == Rotations::Totals;
     let increments = (!total).then(|| Increments::new(&model, &assembly.system.pattern.equations));

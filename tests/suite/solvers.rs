@@ -6,7 +6,7 @@ use beamsim::kernel::{ElementSystem, Weights};
 use beamsim::model::Assembly;
 use beamsim::scene;
 use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, is_symmetric};
-use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Pattern, System};
+use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Pattern, System};
 use beamsim::tensor::{Mat3, Vec3};
 use nalgebra::DMatrix;
 
@@ -41,7 +41,7 @@ fn system(edges: &[[usize; 2]], symmetric: bool, shift: f64, random: &mut Random
     let slanted = Direction { slot: 3, axis: Vec3([0.6, 0.0, 0.8]) };
     let held = [Direction { slot: 0, axis: Vec3::UNIT[1] }, slanted];
     let equations = Equations::new(2 * nodes, &held).unwrap();
-    let groups = Groups::new(2 * nodes, |slot| slot % 2 == 1);
+    let groups = Groups::new(2 * nodes, Layout::Spatial, |slot| slot % 2 == 1);
     let pattern = Pattern::new(equations, groups, vec![cliques, own]);
     let mut system = System::new(pattern, 2 * nodes, symmetric);
     system.clear(None);
@@ -196,7 +196,7 @@ fn what_is_called_symmetric_is() {
         if equations.count() == 0 || equations.count() > 600 {
             continue;
         }
-        let mut assembly = Assembly::new(model.acting(&stage), equations, &model);
+        let mut assembly = Assembly::new(&stage, equations, &model);
         if !assembly.system.symmetric {
             continue;
         }

@@ -188,7 +188,7 @@ fn rotary<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(N);
     for point in points {
-        point.lifted(|j| Mat3::constant(*j)).add(&Rotary, nodes, weights, &mut out);
+        point.lifted(|j| Mat3::constant(*j)).add(&Rotary { gyroscopic: true }, nodes, weights, &mut out);
     }
     out
 }
@@ -200,7 +200,7 @@ fn body<T: Real, const N: usize>(
 ) -> ElementSystem<T> {
     let mut out = ElementSystem::new(2 * N);
     for point in points {
-        point.lifted(Inertia::lifted).add(&Eccentric, nodes, weights, &mut out);
+        point.lifted(Inertia::lifted).add(&Eccentric { gyroscopic: true }, nodes, weights, &mut out);
     }
     out
 }
@@ -613,7 +613,7 @@ fn rotary_seam_holds<const N: usize>() {
                 |nodes, weights, out| {
                     out.clear();
                     for point in &points {
-                        point.add(&Rotary, nodes, weights, out);
+                        point.add(&Rotary { gyroscopic: true }, nodes, weights, out);
                     }
                 },
                 |nodes| rotary(&points, nodes, Weights::NONE),
@@ -648,7 +648,7 @@ fn body_seam_holds<const N: usize>() {
                 |nodes, weights, out| {
                     out.clear();
                     for point in &points {
-                        point.add(&Eccentric, nodes, weights, out);
+                        point.add(&Eccentric { gyroscopic: true }, nodes, weights, out);
                     }
                 },
                 |nodes| body(&points, nodes, Weights::NONE),

@@ -1,7 +1,7 @@
 //! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional damping.
 
 use super::{Composer, push_volume};
-use crate::deck::{self, Diagnostic, InterpolationWord};
+use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
 use crate::effect::ByOrder;
 use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
@@ -26,7 +26,8 @@ impl Composer<'_> {
             let why = if self.mesh.elements.is_empty() { "no beams" } else { "no dynamic stage" };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
-        let wanted = self.deck.effects.rotary_inertia.as_ref().map(|flag| flag.value);
+        let wanted = self.deck.effects.allow(EffectWord::RotaryInertia);
+        let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
         let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
         let bodies = self.each_inertia(|number, element, found| {
             if found.iter().any(|m| m.offset != Vec3::ZERO) {
@@ -39,15 +40,16 @@ impl Composer<'_> {
                 push_volume(&mut rotary, self.mesh, number, element, |k, _| found[k].about_node);
             }
         });
-        let (mass, rotary, eccentric) =
-            (BeamMass { elements: mass }, RotaryInertia { elements: rotary }, SectionInertia { elements: eccentric });
+        let mass = BeamMass { elements: mass };
+        let rotary = RotaryInertia { elements: rotary, gyroscopic };
+        let eccentric = SectionInertia { elements: eccentric, gyroscopic };
         if mass.elements.is_empty() {
             self.reason(names[0], false, "no section has mass on its centre line");
         } else {
             self.push(mass, "a dynamic stage, and sections with `rhoA`".into());
         }
         match (rotary.elements.is_empty(), wanted) {
-            (_, Some(false)) => self.reason(names[1], false, "switched off in [effects]"),
+            (_, false) => self.reason(names[1], false, "switched off in [effects]"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
             _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
         }
@@ -55,7 +57,7 @@ impl Composer<'_> {
             self.reason(
                 names[3],
                 false,
-                if wanted == Some(false) {
+                if !wanted {
                     "rotary inertia is switched off in [effects], and no relative beam has eccentric mass"
                 } else {
                     "no beam with interpolation = \"relative\" has rotary inertia or eccentric mass"
@@ -63,7 +65,7 @@ impl Composer<'_> {
             );
         } else {
             self.push(
-                RigidBody { name: names[3], bodies },
+                RigidBody { name: names[3], bodies, gyroscopic },
                 "relative beams with rotary inertia or eccentric mass".into(),
             );
         }
@@ -103,7 +105,8 @@ impl Composer<'_> {
             (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
             _ => {
                 let reason = format!("{} [[body]] table(s) and a dynamic stage", bodies.len());
-                self.push(RigidBody { name: "rigid body inertia", bodies }, reason);
+                let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
+                self.push(RigidBody { name: "rigid body inertia", bodies, gyroscopic }, reason);
             }
         }
     }
@@ -150,7 +153,7 @@ impl Composer<'_> {
     /// returns what sits at nodes instead: on beams whose rotations are relative all that turns with the section, because no
     /// chart matters there.
     fn each_inertia(&self, mut visit: impl FnMut(usize, &MeshElement, &[Inertia])) -> Vec<Body> {
-        let rotary = self.deck.effects.rotary_inertia.as_ref().is_none_or(|flag| flag.value);
+        let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let mut nodal = NodalInertia::default();
         self.each_element(|beam, number, element, _| {
             let relative = beam.interpolation == InterpolationWord::Relative;

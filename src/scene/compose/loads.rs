@@ -1,7 +1,7 @@
 //! Loads at nodes and along beams.
 
 use super::{Composer, push_volume};
-use crate::deck::{self, Diagnostic, Frame, InterpolationWord, LoadTarget, LoadVector};
+use crate::deck::{self, Diagnostic, EffectWord, Frame, InterpolationWord, LoadTarget, LoadVector};
 use crate::effect::line_load::{LineLoad, LineLoadKind};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::{ByOrder, Effect};
@@ -27,8 +27,9 @@ impl Composer<'_> {
                 }
             }
         }
+        let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
         for (kind, loads) in kinds.into_iter().zip(loads) {
-            let effect = NodeLoad { kind, loads };
+            let effect = NodeLoad { kind, loads, tangent };
             if effect.loads.is_empty() {
                 self.reason(effect.name(), false, "no such [[load]] at a node");
             } else {
@@ -93,8 +94,9 @@ impl Composer<'_> {
                 push_volume(out, self.mesh, number, element, |_, station| intensity(load, station, amplitude));
             }
         }
+        let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
         for (kind, elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
-            let effect = LineLoad { kind, elements };
+            let effect = LineLoad { kind, elements, tangent };
             if effect.elements.is_empty() {
                 self.reason(effect.name(), false, "no such [[load]] along a beam");
             } else {

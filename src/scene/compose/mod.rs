@@ -8,7 +8,7 @@ mod spins;
 use super::joints::FoundJoint;
 use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
 use super::names;
-use crate::deck::{self, Deck, Diagnostic, InterpolationWord};
+use crate::deck::{self, Deck, Diagnostic, EffectWord, InterpolationWord};
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
 use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
 use crate::effect::rigid_body::Body;
@@ -91,6 +91,7 @@ pub fn compose(
         angles: 0,
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
+    composer.formulation();
     composer.elasticity();
     composer.springs();
     composer.links();
@@ -144,6 +145,32 @@ impl Composer<'_> {
         self.mesh.find_node(self.deck, name).map_err(|d| self.diagnostics.push(d)).ok()
     }
 
+    /// Parts of the mechanics that [effects] may switch off.
+    fn formulation(&mut self) {
+        let beams = !self.mesh.elements.is_empty();
+        let (large, linear) = ("large rotations", "switched off in [effects]: linear about the start of each stage");
+        match self.deck.effects.allow(EffectWord::LargeRotations) {
+            true => self.reason(large, true, "forces and tangents of the present state"),
+            false => self.reason(large, false, linear),
+        }
+        let parts = [
+            (EffectWord::Shear, "shear", "sections have `GA`"),
+            (EffectWord::Extension, "extension", "sections have `EA`"),
+            (
+                EffectWord::GeometricStiffness,
+                "geometric stiffness",
+                "the tangent knows how stress turns with the beams",
+            ),
+        ];
+        for (word, name, why) in parts {
+            match (beams, self.deck.effects.allow(word)) {
+                (false, _) => self.reason(name, false, "no beams"),
+                (true, false) => self.reason(name, false, "switched off in [effects]"),
+                (true, true) => self.reason(name, true, why),
+            }
+        }
+    }
+
     fn elasticity(&mut self) {
         self.elasticity_of::<TotalVectors>(InterpolationWord::Total);
         self.elasticity_of::<RelativeVectors>(InterpolationWord::Relative);
@@ -171,7 +198,9 @@ impl Composer<'_> {
             );
         }
         let count = elements.two.len() + elements.three.len() + elements.four.len();
-        let effect = Arc::new(BeamElasticity::<I>::new(elements));
+        let effect = BeamElasticity::<I>::new(elements);
+        let stressed = self.deck.effects.allow(EffectWord::GeometricStiffness);
+        let effect = Arc::new(if stressed { effect } else { effect.without_geometric_stiffness() });
         self.reason(I::NAME, true, format!("{count} beam elements"));
         self.out.elasticity.push(effect.clone());
         self.out.effects.push(effect.clone());
@@ -209,7 +238,6 @@ impl Composer<'_> {
             "no beam with interpolation = \"total\""
         };
         self.reason("mixed elements", seams, why);
-        self.reason("planar", false, "not supported yet: every scene is simulated in three dimensions");
     }
 }
 

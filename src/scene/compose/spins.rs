@@ -1,7 +1,7 @@
 //! Straight beams whose spin about their own axis nothing resists: no inertia, no support, no other beam.
 
 use super::Composer;
-use crate::deck::{JointKind, MotionWhat, Spanned};
+use crate::deck::{EffectWord, JointKind, MotionWhat, Spanned};
 use crate::effect::spin_hold::{Instance, SpinHold};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
@@ -38,7 +38,7 @@ impl Composer<'_> {
         let straight = nodes.iter().all(|node| aside(node.place) <= STRAIGHT * length);
         let middle = nodes.len() / 2;
         let SectionMatrices { stiffness, mass } = beam.section.at(beam.fractions[middle]);
-        let rotary = self.deck.effects.rotary_inertia.as_ref().is_none_or(|flag| flag.value);
+        let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let own = mass.is_some_and(|mass| mass.offset != Vec3::ZERO || (rotary && mass.about_line.0[0][0] > 0.0));
         if !straight || own || nodes.iter().any(|node| resisted.contains(&node.node.p)) {
             return None;

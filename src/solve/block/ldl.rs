@@ -1,27 +1,30 @@
 //! L D L^T in blocks, of symmetric tangents.
 
 use super::elimination::Elimination;
-use super::tile::{self, Part, Tile};
-use super::{load, tiles};
+use super::tile::{self, Part, Rows, Tile, Width};
+use super::{Factor, load, tiles};
+use crate::real::Instructions;
 use crate::system::System;
 
 /// With Y = L_kk^-1 A_kj right of the diagonal, L_jk = Y^T D_k^-1.
-pub struct Ldl {
-    diagonal: Vec<Tile>,
-    upper: Vec<Tile>,
+pub struct Ldl<const W: usize> {
+    diagonal: Vec<Tile<W>>,
+    upper: Vec<Tile<W>>,
     /// Pivots below zero in the last factorisation
-    pub negative: usize,
+    negative: usize,
 }
 
-impl Ldl {
+impl<const W: usize> Ldl<W>
+where
+    Width<W>: Rows<W>,
+{
     /// Of so many rows, and blocks right of the diagonal.
     pub fn new(rows: usize, blocks: usize) -> Option<Self> {
         Some(Self { diagonal: tiles(rows)?, upper: tiles(blocks)?, negative: 0 })
     }
 
-    /// Factorises; `false` where a pivot is zero or no number.
     #[inline(always)]
-    pub fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
+    fn eliminate(&mut self, elimination: &Elimination, system: &System) -> bool {
         load(elimination, system, &mut self.diagonal, &mut self.upper, None);
         self.negative = 0;
         let mut target = 0;
@@ -47,9 +50,8 @@ impl Ldl {
         true
     }
 
-    /// Solves with the last factorisation.
     #[inline(always)]
-    pub fn solve(&self, elimination: &Elimination, x: &mut [Part]) {
+    fn substitute(&self, elimination: &Elimination, x: &mut [Part<W>]) {
         for (row, factor) in self.diagonal.iter().enumerate() {
             let mut part = x[row];
             tile::solve_forward_symmetric(factor, &mut part);
@@ -60,7 +62,7 @@ impl Ldl {
             x[row] = part;
         }
         for (row, factor) in self.diagonal.iter().enumerate().rev() {
-            let mut sum = [0.0; tile::WIDTH];
+            let mut sum = [0.0; W];
             for k in elimination.neighbours(row) {
                 tile::subtract_times(&mut sum, &self.upper[k], &x[elimination.later[k] as usize]);
             }
@@ -69,5 +71,32 @@ impl Ldl {
             tile::solve_backward_symmetric(factor, &mut part);
             x[row] = part;
         }
+    }
+}
+
+impl<const W: usize> Factor for Ldl<W>
+where
+    Width<W>: Rows<W>,
+{
+    fn name(&self) -> &'static str {
+        "block LDL^T"
+    }
+
+    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
+        Instructions::here().run(
+            #[inline(always)]
+            || self.eliminate(elimination, system),
+        )
+    }
+
+    fn negative(&self) -> Option<usize> {
+        Some(self.negative)
+    }
+
+    fn solve(&self, elimination: &Elimination, x: &mut [f64]) {
+        Instructions::here().run(
+            #[inline(always)]
+            || self.substitute(elimination, x.as_chunks_mut().0),
+        )
     }
 }

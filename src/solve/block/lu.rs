@@ -1,29 +1,32 @@
 //! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal.
 
 use super::elimination::Elimination;
-use super::tile::{self, Part, RowOrder, Tile};
-use super::{load, tiles};
+use super::tile::{self, Part, RowOrder, Rows, Tile, Width};
+use super::{Factor, load, tiles};
+use crate::real::Instructions;
 use crate::system::System;
 
 /// With P A_kk = L U: Y = L^-1 P A_kj right of the diagonal, W = U^-T A_jk^T below it; L_jk = W^T.
-pub struct Lu {
-    diagonal: Vec<Tile>,
-    orders: Vec<RowOrder>,
-    upper: Vec<Tile>,
+pub struct Lu<const W: usize> {
+    diagonal: Vec<Tile<W>>,
+    orders: Vec<RowOrder<W>>,
+    upper: Vec<Tile<W>>,
     /// Transposed, each beside its mirror image in `upper`
-    lower: Vec<Tile>,
+    lower: Vec<Tile<W>>,
 }
 
-impl Lu {
+impl<const W: usize> Lu<W>
+where
+    Width<W>: Rows<W>,
+{
     /// Of so many rows, and blocks right of the diagonal.
     pub fn new(rows: usize, blocks: usize) -> Option<Self> {
-        let orders = vec![[0; tile::WIDTH]; rows];
+        let orders = vec![[0; W]; rows];
         Some(Self { diagonal: tiles(rows)?, orders, upper: tiles(blocks)?, lower: tiles(blocks)? })
     }
 
-    /// Factorises; `false` where a pivot is zero or no number.
     #[inline(always)]
-    pub fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
+    fn eliminate(&mut self, elimination: &Elimination, system: &System) -> bool {
         load(elimination, system, &mut self.diagonal, &mut self.upper, Some(&mut self.lower));
         let mut target = 0;
         for row in 0..self.diagonal.len() {
@@ -52,9 +55,8 @@ impl Lu {
         true
     }
 
-    /// Solves with the last factorisation.
     #[inline(always)]
-    pub fn solve(&self, elimination: &Elimination, x: &mut [Part]) {
+    fn substitute(&self, elimination: &Elimination, x: &mut [Part<W>]) {
         for (row, factor) in self.diagonal.iter().enumerate() {
             let mut part = x[row];
             tile::solve_forward(factor, &self.orders[row], &mut part);
@@ -71,5 +73,32 @@ impl Lu {
             tile::solve_backward(factor, &mut part);
             x[row] = part;
         }
+    }
+}
+
+impl<const W: usize> Factor for Lu<W>
+where
+    Width<W>: Rows<W>,
+{
+    fn name(&self) -> &'static str {
+        "block LU"
+    }
+
+    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
+        Instructions::here().run(
+            #[inline(always)]
+            || self.eliminate(elimination, system),
+        )
+    }
+
+    fn negative(&self) -> Option<usize> {
+        None
+    }
+
+    fn solve(&self, elimination: &Elimination, x: &mut [f64]) {
+        Instructions::here().run(
+            #[inline(always)]
+            || self.substitute(elimination, x.as_chunks_mut().0),
+        )
     }
 }

@@ -1,0 +1,49 @@
+//! The deck as `[effects]` wants it: tables that are switched off are taken out before the scene is built.
+
+use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, SpringBody, StageBody};
+use std::borrow::Cow;
+
+/// The deck without what is switched off and stands in tables of its own.
+pub fn deck(deck: &Deck) -> Cow<'_, Deck> {
+    let [gravity, damping] = [EffectWord::Gravity, EffectWord::Damping].map(|word| deck.effects.allow(word));
+    if gravity && damping {
+        return Cow::Borrowed(deck);
+    }
+    let mut deck = deck.clone();
+    if !gravity {
+        deck.gravity = None;
+    }
+    if !damping {
+        take_dampers_out(&mut deck);
+    }
+    Cow::Owned(deck)
+}
+
+fn take_dampers_out(deck: &mut Deck) {
+    deck.damping = None;
+    deck.joints.iter_mut().for_each(|joint| joint.damping = 0.0);
+    for spring in &mut deck.springs {
+        match &mut spring.body {
+            SpringBody::Ground { damping, .. } => *damping = [0.0; 6],
+            SpringBody::Between { damping, .. } => *damping = 0.0,
+        }
+    }
+}
+
+/// Linear stages have no increments of rotation, and follow no paths.
+pub fn refuse_impossible(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
+    if deck.effects.allow(EffectWord::LargeRotations) {
+        return;
+    }
+    for stage in &deck.stages {
+        let why = match stage.body {
+            StageBody::Path { .. } => "control = \"arc_length\" follows what is not linear",
+            StageBody::Dynamic { scheme: SchemeWord::LieGeneralizedAlpha(_), .. } => {
+                "lie_generalized_alpha has increments of large rotations for unknowns"
+            }
+            _ => continue,
+        };
+        let message = format!("large_rotations = false makes this stage linear, but {why}");
+        diagnostics.push(Diagnostic::error(message, stage.span.clone()));
+    }
+}

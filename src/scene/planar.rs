@@ -1,0 +1,62 @@
+//! Whether a scene is simulated in a plane, and why.
+
+use super::compose::Reason;
+use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, StageBody};
+use crate::drive::InitialMotion;
+use crate::model::Model;
+use crate::system::{Aspect, Plane};
+
+/// The plane of a scene, if it has one and the deck does not refuse it.
+pub fn plane(
+    deck: &Deck,
+    model: &Model,
+    initial: &[InitialMotion],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> (Option<Plane>, Reason) {
+    let wanted = deck.effects.said(EffectWord::Planar);
+    let found = match wanted {
+        Some(flag) if !flag.value => Err("off by [effects]".to_string()),
+        _ => find(deck, model, initial),
+    };
+    let name = "planar";
+    match found {
+        Ok(plane) => {
+            let [x, y, z] = plane.normal().0;
+            let which = if [x, y, z].iter().filter(|c| **c == 0.0).count() == 2 {
+                ["x = constant", "y = constant", "z = constant"][[x, y, z].iter().position(|c| *c != 0.0).unwrap_or(2)]
+                    .into()
+            } else {
+                format!("the plane normal to [{x:.6}, {y:.6}, {z:.6}]")
+            };
+            let reason = format!(
+                "all of it lies in {which} and is loaded there: three unknowns a node in static and dynamic stages"
+            );
+            (Some(plane), Reason { name, active: true, reason })
+        }
+        Err(reason) => {
+            if let Some(flag) = wanted.filter(|flag| flag.value) {
+                let message = format!("planar = true, but this scene is not planar ({reason})");
+                diagnostics.push(Diagnostic::error(message, flag.span.clone()));
+            }
+            (None, Reason { name, active: false, reason })
+        }
+    }
+}
+
+fn find(deck: &Deck, model: &Model, initial: &[InitialMotion]) -> Result<Plane, String> {
+    if model.linear {
+        return Err("large_rotations = false: linear stages are simulated in space".into());
+    }
+    let is_lie =
+        |body: &StageBody| matches!(body, StageBody::Dynamic { scheme: SchemeWord::LieGeneralizedAlpha(_), .. });
+    if deck.stages.iter().any(|stage| is_lie(&stage.body)) {
+        return Err("lie_generalized_alpha: no kernel for planes".into());
+    }
+    Plane::of(model.length, &|show| {
+        model.aspects(show);
+        for motion in initial {
+            show("initial motion", Aspect::Vector(motion.velocity));
+            show("initial motion", Aspect::Axial(motion.spin));
+        }
+    })
+}

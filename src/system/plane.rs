@@ -1,0 +1,232 @@
+//! Scenes that stay in one plane: their own mirror images in it.
+//!
+//! What lies in the plane and is loaded in it moves in it, since a motion out of it would have to choose a side. Then displacements keep
+//! to two directions, and rotation vectors to the normal of the plane.
+
+use crate::tensor::{Mat3, Vec3};
+
+/// What lies less far out of a plane, relative to its size, lies in it but for round-off.
+const ROUND_OFF: f64 = 1e-13;
+
+/// A normal that is so near to an axis is this axis.
+const SNAP: f64 = 1e-12;
+
+/// Directions that differ by less do not tell a plane.
+const NO_PLANE: f64 = 1e-6;
+
+/// Something that a scene is made of, as a mirror sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aspect {
+    /// A place
+    Place(Vec3),
+    /// A displacement, velocity or force
+    Vector(Vec3),
+    /// A rotation, spin or moment
+    Axial(Vec3),
+    /// An axis whose sense does not matter
+    Line(Vec3),
+    /// What maps vectors to vectors, or axial ones to axial ones
+    Tensor(Mat3),
+    /// What maps axial vectors to vectors
+    Coupling(Mat3),
+    /// What is never treated in a plane
+    Spatial,
+}
+
+/// Shows the parts of a scene, each with whose it is.
+pub type Shown<'a> = dyn Fn(&mut dyn FnMut(&'static str, Aspect)) + 'a;
+
+/// A plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    axes: Mat3,
+}
+
+impl Plane {
+    /// The plane with this normal; `None` for zero.
+    pub fn normal_to(normal: Vec3) -> Option<Self> {
+        let mut e = normal.normalized()?;
+        let nearest = (0..3).fold(0, |best, k| if e.0[k].abs() > e.0[best].abs() { k } else { best });
+        if e.0[nearest] < 0.0 {
+            e = -e;
+        }
+        if (e - Vec3::UNIT[nearest]).norm() < SNAP {
+            let [x, y, z] = Vec3::UNIT;
+            let [a, b] = [[y, z], [z, x], [x, y]][nearest];
+            return Some(Self { axes: Mat3::from_columns(a, b, Vec3::UNIT[nearest]) });
+        }
+        let aside = Vec3::UNIT[(nearest + 1) % 3];
+        let a = (aside - e * e.dot(aside)).normalized()?;
+        Some(Self { axes: Mat3::from_columns(a, e.cross(a), e) })
+    }
+
+    /// Two axes in the plane and its normal, as columns.
+    #[inline]
+    pub fn axes(&self) -> &Mat3 {
+        &self.axes
+    }
+
+    /// The normal, a unit vector.
+    pub fn normal(&self) -> Vec3 {
+        self.axes.column(2)
+    }
+
+    /// Whether these axes are the global ones.
+    pub fn is_global(&self) -> bool {
+        self.axes == Mat3::IDENTITY
+    }
+
+    /// Whether a vector is normal to the plane.
+    pub fn is_normal(&self, v: Vec3) -> bool {
+        let e = self.normal();
+        (v - e * v.dot(e)).norm() <= ROUND_OFF * v.norm()
+    }
+
+    /// Whether a vector lies in the plane.
+    pub fn is_along(&self, v: Vec3) -> bool {
+        v.dot(self.normal()).abs() <= ROUND_OFF * v.norm()
+    }
+
+    /// Whether something is its own mirror image; places are compared with `origin`, a point of the plane, in a scene so long.
+    fn mirrors(&self, aspect: &Aspect, origin: Vec3, length: f64) -> bool {
+        let e = self.normal();
+        // Its own image where it maps the normal to the normal, and the plane to itself.
+        let across = |m: Mat3| {
+            let (left, right) = (m.transpose_mul(e), m * e);
+            let along = e * e.dot(right);
+            (left - along).norm().max((right - along).norm())
+        };
+        match *aspect {
+            Aspect::Place(x) => (x - origin).dot(e).abs() <= ROUND_OFF * length.max(x.norm()),
+            Aspect::Vector(v) => self.is_along(v),
+            Aspect::Axial(v) => self.is_normal(v),
+            Aspect::Line(v) => self.is_along(v) || self.is_normal(v),
+            Aspect::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
+            // Only the normal is mapped, and into the plane.
+            Aspect::Coupling(m) => {
+                let rest = m - (m * e).outer(e);
+                rest.max_abs().max((m * e).dot(e).abs()) <= ROUND_OFF * m.max_abs()
+            }
+            Aspect::Spatial => false,
+        }
+    }
+
+    /// The plane of a scene with this length, whose parts are `shown`, each with whose it is. `Err`: why there is none.
+    pub fn of(length: f64, shown: &Shown) -> Result<Self, String> {
+        let search = Search::through(length, shown);
+        if let Some(name) = search.spatial {
+            return Err(format!("{name}: no kernel for planes"));
+        }
+        let normal = search.normal().ok_or("nothing tells a plane: all lies in one line")?;
+        let plane = Self::normal_to(normal).ok_or("no plane")?;
+        let mut apart = None;
+        shown(&mut |name, aspect| {
+            if apart.is_none() && !plane.mirrors(&aspect, search.origin.unwrap_or(Vec3::ZERO), length) {
+                apart = Some(name);
+            }
+        });
+        match apart {
+            None => Ok(plane),
+            Some(name) => Err(format!("{name}: not mirrored in a plane that the others share")),
+        }
+    }
+}
+
+/// What is known of a plane while it is looked for.
+#[derive(Default)]
+struct Search {
+    origin: Option<Vec3>,
+    /// The longest vector in the plane, places measured from the origin, others as long as the scene
+    longest: Vec3,
+    /// The largest product of it and another
+    product: Vec3,
+    axial: Option<Vec3>,
+    spatial: Option<&'static str>,
+    length: f64,
+}
+
+impl Search {
+    fn through(length: f64, shown: &Shown) -> Self {
+        let mut search = Self { length, ..Self::default() };
+        shown(&mut |name, aspect| search.look(name, &aspect));
+        shown(&mut |_, aspect| {
+            let product = search.vector(&aspect).map_or(Vec3::ZERO, |v| search.longest.cross(v));
+            if product.norm() > search.product.norm() {
+                search.product = product;
+            }
+        });
+        search
+    }
+
+    fn look(&mut self, name: &'static str, aspect: &Aspect) {
+        match *aspect {
+            Aspect::Place(x) => _ = self.origin.get_or_insert(x),
+            Aspect::Axial(v) if v != Vec3::ZERO && self.axial.is_none() => self.axial = Some(v),
+            Aspect::Spatial if self.spatial.is_none() => self.spatial = Some(name),
+            _ => {}
+        }
+        if let Some(v) = self.vector(aspect).filter(|v| v.norm() > self.longest.norm()) {
+            self.longest = v;
+        }
+    }
+
+    fn vector(&self, aspect: &Aspect) -> Option<Vec3> {
+        match *aspect {
+            Aspect::Place(x) => self.origin.map(|origin| x - origin),
+            Aspect::Vector(v) => v.normalized().map(|v| v * self.length),
+            _ => None,
+        }
+    }
+
+    fn normal(&self) -> Option<Vec3> {
+        let tells = self.product.norm() > NO_PLANE * self.longest.squared().max(f64::MIN_POSITIVE);
+        self.axial.or(tells.then_some(self.product))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TILTED: Vec3 = Vec3([0.36, 0.48, 0.8]);
+
+    fn plane_of(parts: &[Aspect]) -> Result<Plane, String> {
+        Plane::of(1.0, &|show| parts.iter().for_each(|&aspect| show("part", aspect)))
+    }
+
+    #[test]
+    fn axes_are_right_handed_and_coordinate_planes_exact() {
+        for normal in [Vec3::UNIT[0], Vec3::UNIT[1], Vec3::UNIT[2] * -3.0, TILTED, Vec3([1.0, 1e-9, 0.0])] {
+            let plane = Plane::normal_to(normal).unwrap();
+            let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+            assert!((a.cross(b) - e).norm() < 1e-15 && plane.is_normal(normal));
+        }
+        assert!(Plane::normal_to(Vec3([1e-14, 0.0, -2.0])).unwrap().is_global());
+    }
+
+    #[test]
+    fn loads_turn_a_line_into_a_plane() {
+        let line = [Aspect::Place(Vec3::ZERO), Aspect::Place(Vec3::UNIT[0])];
+        assert!(plane_of(&line).unwrap_err().contains("one line"));
+        let with = |aspect| plane_of(&[line[0], line[1], aspect]);
+        assert_eq!(with(Aspect::Vector(Vec3::UNIT[1])).unwrap().normal(), Vec3::UNIT[2]);
+        assert_eq!(with(Aspect::Axial(Vec3::UNIT[1] * -1.0)).unwrap().normal(), Vec3::UNIT[1]);
+        assert!(with(Aspect::Axial(Vec3::UNIT[0])).is_err(), "torsion leaves every plane");
+    }
+
+    #[test]
+    fn what_stands_aside_by_more_than_round_off_makes_a_scene_spatial() {
+        let plane = Plane::normal_to(TILTED).unwrap();
+        let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+        let base = [Aspect::Place(a), Aspect::Place(b * 0.5), Aspect::Vector(a + b)];
+        let with = |aspect| plane_of(&[&base[..], &[aspect]].concat());
+        let fits = |aspect| with(aspect).is_ok_and(|found| (found.normal() - e).norm() < 1e-13);
+        assert!(fits(Aspect::Place(a * 3.0 + e * 1e-16)) && !fits(Aspect::Place(a * 3.0 + e * 1e-11)));
+        assert!(fits(Aspect::Line(e)) && fits(Aspect::Line(a)) && !fits(Aspect::Line(a + e)));
+        assert!(fits(Aspect::Axial(e)) && !fits(Aspect::Axial(e + a * 1e-9)));
+        let section = a.outer(a) + b.outer(b).scale(3.0) + a.outer(b) + b.outer(a) + e.outer(e).scale(7.0);
+        assert!(fits(Aspect::Tensor(section)) && !fits(Aspect::Tensor(section + a.outer(e).scale(1e-9))));
+        assert!(fits(Aspect::Coupling(a.outer(e))) && !fits(Aspect::Coupling(e.outer(a))));
+        assert!(!fits(Aspect::Coupling(e.outer(e))) && !fits(Aspect::Spatial));
+    }
+}

@@ -1,0 +1,189 @@
+//! Effects that are forced off, and the study that takes them out one by one.
+
+use beamsim::deck::{self, EffectWord};
+use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot};
+use beamsim::scene;
+use beamsim::study::ablation::{Ablation, ablate};
+use beamsim::tensor::Vec3;
+
+/// The state of the last node, row by row.
+#[derive(Default)]
+struct Tip(Vec<[Vec3; 4]>);
+
+impl Observer for Tip {
+    fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
+        let [u, p] = [at.state.q.len() - 2, at.state.q.len() - 1];
+        self.0.push([at.state.q[u], at.state.q[p], at.state.v[u], at.state.v[p]]);
+        Ok(())
+    }
+}
+
+fn run(text: &str) -> (Vec<[Vec3; 4]>, Counters) {
+    let (scene, _) = scene::from_text(text).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
+    let mut tip = Tip::default();
+    let (ended, counters) = Run::new(scene.plan, &mut tip).finish();
+    ended.unwrap_or_else(|failure| panic!("{failure}\n{text}"));
+    (tip.0, counters)
+}
+
+fn last(text: &str) -> [Vec3; 4] {
+    *run(text).0.last().unwrap()
+}
+
+/// A cantilever along x of length 2, exact for forces at its end, with what follows its tables.
+fn cantilever(rest: &str) -> String {
+    format!(
+        "[point]\nroot = [0, 0, 0]\ntip = [2, 0, 0]\n[section.s]\nEA = 500\nGA = 60\nGJ = 20\nEI = 40\nrhoA = 1.5\nrhoJ = [0.02, 0.01, 0.01]\n\
+         [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 2\norder = 3\n\
+         [[support]]\nat = \"root\"\nfix = \"all\"\n{rest}"
+    )
+}
+
+const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 4\n";
+const DYNAMIC: &str = "[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.05\ntolerance = 1e-12\n";
+
+fn force(x: f64, y: f64) -> String {
+    format!("[[load]]\nat = \"tip\"\nforce = [{x}, {y}, 0]\n")
+}
+
+fn close(came: f64, exact: f64, tolerance: f64) {
+    assert!((came - exact).abs() <= tolerance * exact.abs(), "{came} instead of {exact}");
+}
+
+#[test]
+fn linear_statics_is_timoshenkos_beam_however_large_the_load() {
+    for size in [1e-3, 1.0, 1e3] {
+        let text =
+            cantilever(&format!("{}{STATIC}[effects]\nlarge_rotations = false\n", force(2.0 * size, 3.0 * size)));
+        let (rows, counters) = run(&text);
+        let [u, p, ..] = rows.last().unwrap();
+        close(u.0[1], size * 3.0 * (8.0 / (3.0 * 40.0) + 2.0 / 60.0), 1e-10);
+        close(u.0[0], size * 2.0 * 2.0 / 500.0, 1e-10);
+        close(p.0[2], size * 3.0 * 4.0 / (2.0 * 40.0), 1e-10);
+        // One for the look for mechanisms is not counted; each level takes the same factors.
+        assert_eq!((counters.work.factorisations, counters.steps), (1, 4));
+    }
+}
+
+#[test]
+fn linear_dynamics_is_that_of_small_motions() {
+    let linear = |size: f64| {
+        let effects = "[effects]\nlarge_rotations = false\n[damping]\nstiffness = 0.01\nmass = 0.1\n";
+        last(&cantilever(&format!("{}{DYNAMIC}{effects}", force(0.0, size))))
+    };
+    let small = last(&cantilever(&format!("{}{DYNAMIC}[damping]\nstiffness = 0.01\nmass = 0.1\n", force(0.0, 1e-5))));
+    let (one, thousand) = (linear(1.0), linear(1e3));
+    for k in 0..4 {
+        let (one, thousand, small) = (one[k], thousand[k], small[k]);
+        assert!((thousand - one * 1e3).norm() <= 1e-9 * thousand.norm(), "superposition");
+        assert!((small * 1e5 - one).norm() <= 1e-5 * one.norm(), "the small motion {small:?} of {one:?}");
+    }
+}
+
+/// A prescribed displacement enters a linear stage through the tangent.
+#[test]
+fn linear_stages_follow_prescribed_motions() {
+    let text = cantilever(&format!("[[motion]]\nat = \"tip\"\nuy = 5\n{STATIC}[effects]\nlarge_rotations = false\n"));
+    let [u, p, ..] = last(&text);
+    let force = 5.0 / (8.0 / (3.0 * 40.0) + 2.0 / 60.0);
+    close(u.0[1], 5.0, 1e-12);
+    close(p.0[2], force * 4.0 / (2.0 * 40.0), 1e-10);
+}
+
+#[test]
+fn what_is_rigid_keeps_a_hundredth_of_its_strain() {
+    let linear = "large_rotations = false\n";
+    let bent =
+        |effects: &str| last(&cantilever(&format!("{}{STATIC}[effects]\n{linear}{effects}", force(2.0, 3.0))))[0];
+    close(bent("shear = false\n").0[1], 3.0 * (8.0 / (3.0 * 40.0) + 2.0 / 60.0 / 1e2), 1e-9);
+    close(bent("shear = false\n").0[0], 2.0 * 2.0 / 500.0, 1e-9);
+    close(bent("extension = false\n").0[0], 2.0 * 2.0 / 500.0 / 1e2, 1e-9);
+}
+
+#[test]
+fn what_is_switched_off_is_as_if_it_were_not_there() {
+    let damping = "[damping]\nmass = 0.3\nstiffness = 0.02\n";
+    let spring = |damper: f64| {
+        format!("[[spring]]\nat = \"tip\"\nstiffness = [3, 3, 3, 0, 0, 0]\ndamping = [{damper}, 0, 0, 0, 0, 0]\n")
+    };
+    let undamped = run(&cantilever(&format!("{}{}{DYNAMIC}", force(1.0, 4.0), spring(0.0)))).0;
+    let off = "[effects]\ndamping = false\n";
+    let forced = run(&cantilever(&format!("{}{}{damping}{DYNAMIC}{off}", force(1.0, 4.0), spring(2.0)))).0;
+    assert_eq!(undamped, forced);
+    let weight =
+        |rest: &str| format!("gravity = [0, -9.81, 0]\n{}", cantilever(&format!("{}{STATIC}{rest}", force(1.0, 4.0))));
+    assert_eq!(
+        run(&weight("[effects]\ngravity = false\n")).0,
+        run(&cantilever(&format!("{}{STATIC}", force(1.0, 4.0)))).0
+    );
+    assert_ne!(run(&weight("")).0, run(&weight("[effects]\ngravity = false\n")).0);
+}
+
+/// A free body that spins near its middle axis tumbles; without gyroscopic moments its material spin stays what it is.
+#[test]
+fn without_gyroscopic_moments_nothing_tumbles() {
+    let body = |effects: &str| {
+        format!(
+            "[point]\np = [0, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\ninertia = [1, 2, 3]\n[[initial]]\nspin = [0.01, 3, 0]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 6\nstep = 0.01\n{effects}"
+        )
+    };
+    let spin = |effects: &str| {
+        let [_, p, _, rate] = last(&body(effects));
+        beamsim::rotation::Rotation::new(p).t * rate
+    };
+    assert!((spin("[effects]\ngyroscopic = false\n") - Vec3([0.01, 3.0, 0.0])).norm() < 1e-5);
+    assert!((spin("") - Vec3([0.01, 3.0, 0.0])).norm() > 1.0);
+}
+
+#[test]
+fn tangents_change_iterations_and_no_answer() {
+    let follower = "[[load]]\nat = \"tip\"\nforce = [0, 12, 0]\nframe = \"body\"\n";
+    let text =
+        |effects: &str| cantilever(&format!("{follower}{STATIC}tolerance = 1e-12\nmax_iterations = 200\n{effects}"));
+    let (whole, work) = run(&text(""));
+    for effects in ["follower_tangent = false", "geometric_stiffness = false"] {
+        let (rows, slower) = run(&text(&format!("[effects]\n{effects}\n")));
+        assert!((rows.last().unwrap()[0] - whole.last().unwrap()[0]).norm() < 1e-9, "{effects}");
+        assert!(slower.work.iterations > work.work.iterations, "{effects}");
+    }
+}
+
+fn study(text: &str, tolerance: f64) -> Ablation {
+    let (scene, _) = scene::from_text(text).unwrap();
+    let (deck, _) = deck::read(text).unwrap();
+    let Ok(found) = ablate(&deck, &scene, tolerance, &|| None, &mut |_| ()) else { panic!("the scene runs") };
+    found
+}
+
+#[test]
+fn a_study_tells_what_each_effect_changes() {
+    let found = study(&cantilever(&format!("{}{STATIC}", force(0.0, 0.01))), 1e-3);
+    let without = |word: EffectWord| found.variants.iter().find(|variant| variant.without == [word]).unwrap();
+    // A hundredth of a degree: shear makes a third of the displacement, and the rest is linear.
+    let (change, column) = without(EffectWord::Shear).largest();
+    close(change, 0.99 * 2.0 / 60.0 / (8.0 / (3.0 * 40.0) + 2.0 / 60.0), 1e-3);
+    assert_eq!(found.columns[column], "tip.uy");
+    assert!(without(EffectWord::LargeRotations).largest().0 < 1e-3);
+    assert!(without(EffectWord::Planar).largest().0 < 1e-10);
+    assert_eq!(found.variants[0].without, [EffectWord::Shear], "what changes most stands first");
+    assert!(found.absent.contains(&EffectWord::Gravity) && found.absent.contains(&EffectWord::Gyroscopic));
+    assert!(found.cheapest.largest().0 <= 1e-3 && !found.cheapest.without.contains(&EffectWord::Shear));
+    let csv = found.to_csv();
+    assert!(csv.starts_with("without,status,iterations,seconds,output,change\n,finished,"));
+    assert_eq!(csv.lines().filter(|line| line.starts_with("shear,finished,")).count(), found.columns.len());
+}
+
+/// What cannot be taken out is told, and does not end the study.
+#[test]
+fn a_variant_that_fails_is_a_result() {
+    let hanging = "[[spring]]\nat = \"tip\"\nstiffness = [0, 0, 0, 0, 0, 5]\n";
+    let text = cantilever(&format!(
+        "{}{hanging}[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = 4\n",
+        force(0.0, 3.0)
+    ));
+    let found = study(&text, 1e-3);
+    let linear = found.variants.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
+    assert!(linear.largest().0.is_infinite() && linear.failure().contains("arc_length"));
+    assert!(found.to_csv().contains("large_rotations,failed"));
+}
