@@ -4,7 +4,7 @@ use super::run::{folder, status_of, twin};
 use super::{Status, Verdict, load, say, signals};
 use crate::deck::EffectWord;
 use crate::output::PartFile;
-use crate::study::ablation::{Ablation, Refused, Variant, ablate};
+use crate::study::ablation::{Ablation, Variant, ablate};
 use std::path::{Path, PathBuf};
 
 /// Studies decks one after the other.
@@ -48,10 +48,8 @@ fn study(
     };
     let name = load::name(path);
     let mut progress = |what: &str| say::note(&format!("{name}: {what}"));
-    let found = ablate(&deck, &scene, tolerance, &signals::caught, &mut progress).map_err(|refused| match refused {
-        Refused::Failed(failure) => (status_of(&failure), failure.name(), failure.to_string()),
-        Refused::NoScene(message) => (Status::Wrong, "deck", message),
-    })?;
+    let found = ablate(&deck, &scene, tolerance, &signals::caught, &mut progress)
+        .map_err(|failure| (status_of(&failure), failure.name(), failure.to_string()))?;
     tell(&name, scene.title.as_deref(), &found, tolerance);
     let folder = folder(out, &name, several);
     let written = PartFile::written(&folder, "effects.csv", found.to_csv().as_bytes());

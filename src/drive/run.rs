@@ -273,6 +273,8 @@ pub struct Run<'o> {
     pub(super) soft: bool,
     /// The plane that the stage is treated in
     pub(super) plane: Option<Plane>,
+    /// The state in which the first linear stage began
+    origin: Option<State>,
     /// Of earlier stages
     cutbacks_before: u64,
     moving: bool,
@@ -313,6 +315,7 @@ impl<'o> Run<'o> {
             told: Told::default(),
             soft: false,
             plane: None,
+            origin: None,
             cutbacks_before: 0,
             moving: false,
         }
@@ -373,11 +376,8 @@ impl<'o> Run<'o> {
         let equations = begun.map_err(|error| self.describe(error))?;
         let slots = self.model.slots.len();
         self.plane = equations.plane().copied();
-        let mut assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
-        if self.is_linear() {
-            let linear = assembly.linearise(&self.model, &self.state);
-            linear.map_err(|conflict| self.describe(StageError::Conflict(conflict)))?;
-        }
+        self.warn_of_space(kind);
+        let assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
         let Some(solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
             return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
         };
@@ -396,7 +396,21 @@ impl<'o> Run<'o> {
         })
     }
 
-    /// Whether the stage is linear about the state in which it begins.
+    /// Where the stage is linear, it is so about the state in which the first such stage began, and the springs and loads that act when it
+    /// begins itself.
+    pub(super) fn linearise(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        if !self.is_linear() {
+            return Ok(());
+        }
+        let mut origin = self.origin.get_or_insert_with(|| self.state.clone()).clone();
+        (origin.time, origin.load) = (self.state.time, self.state.load);
+        origin.amplitude.copy_from_slice(&self.state.amplitude);
+        origin.amplitude_rates.copy_from_slice(&self.state.amplitude_rates);
+        let linear = workshop.assembly.linearise(&self.model, &origin);
+        linear.map_err(|conflict| self.describe(StageError::Conflict(conflict)))
+    }
+
+    /// Whether the stage is linear.
     pub(super) fn is_linear(&self) -> bool {
         self.model.linear && matches!(self.plan.stages[self.stage].work.kind(), StageKind::Static | StageKind::Dynamic)
     }
@@ -428,6 +442,9 @@ impl<'o> Run<'o> {
     /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
     pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
         self.refuse_infinities()?;
+        if let Some(plane) = &self.plane {
+            self.model.flatten(plane, &mut self.state);
+        }
         self.wind()?;
         self.model.remember(&mut self.state);
         self.judge_mesh()?;

@@ -30,6 +30,7 @@ impl Run<'_> {
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);
         self.change_charts(None);
+        self.linearise(workshop)?;
         self.refuse_loose(workshop, method)?;
         self.refuse_loose_in_space(method.weights())?;
         self.close_joints(workshop)?;

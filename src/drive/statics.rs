@@ -69,6 +69,7 @@ impl Run<'_> {
             charts::switch(&mut self.state, &self.model.rotations, charts::STATIC_BAND, None);
             charts::freeze(&mut self.state, &self.model.elements);
         }
+        self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
         if newton.solver.factorise(&assembly.system)

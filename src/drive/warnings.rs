@@ -2,7 +2,7 @@
 
 use super::guard::EnergyGuard;
 use super::run::{Run, Workshop};
-use crate::model::charts;
+use crate::model::{StageKind, charts};
 use crate::system::Slot;
 
 /// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
@@ -95,12 +95,23 @@ impl Run<'_> {
         }
     }
 
+    /// A planar scene that a stage does not find in its plane.
+    pub(super) fn warn_of_space(&mut self, kind: StageKind) {
+        let planar = self.model.plane.is_some() && matches!(kind, StageKind::Static | StageKind::Dynamic);
+        if planar && self.plane.is_none() {
+            let stage = self.stage + 1;
+            self.observer.warn(&format!(
+                "stage {stage} is simulated in space: the state in which it begins is not in the plane of the scene to the last digits"
+            ));
+        }
+    }
+
     /// The plane would be left.
     pub(super) fn warn_out_of_plane(&mut self, count: usize) {
         self.told.unstable = Some(self.stage);
         let at = self.moment();
         self.observer.warn(&format!(
-            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in;              what it would do is seen with a small load or imperfection out of the plane"
+            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in: what it would do is seen with a small load or imperfection out of the plane"
         ));
     }
 

@@ -1,11 +1,13 @@
 //! Translational inertia of beams without eccentric mass: the consistent mass matrix, free of charts.
 
+use super::planar_inertia::PlanarMass;
 use super::volume::VolumeElements;
 use super::{Effect, Energy, Momentum};
 use crate::kernel::Weights;
 use crate::kernel::inertia::Translation;
 use crate::kernel::volume::Blocks;
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
+use std::sync::Arc;
 
 /// All beam elements with mass on their centre line, by their mass per length.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +35,10 @@ impl Effect for BeamMass {
 
     fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {
         // On the centre line, which the beams' elasticity shows.
+    }
+
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Arc<dyn Effect>> {
+        Some(Arc::new(PlanarMass::new(self, *plane)))
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -12,6 +12,7 @@ pub mod link;
 pub mod mass_damping;
 pub mod node_load;
 pub mod planar_elasticity;
+pub mod planar_inertia;
 pub mod rigid_body;
 pub mod rotary_inertia;
 pub mod rotating_frame;

@@ -1,10 +1,12 @@
 //! Rigid bodies at nodes, with their mass centre at an offset.
 
+use super::planar_inertia::PlanarBodies;
 use super::{Effect, Energy, Momentum, inertia_aspects, quadratic};
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, State};
 use crate::tensor::Vec3;
+use std::sync::Arc;
 
 /// A body.
 #[derive(Clone, Copy, Debug)]
@@ -50,15 +52,12 @@ impl Effect for RigidBody {
         }
     }
 
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Arc<dyn Effect>> {
+        Some(Arc::new(PlanarBodies::new(self, *plane)))
+    }
+
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        let mut system = ElementSystem::new(2);
-        for (k, body) in self.bodies.iter().enumerate() {
-            let spin = at.spin(body.node.p).with_gyroscopic_forces(self.gyroscopic);
-            let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &spin, weights);
-            system.clear();
-            force.write(&mut system);
-            out.add(k, &system);
-        }
+        (0..self.bodies.len()).for_each(|k| self.add_one(k, at, weights, out));
     }
 
     fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
@@ -73,6 +72,17 @@ impl Effect for RigidBody {
         let mut sum = Momentum::ZERO;
         self.bodies.iter().for_each(|b| sum.add(momentum(&b.inertia, b.place, &at.motion(b.node), 1.0)));
         sum
+    }
+}
+
+impl RigidBody {
+    /// Adds body `k`.
+    pub(super) fn add_one(&self, k: usize, at: &State, weights: Weights, out: &mut Sink) {
+        let (body, mut system) = (&self.bodies[k], ElementSystem::new(2));
+        let spin = at.spin(body.node.p).with_gyroscopic_forces(self.gyroscopic);
+        let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &spin, weights);
+        force.write(&mut system);
+        out.add(k, &system);
     }
 }
 

@@ -10,6 +10,8 @@
 
 use super::beam::StiffnessPoint;
 use super::elastic::Stress;
+use super::element::Weights;
+use super::inertia::Inertia;
 use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::rotation::Series;
 use crate::tensor::{Mat3, Vec3};
@@ -267,6 +269,75 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
             z + cos * along[1] - sin * along[0] - y[0] * turned,
             kappa + self.sum(&self.slope, |i| change[i].angle),
         ])
+    }
+}
+
+/// The mass properties of a body at its node, in the axes of the plane.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarBody<T = f64> {
+    /// Mass
+    pub mass: T,
+    /// The mass centre from the node, in the initial placement
+    pub offset: [T; 2],
+    /// Inertia about the node, against rotation in the plane
+    pub about_node: T,
+}
+
+impl PlanarBody {
+    /// What of mass properties matters in the plane with these axes (columns, the third one normal).
+    pub fn new(inertia: &Inertia, axes: &Mat3) -> Self {
+        let [x, y, _] = axes.transpose_mul(inertia.offset).0;
+        let normal = axes.column(2);
+        Self { mass: inertia.mass, offset: [x, y], about_node: normal.dot(inertia.about_node * normal) }
+    }
+}
+
+impl Pack for PlanarBody {
+    type Packed = PlanarBody<Lanes>;
+
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        PlanarBody { mass: pack!(of.mass), offset: pack!(of.offset), about_node: pack!(of.about_node) }
+    }
+}
+
+impl<T: Real> PlanarBody<T> {
+    /// Force and tangent. With the spin w and its rate w', d the offset turned into its present place, and e the normal
+    ///
+    /// ```text
+    /// f_u = m (u'' + w' e x d - w^2 d),   f_theta = J0 w' + m (d x u'').e
+    /// ```
+    ///
+    /// `acceleration` is u'', and `spins` are w and w'.
+    #[inline(always)]
+    pub fn evaluate(&self, acceleration: [T; 2], angle: T, spins: [T; 2], weights: Weights) -> PlanarSystem<1, T> {
+        let ([ax, ay], [w, rate], m) = (acceleration, spins, self.mass);
+        let [cos, over_angle, ..] = Series::at(angle * angle).0;
+        let sin = over_angle * angle;
+        let [x, y] = self.offset;
+        let (dx, dy) = (cos * x - sin * y, sin * x + cos * y);
+        let (mut out, square) = (PlanarSystem::zero(), w * w);
+        out.force[0] = [
+            m * (ax - rate * dy - square * dx),
+            m * (ay + rate * dx - square * dy),
+            self.about_node * rate + m * (dx * ay - dy * ax),
+        ];
+        if weights == Weights::NONE {
+            return out;
+        }
+        let Weights { stiffness, damping, mass } = weights;
+        // d turns by dtheta e x d.
+        let twice = w * (2.0 * damping);
+        let over_x = (square * dy - rate * dx) * stiffness - twice * dx - dy * mass;
+        let over_y = -(rate * dy + square * dx) * stiffness - twice * dy + dx * mass;
+        let tile = &mut out.tangent[0][0];
+        tile[0] = m * mass;
+        tile[4] = m * mass;
+        tile[2] = -(m * dy) * mass;
+        tile[5] = m * dx * mass;
+        tile[6] = m * over_x;
+        tile[7] = m * over_y;
+        tile[8] = self.about_node * mass - m * (dx * ax + dy * ay) * stiffness;
+        out
     }
 }
 

@@ -7,14 +7,18 @@
 use super::Model;
 use crate::effect::Effect;
 use crate::kernel::Weights;
-use crate::system::{Category, Cliques, Equations, FrameConflict, Layout, Memory, Pattern, State, System};
+use crate::system::{Category, Cliques, Equations, FrameConflict, Layout, Memory, Pattern, Slot, State, System};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
 /// The matrices of a stage.
 pub struct Linear {
-    /// The state about which everything is linear, at rest; its clock follows that of the run.
+    /// The state about which everything is linear, at rest, with the loads that it has there
+    pub origin: State,
+    /// The same, whose clock follows that of the run
     pub about: State,
+    /// The slots of multipliers, which have no rates
+    multipliers: Vec<Slot>,
     /// All directions, the held ones too: they have forces, and motions that are prescribed
     whole: System,
     stiffness: Vec<f64>,
@@ -30,19 +34,20 @@ impl Linear {
         let slots = model.slots.len();
         let cliques: Vec<Cliques> = effects.iter().map(|effect| effect.cliques()).collect();
         let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques);
-        let mut about = about.clone();
-        about.stand_still();
+        let mut origin = about.clone();
+        origin.stand_still();
         let mut whole = System::new(pattern, slots, false);
         let mut matrix = |weights: Weights| {
             whole.clear(None);
             let forget = Memory::default();
             for (number, effect) in effects.iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
-                effect.add(&about, &forget, weights, &mut whole.sink(number, effect.category(), true));
+                effect.add(&origin, &forget, weights, &mut whole.sink(number, effect.category(), true));
             }
             whole.values.clone()
         };
         let (stiffness, damping, mass) = (matrix(Weights::STIFFNESS), matrix(Weights::DAMPING), matrix(Weights::MASS));
-        Ok(Self { about, whole, stiffness, damping, mass, formed: None })
+        let (about, multipliers) = (origin.clone(), model.multipliers.clone());
+        Ok(Self { origin, about, multipliers, whole, stiffness, damping, mass, formed: None })
     }
 
     /// Takes the clock, and the amplitudes that belong to it, from a state.
@@ -62,8 +67,13 @@ impl Linear {
         ];
         for (values, field, category) in parts {
             // Without held directions the equations are the components of the slots, one after the other.
-            let x: Vec<f64> = field.iter().flat_map(|v| v.0).collect();
-            let product = self.whole.multiply(values, &x);
+            let mut x: Vec<f64> = field.iter().flat_map(|v| v.0).collect();
+            let of_multipliers = || self.multipliers.iter().flat_map(|&slot| 3 * slot as usize..3 * slot as usize + 3);
+            let rates = category != Category::Internal;
+            // Joints show the mass matrix their conditions for accelerations, which are no forces.
+            of_multipliers().filter(|_| rates).for_each(|k| x[k] = 0.0);
+            let mut product = self.whole.multiply(values, &x);
+            of_multipliers().filter(|_| rates).for_each(|k| product[k] = 0.0);
             for (force, part) in force[category as usize].iter_mut().zip(product.as_chunks::<3>().0) {
                 *force += Vec3(*part);
             }

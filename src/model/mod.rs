@@ -155,9 +155,7 @@ impl Model {
         let plane = self
             .plane
             .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
-        if plane.is_none() {
-            self.refuse_turned_hinges(&held, state)?;
-        }
+        self.refuse_turned_hinges(&held, state)?;
         self.number(stage, plane)
     }
 
@@ -179,6 +177,20 @@ impl Model {
         }
         self.supports.iter().for_each(|support| support.aspects(&mut |aspect| show("supports", aspect)));
         self.motions.iter().for_each(|motion| show("motions", motion.aspect()));
+    }
+
+    /// Takes out of a state what round-off has put aside of its plane: nothing else would, and it grows from step to step.
+    pub fn flatten(&self, plane: &Plane, state: &mut State) {
+        if !plane.is_tilted() {
+            return;
+        }
+        let normal = plane.normal();
+        for field in [&mut state.q, &mut state.v, &mut state.a, &mut state.algorithmic] {
+            for (info, value) in self.slots.iter().zip(field) {
+                let aside = normal * value.dot(normal);
+                *value = if info.kind == SlotKind::Rotation { aside } else { *value - aside };
+            }
+        }
     }
 
     /// Whether a state lies in a plane and moves in it, but for round-off.
@@ -375,6 +387,11 @@ impl Assembly {
         }
     }
 
+    /// Whether everything is linear.
+    pub fn is_linear(&self) -> bool {
+        self.linear.is_some()
+    }
+
     /// From here on everything is linear about a state.
     pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
         self.linear = Some(Box::new(Linear::new(&self.effects, model, about)?));
@@ -399,11 +416,17 @@ impl Assembly {
         let known =
             weights == Weights::NONE || (lift.is_none() && linear.formed == Some((weights, self.system.revision)));
         if known {
-            self.evaluate_effects(&linear.about, Weights::NONE, None);
+            self.system.clear_forces();
         } else {
             self.forget();
-            self.evaluate_effects(&linear.about, weights, lift);
+            self.evaluate_effects(&linear.origin, weights, lift);
+            self.system.forget_forces();
             linear.formed = Some((weights, self.system.revision));
+        }
+        for (number, effect) in self.effects.iter().enumerate() {
+            let mut sink = self.system.sink(number, effect.category(), false);
+            effect.add(&linear.about, &self.memories[number], Weights::NONE, &mut sink);
+            self.evaluations[number].1 += self.sizes[number];
         }
         linear.add_forces(state, &mut self.system.force);
     }

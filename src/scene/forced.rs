@@ -30,20 +30,31 @@ fn take_dampers_out(deck: &mut Deck) {
     }
 }
 
-/// Linear stages have no increments of rotation, and follow no paths.
+/// What cannot be switched off in the stages that a deck has.
 pub fn refuse_impossible(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    if deck.effects.allow(EffectWord::LargeRotations) {
-        return;
-    }
+    let linear = !deck.effects.allow(EffectWord::LargeRotations);
+    let tangents = [EffectWord::GeometricStiffness, EffectWord::FollowerTangent];
+    let incomplete = tangents.into_iter().find(|&word| !deck.effects.allow(word));
+    let mut moved = false;
     for stage in &deck.stages {
+        let looks = matches!(stage.body, StageBody::Modal { .. } | StageBody::Buckling { .. });
+        if let (true, Some(word)) = (looks, incomplete) {
+            let message = format!("{} = false leaves out part of the tangent, which this stage is about", word.key());
+            diagnostics.push(Diagnostic::error(message, stage.span.clone()));
+        }
         let why = match stage.body {
+            _ if !linear => continue,
             StageBody::Path { .. } => "control = \"arc_length\" follows what is not linear",
             StageBody::Dynamic { scheme: SchemeWord::LieGeneralizedAlpha(_), .. } => {
                 "lie_generalized_alpha has increments of large rotations for unknowns"
             }
-            _ => continue,
+            _ if looks && moved => "this one looks at the full theory about the state reached",
+            _ => {
+                moved |= !looks;
+                continue;
+            }
         };
-        let message = format!("large_rotations = false makes this stage linear, but {why}");
+        let message = format!("large_rotations = false makes static and dynamic stages linear, but {why}");
         diagnostics.push(Diagnostic::error(message, stage.span.clone()));
     }
 }

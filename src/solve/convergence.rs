@@ -2,7 +2,7 @@
 
 use crate::effect::Noise;
 use crate::model::{Model, SlotInfo, SlotKind};
-use crate::system::{Equations, Slot, System};
+use crate::system::{Equations, Plane, Slot, System};
 use crate::tensor::Vec3;
 
 /// The bounds of the test.
@@ -111,7 +111,7 @@ struct Peak {
 }
 
 impl Peak {
-    #[inline(always)]
+    #[inline]
     fn see(&mut self, size: f64, slot: usize) {
         // NaN is larger than anything, and stays.
         if size > self.size || (size.is_nan() && !self.size.is_nan()) {
@@ -133,16 +133,19 @@ struct Peaks {
 impl Peaks {
     /// In this measure of vectors.
     fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64) -> Self {
-        let (mut forces, mut residuals) = ([Peak::default(); 4], [Peak::default(); 4]);
+        let (mut forces, mut residuals) = ([0.0; 4], [Peak::default(); 4]);
         for (slot, info) in model.slots.iter().enumerate() {
-            let parts = system.force.each_ref().map(|force| force[slot]);
+            let [a, b, c, d] = system.force.each_ref().map(|force| force[slot]);
             let total = system.total(slot);
             let free = free_part(&system.pattern.equations, slot as Slot, total);
+            let [a, b, c, d, held] = [measure(a), measure(b), measure(c), measure(d), measure(total - free)];
+            // The largest of numbers leaves NaN out, their sum does not.
+            let largest = if (a + b + c + d + held).is_nan() { f64::NAN } else { a.max(b).max(c.max(d)).max(held) };
             let kind = info.kind as usize;
-            parts.into_iter().chain([total - free]).for_each(|part| forces[kind].see(measure(part), slot));
+            forces[kind] = largest.max_or_nan(forces[kind]);
             residuals[kind].see(measure(free), slot);
         }
-        let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize].size);
+        let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize]);
         Self { force, moment, residuals }
     }
 
@@ -171,7 +174,8 @@ impl MaxOrNan for f64 {
 
 /// The part of a force in the free directions of its slot, in local components.
 fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
-    if equations.is_plain(slot) { force } else { force - equations.held_part(slot, force) }
+    let whole = equations.is_plain(slot) && !equations.plane().is_some_and(Plane::is_tilted);
+    if whole { force } else { force - equations.held_part(slot, force) }
 }
 
 /// The largest correction, displacements over the length of the scene.

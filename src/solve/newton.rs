@@ -220,7 +220,7 @@ impl Newton {
                 });
             }
             assembly.extrapolate(state, &self.dq);
-            let changes_charts = method.changes_charts() && !model.linear;
+            let changes_charts = method.changes_charts() && !assembly.is_linear();
             if changes_charts {
                 charts::carry(state, &self.dq, &model.rotations);
             }

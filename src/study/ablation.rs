@@ -1,7 +1,7 @@
 //! What each effect of a scene changes in its answer, and what it costs: each is taken out in turn, and the scene is run again.
 
 use crate::deck::{self, Deck, Diagnostic, EffectWord, SpringBody};
-use crate::drive::{Counters, Failure, Mode, Observer, Run, Snapshot, StageWork};
+use crate::drive::{Counters, Failure, Mode, Observer, Run, Snapshot, Stage, StageWork};
 use crate::scene::{self, Scene};
 use std::time::Instant;
 
@@ -14,6 +14,9 @@ const MOST_REPEATS: usize = 9;
 /// What takes more attempts than so many times those of the whole scene, and a few, is given up.
 const MOST_ATTEMPTS: u64 = 20;
 const FEW_ATTEMPTS: u64 = 200;
+
+/// Forces below this part of the moments over the length of the scene are round-off, and moments likewise.
+const ROUND_OFF: f64 = 1e-6;
 
 /// Times that differ by less than this part are the same.
 const SAME_TIME: f64 = 0.02;
@@ -35,14 +38,6 @@ pub struct Outcome {
     pub counters: Counters,
     /// Wall-clock seconds, the median of several runs
     pub seconds: f64,
-}
-
-/// Why there is no study.
-pub enum Refused {
-    /// The scene as it is fails, or was interrupted
-    Failed(Failure),
-    /// There is no such scene
-    NoScene(String),
 }
 
 /// What a scene without some of its effects does.
@@ -136,6 +131,14 @@ struct Columns<'a> {
     interrupted: &'a dyn Fn() -> Option<i32>,
 }
 
+impl Columns<'_> {
+    /// As many numbers as a stage (from 1) has columns, NaN for modes that it did not find.
+    fn take_modes(&mut self, stage: usize, mut found: Vec<f64>) {
+        found.resize(columns_of(stage, &self.scene.plan.stages[stage - 1]).len(), f64::NAN);
+        self.modes.extend(found);
+    }
+}
+
 impl Observer for Columns<'_> {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
         let mut row = Vec::new();
@@ -146,13 +149,14 @@ impl Observer for Columns<'_> {
         Ok(())
     }
 
-    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.modes.extend(modes.iter().flat_map(|mode| [mode.omega, mode.growth]));
+    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
+        let found = modes.iter().flat_map(|mode| [mode.omega, mode.growth]);
+        self.take_modes(stage, found.collect());
         Ok(())
     }
 
-    fn buckling(&mut self, _stage: usize, loads: &[f64]) -> Result<(), Failure> {
-        self.modes.extend(loads);
+    fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+        self.take_modes(stage, loads.to_vec());
         Ok(())
     }
 
@@ -177,15 +181,15 @@ pub fn ablate(
     tolerance: f64,
     interrupted: &dyn Fn() -> Option<i32>,
     tell: &mut dyn FnMut(&str),
-) -> Result<Ablation, Refused> {
+) -> Result<Ablation, Failure> {
     let columns = columns(scene);
     let (present, absent) = EffectWord::ALL.into_iter().partition::<Vec<_>, _>(|word| acts(*word, deck, scene));
     tell("the whole scene");
     let whole = run(scene, u64::MAX, interrupted);
     if let Err(failure) = &whole.ended {
-        return Err(Refused::Failed(failure.clone()));
+        return Err(failure.clone());
     }
-    let study = Study { deck, whole: &whole, columns: &columns, interrupted };
+    let study = Study { deck, whole: &whole, columns: &columns, length: scene.plan.model.length, interrupted };
     let mut variants = Vec::new();
     for word in present {
         tell(&format!("without {}", word.key()));
@@ -201,20 +205,22 @@ struct Study<'a> {
     deck: &'a Deck,
     whole: &'a Outcome,
     columns: &'a [String],
+    /// That of the scene
+    length: f64,
     interrupted: &'a dyn Fn() -> Option<i32>,
 }
 
 impl Study<'_> {
-    fn without(&self, words: &[EffectWord]) -> Result<Variant, Refused> {
+    fn without(&self, words: &[EffectWord]) -> Result<Variant, Failure> {
         let mut deck = self.deck.clone();
         words.iter().for_each(|&word| deck.effects.force(word, false));
         let most = MOST_ATTEMPTS * self.whole.attempts + FEW_ATTEMPTS;
         let outcome = build(&deck).map(|scene| run(&scene, most, self.interrupted));
         if let Ok(Outcome { ended: Err(failure @ Failure::Interrupted { .. }), .. }) = &outcome {
-            return Err(Refused::Failed(failure.clone()));
+            return Err(failure.clone());
         }
         let mut changes = match &outcome {
-            Ok(outcome) if outcome.ended.is_ok() => changes(self.columns, self.whole, outcome),
+            Ok(outcome) if outcome.ended.is_ok() => changes(self.columns, self.length, self.whole, outcome),
             _ => Vec::new(),
         };
         if words.contains(&EffectWord::LargeRotations) {
@@ -226,7 +232,7 @@ impl Study<'_> {
     }
 
     /// What may go goes together, the least first, as long as no output changes by more than `tolerance`. What saves no time stays.
-    fn cheapest(&self, variants: &[Variant], tolerance: f64) -> Result<Variant, Refused> {
+    fn cheapest(&self, variants: &[Variant], tolerance: f64) -> Result<Variant, Failure> {
         let nothing =
             Variant { without: Vec::new(), outcome: Ok(self.whole.clone()), changes: vec![0.0; self.columns.len()] };
         let mut best = nothing;
@@ -279,28 +285,26 @@ fn run(scene: &Scene, most_attempts: u64, interrupted: &dyn Fn() -> Option<i32>)
 /// The names of all outputs: the columns of the history, then modes and critical loads, stage by stage.
 fn columns(scene: &Scene) -> Vec<String> {
     let mut columns: Vec<String> = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
-    for (number, stage) in scene.plan.stages.iter().enumerate().map(|(k, stage)| (k + 1, stage)) {
-        match stage.work {
-            StageWork::Modal { modes } => {
-                columns.extend((1..=modes).flat_map(|mode| {
-                    ["omega", "growth"].map(|quantity| format!("stage{number}.mode{mode}.{quantity}"))
-                }))
-            }
-            StageWork::Buckling { modes } => {
-                columns.extend((1..=modes).map(|mode| format!("stage{number}.buckling{mode}.load")));
-            }
-            _ => {}
-        }
-    }
+    columns.extend(scene.plan.stages.iter().enumerate().flat_map(|(k, stage)| columns_of(k + 1, stage)));
     columns
+}
+
+/// Those of a stage, which has this number.
+fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
+    let mode = |mode: usize| ["omega", "growth"].map(|quantity| format!("stage{number}.mode{mode}.{quantity}"));
+    match stage.work {
+        StageWork::Modal { modes } => (1..=modes).flat_map(mode).collect(),
+        StageWork::Buckling { modes } => (1..=modes).map(|mode| format!("stage{number}.buckling{mode}.load")).collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// The largest change of each column over all rows, relative to the largest value of its kind in the whole scene: of all displacements,
 /// rotations, forces, ….
-fn changes(columns: &[String], whole: &Outcome, other: &Outcome) -> Vec<f64> {
+fn changes(columns: &[String], length: f64, whole: &Outcome, other: &Outcome) -> Vec<f64> {
     let kinds: Vec<&str> = columns.iter().map(|column| kind(column)).collect();
     let mut scales = std::collections::HashMap::new();
-    let of_history = whole.rows.first().map_or(0, Vec::len);
+    let of_history = columns.len() - whole.modes.len();
     let all = whole.rows.iter().map(|row| (0, row)).chain([(of_history, &whole.modes)]);
     for (first, row) in all {
         for (kind, value) in kinds[first..].iter().zip(row) {
@@ -308,12 +312,25 @@ fn changes(columns: &[String], whole: &Outcome, other: &Outcome) -> Vec<f64> {
             *scale = scale.max(value.abs());
         }
     }
+    // Round-off of forces is no moment, and the other way about.
+    for (one, other, arm) in
+        [("f", "m", 1.0 / length), ("m", "f", length), ("N", "M", 1.0 / length), ("M", "N", length)]
+    {
+        let floor = scales.get(other).map_or(0.0, |scale| ROUND_OFF * arm * scale);
+        scales.entry(one).and_modify(|scale| *scale = scale.max(floor));
+    }
     let mut changes = vec![0.0_f64; columns.len()];
     let mut compare = |column: usize, came: f64, was: f64| {
         let (difference, scale) = ((came - was).abs(), scales[kinds[column]]);
-        let now = if difference == 0.0 { 0.0 } else { difference / scale };
-        // NaN is a change, too.
-        changes[column] = if now.is_nan() { f64::INFINITY } else { changes[column].max(now) };
+        let same = difference == 0.0 || (came.is_nan() && was.is_nan());
+        let now = if same { 0.0 } else { difference / scale };
+        changes[column] = match now {
+            // What is always zero has nothing that a change would compare with.
+            _ if scale == 0.0 && !same => f64::NAN,
+            now if now.is_nan() => f64::INFINITY,
+            now if changes[column].is_nan() => now,
+            now => changes[column].max(now),
+        };
     };
     for (k, row) in whole.rows.iter().enumerate() {
         let Some(there) = other.at(whole, k) else { continue };
@@ -326,8 +343,15 @@ fn changes(columns: &[String], whole: &Outcome, other: &Outcome) -> Vec<f64> {
     changes
 }
 
-/// What a column shows: its name without the node, and without the direction.
+/// What a column shows: its name without the node, and without the direction. Energies compare with each other: their sum is the error
+/// of the scheme alone.
 fn kind(column: &str) -> &str {
+    if column.starts_with("energy.") {
+        return "energy";
+    }
+    if column.ends_with(".omega") || column.ends_with(".growth") {
+        return "mode";
+    }
     let quantity = column.rsplit('.').next().unwrap_or(column);
     quantity.trim_end_matches(|c: char| c.is_ascii_digit() || ['x', 'y', 'z'].contains(&c))
 }

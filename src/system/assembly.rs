@@ -374,6 +374,61 @@ impl Sink<'_> {
         }
     }
 
+    /// Whether prescribed increments act through the tangent.
+    pub fn lifts(&self) -> bool {
+        self.with_tangent && self.lift.is_some()
+    }
+
+    /// Adds instances that couple displacements alone, in lanes, by mass matrices of the plane: their forces (global components), and
+    /// `weight` times the matrices.
+    #[inline(always)]
+    pub fn add_planar_mass<const N: usize>(
+        &mut self,
+        plane: &Plane,
+        first: usize,
+        count: usize,
+        forces: &[Vec3<Lanes>; N],
+        mass: &[[Lanes; N]; N],
+        weight: f64,
+    ) {
+        for lane in 0..count {
+            let k = first + lane;
+            let all = &mut self.force[self.category as usize];
+            for (force, &slot) in forces.iter().zip(self.places.cliques.get(k)) {
+                all[slot as usize] += Vec3(force.0.map(|component| component.0[lane]));
+            }
+            if !self.with_tangent || weight == 0.0 {
+                continue;
+            }
+            let entries = mass.as_flattened().iter().map(|entry| entry.0[lane] * weight);
+            if self.places.special[k] {
+                self.add_constrained_mass(plane, k, N, entries);
+                continue;
+            }
+            for (entry, &place) in entries.zip(self.places.of(k)) {
+                self.values[place as usize] += entry;
+                self.values[place as usize + 4] += entry;
+            }
+        }
+    }
+
+    /// The same where directions are held: a mass is one in all directions, and between slots with other axes their cosine.
+    #[cold]
+    fn add_constrained_mass(&mut self, plane: &Plane, k: usize, nodes: usize, entries: impl Iterator<Item = f64>) {
+        let slots = self.places.cliques.get(k);
+        let frame = |slot: Slot| self.equations.frame(slot).unwrap_or(*plane.axes());
+        for (number, (entry, &place)) in entries.zip(self.places.of(k)).enumerate() {
+            let (i, j) = (slots[number / nodes], slots[number % nodes]);
+            let (rows, columns) = (self.equations.of(i), self.equations.of(j));
+            let cosines = frame(i).transpose_matmul(frame(j));
+            for c in (0..2).filter(|&c| columns[c] != Equations::HELD) {
+                for r in (0..2).filter(|&r| rows[r] != Equations::HELD) {
+                    self.values[place as usize + 3 * c + r] += cosines.0[r][c] * entry;
+                }
+            }
+        }
+    }
+
     /// Adds the tangent of one lane where nodes may share displacements: each entry of a tile goes to where those of its slots meet.
     fn add_planar_parts<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
         let places = self.places.of(k);

@@ -240,19 +240,46 @@ fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
 
 /// Column by column the groups that a group meets, itself among them.
 fn compressed_columns(groups: &Groups, effects: &[Cliques]) -> (Vec<u32>, Vec<u32>) {
-    let mut meets: Vec<[u32; 2]> = (0..groups.count() as u32).map(|group| [group; 2]).collect();
-    for clique in effects.iter().flat_map(Cliques::iter) {
-        let group = |&slot: &Slot| groups.of(slot).0 as u32;
-        for a in clique.iter().map(group) {
-            meets.extend(clique.iter().map(|b| [a, group(b)]));
+    // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
+    let mut room = vec![1_u32; groups.count()];
+    each_meeting(groups, effects, &mut |met| met.iter().for_each(|&group| room[group as usize] += met.len() as u32));
+    let mut ends = Vec::with_capacity(groups.count());
+    let mut meets = Vec::new();
+    for (group, room) in room.iter().enumerate() {
+        ends.push(meets.len() + 1);
+        meets.resize(meets.len() + *room as usize, group as u32);
+    }
+    each_meeting(groups, effects, &mut |met| {
+        for &column in met {
+            let end = &mut ends[column as usize];
+            meets[*end..*end + met.len()].copy_from_slice(met);
+            *end += met.len();
         }
+    });
+    let (mut column_starts, mut rows) = (vec![0], Vec::new());
+    let mut start = 0;
+    for end in ends {
+        let column = &mut meets[start..end];
+        column.sort_unstable();
+        let first = rows.len();
+        for &row in &*column {
+            if rows.get(first..).and_then(<[u32]>::last) != Some(&row) {
+                rows.push(row);
+            }
+        }
+        column_starts.push(rows.len() as u32);
+        start = end;
     }
-    meets.sort_unstable();
-    meets.dedup();
-    let mut column_starts = vec![0; groups.count() + 1];
-    meets.iter().for_each(|&[column, _]| column_starts[column as usize + 1] += 1);
-    for column in 0..groups.count() {
-        column_starts[column + 1] += column_starts[column];
+    (column_starts, rows)
+}
+
+/// Shows the groups that meet in each instance.
+fn each_meeting(groups: &Groups, effects: &[Cliques], show: &mut dyn FnMut(&[u32])) {
+    let mut met = Vec::new();
+    for clique in effects.iter().flat_map(Cliques::iter) {
+        met.clear();
+        met.extend(clique.iter().map(|&slot| groups.of(slot).0 as u32));
+        met.dedup();
+        show(&met);
     }
-    (column_starts, meets.into_iter().map(|[_, row]| row).collect())
 }

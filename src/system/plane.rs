@@ -76,6 +76,11 @@ impl Plane {
         self.axes == Mat3::IDENTITY
     }
 
+    /// Whether it is no coordinate plane, so that vectors in it are rounded aside.
+    pub fn is_tilted(&self) -> bool {
+        !Vec3::UNIT.contains(&self.normal())
+    }
+
     /// Whether a vector is normal to the plane.
     pub fn is_normal(&self, v: Vec3) -> bool {
         let e = self.normal();
@@ -102,10 +107,12 @@ impl Plane {
             Aspect::Axial(v) => self.is_normal(v),
             Aspect::Line(v) => self.is_along(v) || self.is_normal(v),
             Aspect::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
-            // Only the normal is mapped, and into the plane.
+            // What turns in the plane strains aside, and the other way about.
             Aspect::Coupling(m) => {
-                let rest = m - (m * e).outer(e);
-                rest.max_abs().max((m * e).dot(e).abs()) <= ROUND_OFF * m.max_abs()
+                let (right, left) = (m * e, m.transpose_mul(e));
+                let along = right.dot(e);
+                let rest = m - right.outer(e) - e.outer(left) + e.outer(e).scale(along);
+                rest.max_abs().max(along.abs()) <= ROUND_OFF * m.max_abs()
             }
             Aspect::Spatial => false,
         }
@@ -226,7 +233,7 @@ mod tests {
         assert!(fits(Aspect::Axial(e)) && !fits(Aspect::Axial(e + a * 1e-9)));
         let section = a.outer(a) + b.outer(b).scale(3.0) + a.outer(b) + b.outer(a) + e.outer(e).scale(7.0);
         assert!(fits(Aspect::Tensor(section)) && !fits(Aspect::Tensor(section + a.outer(e).scale(1e-9))));
-        assert!(fits(Aspect::Coupling(a.outer(e))) && !fits(Aspect::Coupling(e.outer(a))));
-        assert!(!fits(Aspect::Coupling(e.outer(e))) && !fits(Aspect::Spatial));
+        assert!(fits(Aspect::Coupling(a.outer(e))) && fits(Aspect::Coupling(e.outer(a) + b.outer(e))));
+        assert!(!fits(Aspect::Coupling(e.outer(e))) && !fits(Aspect::Coupling(a.outer(b))) && !fits(Aspect::Spatial));
     }
 }

@@ -187,3 +187,66 @@ fn a_variant_that_fails_is_a_result() {
     assert!(linear.largest().0.is_infinite() && linear.failure().contains("arc_length"));
     assert!(found.to_csv().contains("large_rotations,failed"));
 }
+
+/// Springs and dampers act in the first stage, and a stage goes on where the last one ended.
+#[test]
+fn linear_stages_know_springs_dampers_and_what_went_before() {
+    let off = "[effects]\nlarge_rotations = false\n";
+    let body = |spring: &str| {
+        format!(
+            "[point]\np = [1, 0, 0]\n[[body]]\nat = \"p\"\nmass = 1\n[[spring]]\nat = \"p\"\n{spring}\n[[initial]]\nvelocity = [0.3, 0, 0]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.001\n{off}"
+        )
+    };
+    close(last(&body("stiffness = [9, 9, 9, 0, 0, 0]"))[0].0[0], 0.1 * 3_f64.sin(), 1e-4);
+    close(last(&body("damping = [2, 2, 2, 0, 0, 0]"))[2].0[0], 0.3 * (-2_f64).exp(), 1e-4);
+    let (rows, counters) = run(&cantilever(&format!("{}{STATIC}{STATIC}{DYNAMIC}{off}", force(0.0, 30.0))));
+    let exact = 30.0 * (8.0 / (3.0 * 40.0) + 2.0 / 60.0);
+    rows[4..].iter().for_each(|row| close(row[0].0[1], exact, 1e-9));
+    assert!(counters.work.iterations <= counters.steps, "{} iterations", counters.work.iterations);
+}
+
+/// Joints show the mass matrix their conditions for accelerations: these are no forces of a linear stage.
+#[test]
+fn linear_dynamics_goes_through_joints() {
+    let jointed = |effects: &str| {
+        format!(
+            "[point]\nroot = [0, 0, 0]\nknee = [1, 0, 0]\ntip = [2, 0, 0]\n[section.s]\nEA = 500\nGA = 60\nGJ = 20\nEI = 40\nrhoA = 1.5\n\
+             rhoJ = [0.02, 0.01, 0.01]\n[[beam]]\nname = \"a\"\nsection = \"s\"\nthrough = [\"root\", \"knee\"]\nelements = 2\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"knee\", \"tip\"]\nelements = 2\n[[support]]\nat = \"root\"\nfix = \"all\"\n\
+             [[joint]]\nkind = \"rigid\"\nat = \"knee\"\nbeams = [\"a\", \"b\"]\n[[load]]\nat = \"tip\"\nforce = [0, 1e-6, 0]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.05\nscheme = \"generalized_alpha\"\n{effects}"
+        )
+    };
+    let tip = |text: &str| {
+        let (scene, _) = scene::from_text(text).unwrap();
+        let slot = scene.mesh.nodes.iter().find(|node| node.name == "tip").unwrap().node.u as usize;
+        struct Row(usize, Vec3);
+        impl Observer for Row {
+            fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
+                self.1 = at.state.q[self.0];
+                Ok(())
+            }
+        }
+        let mut row = Row(slot, Vec3::ZERO);
+        Run::new(scene.plan, &mut row).finish().0.unwrap();
+        row.1
+    };
+    let (whole, linear) = (tip(&jointed("")), tip(&jointed("[effects]\nlarge_rotations = false\n")));
+    assert!((whole - linear).norm() < 1e-6 * whole.norm(), "{linear:?} instead of {whole:?}");
+}
+
+#[test]
+fn stages_that_need_what_is_switched_off_are_refused() {
+    let refused = |stages: &str, effects: &str| {
+        let text = cantilever(&format!("{}{stages}[effects]\n{effects} = false\n", force(0.0, 1.0)));
+        let Err(found) = scene::from_text(&text) else { panic!("{effects} with {stages}") };
+        assert!(found[0].message.contains(effects), "{}", found[0].message);
+    };
+    let modal = "[[stage]]\nkind = \"modal\"\nmodes = 2\n";
+    refused(modal, "geometric_stiffness");
+    refused("[[stage]]\nkind = \"buckling\"\nmodes = 1\n", "follower_tangent");
+    refused(&format!("{STATIC}{modal}"), "large_rotations");
+    refused(&STATIC.replace("steps", "control = \"arc_length\"\nsteps"), "large_rotations");
+    refused(&format!("{DYNAMIC}scheme = \"lie_generalized_alpha\"\n"), "large_rotations");
+}

@@ -148,7 +148,7 @@ impl Composer<'_> {
     /// Parts of the mechanics that [effects] may switch off.
     fn formulation(&mut self) {
         let beams = !self.mesh.elements.is_empty();
-        let (large, linear) = ("large rotations", "switched off in [effects]: linear about the start of each stage");
+        let (large, linear) = ("large rotations", "switched off in [effects]: static and dynamic stages are linear");
         match self.deck.effects.allow(EffectWord::LargeRotations) {
             true => self.reason(large, true, "forces and tangents of the present state"),
             false => self.reason(large, false, linear),

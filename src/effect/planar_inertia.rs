@@ -1,0 +1,217 @@
+//! Inertia in a scene that lies in a plane: the mass of beams on their centre lines, and bodies at nodes.
+
+use super::beam_mass::BeamMass;
+use super::rigid_body::RigidBody;
+use super::volume::VolumeElement;
+use super::{ByOrder, Effect, Energy, Momentum, at_slots};
+use crate::kernel::inertia::Inertia;
+use crate::kernel::planar::PlanarBody;
+use crate::kernel::{PlanarSystem, Weights};
+use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
+use crate::system::{Category, Cliques, Memory, Node, Plane, Sink, Slot, State};
+use crate::tensor::Vec3;
+use std::sync::Arc;
+
+/// Consistent mass matrices, which never change.
+pub struct PlanarMass {
+    plane: Plane,
+    spatial: Arc<BeamMass>,
+    blocks: ByOrder<MassBlock<2>, MassBlock<3>, MassBlock<4>>,
+}
+
+/// Elements side by side.
+struct MassBlock<const N: usize> {
+    u: [[Slot; LANES]; N],
+    count: usize,
+    /// sum of w rhoA N_i N_j over the points
+    mass: [[Lanes; N]; N],
+}
+
+impl PlanarMass {
+    /// The masses of `spatial`, which lie in this plane.
+    pub fn new(spatial: Arc<BeamMass>, plane: Plane) -> Self {
+        let elements = &spatial.elements;
+        let blocks = ByOrder {
+            two: mass_blocks(&elements.two),
+            three: mass_blocks(&elements.three),
+            four: mass_blocks(&elements.four),
+        };
+        Self { plane, spatial, blocks }
+    }
+}
+
+fn mass_blocks<const N: usize>(batch: &[VolumeElement<N, f64>]) -> Vec<MassBlock<N>> {
+    let entry = |element: &VolumeElement<N, f64>, i: usize, j: usize| -> f64 {
+        element.points.iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
+    };
+    let block = |elements: &[VolumeElement<N, f64>]| {
+        let all: [&VolumeElement<N, f64>; LANES] = each_lane!(|k| &elements[k.min(elements.len() - 1)]);
+        MassBlock {
+            u: std::array::from_fn(|i| all.map(|element| element.connection.nodes[i].u)),
+            count: elements.len(),
+            mass: std::array::from_fn(|i| std::array::from_fn(|j| Lanes(all.map(|element| entry(element, i, j))))),
+        }
+    };
+    batch.chunks(LANES).map(block).collect()
+}
+
+/// Adds the elements of one order, `first` instances after the first one of the effect.
+#[inline(always)]
+fn add_masses<const N: usize>(
+    blocks: &[MassBlock<N>],
+    first: usize,
+    at: &State,
+    plane: &Plane,
+    weights: Weights,
+    out: &mut Sink,
+) {
+    for (number, block) in blocks.iter().enumerate() {
+        let mut force = [Vec3::zero(); N];
+        for j in 0..N {
+            let acceleration = at_slots(&at.a, block.u[j]);
+            for i in 0..N {
+                force[i] += acceleration * block.mass[i][j];
+            }
+        }
+        out.add_planar_mass(plane, first + number * LANES, block.count, &force, &block.mass, weights.mass);
+    }
+}
+
+impl Effect for PlanarMass {
+    fn name(&self) -> &'static str {
+        self.spatial.name()
+    }
+
+    fn category(&self) -> Category {
+        self.spatial.category()
+    }
+
+    fn cliques(&self) -> Cliques {
+        self.spatial.cliques()
+    }
+
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
+        // Prescribed increments push through the mass as well, which the effect in space knows.
+        if out.lifts() {
+            return self.spatial.add(at, memory, weights, out);
+        }
+        let (blocks, plane) = (&self.blocks, &self.plane);
+        let (two, three) = (self.spatial.elements.two.len(), self.spatial.elements.three.len());
+        Instructions::here().run(
+            #[inline(always)]
+            || {
+                add_masses(&blocks.two, 0, at, plane, weights, out);
+                add_masses(&blocks.three, two, at, plane, weights, out);
+                add_masses(&blocks.four, two + three, at, plane, weights, out);
+            },
+        );
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        self.spatial.energy(at)
+    }
+
+    fn momentum(&self, at: &State) -> Momentum {
+        self.spatial.momentum(at)
+    }
+}
+
+/// Bodies at nodes.
+pub struct PlanarBodies {
+    plane: Plane,
+    spatial: Arc<RigidBody>,
+    blocks: Vec<BodyBlock>,
+}
+
+/// Bodies side by side.
+struct BodyBlock {
+    u: [Slot; LANES],
+    p: [Slot; LANES],
+    body: PlanarBody<Lanes>,
+}
+
+impl PlanarBodies {
+    /// The bodies of `spatial`, which lie in this plane.
+    pub fn new(spatial: Arc<RigidBody>, plane: Plane) -> Self {
+        let bodies = spatial.bodies.chunks(LANES).map(|bodies| {
+            let all: [_; LANES] = each_lane!(|k| &bodies[k.min(bodies.len() - 1)]);
+            let in_plane = all.map(|body| PlanarBody::new(&body.inertia, plane.axes()));
+            BodyBlock {
+                u: all.map(|body| body.node.u),
+                p: all.map(|body| body.node.p),
+                body: PlanarBody::pack(in_plane.each_ref()),
+            }
+        });
+        Self { plane, blocks: bodies.collect(), spatial }
+    }
+
+    #[inline(always)]
+    fn add_side_by_side(&self, at: &State, weights: Weights, out: &mut Sink) {
+        let (plane, bodies) = (&self.plane, &self.spatial.bodies);
+        let normal = plane.normal();
+        let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
+        let in_plane = |v: Vec3<Lanes>| [along(v, plane.axes().column(0)), along(v, plane.axes().column(1))];
+        let gyroscopic = if self.spatial.gyroscopic { 1.0 } else { 0.0 };
+        for (number, block) in self.blocks.iter().enumerate() {
+            let first = number * LANES;
+            let angle = along(at_slots(&at.q, block.p), normal);
+            let spin = along(at_slots(&at.v, block.p), normal) * gyroscopic;
+            let spin_rate = along(at_slots(&at.a, block.p), normal);
+            let acceleration = in_plane(at_slots(&at.a, block.u));
+            let system: PlanarSystem<1, Lanes> = block.body.evaluate(acceleration, angle, [spin, spin_rate], weights);
+            let count = LANES.min(bodies.len() - first);
+            out.add_planar(
+                plane,
+                first,
+                count,
+                &system,
+                |_| false,
+                |k, out| {
+                    self.spatial.add_one(first + k, at, weights, out);
+                },
+            );
+        }
+    }
+}
+
+impl Effect for PlanarBodies {
+    fn name(&self) -> &'static str {
+        self.spatial.name()
+    }
+
+    fn category(&self) -> Category {
+        self.spatial.category()
+    }
+
+    fn cliques(&self) -> Cliques {
+        self.spatial.cliques()
+    }
+
+    /// A spin about one axis has no gyroscopic moments; only masses beside their node pull.
+    fn is_symmetric(&self) -> bool {
+        self.spatial.bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+        Instructions::here().run(
+            #[inline(always)]
+            || self.add_side_by_side(at, weights, out),
+        );
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        self.spatial.energy(at)
+    }
+
+    fn momentum(&self, at: &State) -> Momentum {
+        self.spatial.momentum(at)
+    }
+
+    fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
+        self.spatial.bodies(show);
+    }
+}
