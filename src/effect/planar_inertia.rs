@@ -6,7 +6,7 @@ use super::volume::VolumeElement;
 use super::{ByOrder, Effect, Energy, Momentum, at_slots};
 use crate::kernel::inertia::Inertia;
 use crate::kernel::planar::PlanarBody;
-use crate::kernel::{PlanarSystem, Weights};
+use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
 use crate::system::{Category, Cliques, Memory, Node, Plane, Sink, Slot, State};
 use crate::tensor::Vec3;
@@ -156,6 +156,7 @@ impl PlanarBodies {
         let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
         let in_plane = |v: Vec3<Lanes>| [along(v, plane.axes().column(0)), along(v, plane.axes().column(1))];
         let gyroscopic = if self.spatial.gyroscopic { 1.0 } else { 0.0 };
+        let mut alone = None;
         for (number, block) in self.blocks.iter().enumerate() {
             let first = number * LANES;
             let angle = along(at_slots(&at.q, block.p), normal);
@@ -171,7 +172,8 @@ impl PlanarBodies {
                 &system,
                 |_| false,
                 |k, out| {
-                    self.spatial.add_one(first + k, at, weights, out);
+                    let system = alone.get_or_insert_with(|| ElementSystem::new(2));
+                    self.spatial.add_one(first + k, at, weights, system, out);
                 },
             );
         }

@@ -57,7 +57,8 @@ impl Effect for RigidBody {
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        (0..self.bodies.len()).for_each(|k| self.add_one(k, at, weights, out));
+        let mut system = ElementSystem::new(2);
+        (0..self.bodies.len()).for_each(|k| self.add_one(k, at, weights, &mut system, out));
     }
 
     fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
@@ -76,13 +77,14 @@ impl Effect for RigidBody {
 }
 
 impl RigidBody {
-    /// Adds body `k`.
-    pub(super) fn add_one(&self, k: usize, at: &State, weights: Weights, out: &mut Sink) {
-        let (body, mut system) = (&self.bodies[k], ElementSystem::new(2));
+    /// Adds body `k`; `system` is scratch.
+    pub(super) fn add_one(&self, k: usize, at: &State, weights: Weights, system: &mut ElementSystem, out: &mut Sink) {
+        let body = &self.bodies[k];
         let spin = at.spin(body.node.p).with_gyroscopic_forces(self.gyroscopic);
         let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &spin, weights);
-        force.write(&mut system);
-        out.add(k, &system);
+        system.clear();
+        force.write(system);
+        out.add(k, system);
     }
 }
 
