@@ -47,7 +47,7 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
     let state = model.rest();
     let Ok(equations) = model.begin_stage(0, kind, &state) else { return 0.0 };
     let stage = StageContext { number: 0, kind, rotating: false };
-    let effects = model.acting(&stage, equations.plane());
+    let effects = model.acting(&stage);
     let shapes: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
     let mut assembly = Assembly::new(&stage, equations, &model);
     let mut scatter = || {

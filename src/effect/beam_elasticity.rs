@@ -2,7 +2,7 @@
 
 use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
 use super::planar_elasticity::PlanarElasticity;
-use super::{ByOrder, Connection, Effect, Energy, Noise, at_slots, for_each_batch, side_by_side};
+use super::{ByOrder, Connection, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
@@ -122,8 +122,8 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         });
     }
 
-    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Arc<dyn Effect>> {
-        Some(Arc::new(PlanarElasticity::new(self, *plane)))
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Box<dyn PlanarForm>> {
+        Some(Box::new(PlanarElasticity::new(self, *plane)))
     }
 
     fn memory_points(&self) -> usize {

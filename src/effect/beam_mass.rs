@@ -2,7 +2,7 @@
 
 use super::planar_inertia::PlanarMass;
 use super::volume::VolumeElements;
-use super::{Effect, Energy, Momentum};
+use super::{Effect, Energy, Momentum, PlanarForm};
 use crate::kernel::Weights;
 use crate::kernel::inertia::Translation;
 use crate::kernel::volume::Blocks;
@@ -37,8 +37,8 @@ impl Effect for BeamMass {
         // On the centre line, which the beams' elasticity shows.
     }
 
-    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Arc<dyn Effect>> {
-        Some(Arc::new(PlanarMass::new(self, *plane)))
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Box<dyn PlanarForm>> {
+        Some(Box::new(PlanarMass::new(self, *plane)))
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -113,7 +113,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// What does its work in a plane that it lies in, where that is less than in space.
-    fn in_plane(self: Arc<Self>, _plane: &Plane) -> Option<Arc<dyn Effect>> {
+    fn in_plane(self: Arc<Self>, _plane: &Plane) -> Option<Box<dyn PlanarForm>> {
         None
     }
 
@@ -176,6 +176,20 @@ pub trait Effect: Send + Sync {
     fn noise(&self, _at: &State) -> Noise {
         Noise::default()
     }
+}
+
+/// The work of an effect in a plane: what it adds to the system there. All else it is asked itself.
+pub trait PlanarForm: Send + Sync {
+    /// Whether its tangent is symmetric, whatever the weights.
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    /// As [`Effect::add`].
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink);
+
+    /// As [`Effect::extrapolate`].
+    fn extrapolate(&self, _at: &State, _dq: &[Vec3], _memory: &mut Memory) {}
 }
 
 /// A beam element as effects know it: its number in the scene and its nodes.

@@ -2,11 +2,11 @@
 
 use super::beam_elasticity::{BeamElasticity, ElasticElement, stresses_of, workspace};
 use super::interpolation::Interpolation;
-use super::{ByOrder, Effect, Energy, Noise, at_slots};
+use super::{ByOrder, PlanarForm, at_slots};
 use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane};
-use crate::system::{Category, Cliques, Memory, Plane, Sink, Slot, State};
+use crate::system::{Memory, Plane, Sink, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -139,27 +139,7 @@ fn extrapolate_batch<const N: usize, const G: usize>(
     }
 }
 
-impl<I: Interpolation> Effect for PlanarElasticity<I> {
-    fn name(&self) -> &'static str {
-        self.spatial.name()
-    }
-
-    fn category(&self) -> Category {
-        self.spatial.category()
-    }
-
-    fn cliques(&self) -> Cliques {
-        self.spatial.cliques()
-    }
-
-    fn is_symmetric(&self) -> bool {
-        self.spatial.is_symmetric()
-    }
-
-    fn memory_points(&self) -> usize {
-        self.spatial.memory_points()
-    }
-
+impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
         let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
         let known = self.spatial.remembered(memory);
@@ -189,21 +169,5 @@ impl<I: Interpolation> Effect for PlanarElasticity<I> {
             },
         );
         memory.valid = true;
-    }
-
-    fn energy(&self, at: &State) -> Energy {
-        self.spatial.energy(at)
-    }
-
-    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
-        self.spatial.strain_of(at, field, length)
-    }
-
-    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
-        self.spatial.drives(at, show);
-    }
-
-    fn noise(&self, at: &State) -> Noise {
-        self.spatial.noise(at)
     }
 }

@@ -3,12 +3,11 @@
 use super::beam_mass::BeamMass;
 use super::rigid_body::RigidBody;
 use super::volume::VolumeElement;
-use super::{ByOrder, Effect, Energy, Momentum, at_slots};
-use crate::kernel::inertia::Inertia;
+use super::{ByOrder, Effect, PlanarForm, at_slots};
 use crate::kernel::planar::PlanarBody;
 use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
-use crate::system::{Category, Cliques, Memory, Node, Plane, Sink, Slot, State};
+use crate::system::{Memory, Plane, Sink, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -77,23 +76,7 @@ fn add_masses<const N: usize>(
     }
 }
 
-impl Effect for PlanarMass {
-    fn name(&self) -> &'static str {
-        self.spatial.name()
-    }
-
-    fn category(&self) -> Category {
-        self.spatial.category()
-    }
-
-    fn cliques(&self) -> Cliques {
-        self.spatial.cliques()
-    }
-
-    fn is_symmetric(&self) -> bool {
-        true
-    }
-
+impl PlanarForm for PlanarMass {
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
         // Prescribed increments push through the mass as well, which the effect in space knows.
         if out.lifts() {
@@ -109,14 +92,6 @@ impl Effect for PlanarMass {
                 add_masses(&blocks.four, two + three, at, plane, weights, out);
             },
         );
-    }
-
-    fn energy(&self, at: &State) -> Energy {
-        self.spatial.energy(at)
-    }
-
-    fn momentum(&self, at: &State) -> Momentum {
-        self.spatial.momentum(at)
     }
 }
 
@@ -180,19 +155,7 @@ impl PlanarBodies {
     }
 }
 
-impl Effect for PlanarBodies {
-    fn name(&self) -> &'static str {
-        self.spatial.name()
-    }
-
-    fn category(&self) -> Category {
-        self.spatial.category()
-    }
-
-    fn cliques(&self) -> Cliques {
-        self.spatial.cliques()
-    }
-
+impl PlanarForm for PlanarBodies {
     /// A spin about one axis has no gyroscopic moments; only masses beside their node pull.
     fn is_symmetric(&self) -> bool {
         self.spatial.bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
@@ -203,17 +166,5 @@ impl Effect for PlanarBodies {
             #[inline(always)]
             || self.add_side_by_side(at, weights, out),
         );
-    }
-
-    fn energy(&self, at: &State) -> Energy {
-        self.spatial.energy(at)
-    }
-
-    fn momentum(&self, at: &State) -> Momentum {
-        self.spatial.momentum(at)
-    }
-
-    fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
-        self.spatial.bodies(show);
     }
 }

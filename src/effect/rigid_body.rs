@@ -1,7 +1,7 @@
 //! Rigid bodies at nodes, with their mass centre at an offset.
 
 use super::planar_inertia::PlanarBodies;
-use super::{Effect, Energy, Momentum, inertia_aspects, quadratic};
+use super::{Effect, Energy, Momentum, PlanarForm, inertia_aspects, quadratic};
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, State};
@@ -52,8 +52,8 @@ impl Effect for RigidBody {
         }
     }
 
-    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Arc<dyn Effect>> {
-        Some(Arc::new(PlanarBodies::new(self, *plane)))
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Box<dyn PlanarForm>> {
+        Some(Box::new(PlanarBodies::new(self, *plane)))
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

@@ -9,7 +9,6 @@ use crate::effect::Effect;
 use crate::kernel::Weights;
 use crate::system::{Category, Cliques, Equations, FrameConflict, Layout, Memory, Pattern, Slot, State, System};
 use crate::tensor::Vec3;
-use std::sync::Arc;
 
 /// The matrices of a stage.
 pub struct Linear {
@@ -30,7 +29,12 @@ pub struct Linear {
 
 impl Linear {
     /// Of what acts about a state. `Err` never happens without held directions.
-    pub fn new(effects: &[Arc<dyn Effect>], model: &Model, about: &State) -> Result<Self, FrameConflict> {
+    pub fn new<'e>(
+        effects: impl Iterator<Item = &'e dyn Effect>,
+        model: &Model,
+        about: &State,
+    ) -> Result<Self, FrameConflict> {
+        let effects: Vec<&dyn Effect> = effects.collect();
         let slots = model.slots.len();
         let cliques: Vec<Cliques> = effects.iter().map(|effect| effect.cliques()).collect();
         let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques);

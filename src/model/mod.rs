@@ -1,24 +1,23 @@
 //! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
 
 mod amplitude;
+mod assembly;
 pub mod charts;
 mod constraint;
 mod history;
 mod linear;
+mod share;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
 pub use amplitude::Amplitude;
+pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
 pub use history::{History, Table};
+pub use share::Share;
 
-use crate::effect::{Effect, Energy, Momentum, Noise};
-use crate::kernel::Weights;
-use crate::system::{
-    Aspect, Cliques, Direction, Equations, FrameConflict, Groups, Layout, Memory, Node, Pattern, Plane, Slot, State,
-    System,
-};
+use crate::effect::{Effect, Energy, Momentum};
+use crate::system::{Aspect, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State};
 use crate::tensor::Vec3;
-use linear::Linear;
 use std::sync::Arc;
 
 /// A prescribed rotation may go this far in one step or load increment.
@@ -80,19 +79,6 @@ impl SlotInfo {
     pub fn arm(&self, length: f64) -> f64 {
         if self.kind == SlotKind::Rotation { length } else { 1.0 }
     }
-}
-
-/// What an effect adds to a system.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Share {
-    /// The effect
-    pub name: &'static str,
-    /// How many of it there are: elements, loads, …
-    pub instances: usize,
-    /// Unknowns that nothing else touches
-    pub unknowns: usize,
-    /// Entries of the tangent that are there for it alone
-    pub entries: usize,
 }
 
 /// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
@@ -278,36 +264,9 @@ impl Model {
         })
     }
 
-    /// The effects that act in a stage, as they do in a plane or in space.
-    pub fn acting(&self, stage: &StageContext, plane: Option<&Plane>) -> Vec<Arc<dyn Effect>> {
-        let form = |effect: &Arc<dyn Effect>| match plane {
-            None => effect.clone(),
-            Some(plane) => effect.clone().in_plane(plane).unwrap_or_else(|| effect.clone()),
-        };
-        self.effects.iter().filter(|effect| effect.acts(stage)).map(form).collect()
-    }
-
-    /// What each effect that acts in a stage adds to the system of these equations.
-    pub fn shares(&self, stage: &StageContext, equations: &Equations) -> Vec<Share> {
-        let effects = self.acting(stage, None);
-        let layout = if equations.plane().is_some() { Layout::Planar } else { Layout::Spatial };
-        let cliques: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
-        let size_without = |left_out: Option<usize>| {
-            let others = cliques.iter().enumerate().filter(|(k, _)| Some(*k) != left_out).map(|(_, own)| own.clone());
-            let others: Vec<Cliques> = others.collect();
-            let mut touched = vec![false; self.slots.len()];
-            others.iter().flat_map(Cliques::iter).flatten().for_each(|&slot| touched[slot as usize] = true);
-            let free = |slot: usize| equations.of(slot as Slot).iter().filter(|&&n| n != Equations::HELD).count();
-            let unknowns = (0..touched.len()).filter(|&slot| touched[slot]).map(free).sum::<usize>();
-            (unknowns, Pattern::new(equations.clone(), self.groups(layout), others).nonzeros())
-        };
-        let (unknowns, entries) = size_without(None);
-        let share = |(k, effect): (usize, &Arc<dyn Effect>)| {
-            let without = size_without(Some(k));
-            let (unknowns, entries) = (unknowns - without.0, entries - without.1);
-            Share { name: effect.name(), instances: cliques[k].len(), unknowns, entries }
-        };
-        effects.iter().enumerate().map(share).collect()
+    /// The effects that act in a stage.
+    pub fn acting(&self, stage: &StageContext) -> Vec<Arc<dyn Effect>> {
+        self.effects.iter().filter(|effect| effect.acts(stage)).cloned().collect()
     }
 
     /// The stored energy.
@@ -353,154 +312,5 @@ impl Model {
         let mut sum = Momentum::ZERO;
         self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
         sum
-    }
-}
-
-/// The effects of one stage with their scratch, and the system they add to.
-pub struct Assembly {
-    effects: Vec<Arc<dyn Effect>>,
-    memories: Vec<Memory>,
-    /// Forces and tangent
-    pub system: System,
-    /// Evaluations of each effect's instances so far, by name
-    pub evaluations: Vec<(&'static str, u64)>,
-    sizes: Vec<u64>,
-    /// In linear stages
-    linear: Option<Box<Linear>>,
-}
-
-impl Assembly {
-    /// The system of what acts in a stage on these equations.
-    pub fn new(stage: &StageContext, equations: Equations, model: &Model) -> Self {
-        let effects = model.acting(stage, equations.plane());
-        let layout = if equations.plane().is_some() { Layout::Planar } else { Layout::Spatial };
-        let cliques: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
-        let symmetric = effects.iter().all(|effect| effect.is_symmetric());
-        let memory = |e: &Arc<dyn Effect>| Memory { points: vec![[0.0; 6]; e.memory_points()], valid: false };
-        Self {
-            memories: effects.iter().map(memory).collect(),
-            evaluations: effects.iter().map(|effect| (effect.name(), 0)).collect(),
-            sizes: cliques.iter().map(|c| c.len() as u64).collect(),
-            system: System::new(Pattern::new(equations, model.groups(layout), cliques), model.slots.len(), symmetric),
-            effects,
-            linear: None,
-        }
-    }
-
-    /// Whether everything is linear.
-    pub fn is_linear(&self) -> bool {
-        self.linear.is_some()
-    }
-
-    /// From here on everything is linear about a state.
-    pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
-        self.linear = Some(Box::new(Linear::new(&self.effects, model, about)?));
-        Ok(())
-    }
-
-    /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`]. Without weights the tangent is left as
-    /// it is.
-    pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
-        match self.linear.take() {
-            None => self.evaluate_effects(state, weights, lift),
-            Some(mut linear) => {
-                self.evaluate_linear(&mut linear, state, weights, lift);
-                self.linear = Some(linear);
-            }
-        }
-    }
-
-    /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
-    fn evaluate_linear(&mut self, linear: &mut Linear, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
-        linear.follow(state);
-        let known =
-            weights == Weights::NONE || (lift.is_none() && linear.formed == Some((weights, self.system.revision)));
-        if known {
-            self.system.clear_forces();
-        } else {
-            self.forget();
-            self.evaluate_effects(&linear.origin, weights, lift);
-            self.system.forget_forces();
-            linear.formed = Some((weights, self.system.revision));
-        }
-        for (number, effect) in self.effects.iter().enumerate() {
-            let mut sink = self.system.sink(number, effect.category(), false);
-            effect.add(&linear.about, &self.memories[number], Weights::NONE, &mut sink);
-            self.evaluations[number].1 += self.sizes[number];
-        }
-        linear.add_forces(state, &mut self.system.force);
-    }
-
-    fn evaluate_effects(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
-        match weights {
-            Weights::NONE => {
-                debug_assert!(lift.is_none(), "prescribed increments act through the tangent");
-                self.system.clear_forces();
-            }
-            _ => self.system.clear(lift),
-        }
-        for (number, effect) in self.effects.iter().enumerate() {
-            let with_tangent = weights != Weights::NONE && effect.has_tangent();
-            let mut sink = self.system.sink(number, effect.category(), with_tangent);
-            let weights = if with_tangent { weights } else { Weights::NONE };
-            effect.add(state, &self.memories[number], weights, &mut sink);
-            self.evaluations[number].1 += self.sizes[number];
-        }
-    }
-
-    /// Lets effects remember what the next tangent is formed with, before the state is corrected by `dq`.
-    pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
-        if self.linear.is_some() {
-            return;
-        }
-        for (effect, memory) in self.effects.iter().zip(&mut self.memories).filter(|(e, _)| e.memory_points() > 0) {
-            effect.extrapolate(state, dq, memory);
-        }
-    }
-
-    /// Forgets what was remembered: a new step begins.
-    pub fn forget(&mut self) {
-        self.memories.iter_mut().for_each(|memory| memory.valid = false);
-    }
-
-    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Effect::drift`].
-    pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
-        let zero = vec![Vec3::ZERO; state.q.len()];
-        let (mut rates, mut rates2) = (zero.clone(), zero);
-        self.effects.iter().for_each(|effect| effect.drift(state, &mut rates, &mut rates2));
-        [rates, rates2]
-    }
-
-    /// The largest round-off among the effects.
-    pub fn noise(&self, state: &State) -> Noise {
-        let mut largest = Noise::default();
-        for noise in self.effects.iter().map(|effect| effect.noise(state)) {
-            largest.force = largest.force.max(noise.force);
-            largest.moment = largest.moment.max(noise.moment);
-        }
-        largest
-    }
-
-    /// The largest strain that a field makes, see [`Effect::strain_of`].
-    pub fn strain_of(&self, state: &State, field: &[Vec3], length: f64) -> f64 {
-        self.effects.iter().map(|effect| effect.strain_of(state, field, length)).fold(0.0, f64::max)
-    }
-
-    /// The name of the first effect whose forces are not finite, and the slot.
-    pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
-        for (number, effect) in self.effects.iter().enumerate() {
-            self.system.clear(None);
-            effect.add(
-                state,
-                &self.memories[number],
-                Weights::NONE,
-                &mut self.system.sink(number, effect.category(), false),
-            );
-            let forces = &self.system.force[effect.category() as usize];
-            if let Some(slot) = forces.iter().position(|f| !f.is_finite()) {
-                return Some((effect.name(), slot));
-            }
-        }
-        None
     }
 }

@@ -1,5 +1,6 @@
 //! Which unknowns are free: the numbering of the equations, and turned axes at constrained slots.
 
+use super::groups::Layout;
 use super::plane::Plane;
 use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
@@ -92,6 +93,11 @@ impl Equations {
         self.number.push(number);
         self.frame.push(frame);
         self.constrained.push(constrained);
+    }
+
+    /// Which rows of a tile they are.
+    pub fn layout(&self) -> Layout {
+        if self.plane.is_some() { Layout::Planar } else { Layout::Spatial }
     }
 
     /// The plane that everything stays in, if there is one.

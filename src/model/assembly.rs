@@ -1,0 +1,186 @@
+//! The effects of one stage, and the system that they add to.
+
+use super::linear::Linear;
+use super::{Model, StageContext};
+use crate::effect::{Effect, Noise, PlanarForm};
+use crate::kernel::Weights;
+use crate::system::{Cliques, Equations, FrameConflict, Memory, Pattern, Plane, Sink, State, System};
+use crate::tensor::Vec3;
+use std::sync::Arc;
+
+/// The effects of one stage with their scratch, and the system they add to.
+pub struct Assembly {
+    effects: Vec<Acting>,
+    /// Forces and tangent
+    pub system: System,
+    /// Evaluations of each effect's instances so far, by name
+    pub evaluations: Vec<(&'static str, u64)>,
+    /// In linear stages
+    linear: Option<Box<Linear>>,
+}
+
+/// An effect in a stage.
+struct Acting {
+    effect: Arc<dyn Effect>,
+    /// What does its work, where the stage is one in a plane
+    planar: Option<Box<dyn PlanarForm>>,
+    memory: Memory,
+    instances: u64,
+}
+
+impl Acting {
+    fn new(effect: Arc<dyn Effect>, plane: Option<&Plane>, instances: usize) -> Self {
+        let memory = Memory { points: vec![[0.0; 6]; effect.memory_points()], valid: false };
+        let planar = plane.and_then(|plane| effect.clone().in_plane(plane));
+        Self { effect, planar, memory, instances: instances as u64 }
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.planar.as_ref().map_or_else(|| self.effect.is_symmetric(), |planar| planar.is_symmetric())
+    }
+
+    fn add(&self, at: &State, weights: Weights, out: &mut Sink) {
+        match &self.planar {
+            None => self.effect.add(at, &self.memory, weights, out),
+            Some(planar) => planar.add(at, &self.memory, weights, out),
+        }
+    }
+
+    fn extrapolate(&mut self, at: &State, dq: &[Vec3]) {
+        match &self.planar {
+            None => self.effect.extrapolate(at, dq, &mut self.memory),
+            Some(planar) => planar.extrapolate(at, dq, &mut self.memory),
+        }
+    }
+}
+
+impl Assembly {
+    /// The system of what acts in a stage on these equations.
+    pub fn new(stage: &StageContext, equations: Equations, model: &Model) -> Self {
+        let acting = model.acting(stage);
+        let cliques: Vec<_> = acting.iter().map(|effect| effect.cliques()).collect();
+        let acts = |(effect, own): (Arc<dyn Effect>, &Cliques)| Acting::new(effect, equations.plane(), own.len());
+        let effects: Vec<Acting> = acting.into_iter().zip(&cliques).map(acts).collect();
+        let symmetric = effects.iter().all(Acting::is_symmetric);
+        let groups = model.groups(equations.layout());
+        Self {
+            evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
+            system: System::new(Pattern::new(equations, groups, cliques), model.slots.len(), symmetric),
+            effects,
+            linear: None,
+        }
+    }
+
+    /// Whether everything is linear.
+    pub fn is_linear(&self) -> bool {
+        self.linear.is_some()
+    }
+
+    /// From here on everything is linear about a state.
+    pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
+        self.linear = Some(Box::new(Linear::new(self.effects.iter().map(|acting| &*acting.effect), model, about)?));
+        Ok(())
+    }
+
+    /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`]. Without weights the tangent is left as
+    /// it is.
+    pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+        match self.linear.take() {
+            None => self.evaluate_effects(state, weights, lift),
+            Some(mut linear) => {
+                self.evaluate_linear(&mut linear, state, weights, lift);
+                self.linear = Some(linear);
+            }
+        }
+    }
+
+    /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
+    fn evaluate_linear(&mut self, linear: &mut Linear, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+        linear.follow(state);
+        let known =
+            weights == Weights::NONE || (lift.is_none() && linear.formed == Some((weights, self.system.revision)));
+        if known {
+            self.system.clear_forces();
+        } else {
+            self.forget();
+            self.evaluate_effects(&linear.origin, weights, lift);
+            self.system.forget_forces();
+            linear.formed = Some((weights, self.system.revision));
+        }
+        self.add_effects(&linear.about, Weights::NONE);
+        linear.add_forces(state, &mut self.system.force);
+    }
+
+    fn evaluate_effects(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+        match weights {
+            Weights::NONE => {
+                debug_assert!(lift.is_none(), "prescribed increments act through the tangent");
+                self.system.clear_forces();
+            }
+            _ => self.system.clear(lift),
+        }
+        self.add_effects(state, weights);
+    }
+
+    fn add_effects(&mut self, state: &State, weights: Weights) {
+        for (number, acting) in self.effects.iter().enumerate() {
+            let with_tangent = weights != Weights::NONE && acting.effect.has_tangent();
+            let mut sink = self.system.sink(number, acting.effect.category(), with_tangent);
+            let weights = if with_tangent { weights } else { Weights::NONE };
+            acting.add(state, weights, &mut sink);
+            self.evaluations[number].1 += acting.instances;
+        }
+    }
+
+    /// Lets effects remember what the next tangent is formed with, before the state is corrected by `dq`.
+    pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
+        if self.linear.is_some() {
+            return;
+        }
+        for acting in self.effects.iter_mut().filter(|acting| !acting.memory.points.is_empty()) {
+            acting.extrapolate(state, dq);
+        }
+    }
+
+    /// Forgets what was remembered: a new step begins.
+    pub fn forget(&mut self) {
+        self.effects.iter_mut().for_each(|acting| acting.memory.valid = false);
+    }
+
+    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Effect::drift`].
+    pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
+        let zero = vec![Vec3::ZERO; state.q.len()];
+        let (mut rates, mut rates2) = (zero.clone(), zero);
+        self.effects.iter().for_each(|acting| acting.effect.drift(state, &mut rates, &mut rates2));
+        [rates, rates2]
+    }
+
+    /// The largest round-off among the effects.
+    pub fn noise(&self, state: &State) -> Noise {
+        let mut largest = Noise::default();
+        for noise in self.effects.iter().map(|acting| acting.effect.noise(state)) {
+            largest.force = largest.force.max(noise.force);
+            largest.moment = largest.moment.max(noise.moment);
+        }
+        largest
+    }
+
+    /// The largest strain that a field makes, see [`Effect::strain_of`].
+    pub fn strain_of(&self, state: &State, field: &[Vec3], length: f64) -> f64 {
+        self.effects.iter().map(|acting| acting.effect.strain_of(state, field, length)).fold(0.0, f64::max)
+    }
+
+    /// The name of the first effect whose forces are not finite, and the slot.
+    pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
+        for (number, acting) in self.effects.iter().enumerate() {
+            self.system.clear(None);
+            let category = acting.effect.category();
+            acting.add(state, Weights::NONE, &mut self.system.sink(number, category, false));
+            let forces = &self.system.force[category as usize];
+            if let Some(slot) = forces.iter().position(|f| !f.is_finite()) {
+                return Some((acting.effect.name(), slot));
+            }
+        }
+        None
+    }
+}
