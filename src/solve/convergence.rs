@@ -74,11 +74,14 @@ impl Convergence {
         let squares = Peaks::of(model, system, Vec3::squared);
         let peaks = match squares.largest() {
             // Neither has a square overflowed, nor has anything that counts been lost.
-            1e-280..=1e280 => squares.map(f64::sqrt),
+            1e-280..=1e280 if squares.sum.is_finite() => squares.map(f64::sqrt),
             _ => Peaks::of(model, system, Vec3::size),
         };
-        let force = peaks.force.max_or_nan(peaks.moment / model.length);
+        let force = larger(peaks.force, peaks.moment / model.length);
         let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force, noisy: false };
+        if !peaks.sum.is_finite() {
+            return Residual { ratio: f64::NAN, ..worst };
+        }
         for (kind, peak) in SlotKind::ALL.into_iter().zip(peaks.residuals) {
             let tolerated = match kind {
                 SlotKind::Force => GAP * self.tolerance * model.length,
@@ -93,8 +96,7 @@ impl Convergence {
             };
             worst.noisy |= peak.size > tolerated;
             let ratio = if peak.size == 0.0 { 0.0 } else { peak.size / allowed };
-            // NaN compares with nothing, so it is let in by hand.
-            if ratio > worst.ratio || ratio.is_nan() {
+            if ratio > worst.ratio {
                 let value = free_part(&system.pattern.equations, peak.slot, system.total(peak.slot as usize));
                 worst = Residual { ratio, slot: peak.slot, value, ..worst };
             }
@@ -110,16 +112,6 @@ struct Peak {
     slot: Slot,
 }
 
-impl Peak {
-    #[inline]
-    fn see(&mut self, size: f64, slot: usize) {
-        // NaN is larger than anything, and stays.
-        if size > self.size || (size.is_nan() && !self.size.is_nan()) {
-            *self = Self { size, slot: slot as Slot };
-        }
-    }
-}
-
 /// The largest forces and residuals.
 #[derive(Clone, Copy, Debug)]
 struct Peaks {
@@ -128,54 +120,54 @@ struct Peaks {
     moment: f64,
     /// By kind of slot
     residuals: [Peak; 4],
+    /// Of all: finite where each is, while the largest of numbers may leave NaN out
+    sum: f64,
 }
 
 impl Peaks {
     /// In this measure of vectors.
     fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64) -> Self {
-        let (mut forces, mut residuals) = ([0.0; 4], [Peak::default(); 4]);
+        let equations = &system.pattern.equations;
+        // Vectors in a tilted plane are rounded aside.
+        let tilted = equations.plane().is_some_and(Plane::is_tilted);
+        let (mut forces, mut residuals, mut sum) = ([0.0; 4], [Peak::default(); 4], 0.0);
         for (slot, info) in model.slots.iter().enumerate() {
-            let [a, b, c, d] = system.force.each_ref().map(|force| force[slot]);
-            let total = system.total(slot);
-            let free = free_part(&system.pattern.equations, slot as Slot, total);
-            let [a, b, c, d, held] = [measure(a), measure(b), measure(c), measure(d), measure(total - free)];
-            // The largest of numbers leaves NaN out, their sum does not.
-            let largest = if (a + b + c + d + held).is_nan() { f64::NAN } else { a.max(b).max(c.max(d)).max(held) };
+            let parts = system.force.each_ref().map(|force| force[slot]);
+            let total = parts.into_iter().fold(Vec3::ZERO, |total, part| total + part);
+            let whole = !tilted && equations.is_plain(slot as Slot);
+            let free = if whole { total } else { free_part(equations, slot as Slot, total) };
+            let [a, b, c, d] = parts.map(&measure);
+            let [held, free] = [measure(total - free), measure(free)];
+            sum += (a + b) + (c + d);
             let kind = info.kind as usize;
-            forces[kind] = largest.max_or_nan(forces[kind]);
-            residuals[kind].see(measure(free), slot);
+            forces[kind] = larger(larger(larger(a, b), larger(c, d)), larger(held, forces[kind]));
+            if free > residuals[kind].size {
+                residuals[kind] = Peak { size: free, slot: slot as Slot };
+            }
         }
         let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize]);
-        Self { force, moment, residuals }
+        Self { force, moment, residuals, sum }
     }
 
-    /// The largest of all; NaN if one is.
+    /// The largest of all.
     fn largest(&self) -> f64 {
-        let residuals = self.residuals.iter().fold(0.0, |largest: f64, peak| largest.max_or_nan(peak.size));
-        self.force.max_or_nan(self.moment).max_or_nan(residuals)
+        self.residuals.iter().fold(larger(self.force, self.moment), |largest, peak| larger(largest, peak.size))
     }
 
     fn map(self, change: impl Fn(f64) -> f64) -> Self {
         let residuals = self.residuals.map(|peak| Peak { size: change(peak.size), ..peak });
-        Self { force: change(self.force), moment: change(self.moment), residuals }
+        Self { force: change(self.force), moment: change(self.moment), residuals, ..self }
     }
 }
 
-/// The larger of two numbers; NaN if one is.
-trait MaxOrNan {
-    fn max_or_nan(self, other: Self) -> Self;
+/// The larger of two numbers, in one instruction: NaN is not minded, as it is by `f64::max`.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
-impl MaxOrNan for f64 {
-    fn max_or_nan(self, other: Self) -> Self {
-        if other > self || other.is_nan() { other } else { self }
-    }
-}
-
-/// The part of a force in the free directions of its slot, in local components.
+/// The part of a force in the free directions of its slot, global components.
 fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
-    let whole = equations.is_plain(slot) && !equations.plane().is_some_and(Plane::is_tilted);
-    if whole { force } else { force - equations.held_part(slot, force) }
+    force - equations.held_part(slot, force)
 }
 
 /// The largest correction, displacements over the length of the scene.

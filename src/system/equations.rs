@@ -5,6 +5,12 @@ use super::plane::Plane;
 use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
 
+/// Unit vectors whose inner product is nearer to 1 are one axis, nearer to 0 orthogonal: the fewest digits that a deck may give axes with.
+const SAME_AXIS: f64 = 1e-9;
+
+/// An axis that is nearer to a global one, by its cosine, is it but for round-off.
+const GLOBAL_AXIS: f64 = 1e-15;
+
 /// A direction of a slot that is not free: its value is held or prescribed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
@@ -191,10 +197,10 @@ fn by_slot(slots: usize, held: &[Direction]) -> Result<Vec<Vec<Vec3>>, FrameConf
         let axis = direction.axis;
         let known = &mut axes[direction.slot as usize];
         let spans = known.len() == 3;
-        if spans || known.iter().any(|a| a.dot(axis).abs() > 1.0 - 1e-9) {
+        if spans || known.iter().any(|a| a.dot(axis).abs() > 1.0 - SAME_AXIS) {
             continue;
         }
-        if known.iter().any(|a| a.dot(axis).abs() > 1e-9) {
+        if known.iter().any(|a| a.dot(axis).abs() > SAME_AXIS) {
             return Err(FrameConflict { slot: direction.slot });
         }
         known.push(axis);
@@ -207,19 +213,20 @@ fn spanned(vectors: impl Iterator<Item = Vec3>) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = Vec::new();
     for vector in vectors {
         let rest = out.iter().fold(vector, |rest, known| rest - *known * known.dot(rest));
-        out.extend(rest.normalized().filter(|_| rest.norm() > 1e-9));
+        out.extend(rest.normalized().filter(|_| rest.norm() > SAME_AXIS));
     }
     out
 }
 
 /// Whether an axis is the k-th of a plane.
 fn is_axis(plane: &Plane, k: usize, axis: Vec3) -> bool {
-    plane.axes().column(k).dot(axis).abs() > 1.0 - 1e-15
+    plane.axes().column(k).dot(axis).abs() > 1.0 - GLOBAL_AXIS
 }
 
 /// Completes held directions to three; no frame where all of them are global axes.
 fn local_axes(held: &[Vec3]) -> (Option<Mat3>, [bool; 3]) {
-    let global = held.iter().map(|axis| (0..3).find(|&k| axis.0[k].abs() > 1.0 - 1e-15)).collect::<Option<Vec<_>>>();
+    let global =
+        held.iter().map(|axis| (0..3).find(|&k| axis.0[k].abs() > 1.0 - GLOBAL_AXIS)).collect::<Option<Vec<_>>>();
     if let Some(global) = global {
         return (None, [0, 1, 2].map(|k| global.contains(&k)));
     }

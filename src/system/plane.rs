@@ -5,13 +5,16 @@
 
 use crate::tensor::{Mat3, Vec3};
 
-/// What lies less far out of a plane, relative to its size, lies in it but for round-off.
+/// What lies less far out of a plane, relative to its size, lies in it but for round-off: some hundreds of units in the last place, what
+/// sines, cosines and a few sums in a deck leave.
 const ROUND_OFF: f64 = 1e-13;
 
-/// A normal that is so near to an axis is this axis.
+/// A normal that is so near to an axis is this axis: in coordinate planes nothing is rounded aside. Whether the scene lies in the plane
+/// is asked afterwards, so that nothing is let in by this.
 const SNAP: f64 = 1e-12;
 
-/// Directions that differ by less do not tell a plane.
+/// Directions that differ by less do not tell a plane: the normal of their cross product would be known to fewer than ten digits, and
+/// what lies in the plane would not be found to.
 const NO_PLANE: f64 = 1e-6;
 
 /// Something that a scene is made of, as a mirror sees it.
