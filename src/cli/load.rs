@@ -41,25 +41,23 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<(Deck, Scene), Refusal> 
     // Settings may have moved lines.
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());
-    let read = scene::from_text(&text).and_then(|(scene, warnings)| Ok((deck::read(&text)?.0, scene, warnings)));
-    match read {
-        Ok((deck, scene, warnings)) => {
-            if !warnings.is_empty() {
-                say::note(&render(&label, &text, &warnings));
-            }
-            Ok((deck, scene))
+    let refuse = |found: &[Diagnostic], expected: Vec<String>| {
+        let errors: Vec<_> = found.iter().filter(|d| !d.is_warning()).collect();
+        let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
+        let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
+        Refusal {
+            details: render(&label, &text, found),
+            expected,
+            ..Refusal::new(Status::Wrong, name, format!("{count} in {}", path.display()))
         }
-        Err(diagnostics) => {
-            let errors: Vec<_> = diagnostics.iter().filter(|d| !d.is_warning()).collect();
-            let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
-            let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
-            Err(Refusal {
-                details: render(&label, &text, &diagnostics),
-                expected: expected_failures(&text),
-                ..Refusal::new(Status::Wrong, name, format!("{count} in {}", path.display()))
-            })
-        }
+    };
+    let (deck, found) = deck::read(&text).map_err(|found| refuse(&found, Vec::new()))?;
+    let built = scene::judged(&deck, found);
+    let (scene, warnings) = built.map_err(|found| refuse(&found, expected_failures(&deck)))?;
+    if !warnings.is_empty() {
+        say::note(&render(&label, &text, &warnings));
     }
+    Ok((deck, scene))
 }
 
 fn text(path: &Path) -> Result<String, Refusal> {
@@ -78,13 +76,12 @@ fn text(path: &Path) -> Result<String, Refusal> {
 }
 
 /// A deck may expect to be wrong.
-fn expected_failures(text: &str) -> Vec<String> {
-    let Ok((deck, _)) = deck::read(text) else { return Vec::new() };
-    let name = |expect: deck::Expect| match expect.body {
-        ExpectBody::Fails(name) => Some(name.value),
+fn expected_failures(deck: &Deck) -> Vec<String> {
+    let name = |expect: &deck::Expect| match &expect.body {
+        ExpectBody::Fails(name) => Some(name.value.clone()),
         ExpectBody::Column { .. } => None,
     };
-    deck.expects.into_iter().filter_map(name).collect()
+    deck.expects.iter().filter_map(name).collect()
 }
 
 fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {

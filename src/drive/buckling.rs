@@ -185,8 +185,8 @@ impl Run<'_> {
             let next = (done + part).min(1.0);
             let load = if next == 1.0 { target } else { start + (target - start) * next };
             if self.attempt(workshop, load).is_ok() {
-                charts::freeze(&mut self.state, &self.model.elements);
-                charts::wind(&mut self.state, &self.good, &self.model.rotations);
+                charts::freeze(&mut self.state, &self.model.charted.elements);
+                charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
                 self.model.remember(&mut self.state);
                 self.good.copy_from(&self.state);
                 done = next;

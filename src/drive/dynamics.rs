@@ -178,10 +178,7 @@ impl Run<'_> {
                 (self.state.a[slot], self.state.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO);
             }
         }
-        if self.is_linear() {
-            return Ok(());
-        }
-        let turning = self.model.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
+        let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
         self.refuse_massless_turns(massive)?;
         self.refuse_leaps()
@@ -189,7 +186,7 @@ impl Run<'_> {
 
     /// Rotations without inertia have no spin to speak of: they go where balance is.
     fn refuse_massless_turns(&self, massive: &[bool]) -> Result<(), NewtonFailure> {
-        let massless = self.model.rotations.iter().map(|&slot| slot as usize).filter(|&slot| !massive[slot]);
+        let massless = self.model.charted.rotations.iter().map(|&slot| slot as usize).filter(|&slot| !massive[slot]);
         let mut turned = massless.map(|slot| (slot, (self.state.q[slot] - self.good.q[slot]).norm()));
         match turned.find(|&(_, angle)| angle > PI && self.state.turns.is_empty()) {
             Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot, angle }),
@@ -227,12 +224,9 @@ impl Run<'_> {
 
     /// Between steps, nodes beyond pi change their chart, and elements settle theirs. `lag`: see [`charts::switch`].
     pub(super) fn change_charts(&mut self, lag: Option<f64>) {
-        if self.is_linear() {
-            return;
-        }
-        let switched = charts::switch(&mut self.state, &self.model.rotations, charts::DYNAMIC_BAND, lag);
+        let switched = charts::switch(&mut self.state, &self.model.charted.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut self.state, &self.model.elements);
+        charts::freeze(&mut self.state, &self.model.charted.elements);
     }
 
     /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the next of those.

@@ -374,7 +374,7 @@ impl Path {
         let here = &self.here;
         run.state.copy_from(&here.state);
         let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
-        charts::carry(&mut run.state, &ahead, &run.model.rotations);
+        charts::carry(&mut run.state, &ahead, &run.model.charted.rotations);
         run.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
         here.state.load + here.load_rate * length
     }
@@ -470,12 +470,12 @@ impl Path {
 /// Adds a correction; whether nodes changed their charts by it.
 fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
     workshop.assembly.extrapolate(&run.state, dq);
-    charts::carry(&mut run.state, dq, &run.model.rotations);
+    charts::carry(&mut run.state, dq, &run.model.charted.rotations);
     run.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
-    let switched = charts::switch(&mut run.state, &run.model.rotations, charts::STATIC_BAND, None);
+    let switched = charts::switch(&mut run.state, &run.model.charted.rotations, charts::STATIC_BAND, None);
     if switched > 0 {
         run.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut run.state, &run.model.elements);
+        charts::freeze(&mut run.state, &run.model.charted.elements);
     }
     switched > 0
 }

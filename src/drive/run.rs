@@ -506,14 +506,12 @@ impl<'o> Run<'o> {
 
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
-        if self.is_linear() {
+        if self.model.linear {
             // Rotations of any size, without charts.
-            for &slot in &self.model.rotations {
-                self.state.wound[slot as usize] = self.state.q[slot as usize];
-            }
-            return Ok(());
+            let (wound, q) = (&mut self.state.wound, &self.state.q);
+            wound.iter_mut().zip(q).for_each(|(wound, q)| *wound = *q);
         }
-        let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.rotations);
+        let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
         }
@@ -526,11 +524,10 @@ impl<'o> Run<'o> {
     }
 
     fn judge_mesh(&mut self) -> Result<(), Failure> {
-        if self.is_linear() {
-            return Ok(());
-        }
         let limit = if self.told.coarse { charts::COARSE } else { charts::COARSE_WARNING };
-        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.elements, limit) else { return Ok(()) };
+        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.charted.elements, limit) else {
+            return Ok(());
+        };
         let failure = self.name_coarse(element, angle);
         if angle > charts::COARSE {
             return Err(failure);
@@ -541,17 +538,14 @@ impl<'o> Run<'o> {
     }
 
     fn name_coarse(&self, element: usize, angle: f64) -> Failure {
-        let nodes = &self.model.elements[element].nodes;
+        let nodes = &self.model.charted.elements[element].nodes;
         let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
     }
 
     /// Between the last good state and this one neighbours may have turned past pi against each other: smaller steps tell.
     pub(super) fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
-        if self.is_linear() {
-            return Ok(());
-        }
-        match charts::leapt(&self.state, &self.good, &self.model.elements) {
+        match charts::leapt(&self.state, &self.good, &self.model.charted.elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
             None => Ok(()),
         }
@@ -581,7 +575,7 @@ impl<'o> Run<'o> {
                     path: matches!(self.plan.stages[self.stage].work, StageWork::Path { .. }),
                     dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
                     soft: self.soft,
-                    beams: !self.model.elements.is_empty(),
+                    beams: self.model.elements > 0,
                 },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {

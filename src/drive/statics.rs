@@ -65,10 +65,8 @@ impl Run<'_> {
         let held = self.state.q.clone();
         self.model.set_clock(&mut self.state, time, 0.0);
         self.state.q = held;
-        if !self.is_linear() {
-            charts::switch(&mut self.state, &self.model.rotations, charts::STATIC_BAND, None);
-            charts::freeze(&mut self.state, &self.model.elements);
-        }
+        charts::switch(&mut self.state, &self.model.charted.rotations, charts::STATIC_BAND, None);
+        charts::freeze(&mut self.state, &self.model.charted.elements);
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;

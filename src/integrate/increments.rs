@@ -41,7 +41,7 @@ impl Increments {
             });
             (slot, carrier.unwrap_or(Carrier::SPIN))
         };
-        Self { carriers: model.rotations.iter().map(carrier).collect() }
+        Self { carriers: model.charted.rotations.iter().map(carrier).collect() }
     }
 
     /// At the start of a stage, what is algorithmic is what is.

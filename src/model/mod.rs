@@ -23,7 +23,8 @@ use std::sync::Arc;
 /// A prescribed rotation may go this far in one step or load increment.
 const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
 
-/// A state that is out of a plane by less, relative to the largest motion, is in it.
+/// A state that is out of a plane by less, relative to the largest motion, is in it: a stage before that ran in space leaves round-off of
+/// a few thousand steps. What is left aside is dropped, a hundredth of what planar and spatial answers may differ by.
 const OUT_OF_PLANE: f64 = 1e-12;
 
 /// What a slot holds.
@@ -81,21 +82,30 @@ impl SlotInfo {
     }
 }
 
+/// The rotation vectors that have charts, and the elements that join them.
+#[derive(Clone, Debug, Default)]
+pub struct Charted {
+    /// The slots of rotation vectors
+    pub rotations: Vec<Slot>,
+    /// The beam elements
+    pub elements: Vec<ElementInfo>,
+}
+
 /// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
 #[derive(Clone)]
 pub struct Model {
     /// All slots
     pub slots: Vec<SlotInfo>,
-    /// The slots with rotation vectors
-    pub rotations: Vec<Slot>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
     pub angles: usize,
     /// The slots on which rotational springs act: how they are wound must be known
     pub sprung: Vec<Slot>,
-    /// The beam elements
-    pub elements: Vec<ElementInfo>,
+    /// How many beam elements there are
+    pub elements: usize,
+    /// What large rotations ask for: nothing where everything is linear
+    pub charted: Charted,
     /// What acts
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs
@@ -126,7 +136,7 @@ pub enum StageError {
 impl Model {
     /// The state before the first stage.
     pub fn rest(&self) -> State {
-        State::rest(self.slots.len(), self.elements.len(), self.amplitudes.len(), self.angles)
+        State::rest(self.slots.len(), self.elements, self.amplitudes.len(), self.angles)
     }
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
@@ -213,7 +223,7 @@ impl Model {
 
     /// One or two held components of a rotation vector survive a change of chart only where they are zero.
     fn refuse_turned_hinges(&self, held: &[Direction], state: &State) -> Result<(), StageError> {
-        for &slot in &self.rotations {
+        for &slot in &self.charted.rotations {
             let here = || held.iter().filter(|d| d.slot == slot);
             let turned = here().any(|d| state.q[slot as usize].dot(d.axis).abs() > 1e-9);
             let spans = |axis: &Vec3| here().any(|d| d.axis.dot(*axis).abs() > 1e-9);

@@ -20,7 +20,7 @@ use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWor
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
-use crate::model::{ElementInfo, Model, SlotInfo, SlotKind};
+use crate::model::{Charted, ElementInfo, Model, SlotInfo, SlotKind};
 use crate::probe::{Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
@@ -124,9 +124,14 @@ const MOST_DIAGNOSTICS: usize = 200;
 
 /// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
 pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let (deck, mut diagnostics) = deck::read(text)?;
+    let (deck, found) = deck::read(text)?;
+    judged(&deck, found)
+}
+
+/// Builds a scene from a deck and what was found in reading it; results as those of [`from_text`].
+pub fn judged(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let mut found = Vec::new();
-    let scene = build(&deck, &mut found);
+    let scene = build(deck, &mut found);
     if !diagnostics.iter().all(Diagnostic::is_warning) {
         // Of a deck that could be read in part only what is said about names is no consequence of that.
         found.retain(|d| d.unknown.as_ref().is_some_and(|name| !deck.broken.iter().any(|b| about(name, b))));
@@ -185,19 +190,20 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
+    let linear = !deck.effects.allow(deck::EffectWord::LargeRotations);
     let mut model = Model {
         slots: [slots(&mesh), composition.multipliers].concat(),
-        rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
-        elements: elements(&mesh),
+        elements: mesh.elements.len(),
+        charted: if linear { Charted::default() } else { charted(&mesh) },
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
         plane: None,
-        linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
+        linear,
         length: check::diagonal(&mesh),
     };
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
@@ -223,12 +229,17 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     })
 }
 
-fn elements(mesh: &Mesh) -> Vec<ElementInfo> {
+/// The rotations of all nodes, and the elements beam by beam.
+fn charted(mesh: &Mesh) -> Charted {
     let info = |beam: &MeshBeam, number: usize| ElementInfo {
         nodes: mesh.elements[number].nodes.iter().map(|&n| mesh.nodes[n].node).collect(),
         in_one_chart: beam.interpolation == deck::InterpolationWord::Total,
     };
-    mesh.beams.iter().flat_map(|beam| beam.elements.clone().map(move |number| info(beam, number))).collect()
+    let of = |beam: &MeshBeam| beam.elements.clone().map(|number| info(beam, number)).collect::<Vec<_>>();
+    Charted {
+        rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
+        elements: mesh.beams.iter().flat_map(of).collect(),
+    }
 }
 
 /// What each slot holds, named after its node.

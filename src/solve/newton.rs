@@ -220,9 +220,9 @@ impl Newton {
                 });
             }
             assembly.extrapolate(state, &self.dq);
-            let changes_charts = method.changes_charts() && !assembly.is_linear();
+            let changes_charts = method.changes_charts();
             if changes_charts {
-                charts::carry(state, &self.dq, &model.rotations);
+                charts::carry(state, &self.dq, &model.charted.rotations);
             }
             method.correct(state, &self.dq);
             if changes_charts {
@@ -263,10 +263,10 @@ impl Newton {
 
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn.
     fn change_charts(&mut self, model: &Model, state: &mut State, work: &mut Work) {
-        let switched = charts::switch(state, &model.rotations, charts::STATIC_BAND, None);
+        let switched = charts::switch(state, &model.charted.rotations, charts::STATIC_BAND, None);
         if switched > 0 {
             work.chart_switches += switched as u64;
-            charts::freeze(state, &model.elements);
+            charts::freeze(state, &model.charted.elements);
             // What was a correction before is none in the new chart: it may not end the iteration.
             self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }

@@ -124,10 +124,10 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
         let field = [&mut state.q, &mut state.v, &mut state.a][field].as_mut_slice();
         scatter(&assembly, &x, field, 1.0);
     }
-    for &slot in &model.rotations {
+    for &slot in &model.charted.rotations {
         state.wound[slot as usize] = state.q[slot as usize];
     }
-    charts::freeze(&mut state, &model.elements);
+    charts::freeze(&mut state, &model.charted.elements);
     // Over increments, accelerations and velocities of rotations are functions of the unknown of the step.
     let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
     let combinations = if incremental {

@@ -137,10 +137,10 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
         if let Some(increments) = &increments {
             increments.end(&mut state, &good);
         }
-        charts::wind(&mut state, &good, &model.rotations);
+        charts::wind(&mut state, &good, &model.charted.rotations);
         let lag = total.then_some(scheme.lag() * length);
-        charts::switch(&mut state, &model.rotations, charts::DYNAMIC_BAND, lag);
-        charts::freeze(&mut state, &model.elements);
+        charts::switch(&mut state, &model.charted.rotations, charts::DYNAMIC_BAND, lag);
+        charts::freeze(&mut state, &model.charted.elements);
         before = length;
     }
     let tip = scene.mesh.nodes.iter().find(|node| node.name == tip).unwrap().node;
