@@ -52,7 +52,8 @@ fn study(
         .map_err(|failure| (status_of(&failure), failure.name(), failure.to_string()))?;
     tell(&name, scene.title.as_deref(), &found, tolerance);
     let folder = folder(out, &name, several);
-    let written = PartFile::written(&folder, "effects.csv", found.to_csv().as_bytes());
+    let table = found.to_csv().map_err(|error| (Status::Io, "io", error.to_string()))?;
+    let written = PartFile::written(&folder, "effects.csv", &table);
     let written = written.and_then(|(part, file)| part.finish(&file, "effects.csv"));
     written.map_err(|error| (Status::Io, "io", error.to_string()))?;
     say::line(&format!("  {}", folder.join("effects.csv").display()));

@@ -169,7 +169,7 @@ fn a_study_tells_what_each_effect_changes() {
     assert_eq!(found.variants[0].without, [EffectWord::Shear], "what changes most stands first");
     assert!(found.absent.contains(&EffectWord::Gravity) && found.absent.contains(&EffectWord::Gyroscopic));
     assert!(found.cheapest.largest().0 <= 1e-3 && !found.cheapest.without.contains(&EffectWord::Shear));
-    let csv = found.to_csv();
+    let csv = String::from_utf8(found.to_csv().unwrap()).unwrap();
     assert!(csv.starts_with("without,status,iterations,seconds,output,change\n,finished,"));
     assert_eq!(csv.lines().filter(|line| line.starts_with("shear,finished,")).count(), found.columns.len());
 }
@@ -185,7 +185,7 @@ fn a_variant_that_fails_is_a_result() {
     let found = study(&text, 1e-3);
     let linear = found.variants.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
     assert!(linear.largest().0.is_infinite() && linear.failure().contains("arc_length"));
-    assert!(found.to_csv().contains("large_rotations,failed"));
+    assert!(String::from_utf8(found.to_csv().unwrap()).unwrap().contains("large_rotations,failed"));
 }
 
 /// Springs and dampers act in the first stage, and a stage goes on where the last one ended.

@@ -1,0 +1,94 @@
+//! How much the outputs of one run differ from those of another.
+
+use super::outcome::Outcome;
+use std::collections::HashMap;
+
+/// Forces below this part of the moments over the length of the scene are round-off, and moments likewise: what a run leaves
+/// out of balance is up to 1e-8 of the largest force, and adds up over elements.
+const ROUND_OFF: f64 = 1e-6;
+
+/// The largest change of each column over all rows, relative to the largest value of its kind in the whole scene: of all displacements,
+/// rotations, forces, ….
+pub(super) fn changes(columns: &[String], length: f64, whole: &Outcome, other: &Outcome) -> Vec<f64> {
+    let kinds: Vec<&str> = columns.iter().map(|column| kind(column)).collect();
+    let mut scales = HashMap::new();
+    let of_history = columns.len() - whole.modes.len();
+    let all = whole.rows.iter().map(|row| (0, row)).chain([(of_history, &whole.modes)]);
+    for (first, row) in all {
+        for (kind, value) in kinds[first..].iter().zip(row) {
+            let scale = scales.entry(*kind).or_insert(0.0_f64);
+            *scale = scale.max(value.abs());
+        }
+    }
+    // Round-off of forces is no moment, and the other way about.
+    for (one, other, arm) in
+        [("f", "m", 1.0 / length), ("m", "f", length), ("N", "M", 1.0 / length), ("M", "N", length)]
+    {
+        let floor = scales.get(other).map_or(0.0, |scale| ROUND_OFF * arm * scale);
+        scales.entry(one).and_modify(|scale| *scale = scale.max(floor));
+    }
+    let mut changes = vec![0.0_f64; columns.len()];
+    let mut compare = |column: usize, came: f64, was: f64| {
+        let (difference, scale) = ((came - was).abs(), scales[kinds[column]]);
+        let same = difference == 0.0 || (came.is_nan() && was.is_nan());
+        let now = if same { 0.0 } else { difference / scale };
+        changes[column] = match now {
+            // What is always zero has nothing that a change would compare with.
+            _ if scale == 0.0 && !same => f64::NAN,
+            now if now.is_nan() => f64::INFINITY,
+            now if changes[column].is_nan() => now,
+            now => changes[column].max(now),
+        };
+    };
+    for (k, row) in whole.rows.iter().enumerate() {
+        let Some(there) = other.at(whole, k) else { continue };
+        there.iter().zip(row).enumerate().for_each(|(column, (came, was))| compare(column, *came, *was));
+    }
+    // A mode that was not found again is a change without measure.
+    for (k, was) in whole.modes.iter().enumerate() {
+        compare(of_history + k, other.modes.get(k).copied().unwrap_or(f64::NAN), *was);
+    }
+    changes
+}
+
+/// What a column shows: its name without the node, and without the direction. Energies compare with each other: their sum is the error
+/// of the scheme alone.
+fn kind(column: &str) -> &str {
+    if column.starts_with("energy.") {
+        return "energy";
+    }
+    if column.ends_with(".omega") || column.ends_with(".growth") {
+        return "mode";
+    }
+    let quantity = column.rsplit('.').next().unwrap_or(column);
+    quantity.trim_end_matches(|c: char| c.is_ascii_digit() || ['x', 'y', 'z'].contains(&c))
+}
+
+impl Outcome {
+    /// The row that belongs to row `k` of another run: at its clock, between two rows where there is none. Of stages whose clock goes
+    /// back, and of others that ended elsewhere, the last row is compared with the last.
+    fn at(&self, other: &Self, k: usize) -> Option<Vec<f64>> {
+        let (stage, clock) = other.clocks[k];
+        if self.clocks.get(k) == Some(&(stage, clock)) {
+            return self.rows.get(k).cloned();
+        }
+        if k + 1 == other.rows.len() {
+            return self.rows.last().cloned();
+        }
+        let goes_on = |outcome: &Self| {
+            let own = outcome.clocks.iter().filter(|(s, _)| *s == stage).map(|(_, clock)| *clock);
+            own.is_sorted()
+        };
+        if !(goes_on(self) && goes_on(other)) {
+            return None;
+        }
+        let after = self.clocks.iter().position(|&(s, c)| s == stage && c >= clock)?;
+        if self.clocks[after].1 == clock {
+            return Some(self.rows[after].clone());
+        }
+        let (s, c0) = *self.clocks.get(after.checked_sub(1)?)?;
+        let share = (s == stage).then(|| (clock - c0) / (self.clocks[after].1 - c0))?;
+        let (a, b) = (&self.rows[after - 1], &self.rows[after]);
+        Some(a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect())
+    }
+}

@@ -1,0 +1,55 @@
+//! Which effects a scene has.
+
+use crate::deck::{self, Deck, EffectWord, SpringBody};
+use crate::scene::Scene;
+
+/// The names under which a scene tells whether it has an effect; dampers stand in tables of their own.
+pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
+    match word {
+        EffectWord::Planar => &["planar"],
+        EffectWord::RotaryInertia => &["rotary inertia", "section inertia at nodes"],
+        EffectWord::Gyroscopic => {
+            &["rotary inertia", "eccentric section inertia", "section inertia at nodes", "rigid body inertia"]
+        }
+        EffectWord::Shear => &["shear"],
+        EffectWord::Extension => &["extension"],
+        EffectWord::Damping => &[],
+        EffectWord::Gravity => &["gravity on beams", "gravity on bodies"],
+        EffectWord::FollowerTangent => {
+            &["following line loads", "following forces", "following moments", "dead moments"]
+        }
+        EffectWord::GeometricStiffness => &["geometric stiffness"],
+        EffectWord::LargeRotations => &["large rotations"],
+    }
+}
+
+/// Whether there is something of an effect in a scene.
+pub(super) fn acts(word: EffectWord, deck: &Deck, scene: &Scene) -> bool {
+    let named = scene.reasons.iter().any(|reason| reason.active && names(word).contains(&reason.name));
+    named || (word == EffectWord::Damping && is_damped(deck))
+}
+
+fn is_damped(deck: &Deck) -> bool {
+    let sprung = |spring: &deck::Spring| match spring.body {
+        SpringBody::Ground { damping, .. } => damping != [0.0; 6],
+        SpringBody::Between { damping, .. } => damping != 0.0,
+    };
+    deck.damping.is_some_and(|factors| factors != [0.0; 2])
+        || deck.springs.iter().any(sprung)
+        || deck.joints.iter().any(|joint| joint.damping != 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A name that no scene tells would call its effect absent for ever.
+    #[test]
+    fn scenes_tell_of_every_name() {
+        let text = include_str!("../../../decks/robot_arm.toml");
+        let (scene, _) = crate::scene::from_text(text).unwrap();
+        for name in EffectWord::ALL.into_iter().flat_map(names) {
+            assert!(scene.reasons.iter().any(|reason| reason.name == *name), "{name}");
+        }
+    }
+}
