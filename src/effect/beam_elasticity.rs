@@ -1,6 +1,6 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
-use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
+use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View};
 use super::planar_elasticity::PlanarElasticity;
 use super::{ByOrder, Connection, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
@@ -257,9 +257,8 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
-        systems.clear_for(Weights { stiffness, ..Weights::NONE });
         let posture = Posture::side_by_side(each_lane!(|k| &elements[k].connection), at);
-        I::View::new(&posture).add(&sum, stiffness, &mut scratch, &mut systems);
+        I::View::new(&posture).fill(&sum, stiffness, &mut scratch, &mut systems);
         let count = LANES.min(batch.len() - start);
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
         out.add_lanes(first + start, count, &systems, &mut apart, is_mixed, |k, out| {
@@ -323,6 +322,12 @@ impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
         }
         true
     }
+
+    #[inline(always)]
+    fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
+        let geometric = self.stresses.as_ref().map(|stresses| &stresses[0]);
+        (N == 2 && G == 1).then(|| HalfWay { point: &self.points[0], free: self.free, geometric })
+    }
 }
 
 #[inline(always)]
@@ -354,10 +359,9 @@ fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
             du[i] = at_slots(dq, each_lane!(|k| connections[k].nodes[i].u));
             dp[i] = at_slots(dq, each_lane!(|k| connections[k].nodes[i].p));
         }
-        let change = view.variation(&du, &dp);
+        let stresses = view.extrapolated(&sum.points, sum.free, &du, &dp);
         for g in 0..G {
-            let stress = sum.points[g].extrapolated_stress(view.nodes(), sum.free, |i| change[i].0, |i| change[i].1);
-            let stress = packed(&stress);
+            let stress = packed(&stresses[g]);
             for k in 0..LANES.min(batch.len() - start) {
                 out[(start + k) * G + g] = stress.map(|lanes| lanes.0[k]);
             }
@@ -420,9 +424,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     #[inline(never)]
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
         let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
-        let change = I::variation(&self.connection, at, dq);
-        for (point, remembered) in self.points.iter().zip(out) {
-            *remembered = packed(&point.extrapolated_stress(view.nodes(), free, |i| change[i].0, |i| change[i].1));
-        }
+        let (du, dp) = self.connection.variations_in_one_chart(at, dq);
+        let stresses = view.extrapolated(&self.points, free, &du, &dp);
+        out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));
     }
 }

@@ -2,6 +2,8 @@
 //! gives back to the nodes of the scene.
 
 use super::{Connection, after_displacement, motions};
+use crate::kernel::beam::StiffnessPoint;
+use crate::kernel::elastic::Stress;
 use crate::kernel::relative::Relative;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{LANES, Lanes, Pack, Real, pack};
@@ -68,6 +70,21 @@ pub trait PointSum<const N: usize, T: Real> {
 
     /// Adds the forces that geometric parts are formed with; `false` where they are those of `add`.
     fn add_geometric(&self, nodes: &[NodeMotion<T>; N], out: &mut ElementSystem<T>) -> bool;
+
+    /// The elastic point half way between two nodes, where it is all there is: for it the way is short.
+    fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
+        None
+    }
+}
+
+/// An elastic point with the amplitude of its free strain, and the stress of its geometric part where that is not the present one.
+pub struct HalfWay<'a, const N: usize, T> {
+    /// The point
+    pub point: &'a StiffnessPoint<N, T>,
+    /// The amplitude
+    pub free: T,
+    /// The stress
+    pub geometric: Option<&'a Stress<T>>,
 }
 
 /// Two element systems to compute with, kept between elements.
@@ -94,8 +111,40 @@ pub trait View<const N: usize, T: Real> {
     /// How these vary with displacements and rotation vectors.
     fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N];
 
-    /// Adds up the points, and adds what they give, carried back to the nodes of the scene, to `out`.
-    fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>);
+    /// Adds up the points, and puts what they give, carried back to the nodes of the scene, in the place of what stands in `out`.
+    fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>);
+
+    /// The stresses that variations of displacements and rotation vectors are expected to lead to.
+    #[inline(always)]
+    fn extrapolated<const G: usize>(
+        &self,
+        points: &[StiffnessPoint<N, T>; G],
+        free: T,
+        du: &[Vec3<T>; N],
+        dp: &[Vec3<T>; N],
+    ) -> [Stress<T>; G]
+    where
+        Self: Sized,
+    {
+        extrapolated(self, points, free, du, dp)
+    }
+}
+
+/// [`View::extrapolated`] of any elements.
+#[inline(always)]
+fn extrapolated<const N: usize, const G: usize, T: Real>(
+    view: &impl View<N, T>,
+    points: &[StiffnessPoint<N, T>; G],
+    free: T,
+    du: &[Vec3<T>; N],
+    dp: &[Vec3<T>; N],
+) -> [Stress<T>; G] {
+    let (nodes, change) = (view.nodes(), view.variation(du, dp));
+    let mut out = [Stress { n: Vec3::zero(), m: Vec3::zero() }; G];
+    for g in 0..G {
+        out[g] = points[g].extrapolated_stress(nodes, free, |i| change[i].0, |i| change[i].1);
+    }
+    out
 }
 
 /// A way to interpolate rotations.
@@ -135,7 +184,7 @@ pub trait Interpolation: Send + Sync + 'static {
         let scratch = std::cell::RefCell::new(scratch);
         connection.evaluate(at, weights, false, after_displacement, out, &|nodes, weights, out| {
             let view = Self::View::new(&Posture::new(connection, nodes, at));
-            view.add(sum, weights.stiffness, &mut scratch.borrow_mut(), out);
+            view.fill(sum, weights.stiffness, &mut scratch.borrow_mut(), out);
         });
     }
 }
@@ -190,7 +239,8 @@ impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
     }
 
     #[inline(always)]
-    fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, _scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+    fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, _scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+        out.clear_for(Weights { stiffness, ..Weights::NONE });
         sum.add(&self.nodes, stiffness, out);
     }
 }
@@ -231,9 +281,28 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
     }
 
     #[inline(always)]
-    fn add<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+    fn extrapolated<const G: usize>(
+        &self,
+        points: &[StiffnessPoint<N, T>; G],
+        free: T,
+        du: &[Vec3<T>; N],
+        dp: &[Vec3<T>; N],
+    ) -> [Stress<T>; G] {
+        if N == 2 && G == 1 {
+            return [self.seen.extrapolated_half_way(&self.rotations, &points[0], free, du, dp); G];
+        }
+        extrapolated(self, points, free, du, dp)
+    }
+
+    #[inline(always)]
+    fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
+        if let Some(HalfWay { point, free, geometric }) = sum.half_way() {
+            return self.seen.fill_half_way(&self.rotations, point, free, geometric, stiffness, out);
+        }
         let Scratch { local, geometric } = scratch;
-        local.clear_for(Weights { stiffness, ..Weights::NONE });
+        let weights = Weights { stiffness, ..Weights::NONE };
+        out.clear_for(weights);
+        local.clear_for(weights);
         sum.add(&self.seen.nodes, stiffness, local);
         geometric.clear_force();
         let other = stiffness != 0.0 && sum.add_geometric(&self.seen.nodes, geometric);

@@ -9,6 +9,7 @@ pub mod element;
 pub mod inertia;
 pub mod joint;
 pub mod load;
+pub mod pair;
 pub mod planar;
 pub mod relative;
 pub mod seam;

@@ -26,18 +26,18 @@ use crate::tensor::{Mat3, Vec3};
 pub struct Relative<const N: usize, T = f64> {
     /// The nodes as the frame sees them: u = xi - X and P = Theta; rates are left at zero.
     pub nodes: [NodeMotion<T>; N],
-    frame: Mat3<T>,
-    arms: [Vec3<T>; N],
+    pub(super) frame: Mat3<T>,
+    pub(super) arms: [Vec3<T>; N],
     turned: [Rotation<T>; N],
     /// A_i
     back: [Mat3<T>; N],
-    half: Half<T>,
+    pub(super) half: Half<T>,
 }
 
 /// The frame half way between two nodes, with h half the rotation vector from the one to the other.
 #[derive(Clone, Copy)]
-struct Half<T> {
-    rotation: Rotation<T>,
+pub(super) struct Half<T> {
+    pub rotation: Rotation<T>,
     /// c = tan(h/2) / (2h)
     c: T,
     /// dc/dz over z = h.h
@@ -57,6 +57,28 @@ impl<T: Real> Half<T> {
         let (d1, d2) = ((f3 - f2) * 0.5, (f4 * 2.0 - f3) * 0.5);
         let c = f2 / f1 * 0.5;
         Self { rotation: Rotation::new(h), c, c_slope: (d2 * f1 - f2 * d1) / (f1 * f1) * 0.5 }
+    }
+
+    /// F_i: how the frame follows the first of the two nodes, or the `second`.
+    #[inline(always)]
+    pub fn follows(&self, second: bool) -> Mat3<T> {
+        let (Rotation { r, p: h, .. }, c) = (self.rotation, self.c);
+        let (even, odd) = (Mat3::identity().scale(0.5), h.skew() * c);
+        if second { (even - odd) * r } else { (even + odd) * r.transpose() }
+    }
+
+    /// The derivatives of F_i^T m over h, for a fixed m:
+    ///
+    /// ```text
+    /// F_1^T m = exp(h) (m/2 - c h x m),   F_2^T m = exp(h)^T (m/2 + c h x m)
+    /// ```
+    #[inline(always)]
+    pub fn turned(&self, m: Vec3<T>) -> [Mat3<T>; 2] {
+        let Self { rotation: Rotation { r, t, p: h, .. }, c, c_slope } = *self;
+        let across = h.cross(m);
+        let bend = across.outer(h) * (c_slope * 2.0) - m.skew() * c;
+        let (g1, g2) = (m.scale(0.5) - across * c, m.scale(0.5) + across * c);
+        [r * (-Mat3::skew_mul(g1, t) - bend), r.transpose_matmul(Mat3::skew_mul(g2, t.transpose()) + bend)]
     }
 }
 
@@ -98,10 +120,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
         if first == last {
             return Some(Mat3::identity());
         }
-        let (Rotation { r, p: h, .. }, c) = (self.half.rotation, self.half.c);
-        let even = Mat3::identity().scale(0.5);
-        let odd = h.skew() * c;
-        Some(if i == first { (even + odd) * r.transpose() } else { (even - odd) * r })
+        Some(self.half.follows(i == last))
     }
 
     /// What the frame sees when the nodes move by `du` and spin by `spins` (material): variations of u and Theta.
@@ -282,25 +301,19 @@ impl<const N: usize, T: Real> Relative<N, T> {
         over
     }
 
-    /// The derivatives of F_i^T m over the spins t_j of the two nodes that carry the frame, for a fixed m:
+    /// The derivatives of F_i^T m over the spins t_j of the two nodes that carry the frame, for a fixed m, with
     ///
     /// ```text
-    /// F_1^T m = exp(h) (m/2 - c h x m),   F_2^T m = exp(h)^T (m/2 + c h x m),   2 dh = T(2h)^-1 t_2 - T(2h)^-T t_1
+    /// 2 dh = T(2h)^-1 t_2 - T(2h)^-T t_1
     /// ```
     #[inline(always)]
     fn drift(&self, rotations: &[Rotation<T>; N], m: Vec3<T>, s: f64) -> Drift<N, T> {
         let (first, last) = carriers(N);
-        let Half { rotation: Rotation { r, t, p: h, .. }, c, c_slope } = self.half;
-        let across = h.cross(m);
-        let bend = across.outer(h) * (c_slope * 2.0) - m.skew() * c;
-        let (g1, g2) = (m.scale(0.5) - across * c, m.scale(0.5) + across * c);
+        let [over_first, over_last] = self.half.turned(m);
         let (t1, t2) = (rotations[first].t, rotations[last].t);
-        let rows = [
-            t1.transpose_matmul(r * (-Mat3::skew_mul(g1, t) - bend)),
-            t2.transpose_matmul(r.transpose_matmul(Mat3::skew_mul(g2, t.transpose()) + bend)),
-        ];
+        let rows = [t1.transpose_matmul(over_first), t2.transpose_matmul(over_last)];
         // T(2h)^-1
-        let inverse = Rotation::new(h.scale(2.0)).t_inverse().scale(0.5 * s);
+        let inverse = Rotation::new(self.half.rotation.p.scale(2.0)).t_inverse().scale(0.5 * s);
         let columns = [-(inverse.transpose() * t1), inverse * t2];
         Drift { rows, columns }
     }

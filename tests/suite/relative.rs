@@ -4,6 +4,7 @@ use crate::dual::{Dual, variables, with_room};
 use crate::random::Random;
 use crate::tangents::{agree, stiffness_points, symmetric};
 use beamsim::kernel::beam::StiffnessPoint;
+use beamsim::kernel::elastic::{Strain, Stress};
 use beamsim::kernel::relative::Relative;
 use beamsim::kernel::{ElementSystem, shape};
 use beamsim::real::Real;
@@ -43,7 +44,18 @@ impl<const N: usize> Element<N> {
         sum
     }
 
+    /// As elements of two nodes do it, or of any number.
     fn system<T: Real>(&self, nodes: &Nodes<N, T>, weight: f64) -> ElementSystem<T> {
+        if N == 2 { self.half_way(nodes, weight) } else { self.carried_back(nodes, weight) }
+    }
+
+    fn half_way<T: Real>(&self, nodes: &Nodes<N, T>, weight: f64) -> ElementSystem<T> {
+        let ((seen, rotations), mut out) = (self.see(nodes), ElementSystem::new(2 * N));
+        seen.fill_half_way(&rotations, &self.points[0].lifted(), T::zero(), None, weight, &mut out);
+        out
+    }
+
+    fn carried_back<T: Real>(&self, nodes: &Nodes<N, T>, weight: f64) -> ElementSystem<T> {
         let (seen, rotations) = self.see(nodes);
         let (mut local, mut out) = (ElementSystem::new(2 * N), ElementSystem::new(2 * N));
         for point in &self.points {
@@ -87,6 +99,44 @@ fn relative_tangents_hold() {
         tangent_holds::<3>();
         tangent_holds::<4>();
     });
+}
+
+/// The short way of two nodes against the general one, with free strains and with the stress of another state in the geometric part.
+#[test]
+fn half_way_between_two_nodes_the_short_way_is_the_general_one() {
+    let mut random = Random::new(1007);
+    for (base, spread) in [(0.0, 0.0), (1e-4, 1e-5), (1.3, 0.4), (PI, 0.9), (5.0, 0.6), (6.6, 0.3), (2.0, 1.1)] {
+        for coupled in [false, true] {
+            let mut element = Element::<2>::new(&mut random);
+            element.points[0].free = Some(Strain { gamma: random.cube(0.1), kappa: random.cube(0.2) });
+            if !coupled {
+                element.points[0].stiffness.cc = None;
+            }
+            let (point, base, free) = (element.points[0], random.vector(base), 0.7);
+            let nodes: Nodes<2> = nodes_around(&mut random, base, spread);
+            let other = Stress { n: random.cube(2.0), m: random.cube(3.0) };
+            let (seen, rotations) = element.see(&nodes);
+            for geometric in [None, Some(&other)] {
+                let [mut local, mut source, mut general, mut short] = from_fn(|_| ElementSystem::new(4));
+                point.add_elastic(&seen.nodes, free, geometric, 1.3, &mut local);
+                if let Some(stress) = geometric {
+                    point.add_force(&point.configuration(&seen.nodes), stress, &mut source);
+                }
+                seen.carry_back(&rotations, &local, geometric.map(|_| &source), 1.3, &mut general);
+                seen.fill_half_way(&rotations, &point, free, geometric, 1.3, &mut short);
+                let what = format!("base {base:?}, spread {spread}, coupled {coupled}, {geometric:?}");
+                agree(&format!("force, {what}"), short.force(), general.force(), 1e-14);
+                agree(&format!("tangent, {what}"), &short.tangent(), &general.tangent(), 1e-14);
+            }
+            let [du, dp]: [[Vec3; 2]; 2] = from_fn(|_| from_fn(|_| random.cube(0.1)));
+            let spins = from_fn(|i| rotations[i].t * dp[i]);
+            let change = seen.variation(&du, &spins);
+            let general = point.extrapolated_stress(&seen.nodes, free, |i| change[i].0, |i| change[i].1);
+            let short = seen.extrapolated_half_way(&rotations, &point, free, &du, &dp);
+            let both = [&short, &general].map(|stress| [stress.n.0, stress.m.0].concat());
+            agree(&format!("extrapolated stress, base {base:?}, spread {spread}"), &both[0], &both[1], 1e-14);
+        }
+    }
 }
 
 /// A rotation of the whole element, in each way to interpolate the curvature of which the paper computes (62).

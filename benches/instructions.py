@@ -1,0 +1,184 @@
+#!/usr/bin/env python3
+"""Counts instructions with valgrind's callgrind, which no other work on the machine disturbs.
+
+    benches/instructions.py [--beamsim PATH] [--bless]
+
+Each scene is a chain of 60 elements, run over few and over many steps; the difference, over elements and iterations, is what an element
+costs in an iteration, without the start of the program. It may exceed what benches/instructions.csv holds by 5 % (compilers differ);
+`--bless` records new numbers. Scenes that differ only by tables without effect must cost the same to a thousandth: what is absent costs
+nothing. Where valgrind is not installed, that is said, and nothing fails.
+Exit status: 0 fine or skipped, 1 something costs more than it should, 2 a run failed.
+"""
+
+import argparse
+import csv
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+RECORD = ROOT / "benches" / "instructions.csv"
+ELEMENTS = 60
+# Whole batches of elements side by side, and enough steps that a cache of the allocator or a first iteration is nothing.
+FEW, MANY = 2, 8
+# A compiler's whims, and scenes that must cost the same.
+TOLERANCE, SAME = 0.05, 1e-3
+
+BASE = """
+[point]
+root = [0, 0, 0]
+tip = [10, 0, 0]
+[section.s]
+EA = 1e4
+GA = 1e4
+GJ = 1e3
+EI = 1e3
+rhoA = {rhoA}
+rhoJ = {rhoJ}
+[[beam]]
+name = "b"
+section = "s"
+through = ["root", "tip"]
+elements = {elements}
+interpolation = "{interpolation}"
+order = {order}
+[[support]]
+at = "root"
+fix = "all"
+[[load]]
+at = "tip"
+force = [0, 0, {force}]
+[effects]
+planar = {planar}
+{rest}
+[output]
+nodes = ["tip"]
+every = 1000
+"""
+STATIC = '[[stage]]\nkind = "static"\nsteps = {steps}\n'
+DYNAMIC = '[[stage]]\nkind = "dynamic"\nend = {steps}e-2\nstep = 1e-2\n'
+
+
+def scene(dynamic=False, top="", rest="", tables="", **changes):
+    """The text of a deck but for its number of steps."""
+    values = {"rhoA": 1, "rhoJ": "[0, 0, 0]", "elements": ELEMENTS, "interpolation": "relative", "order": 1}
+    values |= {"planar": "false", "force": 5 if dynamic else 50} | changes
+    return top + BASE.format(rest=rest, **values) + tables + (DYNAMIC if dynamic else STATIC)
+
+
+ROTARY = {"dynamic": True, "rhoJ": "[2, 1, 1]"}
+GRAVITY = "gravity = [0, 0, -9.81]\n"
+SCENES = {
+    "static, relative": scene(),
+    "static, total": scene(interpolation="total"),
+    "static, order 3": scene(order=3),
+    "static, planar": scene(planar="true"),
+    "static, gravity": scene(top=GRAVITY),
+    "dynamic, relative": scene(dynamic=True),
+    "dynamic, planar": scene(dynamic=True, planar="true"),
+    "dynamic, rotary inertia": scene(**ROTARY),
+    "dynamic, mass damping": scene(**ROTARY, tables="[damping]\nmass = 0.1\n"),
+    "dynamic, strain-rate damping": scene(**ROTARY, tables="[damping]\nstiffness = 1e-3\n"),
+}
+# Pairs that must cost the same.
+ABSENT = {
+    "mass in statics": (scene(), scene(rhoA=0)),
+    "rotary inertia in statics": (scene(), scene(rhoJ="[2, 1, 1]")),
+    "gravity switched off": (scene(), scene(top=GRAVITY, rest="gravity = false")),
+    "gravity of zero": (scene(), scene(top="gravity = [0, 0, 0]\n")),
+    "damping of zero": (scene(dynamic=True), scene(dynamic=True, tables="[damping]\nmass = 0\nstiffness = 0\n")),
+    "rotary inertia switched off": (scene(dynamic=True), scene(**ROTARY, rest="rotary_inertia = false")),
+}
+
+
+class Bench:
+    """A program to count, and a folder to count in."""
+
+    def __init__(self, program, folder):
+        self.program, self.folder = program, folder
+
+    def run(self, text, steps):
+        """Instructions and iterations of a run."""
+        deck, out = self.folder / "deck.toml", self.folder / "out"
+        deck.write_text(text.format(steps=steps))
+        command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+        command += [str(self.program), "run", str(deck), "--out", str(out)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        counted = re.search(r"Collected : (\d+)", done.stderr)
+        if done.returncode != 0 or not counted:
+            raise RuntimeError(f"{' '.join(command)}\n{done.stderr}\n{deck.read_text()}")
+        report = json.loads((out / "run.json").read_text())
+        return int(counted[1]), report["counters"]["iterations"]
+
+    def cost(self, text):
+        """Instructions for an element and an iteration."""
+        (few, at_few), (many, at_many) = self.run(text, FEW), self.run(text, MANY)
+        return (many - few) / (at_many - at_few) / ELEMENTS
+
+
+def recorded():
+    """The costs that are held, by scene."""
+    if not RECORD.exists():
+        return {}
+    with RECORD.open(newline="") as file:
+        return {row["scene"]: float(row["instructions"]) for row in csv.DictReader(file)}
+
+
+def record(costs):
+    """Holds these costs from now on."""
+    with RECORD.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["scene", "instructions"])
+        writer.writerows((name, f"{cost:.0f}") for name, cost in costs.items())
+
+
+def present(bench, bless):
+    """Whether what is there costs no more than it did."""
+    before, costs = recorded(), {name: bench.cost(text) for name, text in SCENES.items()}
+    if bless:
+        record(costs)
+        before = recorded()
+    fine = True
+    for name, cost in costs.items():
+        known = before.get(name)
+        holds = known is not None and cost <= known * (1 + TOLERANCE)
+        fine &= holds
+        print(f"{'ok ' if holds else 'X  '} {name:<30} {cost:8.0f} instructions an element and iteration, held {known}")
+    return fine
+
+
+def absent(bench):
+    """Whether what is absent costs nothing."""
+    fine = True
+    for name, texts in ABSENT.items():
+        without, inert = (bench.cost(text) for text in texts)
+        holds = abs(inert - without) <= SAME * without
+        fine &= holds
+        print(f"{'ok ' if holds else 'X  '} absent: {name:<28} {inert:8.0f} instead of {without:.0f}")
+    return fine
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--beamsim", type=Path, default=ROOT / "target" / "release" / "beamsim")
+    parser.add_argument("--bless", action="store_true")
+    arguments = parser.parse_args()
+    if not shutil.which("valgrind"):
+        print("instruction counts: skipped, valgrind is not installed")
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(arguments.beamsim, Path(folder))
+        try:
+            fine = [present(bench, arguments.bless), absent(bench)]
+        except RuntimeError as error:
+            print(error, file=sys.stderr)
+            return 2
+    return 0 if all(fine) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
