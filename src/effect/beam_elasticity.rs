@@ -7,7 +7,7 @@ use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane, pack};
-use crate::system::{Apart, Aspect, Category, Cliques, Memory, Plane, Sink, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
 use crate::tensor::Vec3;
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -132,10 +132,11 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
 
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
         let remembered = self.remembered(memory);
-        let (two, three) = (self.elements.two.len(), 2 * self.elements.three.len());
-        let mut parts = [0, two, two + three].map(|start| remembered.get(start..).unwrap_or_default()).into_iter();
+        let mut start = 0;
         for_each_batch!(self.elements, |first, batch| {
-            let part = parts.next().unwrap_or_default();
+            let points: usize = batch.iter().map(|element| element.points.len()).sum();
+            let end = start + points;
+            let part = remembered.get(std::mem::replace(&mut start, end)..).unwrap_or_default();
             let done = Instructions::here().run_side_by_side(
                 #[inline(always)]
                 || add_batch::<I, _, _>(batch, first, part, at, weights, out),
@@ -253,7 +254,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
 ) {
     let stiffness = weights.stiffness;
     let (mut systems, mut scratch) = (ElementSystem::<Lanes>::new(2 * N), Scratch::<Lanes>::new(N));
-    let (mut apart, mut alone) = (Apart::default(), None);
+    let mut alone = None;
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
@@ -261,7 +262,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         I::View::new(&posture).fill(&sum, stiffness, &mut scratch, &mut systems);
         let count = LANES.min(batch.len() - start);
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
-        out.add_lanes(first + start, count, &systems, &mut apart, is_mixed, |k, out| {
+        out.add_lanes(first + start, count, &systems, is_mixed, |k, out| {
             let work = alone.get_or_insert_with(|| workspace(batch));
             elements[k].add::<I>(first + start + k, stresses_of(remembered, start + k), at, stiffness, work, out);
         });

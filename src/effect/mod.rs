@@ -328,23 +328,21 @@ impl<A, B, C> ByOrder<A, B, C> {
 /// Where each instance of a batch begins counting: batches follow each other in the order two, three, four.
 macro_rules! for_each_batch {
     ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {{
+        let batches = &$batches;
         let mut $first = 0;
-        {
-            let $batch = &$batches.two;
-            $body;
-            $first += $batch.len();
-        }
-        {
-            let $batch = &$batches.three;
-            $body;
-            $first += $batch.len();
-        }
-        {
-            let $batch = &$batches.four;
-            $body;
-            let _ = $first;
-        }
+        crate::effect::for_each_batch!(@one batches.two, $first, $batch, $body);
+        crate::effect::for_each_batch!(@one batches.three, $first, $batch, $body);
+        crate::effect::for_each_batch!(@one batches.four, $first, $batch, $body);
+        let _ = $first;
     }};
+    // Room to work in is not made for nothing.
+    (@one $own:expr, $first:ident, $batch:ident, $body:expr) => {
+        let $batch = &$own;
+        if !$batch.is_empty() {
+            $body;
+            $first += $batch.len();
+        }
+    };
 }
 pub(crate) use for_each_batch;
 

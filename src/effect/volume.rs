@@ -4,7 +4,7 @@ use super::{ByOrder, Connection, for_each_batch, motions, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
 use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
-use crate::system::{Apart, Cliques, Sink, State};
+use crate::system::{Cliques, Sink, State};
 use crate::tensor::Vec3;
 
 /// An element of N nodes and as many points.
@@ -93,7 +93,7 @@ fn add_batch<K, const N: usize>(
     K: VolumeKernel,
     K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
 {
-    let (mut systems, mut apart) = (ElementSystem::new(K::BLOCKS.count(N)), Apart::default());
+    let mut systems = ElementSystem::new(K::BLOCKS.count(N));
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let nodes = motions(each_lane!(|k| &elements[k].connection), at);
@@ -105,7 +105,7 @@ fn add_batch<K, const N: usize>(
         // Displacements know no charts.
         let charts = K::BLOCKS != Blocks::Displacements;
         let is_mixed = |k: usize| charts && at.mixed[elements[k].connection.element as usize] != 0;
-        out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, &mut apart, is_mixed, |k, out| {
+        out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, is_mixed, |k, out| {
             add_alone(kernel, elements[k], first + start + k, at, weights, out);
         });
     }

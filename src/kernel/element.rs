@@ -60,8 +60,8 @@ impl<T: Real> NodeMotion<T> {
 #[derive(Clone, Debug)]
 pub struct ElementSystem<T = f64> {
     blocks: usize,
-    force: [[T; 3]; 2 * MAX_NODES],
-    tangent: [[T; TILE]; MAX_NODES * MAX_NODES],
+    force: Vec<[T; 3]>,
+    tangent: Vec<[T; TILE]>,
 }
 
 /// Rows and columns of a tile: two blocks of three
@@ -88,27 +88,21 @@ impl<T: Real> ElementSystem<T> {
     /// Zero, of `blocks` 3-vectors.
     #[inline(always)]
     pub fn new(blocks: usize) -> Self {
-        assert!(blocks <= 2 * MAX_NODES, "an element has at most {MAX_NODES} nodes");
-        let zero = T::zero();
-        Self { blocks, force: [[zero; 3]; 2 * MAX_NODES], tangent: [[zero; TILE]; MAX_NODES * MAX_NODES] }
+        let (zero, across) = (T::zero(), blocks.div_ceil(2));
+        Self { blocks, force: vec![[zero; 3]; blocks], tangent: vec![[zero; TILE]; across * across] }
     }
 
     /// Sets force and tangent to zero.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.clear_force();
-        let tiles = self.across() * self.across();
-        for tile in &mut self.tangent[..tiles] {
-            *tile = [T::zero(); TILE];
-        }
+        self.tangent.fill([T::zero(); TILE]);
     }
 
     /// Sets the force alone to zero.
     #[inline(always)]
     pub fn clear_force(&mut self) {
-        for force in &mut self.force[..self.blocks] {
-            *force = [T::zero(); 3];
-        }
+        self.force.fill([T::zero(); 3]);
     }
 
     /// Sets to zero what is going to be added to with these weights.
@@ -138,14 +132,14 @@ impl<T: Real> ElementSystem<T> {
     /// The force, block by block.
     #[inline(always)]
     pub fn forces(&self) -> &[[T; 3]] {
-        &self.force[..self.blocks]
+        &self.force
     }
 
     /// The tangent tile by tile, those of one row of tiles after the other; each by its columns. The last tiles of an odd number of
     /// blocks are not full.
     #[inline(always)]
     pub fn tiles(&self) -> &[[T; TILE]] {
-        &self.tangent[..self.across() * self.across()]
+        &self.tangent
     }
 
     /// The tangent by its rows.

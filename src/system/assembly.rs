@@ -5,7 +5,7 @@ use super::pattern::{Pattern, Places, TILE, Tile, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
 use crate::kernel::{ElementSystem, MAX_NODES, PlanarSystem};
-use crate::real::{Instructions, LANES, Lanes};
+use crate::real::{Instructions, LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
 
 /// What a force is; the stop test of Newton and the energy account look at them apart.
@@ -205,33 +205,17 @@ impl System {
     }
 }
 
-/// The tiles of elements side by side, each for itself.
+/// Adds one lane of a tile to its place.
 #[inline(always)]
-fn lanes_apart(tile: &[Lanes; TILE]) -> [[f64; TILE]; LANES] {
-    let mut out = [[0.0; TILE]; LANES];
-    for start in (0..TILE).step_by(LANES) {
-        for lane in 0..LANES {
-            for k in 0..LANES {
-                out[lane][start + k] = tile[start + k].0[lane];
-            }
-        }
+fn add_lane(place: &mut [f64], tile: &[Lanes; TILE], lane: usize) {
+    for (sums, lanes) in place.as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
+        *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
     }
-    out
 }
 
 /// Values as tiles.
 fn tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
     values.as_chunks::<W>().0.as_chunks::<W>().0
-}
-
-/// Room to take the tangents of elements side by side apart, tile by tile.
-pub struct Apart([[[f64; TILE]; LANES]; MAX_NODES * MAX_NODES]);
-
-impl Default for Apart {
-    #[inline(always)]
-    fn default() -> Self {
-        Self([[[0.0; TILE]; LANES]; MAX_NODES * MAX_NODES])
-    }
 }
 
 /// Through this an effect adds the force and tangent of its instances.
@@ -270,14 +254,13 @@ impl Sink<'_> {
     }
 
     /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
-    /// beside whom. `apart` is scratch. An instance that `is_apart` is left to `alone`.
+    /// beside whom. An instance that `is_apart` is left to `alone`.
     #[inline(always)]
     pub fn add_lanes(
         &mut self,
         first: usize,
         count: usize,
         elements: &ElementSystem<Lanes>,
-        apart: &mut Apart,
         is_apart: impl Fn(usize) -> bool,
         mut alone: impl FnMut(usize, &mut Self),
     ) {
@@ -288,7 +271,7 @@ impl Sink<'_> {
             sink.with_tangent && special
         };
         if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
-            return self.add_plain(first, count, elements, apart);
+            return self.add_plain(first, count, elements);
         }
         for lane in 0..count {
             if is_apart(lane) {
@@ -301,7 +284,7 @@ impl Sink<'_> {
 
     /// The same where none touches a held direction or turned axes.
     #[inline(always)]
-    fn add_plain(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>, apart: &mut Apart) {
+    fn add_plain(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>) {
         let forces = &mut self.force[self.category as usize];
         for lane in 0..count {
             for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(first + lane)) {
@@ -318,7 +301,7 @@ impl Sink<'_> {
             return;
         }
         if self.places.whole {
-            return self.add_whole(first, count, elements, apart);
+            return self.add_whole(first, count, elements);
         }
         for lane in 0..count {
             self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
@@ -327,14 +310,10 @@ impl Sink<'_> {
 
     /// Adds the tangents of elements of whole nodes, one element after the other.
     #[inline(always)]
-    fn add_whole(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>, apart: &mut Apart) {
-        for (lanes, tile) in apart.0.iter_mut().zip(elements.tiles()) {
-            *lanes = lanes_apart(tile);
-        }
+    fn add_whole(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>) {
         for lane in 0..count {
-            for (lanes, &place) in apart.0.iter().zip(self.places.of(first + lane)) {
-                let target = &mut self.values[place as usize..place as usize + TILE];
-                target.iter_mut().zip(&lanes[lane]).for_each(|(sum, value)| *sum += value);
+            for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
+                add_lane(&mut self.values[place as usize..place as usize + TILE], tile, lane);
             }
         }
     }

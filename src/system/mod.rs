@@ -8,7 +8,7 @@ mod plane;
 mod stage;
 mod state;
 
-pub use assembly::{Apart, Category, Sink, System};
+pub use assembly::{Category, Sink, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use groups::{Groups, Layout};
 pub use pattern::{Cliques, Entry, Pattern, Tile};

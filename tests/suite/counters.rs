@@ -86,7 +86,10 @@ fn an_effect_that_is_absent_is_never_evaluated() {
         let (scene, counters) = run(deck);
         for (effect, count) in &counters.evaluations {
             let said = scene.reasons.iter().find(|reason| reason.name == *effect);
-            assert!(said.is_some_and(|reason| reason.active), "{deck}: {count} evaluations of {effect}, which is absent");
+            assert!(
+                said.is_some_and(|reason| reason.active),
+                "{deck}: {count} evaluations of {effect}, which is absent"
+            );
         }
         let absent = scene.reasons.iter().filter(|reason| !reason.active);
         let instances = absent.filter(|reason| scene.plan.model.effects.iter().any(|e| e.name() == reason.name));
