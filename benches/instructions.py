@@ -13,6 +13,7 @@ Exit status: 0 fine or skipped, 1 something costs more than it should, 2 a run f
 import argparse
 import csv
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -21,6 +22,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 RECORD = ROOT / "benches" / "instructions.csv"
 ELEMENTS = 60
 # Whole batches of elements side by side, and enough steps that a cache of the allocator or a first iteration is nothing.
@@ -162,13 +164,23 @@ def absent(bench):
     return fine
 
 
+def why_not():
+    """Why nothing can be counted here, if so."""
+    if not shutil.which("valgrind"):
+        return "valgrind is not installed"
+    flags = Path("/proc/cpuinfo")
+    if not (flags.exists() and "avx2" in flags.read_text()):
+        return "the machine has no AVX2, for which the recorded numbers are"
+    return None
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--beamsim", type=Path, default=ROOT / "target" / "release" / "beamsim")
+    parser.add_argument("--beamsim", type=Path, default=TARGET / "release" / "beamsim")
     parser.add_argument("--bless", action="store_true")
     arguments = parser.parse_args()
-    if not shutil.which("valgrind"):
-        print("instruction counts: skipped, valgrind is not installed")
+    if reason := why_not():
+        print(f"instruction counts: skipped, {reason}")
         return 0
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(arguments.beamsim, Path(folder))

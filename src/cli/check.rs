@@ -2,7 +2,7 @@
 
 use super::{Status, Verdict, load, say};
 use crate::model::{Assembly, Share};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Rule, Scene};
 use crate::tensor::{Mat3, Vec3};
 use std::path::PathBuf;
 
@@ -89,12 +89,11 @@ fn tell_mass(scene: &Scene) {
         about_origin += own + (Mat3::diagonal([centre.squared(); 3]) - centre.outer(centre)) * m;
     };
     for beam in &scene.mesh.beams {
-        for element in &scene.mesh.elements[beam.elements.clone()] {
-            for station in &element.volume {
+        for element in scene.mesh.elements_of(beam) {
+            for station in element.stations(Rule::Volume) {
                 let Some(section) = beam.section.at(station.fraction).mass else { continue };
                 let inertia = section.turned(station.axes);
-                let places = element.nodes.iter().map(|&n| scene.mesh.nodes[n].place);
-                let place = places.zip(&station.shape).fold(Vec3::ZERO, |sum, (x, &n)| sum + x * n);
+                let place = element.between(&station.shape);
                 let d = inertia.offset;
                 let about_line = inertia.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * inertia.mass;
                 add(inertia.mass * station.weight, place + d, about_line * station.weight);

@@ -170,10 +170,11 @@ impl Run<'_> {
 
     /// Of the tangent at the present state, where it is symmetric.
     fn negative_pivots(&mut self, workshop: &mut Workshop) -> Option<usize> {
-        let assembly = &mut workshop.assembly;
+        let Workshop { assembly, newton, .. } = workshop;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        Pivots::new(&assembly.system, &self.model.multipliers)?.negative(&assembly.system)
+        let system = &assembly.system;
+        Pivots::new(system, &self.model.multipliers, Some(&newton.solver))?.negative(system)
     }
 
     /// Goes along the path to a load factor in steps that shrink where they must.
@@ -205,7 +206,7 @@ impl Run<'_> {
     /// The critical loads as they look from the present state.
     fn critical_loads(&mut self, workshop: &mut Workshop, modes: usize) -> Result<Vec<f64>, Failure> {
         let Some(Direction { rate: direction, .. }) = self.path_direction(workshop)? else { return Ok(Vec::new()) };
-        let size = direction.iter().zip(&self.model.slots).filter(|(_, info)| !info.is_multiplier());
+        let size = direction.iter().zip(self.model.slots.iter()).filter(|(_, info)| !info.is_multiplier());
         let size = size.map(|(d, info)| d.norm() * info.arm(self.model.length) / self.model.length).fold(0.0, f64::max);
         let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
         let varied = self.varied_tangent(workshop, &direction, reach);
@@ -218,7 +219,7 @@ impl Run<'_> {
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
         // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.
-        let pivots = Pivots::new(system, &self.model.multipliers);
+        let pivots = Pivots::new(system, &self.model.multipliers, Some(&newton.solver));
         let stable = pivots.and_then(|mut pivots| pivots.negative(system)) == Some(0);
         let symmetric = stable && self.model.multipliers.is_empty() && is_symmetric(&system.pattern, &varied);
         let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };

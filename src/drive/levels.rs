@@ -44,7 +44,7 @@ impl Stability {
     /// At the start of a stage.
     pub fn new(run: &Run, workshop: &Workshop) -> Self {
         let system = &workshop.assembly.system;
-        let mut pivots = Pivots::new(system, &run.model.multipliers);
+        let mut pivots = Pivots::new(system, &run.model.multipliers, Some(&workshop.newton.solver));
         // The start was assembled with its stiffness.
         let negative = pivots.as_mut().and_then(|pivots| pivots.negative(system));
         // What is linear keeps its tangent.

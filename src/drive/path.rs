@@ -272,7 +272,7 @@ impl Path {
             length: 0.0,
             first: 0.0,
             scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
-            pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers),
+            pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers, Some(&workshop.newton.solver)),
         }
     }
 
@@ -483,7 +483,7 @@ fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
 /// The rate of the displacement that the loads do work on; `None` without loads. What stands at multipliers are gaps of motors,
 /// not forces.
 fn work_of_loads(run: &Run, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
-    let acting = || pull.iter().zip(rate).zip(&run.model.slots).filter(|(_, info)| !info.is_multiplier());
+    let acting = || pull.iter().zip(rate).zip(run.model.slots.iter()).filter(|(_, info)| !info.is_multiplier());
     let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
     loaded.then(|| acting().map(|((force, d), _)| -force.dot(*d)).sum())
 }

@@ -6,25 +6,15 @@ use crate::kernel::Weights;
 use crate::model::Assembly;
 use crate::solve::{LinearSolver, Pivots, mechanism};
 
-/// The stage as it would be in space.
-pub(super) struct Space {
-    pub assembly: Assembly,
-    pub solver: LinearSolver,
-}
-
 impl Run<'_> {
     /// The present stage in space, where it is treated in a plane.
-    pub(super) fn in_space(&self) -> Result<Option<Space>, Failure> {
+    pub(super) fn in_space(&self) -> Result<Option<Assembly>, Failure> {
         if self.plane.is_none() {
             return Ok(None);
         }
         let context = self.plan.stages[self.stage].context(self.stage);
         let equations = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
-        let assembly = Assembly::new(&context, equations, &self.model);
-        match LinearSolver::new(&assembly.system, &self.model.multipliers) {
-            Some(solver) => Ok(Some(Space { assembly, solver })),
-            None => Err(Failure::Limit("not enough memory to look at the tangent in space".into())),
-        }
+        Ok(Some(Assembly::new(&context, equations, &self.model)))
     }
 
     /// Warns where the state is unstable in space by more than the `negative` pivots that it has in its plane.
@@ -33,9 +23,9 @@ impl Run<'_> {
         if self.told.unstable == Some(self.stage) {
             return Ok(());
         }
-        let Some(Space { mut assembly, .. }) = self.in_space()? else { return Ok(()) };
+        let Some(mut assembly) = self.in_space()? else { return Ok(()) };
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        let pivots = Pivots::new(&assembly.system, &self.model.multipliers);
+        let pivots = Pivots::new(&assembly.system, &self.model.multipliers, None);
         self.counters.work.factorisations += 1;
         let in_space = pivots.and_then(|mut pivots| pivots.negative(&assembly.system));
         if let Some(more) = in_space.and_then(|in_space| in_space.checked_sub(in_plane)).filter(|&more| more > 0) {
@@ -47,7 +37,10 @@ impl Run<'_> {
     /// Refuses what nothing holds in the plane or out of it, with these weights of stiffness, damping and mass and without
     /// velocities.
     pub(super) fn refuse_loose_in_space(&mut self, weights: Weights) -> Result<(), Failure> {
-        let Some(Space { mut assembly, mut solver }) = self.in_space()? else { return Ok(()) };
+        let Some(mut assembly) = self.in_space()? else { return Ok(()) };
+        let Some(mut solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
+            return Err(Failure::Limit("not enough memory to look at the tangent in space".into()));
+        };
         let mut still = self.state.clone();
         still.stand_still();
         assembly.evaluate(&still, weights, None);

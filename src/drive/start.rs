@@ -132,7 +132,8 @@ impl Run<'_> {
         let Workshop { assembly, newton, .. } = workshop;
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         newton.solver.factorise(&assembly.system)
-            && Limp::find(&mut newton.solver, assembly, &self.model, &self.state).is_none_or(|limp| !limp.is_loose())
+            && Limp::find(&mut newton.solver, assembly, &self.model, &self.state, false)
+                .is_none_or(|limp| !limp.is_loose())
     }
 }
 

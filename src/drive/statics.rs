@@ -71,7 +71,7 @@ impl Run<'_> {
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
         if newton.solver.factorise(&assembly.system)
-            && let Some(limp) = Limp::find(&mut newton.solver, assembly, &self.model, &self.state)
+            && let Some(limp) = Limp::find(&mut newton.solver, assembly, &self.model, &self.state, self.stage > 0)
         {
             if limp.is_loose() {
                 return Err(self.name_mechanism(Some(limp.vector), &assembly.system));
@@ -80,7 +80,7 @@ impl Run<'_> {
                 self.warn_of_softness();
             }
             // At the start of a run cables and strings are meant to be so.
-            if self.stage > 0 && limp.is_held_by_stress() {
+            if limp.is_held_by_stress() {
                 let named = self.name_mechanism(Some(limp.vector), &assembly.system);
                 self.observer.warn(&format!("but for the stress it is under at the start of the stage: {named}"));
             }

@@ -185,9 +185,9 @@ impl<const N: usize, T: Real> Relative<N, T> {
         if let Some(cc) = stiffness.cc {
             let across = Mat3::skew_mul(arm, cc) * slope;
             for j in 0..2 {
-                over_frame[j] = over_frame[j] - across * bend[j];
-                over_bend[j] = over_bend[j] + cc.transpose_matmul(Mat3::skew_mul(arm, frame[j]));
-                over_x[j] = over_x[j] + cc * bend[j] * slope;
+                over_frame[j] -= across * bend[j];
+                over_bend[j] += cc.transpose_matmul(Mat3::skew_mul(arm, frame[j]));
+                over_x[j] += cc * bend[j] * slope;
             }
         }
         let turned = self.half.turned(forces.frame);

@@ -95,7 +95,7 @@ pub struct Charted {
 #[derive(Clone)]
 pub struct Model {
     /// All slots
-    pub slots: Vec<SlotInfo>,
+    pub slots: Arc<Vec<SlotInfo>>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
@@ -105,7 +105,7 @@ pub struct Model {
     /// How many beam elements there are
     pub elements: usize,
     /// What large rotations ask for: nothing where everything is linear
-    pub charted: Charted,
+    pub charted: Arc<Charted>,
     /// What acts
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs

@@ -4,7 +4,7 @@ use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
 use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use crate::kernel::shape;
+use crate::kernel::{MAX_NODES, shape};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
@@ -23,10 +23,10 @@ pub struct MeshNode {
 /// An integration point of an element.
 #[derive(Clone, Debug)]
 pub struct Station {
-    /// Shape functions
-    pub shape: Vec<f64>,
+    /// Shape functions, as many as the element has nodes
+    pub shape: [f64; MAX_NODES],
     /// Their derivatives over arc length
-    pub slope: Vec<f64>,
+    pub slope: [f64; MAX_NODES],
     /// Gauss weight times ds/dxi
     pub weight: f64,
     /// Fraction of the beam's length
@@ -42,12 +42,69 @@ pub struct Station {
 pub struct MeshElement {
     /// Indices of its nodes
     pub nodes: Vec<usize>,
-    /// Points for internal forces
-    pub inner: Vec<Station>,
-    /// Points for mass and line loads
-    pub volume: Vec<Station>,
-    /// Points at the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
-    pub nodal: Vec<Station>,
+    /// The piece of its beam's centre line
+    piece: usize,
+    /// From where to where on that, from 0 to 1
+    range: [f64; 2],
+}
+
+/// Which points of an element are summed over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// For internal forces
+    Inner,
+    /// For mass and line loads
+    Volume,
+    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
+    Nodal,
+}
+
+/// An element and the beam that it belongs to.
+#[derive(Clone, Copy)]
+pub struct BeamElement<'m> {
+    /// Its number in the scene
+    pub number: usize,
+    /// Its beam
+    pub beam: &'m MeshBeam,
+    /// Indices of its nodes
+    pub nodes: &'m [usize],
+    /// The mesh
+    pub mesh: &'m Mesh,
+}
+
+impl BeamElement<'_> {
+    /// Its integration points.
+    pub fn stations(&self, rule: Rule) -> Vec<Station> {
+        let points = match rule {
+            Rule::Inner => shape::gauss(self.nodes.len() - 1),
+            Rule::Volume => shape::gauss(self.nodes.len()),
+            Rule::Nodal => shape::newton_cotes(self.nodes.len()),
+        };
+        points.iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
+    }
+
+    fn station(&self, xi: f64, gauss_weight: f64) -> Station {
+        let MeshElement { piece, range, .. } = self.mesh.elements[self.number];
+        let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
+        let stretch = self.between(&slope);
+        let jacobian = stretch.norm();
+        let t = range[0] + (range[1] - range[0]) * 0.5 * (xi + 1.0);
+        let fraction = line.fraction(piece, t);
+        Station {
+            slope: slope.map(|d| d / jacobian),
+            shape,
+            weight: gauss_weight * jacobian,
+            fraction,
+            axes: line.axes(piece, stretch * (1.0 / jacobian), fraction),
+            exact_axes: line.axes(piece, line.pieces[piece].tangent(t), fraction),
+        }
+    }
+
+    /// The places of its nodes, weighed.
+    pub fn between(&self, weights: &[f64; MAX_NODES]) -> Vec3 {
+        let places = self.nodes.iter().map(|&node| self.mesh.nodes[node].place);
+        places.zip(weights).fold(Vec3::ZERO, |sum, (x, &n)| sum + x * n)
+    }
 }
 
 /// A beam as meshed.
@@ -268,7 +325,7 @@ impl Mesh {
                         .push(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
                     return;
                 }
-                self.elements.push(self.element(own, &line, piece, range));
+                self.elements.push(MeshElement { nodes: own.to_vec(), piece, range });
                 first_node += beam.order;
             }
         }
@@ -295,43 +352,22 @@ impl Mesh {
         self.add_point(point, place)
     }
 
-    fn element(&self, nodes: &[usize], line: &CentreLine, piece: usize, range: [f64; 2]) -> MeshElement {
-        let places: Vec<Vec3> = nodes.iter().map(|&n| self.nodes[n].place).collect();
-        let stations = |points: &[(f64, f64)]| -> Vec<Station> {
-            points.iter().map(|&(xi, w)| station(&places, line, piece, range, xi, w)).collect()
-        };
-        MeshElement {
-            nodes: nodes.to_vec(),
-            inner: stations(shape::gauss(nodes.len() - 1)),
-            volume: stations(shape::gauss(nodes.len())),
-            nodal: stations(shape::newton_cotes(nodes.len())),
-        }
+    /// The elements of a beam.
+    pub fn elements_of<'m>(&'m self, beam: &'m MeshBeam) -> impl Iterator<Item = BeamElement<'m>> {
+        let element = |number: usize| BeamElement { number, beam, nodes: &self.elements[number].nodes, mesh: self };
+        beam.elements.clone().map(element)
     }
 }
 
 /// Shape functions and their derivatives over xi, for 2, 3 or 4 nodes.
-pub fn shape_at(nodes: usize, xi: f64) -> (Vec<f64>, Vec<f64>) {
-    match nodes {
-        2 => (shape::values::<2>(xi).to_vec(), shape::derivatives::<2>(xi).to_vec()),
-        3 => (shape::values::<3>(xi).to_vec(), shape::derivatives::<3>(xi).to_vec()),
-        _ => (shape::values::<4>(xi).to_vec(), shape::derivatives::<4>(xi).to_vec()),
+pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
+    fn padded<const N: usize>(values: [f64; N]) -> [f64; MAX_NODES] {
+        std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
     }
-}
-
-fn station(places: &[Vec3], line: &CentreLine, piece: usize, range: [f64; 2], xi: f64, gauss_weight: f64) -> Station {
-    let (shape, slope) = shape_at(places.len(), xi);
-    let along = |weights: &[f64]| places.iter().zip(weights).fold(Vec3::ZERO, |sum, (&x, &n)| sum + x * n);
-    let stretch = along(&slope);
-    let jacobian = stretch.norm();
-    let t = range[0] + (range[1] - range[0]) * 0.5 * (xi + 1.0);
-    let fraction = line.fraction(piece, t);
-    Station {
-        slope: slope.iter().map(|d| d / jacobian).collect(),
-        shape,
-        weight: gauss_weight * jacobian,
-        fraction,
-        axes: line.axes(piece, stretch * (1.0 / jacobian), fraction),
-        exact_axes: line.axes(piece, line.pieces[piece].tangent(t), fraction),
+    match nodes {
+        2 => (padded(shape::values::<2>(xi)), padded(shape::derivatives::<2>(xi))),
+        3 => (padded(shape::values::<3>(xi)), padded(shape::derivatives::<3>(xi))),
+        _ => (shape::values::<4>(xi), shape::derivatives::<4>(xi)),
     }
 }
 

@@ -13,7 +13,7 @@ mod planar;
 mod section;
 
 pub use compose::Reason;
-pub use mesh::{Mesh, MeshBeam};
+pub use mesh::{Mesh, MeshBeam, Rule};
 pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
@@ -192,12 +192,12 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let multipliers = composition.multipliers.len();
     let linear = !deck.effects.allow(deck::EffectWord::LargeRotations);
     let mut model = Model {
-        slots: [slots(&mesh), composition.multipliers].concat(),
+        slots: Arc::new([slots(&mesh), composition.multipliers].concat()),
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
         elements: mesh.elements.len(),
-        charted: if linear { Charted::default() } else { charted(&mesh) },
+        charted: Arc::new(if linear { Charted::default() } else { charted(&mesh) }),
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),

@@ -45,6 +45,14 @@ impl LinearSolver {
         Some(Self { way, factored: false, revision: None })
     }
 
+    /// Its factorisation in blocks, where it has one.
+    pub(super) fn blocks(&self) -> Option<&BlockSolver> {
+        match &self.way {
+            Way::Blocks(blocks) => Some(blocks),
+            Way::General(_) => None,
+        }
+    }
+
     /// How it solves, in a few words.
     pub fn name(&self) -> &'static str {
         match &self.way {

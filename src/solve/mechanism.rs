@@ -10,8 +10,8 @@ use crate::system::State;
 pub struct Limp {
     /// The motion
     pub vector: NullVector,
-    /// The largest strain that it makes, see [`crate::effect::Effect::strain_of`], over the size of the motion
-    pub strain: f64,
+    /// Whether it strains what it moves
+    strains: bool,
     /// Whether it is a motion, not the multiplier of a joint
     moves: bool,
 }
@@ -21,35 +21,46 @@ pub struct Limp {
 const NO_STRAIN: f64 = 1e-3;
 
 impl Limp {
-    /// The softest motion of the tangent that `solver` has tried to factorise.
-    pub fn find(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<Self> {
+    /// The softest motion of the tangent that `solver` has tried to factorise. Whether it strains is asked where the tangent has no
+    /// stiffness against it, or else where `stress` may be all that holds it.
+    pub fn find(
+        solver: &mut LinearSolver,
+        assembly: &Assembly,
+        model: &Model,
+        state: &State,
+        stress: bool,
+    ) -> Option<Self> {
         let vector = solver.softest(&assembly.system)?;
+        if vector.held && !stress {
+            return Some(Self { vector, strains: true, moves: true });
+        }
         let (largest, motion) = vector.by_slot(&assembly.system.pattern.equations, state.q.len());
         // What moves may be the multiplier of a condition that is said twice: no strain stands in its way.
         let moves = !model.slots[largest].is_multiplier();
         let size = if moves { correction(model, &motion) } else { 0.0 };
-        let strain = if size > 0.0 { assembly.strain_of(state, &motion, model.length) / size } else { 0.0 };
-        Some(Self { vector, strain, moves })
+        let strains = size > 0.0 && assembly.strain_of(state, &motion, model.length) > NO_STRAIN * size;
+        Some(Self { vector, strains, moves })
     }
 
     /// Whether nothing holds it. Very slender beams on fine meshes bend so softly that their stiffness is lost in the tangent,
     /// but they bend.
     pub fn is_loose(&self) -> bool {
-        !self.vector.held && self.strain <= NO_STRAIN
+        !self.vector.held && !self.strains
     }
 
     /// Whether its stiffness is lost in the tangent, although something holds it.
     pub fn is_soft(&self) -> bool {
-        !self.vector.held && self.strain > NO_STRAIN
+        !self.vector.held && self.strains
     }
 
-    /// Whether it strains nothing, and only stress that is there already holds it, as a hanging pendulum.
+    /// Whether it strains nothing, and only stress that is there already holds it, as a hanging pendulum. Known only where that was
+    /// asked for.
     pub fn is_held_by_stress(&self) -> bool {
-        self.vector.held && self.moves && self.strain <= NO_STRAIN
+        self.vector.held && self.moves && !self.strains
     }
 }
 
 /// A motion that nothing holds, of a tangent that `solver` has tried to factorise.
 pub fn mechanism(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<NullVector> {
-    Limp::find(solver, assembly, model, state).filter(Limp::is_loose).map(|limp| limp.vector)
+    Limp::find(solver, assembly, model, state, false).filter(Limp::is_loose).map(|limp| limp.vector)
 }

@@ -2,6 +2,7 @@
 
 use super::block::BlockSolver;
 use super::columns::Columns;
+use super::linear::LinearSolver;
 use crate::system::{Equations, Pattern, Slot, System};
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -36,9 +37,13 @@ const SYMMETRY: f64 = 1e-9;
 const COMPLIANCE: f64 = 1e-9;
 
 impl Pivots {
-    /// For tangents of this pattern. `None` where memory cannot be had.
-    pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
-        let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, true)).flatten();
+    /// For tangents of this pattern; a `solver` for it lends its order of elimination. `None` where memory cannot be had.
+    pub fn new(system: &System, multipliers: &[Slot], solver: Option<&LinearSolver>) -> Option<Self> {
+        let pattern = &system.pattern;
+        let blocks = match solver.and_then(LinearSolver::blocks) {
+            Some(blocks) => blocks.symmetric_beside(pattern),
+            None => multipliers.is_empty().then(|| BlockSolver::new(pattern, true)).flatten(),
+        };
         match blocks {
             Some(blocks) => Some(Self::Blocks(Box::new(blocks))),
             None => Some(Self::Entries(Box::new(Entries::new(system, multipliers)?))),

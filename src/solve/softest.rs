@@ -1,6 +1,8 @@
 //! The softest motion of a tangent, by inverse iteration.
 
 use super::linear::LinearSolver;
+use crate::kernel::WIDTH;
+use crate::real::Instructions;
 use crate::system::{Equations, System};
 use crate::tensor::Vec3;
 
@@ -110,11 +112,13 @@ fn scales(system: &System) -> Vec<f64> {
         compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
     };
     let entry = |c: usize| entries(system, c).fold(0.0_f64, |m, (_, value)| m.max(value.abs()));
-    let scale = |c: usize| match (roots[c], column(c)) {
-        (root, _) if root > 0.0 => root,
-        (_, compared) if compared > 0.0 => compared,
-        // Unknowns and multipliers that only meet each other.
-        _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
+    let scale = |c: usize| match roots[c] {
+        root if root > 0.0 => root,
+        _ => match column(c) {
+            compared if compared > 0.0 => compared,
+            // Unknowns and multipliers that only meet each other.
+            _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
+        },
     };
     (0..roots.len()).map(scale).collect()
 }
@@ -129,18 +133,52 @@ fn empty_column(system: &System) -> Option<usize> {
     (0..system.pattern.equations.count()).find(|&column| entries(system, column).all(|(_, value)| value == 0.0))
 }
 
-/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated (Neumaier 1974), so that
-/// fine meshes of slender beams, whose softest motions are nearly free, are not taken for mechanisms.
+/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated, so that fine meshes of slender beams,
+/// whose softest motions are nearly free, are not taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
-    let (mut sum, mut lost, mut squares) = (0.0_f64, 0.0, 0.0);
-    for column in 0..x.len() {
-        for (row, value) in entries(system, column) {
-            let term = x[row] * value * x[column];
-            let next = sum + term;
-            lost += if sum.abs() >= term.abs() { (sum - next) + term } else { (term - next) + sum };
-            sum = next;
-            squares += term * term;
-        }
+    if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
+}
+
+fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
+    let parts = system.pattern.apart::<W>(x);
+    // A sum for each row of a tile: they do not wait for each other.
+    let (mut sums, mut squares) = ([Compensated::default(); W], [0.0; W]);
+    Instructions::here().run(
+        #[inline(always)]
+        || {
+            system.each_tile::<W>(&system.values, |row, column, tile| {
+                for (line, &x) in tile.iter().zip(&parts[column]) {
+                    for r in 0..W {
+                        let term = parts[row][r] * line[r] * x;
+                        sums[r].add(term);
+                        squares[r] += term * term;
+                    }
+                }
+            });
+        },
+    );
+    let mut whole = Compensated::default();
+    sums.iter().for_each(|part| {
+        whole.add(part.sum);
+        whole.add(part.lost);
+    });
+    let squares: f64 = squares.iter().sum();
+    if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
+}
+
+/// A sum with what its roundings have lost (Knuth's two-sum, which needs no branch).
+#[derive(Clone, Copy, Default)]
+struct Compensated {
+    sum: f64,
+    lost: f64,
+}
+
+impl Compensated {
+    #[inline(always)]
+    fn add(&mut self, term: f64) {
+        let next = self.sum + term;
+        let came = next - self.sum;
+        self.lost += (self.sum - (next - came)) + (term - came);
+        self.sum = next;
     }
-    if squares == 0.0 { 0.0 } else { (sum + lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }

@@ -120,7 +120,7 @@ impl System {
 
     /// Shows each tile with the groups of its rows and of its columns.
     #[inline(always)]
-    fn each_tile<const W: usize>(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile<W>)) {
+    pub fn each_tile<const W: usize>(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile<W>)) {
         let mut tiles = tiles(values).iter();
         for column in 0..self.pattern.groups.count() {
             for (&row, tile) in self.pattern.rows_of(column).iter().zip(&mut tiles) {

@@ -11,7 +11,7 @@ use crate::effect::rotary_inertia::RotaryInertia;
 use crate::effect::rotating_frame::RotatingFrame;
 use crate::effect::section_inertia::SectionInertia;
 use crate::kernel::inertia::Inertia;
-use crate::scene::mesh::{Mesh, MeshBeam, MeshElement, Station};
+use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
 use crate::scene::names;
 use crate::scene::section::MassPerLength;
 use crate::tensor::{Mat3, Vec3};
@@ -29,15 +29,15 @@ impl Composer<'_> {
         let wanted = self.deck.effects.allow(EffectWord::RotaryInertia);
         let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
         let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
-        let bodies = self.each_inertia(|number, element, found| {
+        let bodies = self.each_inertia(|element, stations, found| {
             if found.iter().any(|m| m.offset != Vec3::ZERO) {
-                return push_volume(&mut eccentric, self.mesh, number, element, |k, _| found[k]);
+                return push_volume(&mut eccentric, element, stations, |k| found[k]);
             }
             if found.iter().any(|m| m.mass != 0.0) {
-                push_volume(&mut mass, self.mesh, number, element, |k, _| found[k].mass);
+                push_volume(&mut mass, element, stations, |k| found[k].mass);
             }
             if found.iter().any(|m| m.about_node != Mat3::ZERO) {
-                push_volume(&mut rotary, self.mesh, number, element, |k, _| found[k].about_node);
+                push_volume(&mut rotary, element, stations, |k| found[k].about_node);
             }
         });
         let mass = BeamMass { elements: mass };
@@ -124,8 +124,8 @@ impl Composer<'_> {
         let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
         let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
         let mut elements = ByOrder::default();
-        let nodal = self.each_inertia(|number, element, found| {
-            push_volume(&mut elements, self.mesh, number, element, |k, s| (found[k], self.start_place(element, s)));
+        let nodal = self.each_inertia(|element, stations, found| {
+            push_volume(&mut elements, element, stations, |k| (found[k], element.between(&stations[k].shape)));
         });
         let bodies = [nodal, self.out.bodies.clone()].concat();
         for (number, stage) in &framed {
@@ -152,33 +152,28 @@ impl Composer<'_> {
     /// Visits the elements with the mass properties of their volume points, about the centre line and in global axes, and
     /// returns what sits at nodes instead: on beams whose rotations are relative all that turns with the section, because no
     /// chart matters there.
-    fn each_inertia(&self, mut visit: impl FnMut(usize, &MeshElement, &[Inertia])) -> Vec<Body> {
+    fn each_inertia(&self, mut visit: impl FnMut(&BeamElement, &[Station], &[Inertia])) -> Vec<Body> {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let mut nodal = NodalInertia::default();
-        self.each_element(|beam, number, element, _| {
+        self.each_element(|element| {
+            let (beam, stations) = (element.beam, element.stations(Rule::Volume));
             let relative = beam.interpolation == InterpolationWord::Relative;
-            let eccentric = element.volume.iter().any(|station| mass_at(beam, station).offset != Vec3::ZERO);
+            let eccentric = stations.iter().any(|station| mass_at(beam, station).offset != Vec3::ZERO);
             if relative && eccentric {
-                return nodal.add(beam, element, |whole| whole);
+                return nodal.add(element, |whole| whole);
             }
             if relative && rotary {
-                nodal.add(beam, element, |whole| Inertia { mass: 0.0, ..whole });
+                nodal.add(element, |whole| Inertia { mass: 0.0, ..whole });
             }
             let turns = eccentric || (rotary && !relative);
             let at = |station: &Station| {
                 let whole = mass_at(beam, station).turned(station.axes);
                 if turns { whole } else { Inertia { about_node: Mat3::ZERO, ..whole } }
             };
-            let found: Vec<Inertia> = element.volume.iter().map(at).collect();
-            visit(number, element, &found);
+            let found: Vec<Inertia> = stations.iter().map(at).collect();
+            visit(element, &stations, &found);
         });
         nodal.bodies(self.mesh)
-    }
-
-    /// The initial place of a station, between the nodes of its element.
-    fn start_place(&self, element: &MeshElement, station: &Station) -> Vec3 {
-        let parts = element.nodes.iter().zip(&station.shape);
-        parts.fold(Vec3::ZERO, |sum, (&node, &weight)| sum + self.mesh.nodes[node].place * weight)
     }
 
     pub(super) fn gravity(&mut self) {
@@ -194,8 +189,8 @@ impl Composer<'_> {
             self.reason("gravity on beams", false, "no beams");
         } else {
             let mut elements = ByOrder::default();
-            let nodal = self.each_inertia(|number, element, found| {
-                push_volume(&mut elements, self.mesh, number, element, |k, _| found[k]);
+            let nodal = self.each_inertia(|element, stations, found| {
+                push_volume(&mut elements, element, stations, |k| found[k]);
             });
             bodies.extend(nodal.into_iter().filter(|body| body.inertia.mass > 0.0));
             if elements.is_empty() {
@@ -220,8 +215,8 @@ impl Composer<'_> {
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
         let mut elements = ByOrder::default();
-        let nodal = self.each_inertia(|number, element, found| {
-            push_volume(&mut elements, self.mesh, number, element, |k, _| found[k]);
+        let nodal = self.each_inertia(|element, stations, found| {
+            push_volume(&mut elements, element, stations, |k| found[k]);
         });
         if elements.is_empty() {
             self.reason(names[0], false, "no beams with mass");
@@ -245,9 +240,9 @@ struct NodalInertia {
 
 impl NodalInertia {
     /// Adds what an element brings to its nodes; `pick` may leave parts out.
-    fn add(&mut self, beam: &MeshBeam, element: &MeshElement, pick: impl Fn(Inertia) -> Inertia) {
-        for (station, &node) in element.nodal.iter().zip(&element.nodes) {
-            let own = pick(mass_at(beam, station).turned(station.axes));
+    fn add(&mut self, element: &BeamElement, pick: impl Fn(Inertia) -> Inertia) {
+        for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
+            let own = pick(mass_at(element.beam, station).turned(station.axes));
             let (mass, moment, about) = self.nodes.entry(node).or_insert((0.0, Vec3::ZERO, Mat3::ZERO));
             *mass += own.mass * station.weight;
             *moment += own.offset * (own.mass * station.weight);

@@ -6,7 +6,7 @@ use crate::effect::line_load::{LineLoad, LineLoadKind};
 use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
 use crate::effect::{ByOrder, Effect};
 use crate::kernel::load::Intensity;
-use crate::scene::mesh::{Mesh, MeshElement, Station};
+use crate::scene::mesh::{BeamElement, Rule, Station};
 use crate::scene::names;
 use crate::tensor::{Mat3, Vec3};
 
@@ -85,13 +85,13 @@ impl Composer<'_> {
             let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
             let out = if load.frame == Frame::Space { &mut spatial } else { &mut material };
             let turning = load.frame != Frame::Space || load.moment.is_some();
-            for number in beam.elements.clone() {
-                let element = &self.mesh.elements[number];
+            for element in self.mesh.elements_of(beam) {
                 if turning && beam.interpolation == InterpolationWord::Relative {
-                    add_nodal_loads(&mut nodal, load, element, self.mesh, amplitude);
+                    add_nodal_loads(&mut nodal, load, &element, amplitude);
                     continue;
                 }
-                push_volume(out, self.mesh, number, element, |_, station| intensity(load, station, amplitude));
+                let stations = element.stations(Rule::Volume);
+                push_volume(out, &element, &stations, |k| intensity(load, &stations[k], amplitude));
             }
         }
         let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
@@ -116,13 +116,13 @@ fn force_kind(load: &deck::Load) -> usize {
 }
 
 /// A load along an element, taken at its nodes.
-fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &MeshElement, mesh: &Mesh, amplitude: usize) {
-    for (station, &node) in element.nodal.iter().zip(&element.nodes) {
+fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &BeamElement, amplitude: usize) {
+    for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
         let Intensity { force, moment, .. } = intensity(load, station, amplitude);
         for (vector, kind) in [(force, force_kind(load)), (moment, force_kind(load) + 1)] {
             if vector != Vec3::ZERO {
                 let vector = vector * station.weight;
-                out[kind].push(node_load::Instance { node: mesh.nodes[node].node, vector, amplitude });
+                out[kind].push(node_load::Instance { node: element.mesh.nodes[node].node, vector, amplitude });
             }
         }
     }

@@ -6,7 +6,7 @@ mod loads;
 mod spins;
 
 use super::joints::FoundJoint;
-use super::mesh::{Mesh, MeshBeam, MeshElement, Station};
+use super::mesh::{BeamElement, Mesh, Rule, Station};
 use super::names;
 use crate::deck::{self, Deck, Diagnostic, EffectWord, InterpolationWord};
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
@@ -179,15 +179,15 @@ impl Composer<'_> {
     fn elasticity_of<I: Interpolation>(&mut self, way: InterpolationWord) {
         let free: HashMap<String, usize> = self.free_strains();
         let mut elements = ElasticElements::default();
-        self.each_element(|beam, number, element, mesh| {
-            if beam.interpolation != way {
+        self.each_element(|element| {
+            if element.beam.interpolation != way {
                 return;
             }
-            let free = free.get(&beam.name).copied();
+            let free = free.get(&element.beam.name).copied();
             match element.nodes.len() {
-                2 => elements.two.push(elastic::<2, 1>(mesh, beam, number, element, free)),
-                3 => elements.three.push(elastic::<3, 2>(mesh, beam, number, element, free)),
-                _ => elements.four.push(elastic::<4, 3>(mesh, beam, number, element, free)),
+                2 => elements.two.push(elastic::<2, 1>(element, free)),
+                3 => elements.three.push(elastic::<3, 2>(element, free)),
+                _ => elements.four.push(elastic::<4, 3>(element, free)),
             }
         });
         if elements.is_empty() {
@@ -221,12 +221,9 @@ impl Composer<'_> {
         beams.into_iter().filter_map(numbered).collect()
     }
 
-    fn each_element(&self, mut visit: impl FnMut(&MeshBeam, usize, &MeshElement, &Mesh)) {
-        for beam in &self.mesh.beams {
-            for number in beam.elements.clone() {
-                visit(beam, number, &self.mesh.elements[number], self.mesh);
-            }
-        }
+    fn each_element(&self, mut visit: impl FnMut(&BeamElement)) {
+        let beams = self.mesh.beams.iter();
+        beams.flat_map(|beam| self.mesh.elements_of(beam)).for_each(|element| visit(&element));
     }
 
     /// What is known and never acts yet.
@@ -260,55 +257,45 @@ pub fn stage_set(stages: Option<&Vec<usize>>) -> StageSet {
     StageSet(stages.map(|stages| stages.iter().map(|s| s - 1).collect()))
 }
 
-fn connect<const N: usize>(mesh: &Mesh, number: usize, element: &MeshElement) -> Connection<N> {
+fn connect<const N: usize>(element: &BeamElement) -> Connection<N> {
+    let node = |i: usize| &element.mesh.nodes[element.nodes[i]];
     Connection {
-        element: number as u32,
-        nodes: std::array::from_fn(|i| mesh.nodes[element.nodes[i]].node),
-        places: std::array::from_fn(|i| mesh.nodes[element.nodes[i]].place),
+        element: element.number as u32,
+        nodes: std::array::from_fn(|i| node(i).node),
+        places: std::array::from_fn(|i| node(i).place),
     }
 }
 
-/// Pushes an element with volume points into the batch of its order.
+/// Pushes an element with these volume points into the batch of its order.
 fn push_volume<Q: Copy>(
     batches: &mut VolumeElements<Q>,
-    mesh: &Mesh,
-    number: usize,
-    element: &MeshElement,
-    quantity: impl Fn(usize, &Station) -> Q,
+    element: &BeamElement,
+    stations: &[Station],
+    quantity: impl Fn(usize) -> Q,
 ) {
     match element.nodes.len() {
-        2 => batches.two.push(volume(mesh, number, element, quantity)),
-        3 => batches.three.push(volume(mesh, number, element, quantity)),
-        _ => batches.four.push(volume(mesh, number, element, quantity)),
+        2 => batches.two.push(volume(element, stations, quantity)),
+        3 => batches.three.push(volume(element, stations, quantity)),
+        _ => batches.four.push(volume(element, stations, quantity)),
     }
 }
 
 fn volume<const N: usize, Q: Copy>(
-    mesh: &Mesh,
-    number: usize,
-    element: &MeshElement,
-    quantity: impl Fn(usize, &Station) -> Q,
+    element: &BeamElement,
+    stations: &[Station],
+    quantity: impl Fn(usize) -> Q,
 ) -> VolumeElement<N, Q> {
     let point = |k: usize| {
-        let station = &element.volume[k];
-        VolumePoint {
-            shape: std::array::from_fn(|i| station.shape[i]),
-            weight: station.weight,
-            quantity: quantity(k, station),
-        }
+        let Station { shape, weight, .. } = &stations[k];
+        VolumePoint { shape: std::array::from_fn(|i| shape[i]), weight: *weight, quantity: quantity(k) }
     };
-    VolumeElement { connection: connect(mesh, number, element), points: std::array::from_fn(point) }
+    VolumeElement { connection: connect(element), points: std::array::from_fn(point) }
 }
 
-fn elastic<const N: usize, const G: usize>(
-    mesh: &Mesh,
-    beam: &MeshBeam,
-    number: usize,
-    element: &MeshElement,
-    free: Option<usize>,
-) -> ElasticElement<N, G> {
+fn elastic<const N: usize, const G: usize>(element: &BeamElement, free: Option<usize>) -> ElasticElement<N, G> {
+    let (beam, stations) = (element.beam, element.stations(Rule::Inner));
     let point = |k: usize| {
-        let station = &element.inner[k];
+        let station = &stations[k];
         StiffnessPoint {
             shape: std::array::from_fn(|i| station.shape[i]),
             slope: std::array::from_fn(|i| station.slope[i]),
@@ -318,7 +305,7 @@ fn elastic<const N: usize, const G: usize>(
             free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
         }
     };
-    ElasticElement { connection: connect(mesh, number, element), points: std::array::from_fn(point), free }
+    ElasticElement { connection: connect(element), points: std::array::from_fn(point), free }
 }
 
 /// From section axes to global components.

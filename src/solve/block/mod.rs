@@ -13,11 +13,12 @@ use crate::system::{Pattern, System};
 use elimination::{Elimination, Place};
 use ldl::Ldl;
 use lu::Lu;
+use std::sync::Arc;
 use tile::{Tile, zero};
 
 /// A factorisation in blocks.
 pub struct BlockSolver {
-    elimination: Elimination,
+    elimination: Arc<Elimination>,
     factor: Box<dyn Factor>,
     /// What is solved for, by row
     parts: Vec<f64>,
@@ -41,7 +42,15 @@ trait Factor: Send {
 impl BlockSolver {
     /// For tangents of this pattern. `None` where blocks would fill up, or memory cannot be had.
     pub fn new(pattern: &Pattern, symmetric: bool) -> Option<Self> {
-        let elimination = Elimination::new(pattern)?;
+        Self::by(Arc::new(Elimination::new(pattern)?), pattern, symmetric)
+    }
+
+    /// Another one for tangents of the same pattern, which are symmetric.
+    pub fn symmetric_beside(&self, pattern: &Pattern) -> Option<Self> {
+        Self::by(self.elimination.clone(), pattern, true)
+    }
+
+    fn by(elimination: Arc<Elimination>, pattern: &Pattern, symmetric: bool) -> Option<Self> {
         let (rows, blocks) = (elimination.order.len(), elimination.later.len());
         let factor: Box<dyn Factor> = match (pattern.width(), symmetric) {
             (3, true) => Box::new(Ldl::<3>::new(rows, blocks)?),
