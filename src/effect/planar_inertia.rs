@@ -131,7 +131,7 @@ impl PlanarBodies {
         let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
         let in_plane = |v: Vec3<Lanes>| [along(v, plane.axes().column(0)), along(v, plane.axes().column(1))];
         let gyroscopic = if self.spatial.gyroscopic { 1.0 } else { 0.0 };
-        let mut alone = None;
+        let (mut alone, centred) = (None, self.spatial.is_centred());
         for (number, block) in self.blocks.iter().enumerate() {
             let first = number * LANES;
             let angle = along(at_slots(&at.q, block.p), normal);
@@ -148,7 +148,7 @@ impl PlanarBodies {
                 |_| false,
                 |k, out| {
                     let system = alone.get_or_insert_with(|| ElementSystem::new(2));
-                    self.spatial.add_one(first + k, at, weights, system, out);
+                    self.spatial.add_one(first + k, centred, at, weights, system, out);
                 },
             );
         }
@@ -158,7 +158,7 @@ impl PlanarBodies {
 impl PlanarForm for PlanarBodies {
     /// A spin about one axis has no gyroscopic moments; only masses beside their node pull.
     fn is_symmetric(&self) -> bool {
-        self.spatial.bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
+        self.spatial.is_centred()
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

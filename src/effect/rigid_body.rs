@@ -1,9 +1,10 @@
 //! Rigid bodies at nodes, with their mass centre at an offset.
 
 use super::planar_inertia::PlanarBodies;
-use super::{Effect, Energy, Momentum, PlanarForm, inertia_aspects, quadratic};
+use super::{Effect, Energy, Momentum, PlanarForm, at_slots, inertia_aspects, quadratic, side_by_side};
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::real::{Instructions, LANES, Real, each_lane, pack};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
@@ -57,8 +58,19 @@ impl Effect for RigidBody {
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        let mut system = ElementSystem::new(2);
-        (0..self.bodies.len()).for_each(|k| self.add_one(k, at, weights, &mut system, out));
+        let centred = self.is_centred();
+        // Increments of rotation have spins of their own.
+        let vectors = at.turns.is_empty().then(Instructions::here);
+        let done = vectors.and_then(|instructions| {
+            instructions.run_side_by_side(
+                #[inline(always)]
+                || self.add_side_by_side(centred, at, weights, out),
+            )
+        });
+        if done.is_none() {
+            let mut system = ElementSystem::new(2);
+            (0..self.bodies.len()).for_each(|k| self.add_one(k, centred, at, weights, &mut system, out));
+        }
     }
 
     fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
@@ -77,14 +89,60 @@ impl Effect for RigidBody {
 }
 
 impl RigidBody {
-    /// Adds body `k`; `system` is scratch.
-    pub(super) fn add_one(&self, k: usize, at: &State, weights: Weights, system: &mut ElementSystem, out: &mut Sink) {
+    /// Whether every mass centre is at its node.
+    pub(super) fn is_centred(&self) -> bool {
+        self.bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
+    }
+
+    /// Adds body `k`; `system` is scratch, `centred` see [`Self::is_centred`].
+    pub(super) fn add_one(
+        &self,
+        k: usize,
+        centred: bool,
+        at: &State,
+        weights: Weights,
+        system: &mut ElementSystem,
+        out: &mut Sink,
+    ) {
         let body = &self.bodies[k];
-        let spin = at.spin(body.node.p).with_gyroscopic_forces(self.gyroscopic);
-        let force = inertia::body(&body.inertia, at.a[body.node.u as usize], &spin, weights);
+        let (acceleration, spin) = (at.a[body.node.u as usize], at.spin(body.node.p));
+        self.put(&body.inertia, centred, acceleration, spin, weights, system);
+        out.add(k, system);
+    }
+
+    #[inline(always)]
+    fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Sink) {
+        let mut systems = ElementSystem::new(2);
+        for first in (0..self.bodies.len()).step_by(LANES) {
+            let bodies = side_by_side(&self.bodies, first);
+            let inertia = pack!(bodies.inertia);
+            let [u, p] = [each_lane!(|k| bodies[k].node.u), each_lane!(|k| bodies[k].node.p)];
+            let spin = Spin::new(at_slots(&at.q, p), at_slots(&at.v, p), at_slots(&at.a, p));
+            self.put(&inertia, centred, at_slots(&at.a, u), spin, weights, &mut systems);
+            let count = LANES.min(self.bodies.len() - first);
+            out.add_lanes(first, count, &systems, |_| false, |_, _| ());
+        }
+    }
+
+    /// Puts force and tangent in the place of what stands in `system`.
+    #[inline(always)]
+    fn put<T: Real>(
+        &self,
+        inertia: &Inertia<T>,
+        centred: bool,
+        acceleration: Vec3<T>,
+        spin: Spin<T>,
+        weights: Weights,
+        system: &mut ElementSystem<T>,
+    ) {
+        let spin = spin.with_gyroscopic_forces(self.gyroscopic);
+        let force = if centred {
+            inertia::centred_body(inertia, acceleration, &spin, weights)
+        } else {
+            inertia::body(inertia, acceleration, &spin, weights)
+        };
         system.clear();
         force.write(system);
-        out.add(k, system);
     }
 }
 

@@ -224,6 +224,21 @@ pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, wei
     out
 }
 
+/// [`body`] for mass centres at the node.
+#[inline(always)]
+pub fn centred_body<T: Real>(
+    inertia: &Inertia<T>,
+    u_rate2: Vec3<T>,
+    spin: &Spin<T>,
+    weights: Weights,
+) -> VolumeForce<T> {
+    let mut out = VolumeForce::zero();
+    out.u = u_rate2 * inertia.mass;
+    out.uu = Mat3::identity() * (inertia.mass * weights.mass);
+    (out.p, out.pp) = rotary(inertia.about_node, spin, weights);
+    out
+}
+
 /// Forces proportional to velocities, as mass-proportional damping has them: with v = u' and h = J0 Omega + m d x R^T v
 ///
 /// ```text

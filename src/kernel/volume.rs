@@ -37,9 +37,10 @@ impl<T: Real> VolumeForce<T> {
     }
 }
 
-impl VolumeForce {
+impl<T: Real> VolumeForce<T> {
     /// Adds itself to an element of one node.
-    pub fn write(&self, out: &mut ElementSystem) {
+    #[inline(always)]
+    pub fn write(&self, out: &mut ElementSystem<T>) {
         out.add_force(0, self.u);
         out.add_force(1, self.p);
         out.add_tangent(0, 0, self.uu);

@@ -32,8 +32,10 @@ pub struct FrameConflict {
 pub struct Equations {
     /// For each slot and local direction the equation, or [`Equations::HELD`].
     number: Vec<[u32; 3]>,
-    /// The local directions of a slot as columns, where they are not the global ones.
-    frame: Vec<Option<Mat3>>,
+    /// For each slot the number of its frame, or [`Equations::HELD`] where its local directions are the global ones
+    frame: Vec<u32>,
+    /// Local directions as columns
+    frames: Vec<Mat3>,
     /// Slot and local direction of each equation.
     origin: Vec<(Slot, u8)>,
     /// The slots in which a direction is held, in planar scenes one that does not leave the plane anyway
@@ -87,7 +89,8 @@ impl Equations {
 
     fn empty(slots: usize, plane: Option<Plane>) -> Self {
         let (number, frame) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
-        Self { number, frame, origin: Vec::new(), constrained: Vec::with_capacity(slots), plane }
+        let constrained = Vec::with_capacity(slots);
+        Self { number, frame, frames: Vec::new(), origin: Vec::new(), constrained, plane }
     }
 
     fn push(&mut self, slot: usize, frame: Option<Mat3>, is_held: [bool; 3], constrained: bool) {
@@ -97,7 +100,11 @@ impl Equations {
             self.origin.push((slot as Slot, k as u8));
         }
         self.number.push(number);
-        self.frame.push(frame);
+        // Slots of one plane all have the same.
+        if let Some(frame) = frame.filter(|frame| self.frames.last() != Some(frame)) {
+            self.frames.push(frame);
+        }
+        self.frame.push(frame.map_or(Self::HELD, |_| self.frames.len() as u32 - 1));
         self.constrained.push(constrained);
     }
 
@@ -131,7 +138,7 @@ impl Equations {
     /// The turned axes of a slot as columns.
     #[inline]
     pub fn frame(&self, slot: Slot) -> Option<Mat3> {
-        self.frame[slot as usize]
+        self.frames.get(self.frame[slot as usize] as usize).copied()
     }
 
     /// The slot and the direction (global components) of an equation.
@@ -162,7 +169,7 @@ impl Equations {
                     local.0[k] = solution[self.number[slot][k] as usize];
                 }
             }
-            out[slot] = self.frame[slot].map_or(local, |frame| frame * local);
+            out[slot] = self.frame(slot as Slot).map_or(local, |frame| frame * local);
         }
     }
 
@@ -180,13 +187,13 @@ impl Equations {
                 local.0[k] = 0.0;
             }
         }
-        self.frame[slot as usize].map_or(local, |frame| frame * local)
+        self.frame(slot).map_or(local, |frame| frame * local)
     }
 
     /// Components in the local directions of a slot.
     #[inline]
     pub fn to_local(&self, slot: Slot, value: Vec3) -> Vec3 {
-        self.frame[slot as usize].map_or(value, |frame| frame.transpose_mul(value))
+        self.frame(slot).map_or(value, |frame| frame.transpose_mul(value))
     }
 }
 
