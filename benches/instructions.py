@@ -5,8 +5,8 @@
 
 Each scene is a chain of 60 elements, run over few and over many steps; the difference, over elements and iterations, is what an element
 costs in an iteration, without the start of the program. It may exceed what benches/instructions.csv holds by 5 % (compilers differ);
-`--bless` records new numbers. Scenes that differ only by tables without effect must cost the same to half a per cent, what other texts do to the allocator: what is absent costs
-nothing. Where valgrind is not installed, that is said, and nothing fails.
+`--bless` records new numbers. Scenes that differ only by tables without effect must cost the same to half a per cent, which is what
+other texts do to the allocator: what is absent costs nothing. Where valgrind is not installed, that is said, and nothing fails.
 Exit status: 0 fine or skipped, 1 something costs more than it should, 2 a run failed.
 """
 
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 RECORD = ROOT / "benches" / "instructions.csv"
 ELEMENTS = 60
-# Whole batches of elements side by side, and enough steps that a cache of the allocator or a first iteration is nothing.
+# Steps of the short and of the long run.
 FEW, MANY = 2, 8
 # A compiler's whims, and scenes that must cost the same.
 TOLERANCE, SAME = 0.05, 5e-3

@@ -52,7 +52,7 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<(Deck, Scene), Refusal> 
         }
     };
     let (deck, found) = deck::read(&text).map_err(|found| refuse(&found, Vec::new()))?;
-    let built = scene::judged(&deck, found);
+    let built = scene::from_deck(&deck, found);
     let (scene, warnings) = built.map_err(|found| refuse(&found, expected_failures(&deck)))?;
     if !warnings.is_empty() {
         say::note(&render(&label, &text, &warnings));

@@ -412,7 +412,7 @@ impl<'o> Run<'o> {
 
     /// Whether the stage is linear.
     pub(super) fn is_linear(&self) -> bool {
-        self.model.linear && matches!(self.plan.stages[self.stage].work.kind(), StageKind::Static | StageKind::Dynamic)
+        self.model.is_linear(self.plan.stages[self.stage].work.kind())
     }
 
     /// The first dynamic stage gives the initial velocities.
@@ -506,10 +506,11 @@ impl<'o> Run<'o> {
 
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
-        if self.model.linear {
+        if self.is_linear() {
             // Rotations of any size, without charts.
-            let (wound, q) = (&mut self.state.wound, &self.state.q);
-            wound.iter_mut().zip(q).for_each(|(wound, q)| *wound = *q);
+            for &slot in &self.model.rotating.rotations {
+                self.state.wound[slot as usize] = self.state.q[slot as usize];
+            }
         }
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {

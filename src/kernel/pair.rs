@@ -33,7 +33,7 @@ use crate::tensor::{Mat3, Vec3};
 /// The vector phi from the one node to the other, and how it follows them.
 struct Between<T> {
     phi: Vec3<T>,
-    /// A
+    /// A = T(phi)^-1
     inverse: Mat3<T>,
     /// A = I + phi~/2 + e phi~^2
     e: T,
@@ -93,6 +93,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
         weight: f64,
         out: &mut ElementSystem<T>,
     ) {
+        debug_assert!(N == 2, "the frame of other elements does not stand at their points");
         let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
         let arm = self.arm(slope);
         let stress = point.stress(&self.pair_strain(slope, &between), free);
@@ -172,32 +173,35 @@ impl<const N: usize, T: Real> Relative<N, T> {
         let (slope, stiffness) = (point.slope[1], &point.stiffness);
         let arm = self.arm(slope);
         let ends = [&rotations[0].t, &rotations[1].t];
+        // The weight goes first to what it belongs to: stiff sections of short elements would overflow without it.
+        let (cn, cm, bent) = (stiffness.cn * w, stiffness.cm * (w * slope * slope), w * slope);
         // F_i T_i and B_i T_i
         let frame = [follows[0] * *ends[0], follows[1] * *ends[1]];
         let bend = [-between.inverse.transpose_matmul(*ends[0]), between.inverse * *ends[1]];
-        let g = (stress.n.skew() - Mat3::skew_mul(arm, stiffness.cn)).transpose();
+        let g = ((stress.n * w).skew() - Mat3::skew_mul(arm, cn)).transpose();
         let s = -Mat3::skew_mul(arm, g).transpose();
 
-        let xx = self.frame * stiffness.cn * self.frame.transpose() * (w * slope * slope);
+        let xx = self.frame * (cn * (slope * slope)) * self.frame.transpose();
         let mut over_frame = [s * frame[0], s * frame[1]];
-        let mut over_bend = [stiffness.cm * bend[0] * slope, stiffness.cm * bend[1] * slope];
+        let mut over_bend = [cm * bend[0], cm * bend[1]];
         let mut over_x = [g * frame[0], g * frame[1]];
         if let Some(cc) = stiffness.cc {
-            let across = Mat3::skew_mul(arm, cc) * slope;
+            let cc = cc * bent;
+            let across = Mat3::skew_mul(arm, cc);
             for j in 0..2 {
                 over_frame[j] -= across * bend[j];
                 over_bend[j] += cc.transpose_matmul(Mat3::skew_mul(arm, frame[j]));
-                over_x[j] += cc * bend[j] * slope;
+                over_x[j] += cc * bend[j];
             }
         }
-        let turned = self.half.turned(forces.frame);
-        let (m, twist) = (stress.m * slope, between.bend(stress.m * slope));
+        let m = stress.m * bent;
+        let (turned, twist) = (self.half.turned(forces.frame * w), between.bend(m));
         let spun = [
             ends[0].transpose_matmul(turned[0].scale(0.5) + m.skew().scale(0.5) - twist),
             ends[1].transpose_matmul(turned[1].scale(0.5) + m.skew().scale(0.5) + twist),
         ];
         for j in 0..2 {
-            let xp = self.frame * over_x[j] * (w * slope);
+            let xp = self.frame * over_x[j] * slope;
             for (i, xp) in [(0, -xp), (1, xp)] {
                 out.set_tangent(2 * i, 2 * j + 1, xp);
                 out.set_tangent(2 * j + 1, 2 * i, xp.transpose());
@@ -205,12 +209,11 @@ impl<const N: usize, T: Real> Relative<N, T> {
             }
             for i in 0..=j {
                 let mut pp = frame[i].transpose_matmul(over_frame[j])
-                    + bend[i].transpose_matmul(over_bend[j]) * slope
+                    + bend[i].transpose_matmul(over_bend[j])
                     + spun[i] * bend[j];
                 if i == j {
-                    pp += rotations[i].c2(forces.spin[i]);
+                    pp += rotations[i].c2(forces.spin[i] * w);
                 }
-                let pp = pp * w;
                 out.set_tangent(2 * i + 1, 2 * j + 1, pp);
                 if i < j {
                     out.set_tangent(2 * j + 1, 2 * i + 1, pp.transpose());

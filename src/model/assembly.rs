@@ -71,11 +71,6 @@ impl Assembly {
         }
     }
 
-    /// Whether everything is linear.
-    pub fn is_linear(&self) -> bool {
-        self.linear.is_some()
-    }
-
     /// From here on everything is linear about a state.
     pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
         self.linear = Some(Box::new(Linear::new(self.effects.iter().map(|acting| &*acting.effect), model, about)?));

@@ -104,7 +104,9 @@ pub struct Model {
     pub sprung: Vec<Slot>,
     /// How many beam elements there are
     pub elements: usize,
-    /// What large rotations ask for: nothing where everything is linear
+    /// What large rotations ask for
+    pub rotating: Arc<Charted>,
+    /// The same in the present stage: nothing where that is linear
     pub charted: Arc<Charted>,
     /// What acts
     pub effects: Vec<Arc<dyn Effect>>,
@@ -142,6 +144,7 @@ impl Model {
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
     pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<Equations, StageError> {
         let fresh = self.has_fresh_loads(stage);
+        self.charted = if self.is_linear(kind) { Arc::default() } else { self.rotating.clone() };
         self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind, fresh));
         for (number, motion) in self.motions.iter_mut().enumerate() {
             let jump = |(from, to)| StageError::Jump(Jump { motion: number, from, to });
@@ -153,6 +156,11 @@ impl Model {
             .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
         self.refuse_turned_hinges(&held, state)?;
         self.number(stage, plane)
+    }
+
+    /// Whether stages of a kind are linear in the displacements.
+    pub fn is_linear(&self, kind: StageKind) -> bool {
+        self.linear && matches!(kind, StageKind::Static | StageKind::Dynamic)
     }
 
     /// The unknowns that are free in a stage that has begun, in a plane or in space.

@@ -125,11 +125,11 @@ const MOST_DIAGNOSTICS: usize = 200;
 /// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
 pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (deck, found) = deck::read(text)?;
-    judged(&deck, found)
+    from_deck(&deck, found)
 }
 
 /// Builds a scene from a deck and what was found in reading it; results as those of [`from_text`].
-pub fn judged(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
+pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let mut found = Vec::new();
     let scene = build(deck, &mut found);
     if !diagnostics.iter().all(Diagnostic::is_warning) {
@@ -190,20 +190,21 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
-    let linear = !deck.effects.allow(deck::EffectWord::LargeRotations);
+    let rotating = Arc::new(charted(&mesh));
     let mut model = Model {
         slots: Arc::new([slots(&mesh), composition.multipliers].concat()),
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
         elements: mesh.elements.len(),
-        charted: Arc::new(if linear { Charted::default() } else { charted(&mesh) }),
+        charted: rotating.clone(),
+        rotating,
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
         plane: None,
-        linear,
+        linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
         length: check::diagonal(&mesh),
     };
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();

@@ -74,12 +74,12 @@ impl Convergence {
         let squares = Peaks::of(model, system, Vec3::squared);
         let peaks = match squares.largest() {
             // Neither has a square overflowed, nor has anything that counts been lost.
-            1e-280..=1e280 if squares.sum.is_finite() => squares.map(f64::sqrt),
+            1e-280..=1e280 if squares.poison == 0.0 => squares.map(f64::sqrt),
             _ => Peaks::of(model, system, Vec3::size),
         };
         let force = larger(peaks.force, peaks.moment / model.length);
         let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force, noisy: false };
-        if !peaks.sum.is_finite() {
+        if peaks.poison != 0.0 {
             return Residual { ratio: f64::NAN, ..worst };
         }
         for (kind, peak) in SlotKind::ALL.into_iter().zip(peaks.residuals) {
@@ -120,8 +120,8 @@ struct Peaks {
     moment: f64,
     /// By kind of slot
     residuals: [Peak; 4],
-    /// Of all: finite where each is, while the largest of numbers may leave NaN out
-    sum: f64,
+    /// Zero; NaN where a number is NaN or infinite, which the largest of numbers may leave out
+    poison: f64,
 }
 
 impl Peaks {
@@ -130,7 +130,7 @@ impl Peaks {
         let equations = &system.pattern.equations;
         // Vectors in a tilted plane are rounded aside.
         let tilted = equations.plane().is_some_and(Plane::is_tilted);
-        let (mut forces, mut residuals, mut sum) = ([0.0; 4], [Peak::default(); 4], 0.0);
+        let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
         for (slot, info) in model.slots.iter().enumerate() {
             let parts = system.force.each_ref().map(|force| force[slot]);
             let total = parts.into_iter().fold(Vec3::ZERO, |total, part| total + part);
@@ -138,7 +138,7 @@ impl Peaks {
             let free = if whole { total } else { free_part(equations, slot as Slot, total) };
             let [a, b, c, d] = parts.map(&measure);
             let [held, free] = [measure(total - free), measure(free)];
-            sum += (a + b) + (c + d);
+            poison += ((a + b) + (c + d)) * 0.0;
             let kind = info.kind as usize;
             forces[kind] = larger(larger(larger(a, b), larger(c, d)), larger(held, forces[kind]));
             if free > residuals[kind].size {
@@ -146,7 +146,7 @@ impl Peaks {
             }
         }
         let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize]);
-        Self { force, moment, residuals, sum }
+        Self { force, moment, residuals, poison }
     }
 
     /// The largest of all.
@@ -160,7 +160,7 @@ impl Peaks {
     }
 }
 
-/// The larger of two numbers, in one instruction: NaN is not minded, as it is by `f64::max`.
+/// The larger of two numbers, in one instruction, unlike `f64::max`: where one is NaN it is the second, and `poison` tells.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }

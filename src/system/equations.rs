@@ -27,12 +27,15 @@ pub struct FrameConflict {
     pub slot: Slot,
 }
 
+/// The number of no frame.
+const GLOBAL: u32 = u32::MAX;
+
 /// The numbers of the free equations.
 #[derive(Clone, Debug)]
 pub struct Equations {
     /// For each slot and local direction the equation, or [`Equations::HELD`].
     number: Vec<[u32; 3]>,
-    /// For each slot the number of its frame, or [`Equations::HELD`] where its local directions are the global ones
+    /// For each slot the number of its frame, or `GLOBAL` where its local directions are the global ones
     frame: Vec<u32>,
     /// Local directions as columns
     frames: Vec<Mat3>,
@@ -104,7 +107,7 @@ impl Equations {
         if let Some(frame) = frame.filter(|frame| self.frames.last() != Some(frame)) {
             self.frames.push(frame);
         }
-        self.frame.push(frame.map_or(Self::HELD, |_| self.frames.len() as u32 - 1));
+        self.frame.push(frame.map_or(GLOBAL, |_| self.frames.len() as u32 - 1));
         self.constrained.push(constrained);
     }
 

@@ -250,3 +250,46 @@ fn stages_that_need_what_is_switched_off_are_refused() {
     refused(&STATIC.replace("steps", "control = \"arc_length\"\nsteps"), "large_rotations");
     refused(&format!("{DYNAMIC}scheme = \"lie_generalized_alpha\"\n"), "large_rotations");
 }
+
+/// A wound spring beside the column: where the look for critical loads is not linear, it must know the turns of its node.
+#[test]
+fn buckling_stages_of_linear_scenes_count_turns() {
+    let text = |effects: &str| {
+        let beam = |name: &str, through: &str, rest: &str| {
+            format!("[[beam]]\nname = \"{name}\"\nsection = \"s\"\nthrough = {through}\nelements = 8\n{rest}")
+        };
+        format!(
+            "[point]\nfoot = [0, 0, 0]\ntop = [0, 0, 2]\na = [3, 0, 0]\nb = [4, 0, 0]\n\
+             [section.s]\nEA = 1e6\nGA = 1e6\nGJ = 10\nEI = 10\n{}{}\
+             [[support]]\nat = \"foot\"\nfix = \"all\"\n[[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"ry\", \"rz\"]\n\
+             [[support]]\nat = \"b\"\nfix = [\"uy\", \"uz\", \"ry\", \"rz\"]\n[[spring]]\nat = \"a\"\nstiffness = [0, 0, 0, 1, 0, 0]\n\
+             [[load]]\nat = \"top\"\nforce = [0, 0, -6.168502750680849]\n[[load]]\nat = \"b\"\nmoment = [4.5, 0, 0]\n\
+             [[stage]]\nkind = \"buckling\"\nmodes = 1\n{effects}",
+            beam("column", "[\"foot\", \"top\"]", ""),
+            beam("shaft", "[\"a\", \"b\"]", "interpolation = \"total\"\n"),
+        )
+    };
+    let load = |effects: &str| {
+        let (scene, _) = scene::from_text(&text(effects)).unwrap();
+        let mut found = Loads(Vec::new());
+        let (ended, _) = Run::new(scene.plan.clone(), &mut found).finish();
+        ended.unwrap();
+        found.0[0]
+    };
+    let whole = load("");
+    close(whole, 1.0065, 1e-3);
+    close(load("[effects]\nlarge_rotations = false\n"), whole, 1e-6);
+}
+
+struct Loads(Vec<f64>);
+
+impl Observer for Loads {
+    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn buckling(&mut self, _stage: usize, loads: &[f64]) -> Result<(), Failure> {
+        self.0.extend(loads);
+        Ok(())
+    }
+}

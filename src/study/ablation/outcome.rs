@@ -115,7 +115,7 @@ impl Observer for Columns<'_> {
         match (self.interrupted)() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),
             None if self.attempts > self.most_attempts => Err(Failure::Limit(format!(
-                "given up at {at} after {} attempts at steps, many times those of the whole scene",
+                "given up at {at} after {} attempts at steps, far more than the whole scene takes",
                 self.most_attempts
             ))),
             None => Ok(()),
