@@ -1,6 +1,6 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
-use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View};
+use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
 use super::planar_elasticity::PlanarElasticity;
 use super::{ByOrder, Connection, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
@@ -327,7 +327,7 @@ impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
     #[inline(always)]
     fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
         let geometric = self.stresses.as_ref().map(|stresses| &stresses[0]);
-        (N == 2 && G == 1).then(|| HalfWay { point: &self.points[0], free: self.free, geometric })
+        is_half_way(N, G).then(|| HalfWay { point: &self.points[0], free: self.free, geometric })
     }
 }
 

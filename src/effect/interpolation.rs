@@ -77,6 +77,11 @@ pub trait PointSum<const N: usize, T: Real> {
     }
 }
 
+/// Whether the only point of an element stands half way between two nodes.
+pub const fn is_half_way(nodes: usize, points: usize) -> bool {
+    nodes == 2 && points == 1
+}
+
 /// An elastic point with the amplitude of its free strain, and the stress of its geometric part where that is not the present one.
 pub struct HalfWay<'a, const N: usize, T> {
     /// The point
@@ -288,7 +293,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
         du: &[Vec3<T>; N],
         dp: &[Vec3<T>; N],
     ) -> [Stress<T>; G] {
-        if N == 2 && G == 1 {
+        if is_half_way(N, G) {
             return [self.seen.extrapolated_half_way(&self.rotations, &points[0], free, du, dp); G];
         }
         extrapolated(self, points, free, du, dp)
