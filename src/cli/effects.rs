@@ -39,8 +39,8 @@ fn study(
     several: bool,
     verdict: &mut Verdict,
 ) -> Result<(), (Status, &'static str, String)> {
-    let (deck, scene) = match load::deck(path, settings) {
-        Ok(read) => read,
+    let load::Loaded { deck, scene, .. } = match load::deck(path, settings) {
+        Ok(loaded) => loaded,
         Err(refusal) => {
             verdict.refuse(refusal);
             return Ok(());

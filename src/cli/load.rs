@@ -25,19 +25,30 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    fn new(status: Status, name: &'static str, message: String) -> Self {
+    /// With its last line.
+    pub fn of(status: Status, name: &'static str, message: String) -> Self {
         Self { status, name, message, details: String::new(), expected: Vec::new() }
     }
 }
 
+/// A deck that was read.
+pub struct Loaded {
+    /// Its text, with settings
+    pub text: String,
+    /// Its words
+    pub deck: Deck,
+    /// The scene
+    pub scene: Scene,
+}
+
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
 pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Refusal> {
-    deck(path, settings).map(|(_, scene)| scene)
+    deck(path, settings).map(|loaded| loaded.scene)
 }
 
 /// The same, with the deck itself.
-pub fn deck(path: &Path, settings: &[String]) -> Result<(Deck, Scene), Refusal> {
-    let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::new(Status::Wrong, "deck", why))?;
+pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
+    let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
     // Settings may have moved lines.
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());
@@ -48,7 +59,7 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<(Deck, Scene), Refusal> 
         Refusal {
             details: render(&label, &text, found),
             expected,
-            ..Refusal::new(Status::Wrong, name, format!("{count} in {}", path.display()))
+            ..Refusal::of(Status::Wrong, name, format!("{count} in {}", path.display()))
         }
     };
     let (deck, found) = deck::read(&text).map_err(|found| refuse(&found, Vec::new()))?;
@@ -57,21 +68,21 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<(Deck, Scene), Refusal> 
     if !warnings.is_empty() {
         say::note(&render(&label, &text, &warnings));
     }
-    Ok((deck, scene))
+    Ok(Loaded { text, deck, scene })
 }
 
 fn text(path: &Path) -> Result<String, Refusal> {
-    let refuse = |why: String| Refusal::new(Status::Io, "io", format!("{}: {why}", path.display()));
+    let refuse = |why: String| Refusal::of(Status::Io, "io", format!("{}: {why}", path.display()));
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|e| refuse(e.to_string()))?;
     file.take(LARGEST_DECK + 1).read_to_end(&mut bytes).map_err(|e| refuse(e.to_string()))?;
     if bytes.len() as u64 > LARGEST_DECK {
         let message = format!("{}: more than the largest supported {LARGEST_DECK} bytes", path.display());
-        return Err(Refusal::new(Status::Wrong, "limit", message));
+        return Err(Refusal::of(Status::Wrong, "limit", message));
     }
     String::from_utf8(bytes).map_err(|e| {
         let message = format!("{}: not UTF-8 text at byte {}", path.display(), e.utf8_error().valid_up_to());
-        Refusal::new(Status::Wrong, "deck", message)
+        Refusal::of(Status::Wrong, "deck", message)
     })
 }
 

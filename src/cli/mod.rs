@@ -1,7 +1,9 @@
 //! The command line: one file a subcommand.
 
+mod accuracy;
 mod check;
 mod compare;
+mod cost;
 mod effects;
 mod load;
 mod progress;
@@ -42,6 +44,8 @@ enum Command {
     Run {
         #[command(flatten)]
         input: DeckArguments,
+        #[command(flatten)]
+        target: accuracy::Target,
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -72,9 +76,16 @@ enum Command {
         #[arg(long, default_value_t = 1e-12)]
         atol: f64,
     },
-    /// What accuracy costs in time (not supported yet)
-    #[command(hide = true)]
-    Cost(Rest),
+    /// Tell what accuracy costs in time: many runs of a deck with other elements, orders and steps
+    Cost {
+        #[command(flatten)]
+        input: DeckArguments,
+        #[command(flatten)]
+        wanted: cost::Wanted,
+        /// Folder of the results (default: results/<deck name>)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Take each effect out in turn and tell what it changes and costs
     Effects {
         #[command(flatten)]
@@ -165,11 +176,11 @@ pub fn main() -> ExitCode {
         Err(error) => return ExitCode::from(explain(&error) as u8),
     };
     let status = match arguments.command {
-        Command::Run { input, out } => run::run(&input.decks, &input.set, out.as_deref()),
+        Command::Run { input, target, out } => run::run(&input.decks, &input.set, &target, out.as_deref()),
         Command::Check { input } => check::check(&input.decks, &input.set),
         Command::Verify { input, out } => verify::verify(&input.decks, &input.set, out.as_deref()),
         Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),
-        Command::Cost(rest) => not_yet("cost", &rest),
+        Command::Cost { input, wanted, out } => cost::cost(&input.decks, &input.set, &wanted, out.as_deref()),
         Command::Effects { input, tolerance, out } => {
             effects::effects(&input.decks, &input.set, tolerance, out.as_deref())
         }

@@ -28,8 +28,8 @@ impl Progress {
         Self { bar, name: name.into(), last: Instant::now() }
     }
 
-    /// From 0 to 1.
-    pub fn tell(&mut self, done: f64, time: f64, load: f64) {
+    /// From 0 to 1, and where that is, for lines.
+    pub fn tell(&mut self, done: f64, place: impl Fn() -> String) {
         let wait = if self.bar.is_some() { REDRAW } else { QUIET };
         if self.last.elapsed() < wait {
             return;
@@ -37,7 +37,7 @@ impl Progress {
         self.last = Instant::now();
         match &self.bar {
             Some(bar) => bar.set_position((done * 10_000.0) as u64),
-            None => say::note(&format!("{}: {:.1} % (time {time:.6}, load factor {load:.4})", self.name, 100.0 * done)),
+            None => say::note(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),
         }
     }
 

@@ -1,16 +1,17 @@
 //! `beamsim run`
 
+use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
 use super::{Status, Verdict, load, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
-use crate::output::{HistoryWriter, ModesWriter, Outcome, PartFile, Rows, run_record};
+use crate::output::{HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, run_record};
 use crate::scene::Scene;
 use crate::study::Recorder;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Runs decks one after the other.
-pub fn run(decks: &[PathBuf], settings: &[String], out: Option<&Path>) -> Status {
+/// Runs decks one after the other; where an accuracy is wanted, after a search for elements and steps.
+pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
     if let Some(twin) = twin(decks) {
         verdict.fail(
@@ -21,11 +22,11 @@ pub fn run(decks: &[PathBuf], settings: &[String], out: Option<&Path>) -> Status
         return verdict.finish(1);
     }
     for path in decks {
-        match load::scene(path, settings) {
-            Ok(scene) => {
-                let name = load::name(path);
+        let name = load::name(path);
+        match target.aim(&name, path, settings) {
+            Ok(Aimed { scene, reached }) => {
                 let folder = folder(out, &name, decks.len() > 1);
-                let finished = simulate(&scene, &name, Some(&folder));
+                let finished = simulate(&scene, &name, Some(&folder), reached.as_ref());
                 summarise(&name, &scene, &finished, &folder);
                 if let Err(failure) = &finished.result {
                     verdict.fail(finished.status(), failure.name(), failure.to_string());
@@ -125,7 +126,7 @@ impl Observer for Watcher {
     }
 
     fn progress(&mut self, at: Moment, done: f64) -> Result<(), Failure> {
-        self.progress.tell(done, at.time, at.load);
+        self.progress.tell(done, || format!("time {:.6}, load factor {:.4}", at.time, at.load));
         match signals::caught() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),
             None => Ok(()),
@@ -138,7 +139,7 @@ fn io_failure(error: std::io::Error) -> Failure {
 }
 
 /// Runs a scene; with a folder it leaves its results there.
-pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
+pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, reached: Option<&Reached>) -> Finished {
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
@@ -162,7 +163,7 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>) -> Finished {
     watcher.progress.done();
     let seconds = start.elapsed().as_secs_f64();
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
-        let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds });
+        let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds, reached });
         let record = format!("{record:#}\n");
         let written = write_results(history, &watcher.modes, folder, result.is_ok(), &record);
         if let Err(error) = written {

@@ -109,6 +109,16 @@ pub enum InterpolationWord {
     Relative,
 }
 
+impl InterpolationWord {
+    /// As it stands in the deck.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Total => "total",
+            Self::Relative => "relative",
+        }
+    }
+}
+
 /// `free_strain = […]` with its history
 #[derive(Clone, Debug)]
 pub struct FreeStrain {
@@ -131,6 +141,8 @@ pub struct Beam {
     pub elements: Spanned<Vec<usize>>,
     /// Polynomial order of an element
     pub order: usize,
+    /// How many equal parts of each piece node numbers count; left out: those between nodes
+    pub numbering: Option<Spanned<Vec<usize>>>,
     /// The vector whose normal part is local axis 3
     pub axis3: Option<Spanned<[f64; 3]>>,
     /// Angle of the section about axis 1 at start and end
@@ -340,13 +352,14 @@ fn read_shaped(table: &Table) -> Option<SectionBody> {
     Some(SectionBody::Shaped { shape, material, shear_factor })
 }
 
-const BEAM_KEYS: [&str; 11] = [
+const BEAM_KEYS: [&str; 12] = [
     "name",
     "section",
     "through",
     "arc",
     "elements",
     "order",
+    "numbering",
     "axis3",
     "twist",
     "interpolation",
@@ -359,7 +372,7 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     let name = table.required("name").and_then(|item| context.text(item)).and_then(|name| check_name(context, name));
     let sections = table.required("section").and_then(|item| read_sections(context, item));
     let path = read_path(&table);
-    let elements = table.required("elements").and_then(|item| read_counts(context, item));
+    let elements = table.required("elements").and_then(|item| read_counts(context, item, "elements"));
     let order = match table.get("order") {
         Some(item) => context.whole(item, 1, usize::MAX).and_then(|order| {
             if order.value <= 3 {
@@ -368,6 +381,10 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
             context.wrong(order.span, format!("`order` is 1, 2 or 3, found {}", order.value))
         }),
         None => Some(1),
+    };
+    let numbering = match table.get("numbering") {
+        Some(item) => read_counts(context, item, "numbering").map(Some),
+        None => Some(None),
     };
     let (axis3, twist) = (table.vector("axis3"), table.vector("twist").map(|t| t.value));
     let interpolation = read_interpolation(&table);
@@ -378,6 +395,7 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
         path: path?,
         elements: elements?,
         order: order?,
+        numbering: numbering?,
         axis3,
         twist,
         interpolation: interpolation?,
@@ -453,7 +471,7 @@ pub(super) fn read_point(context: &Context, item: &Item) -> Option<Spanned<Point
     }
 }
 
-fn read_counts(context: &Context, item: &Item) -> Option<Spanned<Vec<usize>>> {
+fn read_counts(context: &Context, item: &Item, key: &str) -> Option<Spanned<Vec<usize>>> {
     let counts: Vec<Option<usize>> = match item.get_ref() {
         DeValue::Array(array) => {
             array.iter().map(|entry| context.whole(entry, 1, MOST_ELEMENTS).map(|n| n.value)).collect()
@@ -462,7 +480,7 @@ fn read_counts(context: &Context, item: &Item) -> Option<Spanned<Vec<usize>>> {
     };
     let value: Vec<usize> = counts.into_iter().collect::<Option<_>>()?;
     if value.is_empty() {
-        return context.wrong(item.span(), "`elements` must not be empty");
+        return context.wrong(item.span(), format!("`{key}` must not be empty"));
     }
     Some(Spanned { value, span: item.span() })
 }

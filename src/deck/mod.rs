@@ -2,7 +2,9 @@
 //!
 //! Everything that is wrong is gathered, each with file, line and column; one struct stands for one table.
 
+mod accuracy;
 mod action;
+mod cost;
 mod diagnostic;
 mod effects;
 mod expression;
@@ -13,10 +15,12 @@ mod procedure;
 mod reader;
 mod resolved;
 
+pub use accuracy::Accuracy;
 pub use action::{
     Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, JointParts, Load,
     LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,
 };
+pub use cost::{Cost, NormWord};
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
 pub use effects::{EffectWord, Effects};
 pub use expression::{Expression, Jet};
@@ -75,6 +79,10 @@ pub struct Deck {
     pub effects: Effects,
     /// What is written
     pub output: Output,
+    /// What a study of accuracy and time varies
+    pub cost: Cost,
+    /// How large the errors of outputs may be
+    pub accuracy: Option<Accuracy>,
     /// Expectations
     pub expects: Vec<Expect>,
     /// The values of `[param]`
@@ -87,9 +95,9 @@ pub struct Deck {
     pub resolved: serde_json::Value,
 }
 
-const KEYS: [&str; 19] = [
+const KEYS: [&str; 21] = [
     "title", "units", "gravity", "param", "point", "material", "section", "beam", "support", "motion", "joint", "body",
-    "spring", "load", "initial", "history", "stage", "effects", "output",
+    "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy",
 ];
 
 /// Reads a deck. What is wrong with it comes beside it, so that the scene can tell what else is; `Err` where the text is no
@@ -172,6 +180,8 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         stages: listed(&top, "stage", procedure::read_stage),
         effects: Effects::read(&top),
         output: procedure::read_output(&top),
+        cost: cost::Cost::read(&top),
+        accuracy: Accuracy::read(&top),
         expects: listed(&top, "expect", procedure::read_expect),
         parameters: Parameters::default(),
         resolved: serde_json::Value::Null,

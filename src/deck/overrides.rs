@@ -28,7 +28,7 @@ fn read_value(text: &str) -> Value {
 }
 
 /// Tables that may be wanted where the deck has none.
-const MADE: [&str; 8] = ["param", "output", "effects", "units", "point", "history", "section", "material"];
+const MADE: [&str; 9] = ["param", "output", "effects", "cost", "units", "point", "history", "section", "material"];
 
 fn set(item: &mut Item, keys: &[Key], new: Value) -> Result<(), String> {
     set_below(item, keys, new, keys.first().is_some_and(|key| MADE.contains(&key.get())))

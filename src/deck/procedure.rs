@@ -1,5 +1,6 @@
 //! What is done with a scene: stages, output, expectations.
 
+use super::cost::SCHEMES;
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
 use super::geometry::{PointRef, read_point};
 use super::reader::{Context, Item, Table, kind_of};
@@ -336,8 +337,7 @@ const COEFFICIENTS: [(&str, &str); 4] =
 
 fn read_scheme(table: &Table) -> Option<SchemeWord> {
     let context = table.context;
-    let words = ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"];
-    let scheme = if table.has("scheme") { table.word("scheme", &words)?.value } else { "newmark" };
+    let scheme = if table.has("scheme") { table.word("scheme", &SCHEMES)?.value } else { "newmark" };
     for (key, owner) in COEFFICIENTS.into_iter().filter(|(key, owner)| table.has(key) && !scheme.ends_with(owner)) {
         let message = format!("`{key}` belongs to scheme = \"{owner}\"");
         context.report(Diagnostic::error(message, table.key_span(key)));

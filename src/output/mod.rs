@@ -3,9 +3,11 @@
 mod files;
 mod history;
 mod modes;
+mod plot;
 mod record;
 
 pub use files::{PartFile, remove_if_there};
 pub use history::{HistoryReader, HistoryWriter, Rows};
 pub use modes::ModesWriter;
-pub use record::{Outcome, run_record};
+pub use plot::{LinePlots, NamedLine};
+pub use record::{Outcome, Reached, run_record};

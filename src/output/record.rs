@@ -12,6 +12,20 @@ pub struct Outcome<'a> {
     pub counters: &'a Counters,
     /// Wall-clock seconds of the run
     pub seconds: f64,
+    /// The accuracy that was reached, where one was wanted
+    pub reached: Option<&'a Reached>,
+}
+
+/// An accuracy that was wanted and reached.
+pub struct Reached {
+    /// Columns with what was wanted of each and the estimated error, over the largest value of its kind
+    pub columns: Vec<(String, f64, f64)>,
+    /// What was set in the deck for it
+    pub settings: Vec<String>,
+    /// Runs that it took to find
+    pub runs: usize,
+    /// Wall-clock seconds of these
+    pub seconds: f64,
 }
 
 /// The content of run.json.
@@ -32,6 +46,11 @@ pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
             "solve": outcome.counters.work.solve_seconds,
         },
     });
+    if let Some(Reached { columns, settings, runs, seconds }) = outcome.reached {
+        let column = |(name, wanted, estimate): &(String, f64, f64)| (name.clone(), json!([wanted, estimate]));
+        let columns: Map<String, Value> = columns.iter().map(column).collect();
+        record["accuracy"] = json!({ "columns": columns, "settings": settings, "runs": runs, "seconds": seconds });
+    }
     if let Err(failure) = outcome.result {
         record["failure"] = numbers(failure);
     }

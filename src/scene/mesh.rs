@@ -116,6 +116,8 @@ pub struct MeshBeam {
     pub nodes: Vec<usize>,
     /// The fraction of the length of each node
     pub fractions: Vec<f64>,
+    /// The fraction of the length that each number means, where numbers do not count the nodes
+    pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
     pub elements: std::ops::Range<usize>,
     /// Nodes of an element, less one
@@ -277,10 +279,14 @@ impl Mesh {
             [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
         };
         let line = path::centre_line(beam, &|point| names::place(deck, point))?;
-        let (pieces, counts) = (line.pieces.len(), beam.elements.value.len());
-        if counts != 1 && counts != pieces {
-            let message = format!("`elements` has {counts} entries, beam `{}` has {pieces} piece(s)", beam.name.value);
-            return Err(Diagnostic::error(message, beam.elements.span.clone()));
+        let pieces = line.pieces.len();
+        for (key, list) in [("elements", Some(&beam.elements)), ("numbering", beam.numbering.as_ref())] {
+            let Some(Spanned { value, span }) = list.filter(|l| l.value.len() != 1 && l.value.len() != pieces) else {
+                continue;
+            };
+            let counts = value.len();
+            let message = format!("`{key}` has {counts} entries, beam `{}` has {pieces} piece(s)", beam.name.value);
+            return Err(Diagnostic::error(message, span.clone()));
         }
         Ok((line, section.forced(&deck.effects)))
     }
@@ -333,6 +339,7 @@ impl Mesh {
             name: beam.name.value.clone(),
             nodes,
             fractions,
+            numbered: beam.numbering.as_ref().map(|numbering| fractions_of(&line, &numbering.value)),
             elements: first_element..self.elements.len(),
             order: beam.order,
             interpolation: beam.interpolation,
@@ -369,6 +376,15 @@ pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
         3 => (padded(shape::values::<3>(xi)), padded(shape::derivatives::<3>(xi))),
         _ => (shape::values::<4>(xi), shape::derivatives::<4>(xi)),
     }
+}
+
+/// The fractions of the length where the pieces of a line are cut into so many equal parts, from start to end.
+fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
+    let inner = (0..line.pieces.len()).flat_map(|piece| {
+        let count = parts[piece.min(parts.len() - 1)];
+        (1..=count).map(move |part| line.fraction(piece, part as f64 / count as f64))
+    });
+    std::iter::once(0.0).chain(inner).collect()
 }
 
 /// The names at the ends of the pieces of a path.

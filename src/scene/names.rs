@@ -100,21 +100,28 @@ impl Mesh {
                 }
             },
         };
-        let mesh_beam = &self.beams[number];
-        let at_node = mesh_beam.fractions.iter().position(|f| (f - fraction).abs() < 1e-9);
-        Ok(match at_node {
-            Some(k) => Found::Node(mesh_beam.nodes[k], Some((number, mesh_beam.fractions[k]))),
+        Ok(self.at_fraction(number, fraction))
+    }
+
+    /// The node of a beam at a fraction of its length, or the place between two.
+    fn at_fraction(&self, number: usize, fraction: f64) -> Found {
+        let beam = &self.beams[number];
+        let at_node = beam.fractions.iter().position(|f| (f - fraction).abs() < 1e-9);
+        match at_node {
+            Some(k) => Found::Node(beam.nodes[k], Some((number, beam.fractions[k]))),
             None => Found::Between(number, fraction),
-        })
+        }
     }
 
     fn find_number(&self, deck: &Deck, name: &Spanned<String>, beam: &str, rest: &str) -> Result<Found, Diagnostic> {
         let number = self.beam(deck, name, beam)?;
         let mesh_beam = &self.beams[number];
-        match rest.parse::<usize>().ok().filter(|&k| k < mesh_beam.nodes.len()) {
+        let numbered = mesh_beam.numbered.as_ref().unwrap_or(&mesh_beam.fractions);
+        match rest.parse::<usize>().ok().filter(|&k| k < numbered.len()) {
+            Some(k) if mesh_beam.numbered.is_some() => Ok(self.at_fraction(number, numbered[k])),
             Some(k) => Ok(Found::Node(mesh_beam.nodes[k], Some((number, mesh_beam.fractions[k])))),
             None => {
-                let last = mesh_beam.nodes.len() - 1;
+                let last = numbered.len() - 1;
                 let message = format!("beam `{beam}` has no node `{rest}`: its nodes are 0 to {last}");
                 Err(Diagnostic::error(message, name.span.clone()))
             }

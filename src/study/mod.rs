@@ -1,8 +1,12 @@
 //! What is done with whole runs.
 
 pub mod ablation;
+pub mod accuracy;
 mod compare;
+pub mod cost;
+mod outcome;
+mod scale;
 mod verify;
 
 pub use compare::{Comparison, compare};
-pub use verify::{Judgement, Recorder, expected_failure, judge};
+pub use verify::{Judgement, Recorder, expected_failure, expected_values, judge};

@@ -65,6 +65,16 @@ impl Recorder {
         }
     }
 
+    /// What came of each expectation that has a value, NaN where it was not reached; in the order of [`expected_values`].
+    pub fn values(&self) -> Vec<f64> {
+        let came = self.expectations.iter().zip(&self.rows).filter_map(|(expectation, rows)| match &expectation.kind {
+            ExpectationKind::Column { reduce: how, bounds, .. } => bounds.value.map(|_| reduce(rows, *how)),
+            ExpectationKind::Mode { quantity, number, bounds } => bounds.value.map(|_| self.mode(*quantity, *number)),
+            ExpectationKind::Counter { .. } | ExpectationKind::Fails => None,
+        });
+        came.map(|value| value.unwrap_or(f64::NAN)).collect()
+    }
+
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
         for (expectation, rows) in self.expectations.iter().zip(&mut self.rows) {
@@ -80,6 +90,18 @@ impl Recorder {
             }
         }
     }
+}
+
+/// What is expected of a run, and the values: of those expectations that name one, but for counters.
+pub fn expected_values(expectations: &[Expectation]) -> Vec<(String, f64)> {
+    let expected = expectations.iter().filter_map(|expectation| match &expectation.kind {
+        ExpectationKind::Column { reduce: how, bounds, .. } => {
+            Some((format!("{} {}", expectation.name, describe(how)), bounds.value?.0))
+        }
+        ExpectationKind::Mode { bounds, .. } => Some((expectation.name.clone(), bounds.value?.0)),
+        ExpectationKind::Counter { .. } | ExpectationKind::Fails => None,
+    });
+    expected.collect()
 }
 
 /// Judges every expectation; a failure that nobody expected is judged too.

@@ -202,7 +202,7 @@ fn wrong_decks_and_missing_files_have_their_status() {
     assert_eq!(status(&huge), 2);
     assert!(last_line(&huge).starts_with("error[limit]: "));
     assert_eq!(status(&folder.beamsim(&["frobnicate"])), 2);
-    for command in ["cost", "sweep", "schema"] {
+    for command in ["sweep", "schema"] {
         let refused = folder.beamsim(&[command, "bad.toml"]);
         assert_eq!(status(&refused), 2);
         assert!(last_line(&refused).contains("not supported yet"));
@@ -247,6 +247,55 @@ fn effects_writes_its_table_and_tells_what_may_go() {
 }
 
 /// A run of a billion steps, stopped by a signal after its first rows.
+#[test]
+fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
+    let folder = Folder::new("cost");
+    folder.write("deck.toml", GOOD);
+    let output =
+        folder.beamsim(&["cost", "deck.toml", "--vary", "order=1,2", "--vary", "elements=1,2,4", "--accuracy", "1e-3"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in ["reference: ", "orders of convergence", "1e-3 costs ", "[[beam]]  # beam arm", "--set beam.0."] {
+        assert!(text.contains(part), "{part} is not in\n{text}");
+    }
+    assert_eq!(folder.names("results/deck"), ["cost.csv", "cost.svg"]);
+    let table = fs::read_to_string(folder.0.join("results/deck/cost.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + 2 * 2 * 3);
+    let plot = fs::read_to_string(folder.0.join("results/deck/cost.svg")).unwrap();
+    assert!(plot.contains("CPU time / s") && plot.contains("order 2, relative") && !plot.contains("NaN"));
+}
+
+#[test]
+fn cost_within_a_budget_tells_what_it_left_out_and_goes_on() {
+    let folder = Folder::new("cost_budget");
+    folder.write("deck.toml", GOOD);
+    let output = folder.beamsim(&["cost", "deck.toml", "--budget", "0s"]);
+    assert_eq!((status(&output), last_line(&output).starts_with("error[limit]: the budget is too small")), (2, true));
+    assert_eq!(folder.names("results/deck"), ["cost.journal"]);
+    let output = folder.beamsim(&["cost", "deck.toml"]);
+    assert_eq!(status(&output), 0);
+    assert_eq!(folder.names("results/deck"), ["cost.csv", "cost.svg"]);
+}
+
+#[test]
+fn wrong_words_for_a_study_are_told() {
+    let folder = Folder::new("cost_wrong");
+    folder.write("deck.toml", GOOD);
+    for (arguments, words) in [
+        (&["--vary", "order=4"][..], "1 error in deck.toml"),
+        (&["--vary", "ordre=1"], "1 error in deck.toml"),
+        (&["--set", "cost.outputs=tip.vx"], "1 error in deck.toml"),
+        (&["--reference", "expect", "--set", "expect.0.fails=limit"], "1 error in deck.toml"),
+        (&["--budget", "soon"], "invalid"),
+        (&["--accuracy", "0"], "--accuracy must be positive"),
+        (&["--reference", "nothing.csv"], "nothing.csv"),
+    ] {
+        let output = folder.beamsim(&[&["cost", "deck.toml"], arguments].concat());
+        assert!([2, 4].contains(&status(&output)), "{arguments:?}");
+        assert!(last_line(&output).contains(words), "{arguments:?}: {}", last_line(&output));
+    }
+}
+
 fn interrupted(name: &str, signal: &str) -> (i32, Vec<String>) {
     let folder = Folder::new(name);
     let stage = "kind = \"dynamic\"\nend = 1e6\nstep = 0.01";

@@ -11,7 +11,7 @@ const ORDER: [&str; 16] = [
 ];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 11] = [
+const CRATES: [(&str, &[&str]); 13] = [
     (
         "faer",
         &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/pivots.rs", "src/solve/block/elimination.rs"],
@@ -21,6 +21,8 @@ const CRATES: [(&str, &[&str]); 11] = [
     ("annotate_snippets", &["src/deck/"]),
     ("strsim", &["src/deck/"]),
     ("csv", &["src/output/", "src/study/"]),
+    ("kuva", &["src/output/plot.rs"]),
+    ("cpu_time", &["src/study/cost/trial.rs"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),
     ("ctrlc", &["src/cli/"]),

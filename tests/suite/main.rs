@@ -6,6 +6,7 @@ mod coefficients;
 mod command;
 mod convergence;
 mod corners;
+mod cost;
 mod counters;
 mod decks;
 mod dual;

@@ -1,35 +1,17 @@
 //! How much the outputs of one run differ from those of another.
 
-use super::outcome::Outcome;
-use std::collections::HashMap;
-
-/// Forces below this part of the moments over the length of the scene are round-off, and moments likewise: what a run leaves
-/// out of balance is up to 1e-8 of the largest force, and adds up over elements.
-const ROUND_OFF: f64 = 1e-6;
+use crate::study::outcome::Outcome;
+use crate::study::scale::scales;
 
 /// The largest change of each column over all rows, relative to the largest value of its kind in the whole scene: of all displacements,
 /// rotations, forces, ….
 pub(super) fn changes(columns: &[String], length: f64, whole: &Outcome, other: &Outcome) -> Vec<f64> {
-    let kinds: Vec<&str> = columns.iter().map(|column| kind(column)).collect();
-    let mut scales = HashMap::new();
     let of_history = columns.len() - whole.modes.len();
-    let all = whole.rows.iter().map(|row| (0, row)).chain([(of_history, &whole.modes)]);
-    for (first, row) in all {
-        for (kind, value) in kinds[first..].iter().zip(row) {
-            let scale = scales.entry(*kind).or_insert(0.0_f64);
-            *scale = scale.max(value.abs());
-        }
-    }
-    // Round-off of forces is no moment, and the other way about.
-    for (one, other, arm) in
-        [("f", "m", 1.0 / length), ("m", "f", length), ("N", "M", 1.0 / length), ("M", "N", length)]
-    {
-        let floor = scales.get(other).map_or(0.0, |scale| ROUND_OFF * arm * scale);
-        scales.entry(one).and_modify(|scale| *scale = scale.max(floor));
-    }
+    let scales =
+        scales(columns, length, whole.rows.iter().map(|row| (0, &row[..])).chain([(of_history, &whole.modes[..])]));
     let mut changes = vec![0.0_f64; columns.len()];
     let mut compare = |column: usize, came: f64, was: f64| {
-        let (difference, scale) = ((came - was).abs(), scales[kinds[column]]);
+        let (difference, scale) = ((came - was).abs(), scales[column]);
         let same = difference == 0.0 || (came.is_nan() && was.is_nan());
         let now = if same { 0.0 } else { difference / scale };
         changes[column] = match now {
@@ -49,19 +31,6 @@ pub(super) fn changes(columns: &[String], length: f64, whole: &Outcome, other: &
         compare(of_history + k, other.modes.get(k).copied().unwrap_or(f64::NAN), *was);
     }
     changes
-}
-
-/// What a column shows: its name without the node, and without the direction. Energies compare with each other: their sum is the error
-/// of the scheme alone.
-fn kind(column: &str) -> &str {
-    if column.starts_with("energy.") {
-        return "energy";
-    }
-    if column.ends_with(".omega") || column.ends_with(".growth") {
-        return "mode";
-    }
-    let quantity = column.rsplit('.').next().unwrap_or(column);
-    quantity.trim_end_matches(|c: char| c.is_ascii_digit() || ['x', 'y', 'z'].contains(&c))
 }
 
 impl Outcome {

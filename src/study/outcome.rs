@@ -2,14 +2,10 @@
 
 use crate::drive::{Counters, Failure, Mode, Observer, Run, Snapshot, Stage, StageWork};
 use crate::model::StageKind;
+use crate::output::HistoryReader;
 use crate::scene::Scene;
+use crate::study::Recorder;
 use std::time::Instant;
-
-/// A run is timed again until it has taken so many seconds in all.
-const TIMED: f64 = 0.2;
-
-/// But not more often than this.
-const MOST_REPEATS: usize = 9;
 
 /// The outputs of a run, and what it took.
 #[derive(Clone)]
@@ -17,47 +13,77 @@ pub struct Outcome {
     /// How it ended
     pub ended: Result<(), Failure>,
     /// Stage and clock of each row: the time, or in static stages the load factor
-    pub(super) clocks: Vec<(usize, f64)>,
+    pub(in crate::study) clocks: Vec<(usize, f64)>,
     /// Row by row
-    pub(super) rows: Vec<Vec<f64>>,
+    pub(in crate::study) rows: Vec<Vec<f64>>,
     /// Modes and critical loads, by the columns behind those of the rows
-    pub(super) modes: Vec<f64>,
+    pub(in crate::study) modes: Vec<f64>,
+    /// Expected numbers, where they were asked for
+    pub(in crate::study) expected: Vec<f64>,
     /// Steps and levels tried
-    pub(super) attempts: u64,
+    pub(in crate::study) attempts: u64,
     /// Work done
     pub counters: Counters,
-    /// Wall-clock seconds, the median of several runs
+    /// Wall-clock seconds
     pub seconds: f64,
 }
 
 impl Outcome {
-    /// Runs a scene several times for its time; everything else is the same each time.
-    pub(super) fn of(scene: &Scene, most_attempts: u64, interrupted: &dyn Fn() -> Option<i32>) -> Self {
-        let once = || {
-            let (clocks, rows, modes) = (Vec::new(), Vec::new(), Vec::new());
-            let mut columns = Columns { scene, clocks, rows, modes, attempts: 0, most_attempts, interrupted };
-            let start = Instant::now();
-            let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
-            let seconds = start.elapsed().as_secs_f64();
-            let Columns { clocks, rows, modes, attempts, .. } = columns;
-            Self { ended, clocks, rows, modes, attempts, counters, seconds }
+    /// Runs a scene; more than `most_attempts` at steps end it with a failure. With a recorder what is expected is looked at too.
+    pub(in crate::study) fn of(
+        scene: &Scene,
+        recorder: Option<Recorder>,
+        most_attempts: u64,
+        interrupted: &dyn Fn() -> Option<i32>,
+    ) -> Self {
+        let (clocks, rows, modes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut columns = Columns { scene, recorder, clocks, rows, modes, attempts: 0, most_attempts, interrupted };
+        let start = Instant::now();
+        let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
+        let seconds = start.elapsed().as_secs_f64();
+        let Columns { recorder, clocks, rows, modes, attempts, .. } = columns;
+        let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
+        Self { ended, clocks, rows, modes, expected, attempts, counters, seconds }
+    }
+}
+
+impl Outcome {
+    /// A stored history as the outcome of a run: columns of the scene that it lacks are NaN.
+    pub(in crate::study) fn of_table(scene: &Scene, table: &HistoryReader) -> Self {
+        let find = |name: &str| table.names.iter().position(|known| known == name);
+        let places: Vec<Option<usize>> = columns(scene).iter().map(|name| find(name)).collect();
+        let cell = |row: &Vec<f64>, place: Option<usize>| place.and_then(|k| row.get(k)).copied();
+        let clock = |row: &Vec<f64>| {
+            let stage = cell(row, find("stage")).map_or(1, |stage| stage as usize);
+            let dynamic =
+                scene.plan.stages.get(stage.wrapping_sub(1)).map(|s| s.work.kind()) == Some(StageKind::Dynamic);
+            (stage, cell(row, find(if dynamic { "time" } else { "load" })).unwrap_or(f64::NAN))
         };
-        let mut outcome = once();
-        let mut times = vec![outcome.seconds];
-        while outcome.ended.is_ok() && times.len() < MOST_REPEATS && times.iter().sum::<f64>() < TIMED {
-            times.push(once().seconds);
+        let history = &places[..columns_of_history(scene)];
+        let row = |row: &Vec<f64>| history.iter().map(|&place| cell(row, place).unwrap_or(f64::NAN)).collect();
+        Self {
+            ended: Ok(()),
+            clocks: table.rows.iter().map(clock).collect(),
+            rows: table.rows.iter().map(row).collect(),
+            modes: vec![f64::NAN; places.len() - history.len()],
+            expected: Vec::new(),
+            attempts: 0,
+            counters: Counters::default(),
+            seconds: 0.0,
         }
-        times.sort_by(f64::total_cmp);
-        outcome.seconds = times[times.len() / 2];
-        outcome
     }
 }
 
 /// The names of all outputs: the columns of the history, then modes and critical loads, stage by stage.
-pub(super) fn columns(scene: &Scene) -> Vec<String> {
+pub(in crate::study) fn columns(scene: &Scene) -> Vec<String> {
     let mut columns: Vec<String> = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
     columns.extend(scene.plan.stages.iter().enumerate().flat_map(|(k, stage)| columns_of(k + 1, stage)));
     columns
+}
+
+/// How many of these are columns of the history.
+pub(in crate::study) fn columns_of_history(scene: &Scene) -> usize {
+    scene.probes.iter().map(|probe| probe.names.len()).sum()
 }
 
 /// Those of a stage, which has this number.
@@ -73,6 +99,7 @@ fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
 /// Collects the columns of every row.
 struct Columns<'a> {
     scene: &'a Scene,
+    recorder: Option<Recorder>,
     clocks: Vec<(usize, f64)>,
     rows: Vec<Vec<f64>>,
     modes: Vec<f64>,
@@ -96,16 +123,19 @@ impl Observer for Columns<'_> {
         let dynamic = self.scene.plan.stages[at.stage - 1].work.kind() == StageKind::Dynamic;
         self.clocks.push((at.stage, if dynamic { at.state.time } else { at.state.load }));
         self.rows.push(row);
+        self.recorder.iter_mut().for_each(|recorder| recorder.row(at));
         Ok(())
     }
 
     fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
         let found = modes.iter().flat_map(|mode| [mode.omega, mode.growth]);
         self.take_modes(stage, found.collect());
         Ok(())
     }
 
     fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.take_modes(stage, loads.to_vec());
         Ok(())
     }

@@ -1,0 +1,149 @@
+//! `beamsim run --accuracy`: elements and steps for a wanted accuracy.
+
+use super::load::{Loaded, Refusal};
+use super::progress::Progress;
+use super::{Status, load, run, say, signals};
+use crate::deck::{Accuracy, Deck};
+use crate::output::Reached;
+use crate::scene::Scene;
+use crate::study::accuracy::{Found, reach};
+use crate::study::cost::{self, Against, Journal, Options, Pace, Point};
+use std::num::NonZero;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What the user wants of a run.
+#[derive(clap::Args)]
+pub struct Target {
+    /// Choose elements and steps for this estimated error of all outputs, relative to the largest value of each kind
+    #[arg(long, value_name = "ERROR")]
+    accuracy: Option<f64>,
+    /// Search no longer than this for them: 90s, 5m, 1h
+    #[arg(long, value_parser = say::duration, value_name = "TIME")]
+    budget: Option<Duration>,
+}
+
+/// A scene that is ready to run.
+pub struct Aimed {
+    /// The scene
+    pub scene: Scene,
+    /// The accuracy that was wanted and reached
+    pub reached: Option<Reached>,
+}
+
+impl Target {
+    /// Reads a deck, and searches for the wanted accuracy where there is one.
+    pub fn aim(&self, name: &str, path: &Path, settings: &[String]) -> Result<Aimed, Refusal> {
+        let loaded = load::deck(path, settings)?;
+        if let Some(wrong) = self.accuracy.filter(|a| !(*a > 0.0 && *a < 1.0)) {
+            return Err(Refusal::of(Status::Wrong, "usage", format!("--accuracy is between 0 and 1, not {wrong}")));
+        }
+        let Some(wanted) = self.accuracy.map(Accuracy::All).or(loaded.deck.accuracy.clone()) else {
+            return Ok(Aimed { scene: loaded.scene, reached: None });
+        };
+        let start = Instant::now();
+        let found = self.search(name, path, &loaded, &wanted)?;
+        tell(name, &loaded.deck, &found, &wanted);
+        let columns = found.columns.iter().zip(&found.estimates).filter(|(_, estimate)| !estimate.is_nan());
+        let columns = columns.map(|(column, &estimate)| (column.clone(), wanted.of(column), estimate));
+        let reached = Reached {
+            columns: columns.filter(|(_, wanted, _)| wanted.is_finite()).collect(),
+            settings: found.settings.clone(),
+            runs: found.runs,
+            seconds: start.elapsed().as_secs_f64(),
+        };
+        let scene = load::scene(path, &[settings, &found.settings].concat())?;
+        Ok(Aimed { scene, reached: Some(reached) })
+    }
+
+    fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {
+        signals::caught();
+        let mut progress = Progress::new(name);
+        let mut tell = |done: usize, all: usize| {
+            progress.tell(done as f64 / all as f64, || format!("looking for the accuracy: {done} of {all} runs"));
+        };
+        let options = Options {
+            against: &Against::Finest,
+            threads: std::thread::available_parallelism().map_or(1, NonZero::get),
+            budget: self.budget,
+            interrupted: &signals::caught,
+            tell: &mut tell,
+            journal: &mut Journal::default(),
+        };
+        let found = reach(&loaded.text, &loaded.deck, &loaded.scene, wanted, options);
+        progress.done();
+        let found = found.map_err(|refusal| refused(refusal, path, loaded))?;
+        if found.reached {
+            return Ok(found);
+        }
+        let (column, estimate) = found.worst(wanted);
+        let message = format!(
+            "an error of {:e} of `{column}` is not reached, the best estimate is {estimate:.1e}, with {}",
+            wanted.of(column),
+            describe(&found.point)
+        );
+        lines(&loaded.deck, &found.settings).iter().for_each(|line| say::note(line));
+        Err(Refusal::of(Status::Wrong, "limit", message))
+    }
+}
+
+/// A study that could not be made, as it is told for a deck.
+pub fn refused(refusal: cost::Refusal, path: &Path, loaded: &Loaded) -> Refusal {
+    match refusal {
+        cost::Refusal::Failure(failure) => Refusal::of(run::status_of(&failure), failure.name(), failure.to_string()),
+        cost::Refusal::Io(error) => Refusal::of(Status::Io, "io", error.to_string()),
+        cost::Refusal::Deck(diagnostic) => Refusal {
+            details: diagnostic.render(&path.display().to_string(), &loaded.text, say::styled()),
+            ..Refusal::of(Status::Wrong, "deck", format!("1 error in {}", path.display()))
+        },
+    }
+}
+
+fn tell(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {
+    let (column, estimate) = found.worst(wanted);
+    say::line(&format!("{name}: estimated error at most {estimate:.1e}, of {column} ({} runs to find)", found.runs));
+    say::line(&format!("  {}", describe(&found.point)));
+    lines(deck, &found.settings).iter().for_each(|line| say::line(&format!("    {line}")));
+}
+
+/// A variant in words.
+pub fn describe(point: &Point) -> String {
+    let elements = match point.count() {
+        0 => None,
+        1 => Some("1 element".into()),
+        count => Some(format!("{count} elements")),
+    };
+    let pace = match point.pace {
+        Pace::Timeless => None,
+        Pace::Steps(1.0) => Some("the deck's step".into()),
+        Pace::Steps(factor) => Some(format!("{factor} times the step")),
+        Pace::Adapts(tolerance) => Some(format!("step_tolerance {tolerance:e}")),
+    };
+    [Some(point.family.name()), elements, pace].into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// Settings as lines to paste into a deck, and as they stand on a command line.
+pub fn lines(deck: &Deck, settings: &[String]) -> Vec<String> {
+    if settings.is_empty() {
+        return vec!["with the deck as it stands".into()];
+    }
+    let mut lines = Vec::new();
+    let mut table = "";
+    for setting in settings {
+        let (path, value) = setting.split_once('=').unwrap_or((setting, ""));
+        let (place, key) = path.rsplit_once('.').unwrap_or(("", path));
+        if place != table {
+            table = place;
+            let (list, number) = place.split_once('.').unwrap_or((place, "0"));
+            let number: usize = number.parse().unwrap_or(0);
+            let which = match deck.beams.get(number).filter(|_| list == "beam") {
+                Some(beam) => format!("beam {}", beam.name.value),
+                None => format!("{list} {}", number + 1),
+            };
+            lines.push(format!("[[{list}]]  # {which}"));
+        }
+        lines.push(format!("{key} = {value}"));
+    }
+    lines.push(format!("or: --set {}", settings.join(" --set ").replace('"', "")));
+    lines
+}

@@ -1,0 +1,77 @@
+//! Orders of convergence, from the differences of three runs.
+
+/// Differences below this part of the outputs are mostly what Newton's method leaves.
+const NOISE: f64 = 1e-8;
+
+/// The bounds of orders that are looked for.
+const ORDERS: [f64; 2] = [0.05, 20.0];
+
+/// An order as seen, and as it should be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Order {
+    /// From the finest three runs whose differences are no noise; `None` where there are none
+    pub observed: Option<f64>,
+    /// Of smooth solutions on fine meshes; `None` where the outputs have different ones
+    pub expected: Option<f64>,
+}
+
+impl Order {
+    /// What it means where the two disagree.
+    pub fn remark(&self) -> Option<&'static str> {
+        let (observed, expected) = (self.observed?, self.expected?);
+        match observed - expected {
+            d if d < -0.2 * expected => Some("lower than expected: too coarse still, or the scene is not smooth"),
+            d if d > 0.2 * expected => Some("higher than expected: errors cancel, or it is too coarse still"),
+            _ => None,
+        }
+    }
+}
+
+/// The order of the error as a power of a width, from widths (falling) and the distances between neighbouring runs: of the finest three
+/// that tell.
+pub fn observed(widths: &[f64], distances: &[f64]) -> Option<f64> {
+    let triples = widths.windows(3).zip(distances.windows(2));
+    triples
+        .rev()
+        .filter(|(_, d)| d[1] > NOISE && d[0] > d[1])
+        .find_map(|(w, d)| order_of([w[0], w[1], w[2]], d[0] / d[1]))
+}
+
+/// Solves (a^p - b^p) / (b^p - c^p) = ratio, whose left side rises with p where a > b > c.
+fn order_of([a, b, c]: [f64; 3], ratio: f64) -> Option<f64> {
+    let rises = |p: f64| (a.powf(p) - b.powf(p)) / (b.powf(p) - c.powf(p)) - ratio;
+    let [mut low, mut high] = ORDERS;
+    if !(rises(low) < 0.0 && rises(high) > 0.0) {
+        return None;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        *(if rises(middle) < 0.0 { &mut low } else { &mut high }) = middle;
+    }
+    Some(0.5 * (low + high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_order_is_found_from_uneven_widths() {
+        for p in [1.0, 2.0, 4.0, 6.0] {
+            let widths = [1.0, 0.6, 0.25, 0.125];
+            let error = widths.map(|w: f64| 0.3 * w.powf(p));
+            let distances: Vec<f64> = error.windows(2).map(|e| e[0] - e[1]).collect();
+            assert!((observed(&widths, &distances).unwrap() - p).abs() < 1e-9, "{p}");
+        }
+    }
+
+    #[test]
+    fn noise_has_no_order() {
+        assert_eq!(observed(&[1.0, 0.5, 0.25], &[1e-9, 1e-10]), None);
+        assert_eq!(observed(&[1.0, 0.5, 0.25], &[1e-3, 1e-2]), None);
+        assert_eq!(observed(&[1.0, 0.5], &[1e-3]), None);
+        // The noise of the finest pair leaves the pair before.
+        let p = observed(&[1.0, 0.5, 0.25, 0.125], &[1e-2, 2.5e-3, 1e-10]).unwrap();
+        assert!((p - 2.0).abs() < 1e-9);
+    }
+}

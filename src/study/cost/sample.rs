@@ -1,0 +1,266 @@
+//! Which numbers of a run are compared with those of another.
+
+use super::grid::{Pace, dynamic_stages};
+use crate::deck::{Deck, NormWord, Path, StageBody};
+use crate::scene::Scene;
+use crate::study::outcome::{Outcome, columns, columns_of_history};
+use crate::study::scale::{kind, scales};
+use crate::study::{Recorder, expected_values};
+use std::f64::consts::TAU;
+
+/// Instants of a stage that are compared, at most.
+const MOST_INSTANTS: usize = 200;
+
+/// Instants that lie closer, relative to their size, are the same.
+const SAME: f64 = 1e-9;
+
+/// Where a run is looked at, and how differences are measured.
+pub struct Sampler {
+    /// The names of all outputs: columns of the history, then modes
+    pub columns: Vec<String>,
+    /// Numbers of those whose error counts
+    pub outputs: Vec<usize>,
+    /// How
+    pub norm: NormWord,
+    /// Columns of the history
+    of_history: usize,
+    /// Diagonal of the scene
+    length: f64,
+    /// Whether the initial line of a beam is one that elements only come near
+    curved: bool,
+    /// Whether something is lumped to nodes where rotations are relative
+    lumped: bool,
+    /// What is looked at
+    looks: Look,
+}
+
+/// What is lumped to the nodes of relative elements.
+const LUMPED: [&str; 4] =
+    ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "following line loads"];
+
+/// What is looked at in a run.
+enum Look {
+    /// Rows with these stages (from 1) and clocks, the last row, and modes
+    At(Vec<(usize, f64)>),
+    /// What the deck expects
+    Expected,
+}
+
+/// Kinds of columns that move as nodes do.
+const MOTIONS: [&str; 7] = ["u", "", "r", "d", "v", "w", "energy"];
+
+/// The numbers of a run that are compared: instant by instant all columns of the history, then modes.
+pub type Samples = Vec<f64>;
+
+impl Sampler {
+    /// For the columns of a scene, compared with a run of the same deck at the coarsest pace of the study.
+    pub fn of_rows(deck: &Deck, scene: &Scene, outputs: Vec<usize>, pace: Pace) -> Self {
+        let looks = Look::At(instants(deck, pace));
+        Self { outputs, looks, ..Self::new(deck, scene, columns(scene), columns_of_history(scene)) }
+    }
+
+    /// For the columns of a scene, compared with a table that has rows with these stages and clocks.
+    pub fn of_table(deck: &Deck, scene: &Scene, outputs: Vec<usize>, instants: Vec<(usize, f64)>) -> Self {
+        Self { outputs, looks: Look::At(instants), ..Self::new(deck, scene, columns(scene), columns_of_history(scene)) }
+    }
+
+    /// For what a deck expects, and the expected values.
+    pub fn of_expectations(deck: &Deck, scene: &Scene) -> (Self, Samples) {
+        let (names, values): (Vec<_>, Vec<_>) = expected_values(&scene.expectations).into_iter().unzip();
+        let count = names.len();
+        (Self { norm: NormWord::End, ..Self::new(deck, scene, names, count) }, values)
+    }
+
+    fn new(deck: &Deck, scene: &Scene, columns: Vec<String>, of_history: usize) -> Self {
+        Self {
+            outputs: (0..columns.len()).collect(),
+            columns,
+            norm: deck.cost.norm.unwrap_or_default(),
+            of_history,
+            length: scene.plan.model.length,
+            curved: deck.beams.iter().any(|beam| matches!(beam.path, Path::Arc(_))),
+            lumped: scene.reasons.iter().any(|reason| reason.active && LUMPED.contains(&reason.name)),
+            looks: Look::Expected,
+        }
+    }
+
+    /// Whether the steps of a deck leave no instants in common but ends.
+    pub fn looks_at_ends_only(&self, deck: &Deck, coarsest: Pace) -> bool {
+        let whole = matches!(self.norm, NormWord::History | NormWord::Rms) && matches!(self.looks, Look::At(_));
+        let adapts = matches!(coarsest, Pace::Adapts(_)) && deck.output.interval.is_none();
+        whole && adapts && dynamic_stages(deck).next().is_some()
+    }
+
+    /// Whether a scene has the outputs that are looked at.
+    pub fn suits(&self, scene: &Scene) -> bool {
+        matches!(self.looks, Look::Expected) || columns(scene) == self.columns
+    }
+
+    /// What records the expectations of a scene, where these are looked at.
+    pub fn recorder(&self, scene: &Scene) -> Option<Recorder> {
+        matches!(self.looks, Look::Expected).then(|| Recorder::new(scene))
+    }
+
+    /// What is compared of a run; NaN where it has no row.
+    pub fn of(&self, outcome: &Outcome) -> Samples {
+        let Look::At(instants) = &self.looks else { return outcome.expected.clone() };
+        let nothing = || vec![f64::NAN; self.of_history];
+        let mut samples = match self.norm {
+            NormWord::End => outcome.rows.last().cloned().unwrap_or_else(nothing),
+            NormWord::Max => {
+                let largest =
+                    |best: Vec<f64>, row: &Vec<f64>| best.iter().zip(row).map(|(b, v)| b.max(v.abs())).collect();
+                outcome.rows.iter().fold(vec![0.0; self.of_history], largest)
+            }
+            NormWord::History | NormWord::Rms => self.rows(instants, outcome),
+        };
+        samples.extend(&outcome.modes);
+        samples
+    }
+
+    /// The rows at the compared instants, and the last.
+    fn rows(&self, instants: &[(usize, f64)], outcome: &Outcome) -> Samples {
+        let mut samples = Vec::new();
+        let mut from = 0;
+        for &(stage, clock) in instants {
+            let slack = SAME * clock.abs().max(SAME);
+            let hit = |&(s, c): &(usize, f64)| s == stage && (c - clock).abs() <= slack;
+            match outcome.clocks[from..].iter().position(hit) {
+                Some(after) => {
+                    from += after;
+                    samples.extend(&outcome.rows[from]);
+                }
+                None => samples.resize(samples.len() + self.of_history, f64::NAN),
+            }
+        }
+        match outcome.rows.last() {
+            Some(last) => samples.extend(last),
+            None => samples.resize(samples.len() + self.of_history, f64::NAN),
+        }
+        samples
+    }
+
+    /// The largest value of each column's kind.
+    pub fn scales(&self, samples: &Samples) -> Vec<f64> {
+        scales(&self.columns, self.length, self.split(samples))
+    }
+
+    /// Rows of the history, then the modes, each with the number of the column that it begins with.
+    fn split<'s>(&self, samples: &'s [f64]) -> impl Iterator<Item = (usize, &'s [f64])> {
+        let modes = self.columns.len() - self.of_history;
+        let (history, modes) = samples.split_at(samples.len().saturating_sub(modes));
+        let modes = (!modes.is_empty()).then_some((self.of_history, modes));
+        history.chunks(self.of_history.max(1)).map(|row| (0, row)).chain(modes)
+    }
+
+    /// The difference of each column, over its scale; NaN where there is nothing to compare.
+    pub fn differences(&self, came: &Samples, reference: &Samples, scales: &[f64]) -> Vec<f64> {
+        let mut sums = vec![(0.0_f64, 0.0_f64, 0_u64); self.columns.len()];
+        if came.len() != reference.len() {
+            return vec![f64::NAN; self.columns.len()];
+        }
+        for ((first, a), (_, b)) in self.split(came).zip(self.split(reference)) {
+            let mut nearest = a.to_vec();
+            self.take_nearest_rotations(first, &mut nearest, b);
+            for (k, (a, b)) in nearest.iter().zip(b).enumerate().filter(|(_, (a, b))| !(a.is_nan() || b.is_nan())) {
+                let difference = (a - b).abs();
+                let (largest, squares, count) = &mut sums[first + k];
+                (*largest, *squares, *count) =
+                    (largest.max(difference), *squares + difference * difference, *count + 1);
+            }
+        }
+        let norm = |(&(largest, squares, count), &scale): (&(f64, f64, u64), &f64)| match self.norm {
+            _ if count == 0 || scale == 0.0 => f64::NAN,
+            NormWord::Rms => (squares / count as f64).sqrt() / scale,
+            _ => largest / scale,
+        };
+        sums.iter().zip(scales).map(norm).collect()
+    }
+
+    /// The largest difference of all outputs that count.
+    pub fn distance(&self, came: &Samples, reference: &Samples, scales: &[f64]) -> f64 {
+        self.worst(&self.differences(came, reference, scales))
+    }
+
+    /// The largest of the outputs that count; NaN where none can be compared.
+    pub fn worst(&self, differences: &[f64]) -> f64 {
+        self.outputs.iter().map(|&k| differences[k]).fold(f64::NAN, f64::max)
+    }
+
+    /// `one` and `weight` times its departure from `other`, number by number.
+    pub fn extrapolated(&self, one: &Samples, other: &Samples, weight: f64) -> Samples {
+        let mut all = Vec::with_capacity(one.len());
+        for ((first, a), (_, b)) in self.split(one).zip(self.split(other)) {
+            let mut nearest = b.to_vec();
+            self.take_nearest_rotations(first, &mut nearest, a);
+            all.extend(a.iter().zip(&nearest).map(|(a, b)| a + weight * (a - b)));
+        }
+        all
+    }
+
+    /// The order over the width of elements of an order at which errors of smooth scenes fall: twice that at nodes, or that at which the elements
+    /// come near a curved line, and at which nodes stand for what is lumped to them; one more than that between nodes; `None` where outputs count that are not motions.
+    pub fn order_in_space(&self, order: usize, relative: bool) -> Option<f64> {
+        let motion = |&k: &usize| MOTIONS.contains(&kind(&self.columns[k]));
+        let between = |&k: &usize| {
+            let place = self.columns[k].split_once('@').map(|(_, rest)| rest);
+            place.is_some_and(|rest| !rest.starts_with("start") && !rest.starts_with("end"))
+        };
+        // An even order's errors of the line itself cancel from end to end of an element.
+        let line = if self.curved || (relative && self.lumped) { 2 * ((order + 2) / 2) } else { 2 * order };
+        let expected = if self.outputs.iter().any(between) { 1 + order } else { line };
+        self.outputs.iter().all(motion).then_some(expected as f64)
+    }
+
+    /// A rotation has two vectors of up to 2 pi: takes those that are nearer to another row's.
+    fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
+        let names = &self.columns[first..first + row.len()];
+        for k in
+            (0..row.len().saturating_sub(2)).filter(|&k| names[k].ends_with(".rx") && names[k + 2].ends_with(".rz"))
+        {
+            let (r, goal): ([f64; 3], [f64; 3]) = ([row[k], row[k + 1], row[k + 2]], [to[k], to[k + 1], to[k + 2]]);
+            let angle = r.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if angle == 0.0 {
+                continue;
+            }
+            let other = r.map(|x| x * (1.0 - TAU / angle));
+            let away = |v: [f64; 3]| v.iter().zip(goal).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+            if away(other) < away(r) {
+                row[k..k + 3].copy_from_slice(&other);
+            }
+        }
+    }
+}
+
+/// Levels of static stages, and multiples of the coarsest step of dynamic ones; paths have no instants in common but their ends.
+fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
+    let mut all = Vec::new();
+    let mut start = 0.0;
+    for (k, stage) in deck.stages.iter().enumerate() {
+        match stage.body {
+            StageBody::Static { steps, .. } => {
+                all.extend(thinned(steps).map(|level| (k + 1, level as f64 / steps as f64)));
+            }
+            StageBody::Dynamic { end, step, .. } => {
+                let step = match coarsest {
+                    Pace::Steps(factor) => Some(step * factor),
+                    _ => deck.output.interval,
+                };
+                if let Some(step) = step {
+                    let count = ((end - start) / step * (1.0 + SAME)).floor() as usize;
+                    all.extend(thinned(count).map(|n| (k + 1, start + n as f64 * step)));
+                }
+                all.push((k + 1, end));
+                start = end;
+            }
+            _ => {}
+        }
+    }
+    all
+}
+
+/// Numbers from 1 to `count`, evenly, not too many.
+fn thinned(count: usize) -> impl Iterator<Item = usize> {
+    let stride = count.div_ceil(MOST_INSTANTS).max(1);
+    (1..=count).filter(move |n| n % stride == 0)
+}

@@ -1,0 +1,124 @@
+//! One run of a variant.
+
+use super::sample::{Sampler, Samples};
+use crate::deck::{self, Deck, Diagnostic, StageBody};
+use crate::drive::Failure;
+use crate::scene::{self, Scene};
+use crate::study::outcome::Outcome;
+use cpu_time::ThreadTime;
+use std::time::Instant;
+
+/// What takes more attempts than so many times its steps, and some, would not end in any time that a user waits.
+const MOST_ATTEMPTS: f64 = 50.0;
+const FEW_ATTEMPTS: u64 = 1000;
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// `finished`, or a failure's name
+    pub status: String,
+    /// What is compared; empty where it failed
+    pub samples: Samples,
+    /// Converged levels and steps
+    pub steps: u64,
+    /// Newton iterations
+    pub iterations: u64,
+    /// Factorisations
+    pub factorisations: u64,
+    /// What it took
+    pub seconds: Seconds,
+}
+
+/// What a run took, from the text of the deck to its last row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seconds {
+    /// Of its thread
+    pub cpu: f64,
+    /// On the wall
+    pub wall: f64,
+}
+
+impl Trial {
+    /// One that did not come to its end.
+    pub(super) fn interrupted() -> Self {
+        let seconds = Seconds { cpu: f64::NAN, wall: f64::NAN };
+        Self { status: "interrupted".into(), samples: Vec::new(), steps: 0, iterations: 0, factorisations: 0, seconds }
+    }
+
+    /// Whether there is something to compare.
+    pub fn finished(&self) -> bool {
+        self.status == "finished"
+    }
+}
+
+/// Runs the deck `text` with settings. `interrupted` tells of signals.
+pub fn run(text: &str, settings: &[String], sampler: &Sampler, interrupted: &dyn Fn() -> Option<i32>) -> Trial {
+    let (cpu, wall) = (ThreadTime::try_now().ok(), Instant::now());
+    let outcome = simulate(text, settings, sampler, interrupted);
+    let wall = wall.elapsed().as_secs_f64();
+    // A system that does not tell the time of threads has that on the wall.
+    let cpu = cpu.and_then(|start| start.try_elapsed().ok()).map_or(wall, |time| time.as_secs_f64());
+    let seconds = Seconds { cpu, wall };
+    match outcome {
+        Ok(outcome) => {
+            let failure = outcome.ended.as_ref().err().map(Failure::name);
+            Trial {
+                status: failure.unwrap_or("finished").into(),
+                samples: if failure.is_none() { sampler.of(&outcome) } else { Vec::new() },
+                steps: outcome.counters.steps,
+                iterations: outcome.counters.work.iterations,
+                factorisations: outcome.counters.work.factorisations,
+                seconds,
+            }
+        }
+        Err(_) => Trial { status: "deck".into(), seconds, ..Trial::interrupted() },
+    }
+}
+
+/// Whether the deck `text` with settings makes sense and has the outputs that are looked at.
+pub fn makes_sense(text: &str, settings: &[String], sampler: &Sampler) -> bool {
+    read(text, settings, sampler).is_ok()
+}
+
+fn simulate(
+    text: &str,
+    settings: &[String],
+    sampler: &Sampler,
+    interrupted: &dyn Fn() -> Option<i32>,
+) -> Result<Outcome, String> {
+    let (deck, scene) = read(text, settings, sampler)?;
+    Ok(Outcome::of(&scene, sampler.recorder(&scene), attempts(&deck), interrupted))
+}
+
+fn read(text: &str, settings: &[String], sampler: &Sampler) -> Result<(Deck, Scene), String> {
+    let text = deck::apply(text, settings)?;
+    let first = |found: Vec<Diagnostic>| {
+        found.into_iter().find(|d| !d.is_warning()).map_or("there is no such scene".into(), |d| d.message)
+    };
+    let (deck, found) = deck::read(&text).map_err(first)?;
+    let (scene, _) = scene::from_deck(&deck, found).map_err(first)?;
+    // A point of an arc may be a node of some meshes only.
+    if !sampler.suits(&scene) {
+        return Err("it has other outputs".into());
+    }
+    Ok((deck, scene))
+}
+
+/// How often a run may try, steps and levels together.
+fn attempts(deck: &Deck) -> u64 {
+    let mut start = 0.0;
+    let mut steps = 0.0;
+    for stage in &deck.stages {
+        steps += match stage.body {
+            StageBody::Static { steps, .. } => steps as f64,
+            StageBody::Path { max_steps, .. } => max_steps as f64,
+            StageBody::Dynamic { end, step, .. } => {
+                let count = (end - start) / step;
+                start = end;
+                count
+            }
+            StageBody::Modal { .. } | StageBody::Buckling { .. } => 1.0,
+        };
+    }
+    (MOST_ATTEMPTS * steps) as u64 + FEW_ATTEMPTS
+}

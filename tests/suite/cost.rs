@@ -1,0 +1,234 @@
+//! The study of what accuracy costs.
+
+use beamsim::deck::{self, Deck};
+use beamsim::scene::{self, Scene};
+use beamsim::study::cost::{Against, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
+use std::path::Path;
+
+fn read(text: &str) -> (Deck, Scene) {
+    let (deck, found) = deck::read(text).unwrap_or_else(|e| panic!("{e:?}"));
+    let (scene, _) = scene::from_deck(&deck, found).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
+    (deck, scene)
+}
+
+/// A study on so many threads, which stops after `most` runs; also how many runs it made.
+fn stopped(
+    text: &str,
+    against: &Against,
+    threads: usize,
+    most: usize,
+    journal: &mut Journal,
+) -> (Result<Study, Refusal>, usize) {
+    let (deck, scene) = read(text);
+    let count = std::sync::atomic::AtomicUsize::new(0);
+    let interrupted = || (count.load(std::sync::atomic::Ordering::Relaxed) > most).then_some(2);
+    let mut tell = |_: usize, _: usize| {
+        count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    };
+    let options = Options { against, threads, budget: None, interrupted: &interrupted, tell: &mut tell, journal };
+    let found = study(text, &deck, &scene, options);
+    (found, count.into_inner())
+}
+
+fn costs(text: &str, against: &Against, threads: usize) -> Study {
+    match stopped(text, against, threads, usize::MAX, &mut Journal::default()).0 {
+        Ok(study) => study,
+        Err(Refusal::Failure(failure)) => panic!("{failure}"),
+        Err(_) => panic!("refused"),
+    }
+}
+
+/// A quarter of a circle: a cantilever of length 10 with a moment at its end.
+fn quarter(rest: &str) -> String {
+    format!(
+        "[point]\nroot = [0, 0, 0]\ntip = [10, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 100\nEI = 100\n\
+         [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 4\n\
+         [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nmoment = [0, 0, \"5*pi\"]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 2\ntolerance = 1e-12\n\
+         [[expect]]\ncolumn = \"tip.ux\"\nvalue = \"20/pi-10\"\nrtol = 1\n[[expect]]\ncolumn = \"tip.uy\"\nvalue = \"20/pi\"\nrtol = 1\n{rest}"
+    )
+}
+
+const TIP: &str = "[output]\nnodes = [\"tip\"]\ncolumns = [\"u\"]\n";
+
+/// A cantilever that is loaded smoothly, and swings.
+const SWINGING: &str = "[point]\nroot = [0, 0, 0]\ntip = [1, 0, 0]\n[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 10\nEI = 10\nrhoA = 1\nrhoJ = [0.02, 0.01, 0.01]\n\
+     [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 4\n\
+     [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 3, 2]\nhistory = \"h\"\n\
+     [history.h]\ntimes = [0, 0.5]\nvalues = [0, 1]\nsmooth = true\n[[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.01\n[output]\nnodes = [\"tip\"]\n";
+
+#[test]
+fn errors_against_the_own_reference_are_those_against_the_exact_solution() {
+    let text = quarter(&format!("{TIP}[cost]\nnorm = \"end\"\noutputs = [\"tip.ux\", \"tip.uy\"]\n"));
+    let own = costs(&text, &Against::Finest, 2);
+    let exact = costs(&text, &Against::Expectations, 2);
+    assert!(own.reference.uncertainty < 1e-8, "{:e}", own.reference.uncertainty);
+    for (a, b) in own.runs.iter().zip(&exact.runs) {
+        assert_eq!(a.settings, b.settings);
+        assert!((a.error - b.error).abs() <= own.reference.uncertainty + 1e-12, "{} against {}", a.error, b.error);
+    }
+    assert!(own.runs.iter().any(|run| run.error > 1e-3) && own.runs.iter().any(|run| run.error < 1e-8));
+}
+
+#[test]
+fn orders_in_space_are_twice_those_of_elements() {
+    // A moment alone is met too well by high orders.
+    let text =
+        quarter(&format!("[[load]]\nat = \"tip\"\nforce = [1, 3, 2]\n{TIP}[cost]\nelements = [1, 1.5, 2, 3, 4]\n"));
+    let found = costs(&text, &Against::Finest, 2);
+    for orders in &found.orders {
+        let (order, space) = (orders.family.order.unwrap(), orders.space.unwrap());
+        assert_eq!(space.expected, Some(2.0 * order as f64));
+        let observed = space.observed.unwrap();
+        assert!((observed - 2.0 * order as f64).abs() < 0.4, "{}: {observed}", orders.family.name());
+        assert_eq!((space.remark(), orders.time.is_none()), (None, true));
+    }
+}
+
+#[test]
+fn steps_cost_accuracy_of_the_second_order_and_are_told_where_they_limit() {
+    let text = format!("{SWINGING}[cost]\norder = [2, 3]\ninterpolation = \"relative\"\n");
+    let found = costs(&text, &Against::Finest, 2);
+    for orders in &found.orders {
+        let time = orders.time.unwrap();
+        assert_eq!(time.expected, Some(2.0));
+        assert!((time.observed.unwrap() - 2.0).abs() < 0.4, "{time:?}");
+    }
+    let frontier = || found.runs.iter().filter(|run| run.frontier);
+    assert!(frontier().any(|run| run.limit == Some(Knob::Step)));
+    // The cheapest run of all has the longest step, and the most accurate one the shortest.
+    let best = frontier().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap();
+    assert_eq!(best.point.pace, Pace::Steps(0.25));
+}
+
+/// What must be the same whenever a study is made.
+#[derive(Debug, PartialEq)]
+struct Exact {
+    settings: Vec<String>,
+    status: Option<String>,
+    counts: Option<[u64; 3]>,
+    errors: Vec<u64>,
+}
+
+fn exact(run: &Run) -> Exact {
+    Exact {
+        settings: run.settings.clone(),
+        status: run.trial.as_ref().map(|t| t.status.clone()),
+        counts: run.trial.as_ref().map(|t| [t.steps, t.iterations, t.factorisations]),
+        errors: run.errors.iter().map(|e| e.to_bits()).collect(),
+    }
+}
+
+#[test]
+fn errors_and_counters_are_the_same_each_time_and_on_any_number_of_threads() {
+    let [one, two] = [1, 2].map(|threads| costs(SWINGING, &Against::Finest, threads));
+    assert_eq!(one.reference.samples, two.reference.samples);
+    assert!(one.runs.len() > 50);
+    for (a, b) in one.runs.iter().zip(&two.runs) {
+        assert_eq!(exact(a), exact(b));
+    }
+}
+
+#[test]
+fn the_lines_of_a_run_give_its_error_again() {
+    let text = quarter(TIP);
+    let found = costs(&text, &Against::Expectations, 2);
+    let frontier: Vec<&Run> = found.runs.iter().filter(|run| run.frontier).collect();
+    assert!(frontier.len() > 3);
+    for run in frontier {
+        let pasted = deck::apply(&text, &run.settings).unwrap();
+        let (order, word) = (run.point.family.order.unwrap(), run.point.family.interpolation.unwrap().word());
+        let alone = format!("{pasted}[cost]\nelements = 1\norder = {order}\ninterpolation = \"{word}\"\n");
+        let again = costs(&alone, &Against::Expectations, 1);
+        assert_eq!(again.runs.len(), 1);
+        assert!(again.runs[0].settings.is_empty(), "{:?}", again.runs[0].settings);
+        assert_eq!(again.runs[0].error, run.error);
+    }
+}
+
+#[test]
+fn numbers_of_nodes_keep_their_places_on_other_meshes() {
+    let by_number = costs(&quarter("[output]\nnodes = [\"b:1\"]\ncolumns = [\"u\"]\n"), &Against::Finest, 2);
+    let by_place = costs(&quarter("[output]\nnodes = [\"b@0.25\"]\ncolumns = [\"u\"]\n"), &Against::Finest, 2);
+    for (a, b) in by_number.runs.iter().zip(&by_place.runs) {
+        assert_eq!(a.error, b.error, "{:?}", a.settings);
+        let moved = a.settings.iter().any(|s| s.starts_with("beam.0.elements") || s.starts_with("beam.0.order"));
+        assert_eq!(moved, a.settings.iter().any(|s| s == "beam.0.numbering=4"), "{:?}", a.settings);
+    }
+    assert!(by_number.runs.iter().any(|run| run.error < 1e-4));
+}
+
+#[test]
+fn a_study_that_was_stopped_goes_on() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cost_journal");
+    let _ = std::fs::remove_dir_all(&folder);
+    let text = quarter(TIP);
+    let open = |identity: &str| Journal::open(&folder, identity).unwrap();
+    let (found, _) = stopped(&text, &Against::Finest, 1, 10, &mut open("a"));
+    assert!(matches!(found, Err(Refusal::Failure(_))));
+
+    let mut journal = open("a");
+    let known = journal.len();
+    assert!((5..20).contains(&known), "{known}");
+    // A line that was cut off is no run.
+    let path = folder.join("cost.journal");
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 30]).unwrap();
+    drop(journal);
+    journal = open("a");
+    assert_eq!(journal.len(), known - 1);
+
+    let (found, runs) = stopped(&text, &Against::Finest, 1, usize::MAX, &mut journal);
+    let Ok(found) = found else { panic!("refused") };
+    let whole = costs(&text, &Against::Finest, 1);
+    for (a, b) in found.runs.iter().zip(&whole.runs) {
+        assert_eq!(exact(a), exact(b));
+    }
+    assert!(runs > 0);
+    assert!(!journal.is_empty() && open("another study").is_empty());
+    journal.close().unwrap();
+    assert!(!path.exists());
+}
+
+#[test]
+fn a_stored_history_can_be_the_reference() {
+    let text = quarter(TIP);
+    let names = ["stage", "time", "load", "tip.ux", "tip.uy", "tip.uz"].map(String::from).to_vec();
+    let exact = std::f64::consts::FRAC_1_PI * 20.0;
+    let rows = vec![vec![1.0, 0.0, 1.0, exact - 10.0, exact, 0.0]];
+    let table = beamsim::output::HistoryReader { names, rows };
+    let found = costs(&text, &Against::Table(table), 2);
+    let by_deck = costs(&text, &Against::Expectations, 2);
+    for (a, b) in found.runs.iter().zip(&by_deck.runs) {
+        assert!((a.error - b.error).abs() < 1e-12, "{} against {}", a.error, b.error);
+    }
+}
+
+#[test]
+fn meshes_keep_nodes_where_something_acts() {
+    let text = quarter(
+        "[[spring]]\nat = \"b@0.5\"\nstiffness = [1, 1, 1, 0, 0, 0]\n[[load]]\nat = \"b:3\"\nforce = [0, 1, 0]\n",
+    );
+    let found = costs(&text, &Against::Finest, 2);
+    assert!(found.runs.iter().all(|run| run.trial.as_ref().unwrap().status == "finished"));
+    for run in &found.runs {
+        let intervals = run.point.count() * run.point.family.order.unwrap();
+        assert_eq!(intervals % 4, 0, "{:?}", run.settings);
+    }
+    assert!(found.runs.iter().any(|run| run.error < 1e-6));
+}
+
+#[test]
+fn runs_that_fail_are_told_and_the_others_stay() {
+    // The coefficient belongs to one of the schemes only.
+    let text = SWINGING.replace("step = 0.01", "step = 0.01\nbeta = 0.25");
+    let text = format!("{text}[cost]\norder = 1\ninterpolation = \"relative\"\nscheme = [\"newmark\", \"hht\"]\n");
+    let found = costs(&text, &Against::Finest, 2);
+    let (failed, rest): (Vec<_>, Vec<_>) = found.runs.iter().partition(|run| run.point.family.scheme == Some("hht"));
+    let status = |run: &Run| run.trial.as_ref().unwrap().status.clone();
+    assert!(
+        failed.len() == 16 && failed.iter().all(|run| status(run) == "deck" && run.error.is_nan() && !run.frontier)
+    );
+    assert!(rest.iter().all(|run| status(run) == "finished" && run.error.is_finite()));
+    assert!(found.to_csv().is_ok_and(|table| !String::from_utf8(table).unwrap().contains("NaN")));
+}
