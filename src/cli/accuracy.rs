@@ -8,6 +8,7 @@ use crate::output::Reached;
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Against, Journal, Options, Pace, Point};
+use crate::study::error_bars::{ErrorBars, error_bars};
 use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -21,6 +22,9 @@ pub struct Target {
     /// Search no longer than this for them: 90s, 5m, 1h
     #[arg(long, value_parser = say::duration, value_name = "TIME")]
     budget: Option<Duration>,
+    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two coarser runs
+    #[arg(long)]
+    error_bars: bool,
 }
 
 /// A scene that is ready to run.
@@ -29,6 +33,8 @@ pub struct Aimed {
     pub scene: Scene,
     /// The accuracy that was wanted and reached
     pub reached: Option<Reached>,
+    /// Error bars, where they are wanted
+    pub bars: Option<ErrorBars>,
 }
 
 impl Target {
@@ -39,7 +45,7 @@ impl Target {
             return Err(Refusal::of(Status::Wrong, "usage", format!("--accuracy is between 0 and 1, not {wrong}")));
         }
         let Some(wanted) = self.accuracy.map(Accuracy::All).or(loaded.deck.accuracy.clone()) else {
-            return Ok(Aimed { scene: loaded.scene, reached: None });
+            return self.with_bars(path, loaded, None);
         };
         let start = Instant::now();
         let found = self.search(name, path, &loaded, &wanted)?;
@@ -52,8 +58,14 @@ impl Target {
             runs: found.runs,
             seconds: start.elapsed().as_secs_f64(),
         };
-        let scene = load::scene(path, &[settings, &found.settings].concat())?;
-        Ok(Aimed { scene, reached: Some(reached) })
+        let loaded = load::deck(path, &[settings, &found.settings].concat())?;
+        self.with_bars(path, loaded, Some(reached))
+    }
+
+    fn with_bars(&self, path: &Path, loaded: Loaded, reached: Option<Reached>) -> Result<Aimed, Refusal> {
+        let made = || error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
+        let bars = self.error_bars.then(made).transpose().map_err(|refusal| refused(refusal, path, &loaded))?;
+        Ok(Aimed { scene: loaded.scene, reached, bars })
     }
 
     fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {

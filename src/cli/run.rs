@@ -4,9 +4,10 @@ use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
 use super::{Status, Verdict, load, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
-use crate::output::{HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, run_record};
+use crate::output::{Beside, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, run_record};
 use crate::scene::Scene;
 use crate::study::Recorder;
+use crate::study::error_bars::ErrorBars;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -24,9 +25,9 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
     for path in decks {
         let name = load::name(path);
         match target.aim(&name, path, settings) {
-            Ok(Aimed { scene, reached }) => {
+            Ok(Aimed { scene, reached, bars }) => {
                 let folder = folder(out, &name, decks.len() > 1);
-                let finished = simulate(&scene, &name, Some(&folder), reached.as_ref());
+                let finished = simulate(&scene, &name, Some(&folder), Beyond { reached, bars });
                 summarise(&name, &scene, &finished, &folder);
                 if let Err(failure) = &finished.result {
                     verdict.fail(finished.status(), failure.name(), failure.to_string());
@@ -138,13 +139,24 @@ fn io_failure(error: std::io::Error) -> Failure {
     Failure::Io(error.to_string())
 }
 
+/// What stands in results beyond those of the run itself.
+#[derive(Default)]
+pub struct Beyond {
+    /// The accuracy that was wanted and reached
+    pub reached: Option<Reached>,
+    /// Error bars
+    pub bars: Option<ErrorBars>,
+}
+
 /// Runs a scene; with a folder it leaves its results there.
-pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, reached: Option<&Reached>) -> Finished {
+pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, beyond: Beyond) -> Finished {
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
     let rows = Rows { every: scene.every, interval: scene.plan.interval };
-    let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows)).transpose();
+    let Beyond { reached, bars } = beyond;
+    let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
+    let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows, beside)).transpose();
     let (history, opened) = match history {
         Ok(history) => (history, Ok(())),
         Err(error) => (None, Err(io_failure(error))),
@@ -163,7 +175,8 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, reached: Optio
     watcher.progress.done();
     let seconds = start.elapsed().as_secs_f64();
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
-        let record = run_record(scene, &Outcome { result: &result, counters: &counters, seconds, reached });
+        let record =
+            run_record(scene, &Outcome { result: &result, counters: &counters, seconds, reached: reached.as_ref() });
         let record = format!("{record:#}\n");
         let written = write_results(history, &watcher.modes, folder, result.is_ok(), &record);
         if let Err(error) = written {

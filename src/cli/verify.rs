@@ -1,6 +1,6 @@
 //! `beamsim verify`
 
-use super::run::{folder, simulate};
+use super::run::{Beyond, folder, simulate};
 use super::{Status, Verdict, load, say, signals};
 use crate::study::{Judgement, expected_failure, judge};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
         let judgements = match load::scene(path, settings) {
             Ok(scene) => {
                 let folder = out.map(|out| folder(Some(out), &name, decks.len() > 1));
-                let finished = simulate(&scene, &name, folder.as_deref(), None);
+                let finished = simulate(&scene, &name, folder.as_deref(), Beyond::default());
                 if let Some(signal) = signals::caught() {
                     say::error("interrupted", &format!("stopped by signal {signal}"));
                     return if signal == 15 { Status::Terminated } else { Status::Interrupted };

@@ -30,6 +30,14 @@ impl Rows {
     }
 }
 
+/// What stands beside the columns of a history: numbers about them, row by row.
+pub trait Beside {
+    /// The names of its columns, beside these
+    fn names(&self, columns: &[String]) -> Vec<String>;
+    /// Its row beside that of a stage (from 1) and clock: the time, or in static stages the load factor
+    fn at(&mut self, stage: usize, clock: f64, row: &[f64]) -> Vec<f64>;
+}
+
 /// Writes the history of a run.
 pub struct HistoryWriter {
     folder: PathBuf,
@@ -37,6 +45,7 @@ pub struct HistoryWriter {
     writer: csv::Writer<File>,
     rows: Rows,
     probes: Vec<Probe>,
+    beside: Option<Box<dyn Beside>>,
     values: Vec<f64>,
     text: String,
     seen: u64,
@@ -46,10 +55,12 @@ pub struct HistoryWriter {
 
 impl HistoryWriter {
     /// Begins a history in `folder`.
-    pub fn create(folder: &Path, probes: Vec<Probe>, rows: Rows) -> io::Result<Self> {
+    pub fn create(folder: &Path, probes: Vec<Probe>, rows: Rows, beside: Option<Box<dyn Beside>>) -> io::Result<Self> {
         let (part, file) = PartFile::create(folder, "history.csv")?;
         let mut writer = csv::Writer::from_writer(file);
-        let names = probes.iter().flat_map(|probe| probe.names.iter().map(String::as_str));
+        let mut names: Vec<String> = probes.iter().flat_map(|probe| probe.names.clone()).collect();
+        names.extend(beside.as_ref().map_or(Vec::new(), |beside| beside.names(&names)));
+        let names = names.iter().map(String::as_str);
         writer.write_record(["stage", "time", "load"].into_iter().chain(names)).map_err(io::Error::from)?;
         Ok(Self {
             folder: folder.into(),
@@ -57,6 +68,7 @@ impl HistoryWriter {
             writer,
             rows,
             probes,
+            beside,
             values: Vec::new(),
             text: String::new(),
             seen: 0,
@@ -76,6 +88,11 @@ impl HistoryWriter {
             // Time and load come before the probes.
             let mut names = self.probes.iter().flat_map(|probe| &probe.names);
             return Ok(names.nth(k.saturating_sub(2)).cloned().or(Some("time".into())));
+        }
+        if let Some(beside) = &mut self.beside {
+            let clock = if dynamic { at.state.time } else { at.state.load };
+            let more = beside.at(at.stage, clock, &self.values[2..]);
+            self.values.extend(more);
         }
         self.record.clear();
         self.record.push_field(at.stage.to_string().as_bytes());

@@ -7,7 +7,7 @@ mod plot;
 mod record;
 
 pub use files::{PartFile, remove_if_there};
-pub use history::{HistoryReader, HistoryWriter, Rows};
+pub use history::{Beside, HistoryReader, HistoryWriter, Rows};
 pub use modes::ModesWriter;
 pub use plot::{LinePlots, NamedLine};
 pub use record::{Outcome, Reached, run_record};

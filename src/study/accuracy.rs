@@ -8,8 +8,8 @@
 //! e = |U - U_coarse| / (r^q - 1)
 //! ```
 //!
-//! where q is one more than the order of the elements, and 3/2 for steps: less than smooth scenes have at nodes, so that estimates are above
-//! errors.
+//! where q is half an order less than smooth scenes have at the least, 2 for steps and one more than the order of elements: so estimates are
+//! above errors.
 
 use super::cost::{Crew, Family, Mesher, Options, Pace, Point, Refusal, Sampler, Samples, Trial, trial};
 use crate::deck::{Accuracy, Deck, Diagnostic, InterpolationWord, StageBody};
@@ -21,6 +21,22 @@ const CUBIC: f64 = 3e-3;
 
 /// The order of the error over the step that estimates count on.
 const ORDER_IN_TIME: f64 = 1.5;
+
+/// And over the width of elements of an order.
+fn order_in_space(order: usize) -> f64 {
+    order as f64 + 0.5
+}
+
+/// By what the difference to a run with other elements is divided to be the error: `ratio` is that of the widths of the other elements and
+/// the own.
+pub(super) fn divisor_in_space(ratio: f64, order: usize) -> f64 {
+    (ratio.powf(order_in_space(order)) - 1.0).abs()
+}
+
+/// And to a run with twice the step.
+pub(super) fn divisor_in_time() -> f64 {
+    2.0_f64.powf(ORDER_IN_TIME) - 1.0
+}
 
 /// The first step over the deck's, at most; and how many steps a stage must have then.
 const FIRST_STEP: f64 = 4.0;
@@ -211,9 +227,9 @@ impl Search<'_> {
         for (k, point) in points.iter().enumerate().skip(1) {
             if point.pace == points[0].pace {
                 let ratio = point.width() / points[0].width();
-                estimate.mesh = share(k, ratio.powi(1 + point.family.order.unwrap_or(1) as i32) - 1.0);
+                estimate.mesh = share(k, divisor_in_space(ratio, point.family.order.unwrap_or(1)));
             } else {
-                estimate.step = share(k, 2.0_f64.powf(ORDER_IN_TIME) - 1.0);
+                estimate.step = share(k, divisor_in_time());
             }
         }
         Estimate { columns, ..estimate }
@@ -224,7 +240,7 @@ impl Search<'_> {
         let steps = matches!(self.pace, Pace::Steps(_));
         let share = if steps && self.family.order.is_some() { 0.5 } else { 1.0 };
         if estimate.mesh > share {
-            let order = 1.0 + self.family.order.unwrap_or(1) as f64;
+            let order = order_in_space(self.family.order.unwrap_or(1));
             let factor = if estimate.mesh.is_finite() { (estimate.mesh / share).powf(1.0 / order) } else { 2.0 };
             self.mesh *= factor.clamp(MESH_GROWS[0], MESH_GROWS[1]);
         }

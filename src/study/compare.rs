@@ -19,7 +19,8 @@ pub struct Comparison {
 
 /// Compares the columns that `stored` has; a column or row that `came` lacks is an error.
 ///
-/// A cell passes where |came - stored| <= atol + rtol |stored|. Columns that are only in `came` are returned by name.
+/// A cell passes where |came - stored| <= atol + rtol |stored|, and where error bars of either history (`tip.ux.err`) stand beside it, by these
+/// more; they are no columns of their own. Columns that are only in `came` are returned by name.
 pub fn compare(
     came: &HistoryReader,
     stored: &HistoryReader,
@@ -33,13 +34,17 @@ pub fn compare(
         return Err("the stored history has no rows: nothing would be compared".into());
     }
     let mut table = Vec::new();
-    for (k, column) in stored.names.iter().enumerate() {
+    for (k, column) in stored.names.iter().enumerate().filter(|(_, name)| !is_bar(name)) {
+        let bars = [came, stored].map(|history| (history, history.names.iter().position(|n| *n == bar_of(column))));
+        let bar = |row: usize| -> f64 {
+            bars.iter().map(|(history, place)| place.map_or(0.0, |k| history.rows[row][k])).sum()
+        };
         let Some(other) = came.names.iter().position(|name| name == column) else {
             return Err(format!("the column `{column}` is missing"));
         };
         let cells = came.rows.iter().zip(&stored.rows).map(|(a, b)| (a[other], b[k]));
         let judged = cells.enumerate().map(|(row, (came, stored))| {
-            let allowed = atol + rtol * stored.abs();
+            let allowed = atol + rtol * stored.abs() + bar(row);
             let difference = (came - stored).abs();
             // Equal cells pass whatever the tolerance; cells that are no numbers never do, unless both are none.
             let same = came == stored || (came.is_nan() && stored.is_nan());
@@ -49,8 +54,17 @@ pub fn compare(
         });
         table.extend(judged.max_by(|a, b| a.ratio.total_cmp(&b.ratio)));
     }
-    let extra = came.names.iter().filter(|name| !stored.names.contains(name)).cloned().collect();
+    let extra = came.names.iter().filter(|name| !stored.names.contains(name) && !is_bar(name)).cloned().collect();
     Ok((table, extra))
+}
+
+/// The name of the column of error bars of another.
+fn bar_of(column: &str) -> String {
+    format!("{column}.err")
+}
+
+fn is_bar(column: &str) -> bool {
+    column.ends_with(".err")
 }
 
 #[cfg(test)]
@@ -80,6 +94,21 @@ mod tests {
         let mut c = history(&[[0.0, 1.0]]);
         c.names[1] = "v".into();
         assert!(compare(&a, &c, 1.0, 1.0).unwrap_err().contains("`v`"));
+    }
+
+    #[test]
+    fn error_bars_of_either_history_are_allowed() {
+        let mut a = history(&[[0.0, 1.0], [1.0, 2.0]]);
+        let b = history(&[[0.0, 1.0], [1.0, 2.3]]);
+        a.names.push("u.err".into());
+        for (error, passes) in [(0.2, false), (0.4, true)] {
+            a.rows.iter_mut().for_each(|row| row.truncate(2));
+            a.rows.iter_mut().for_each(|row| row.push(error));
+            for (one, other) in [(&a, &b), (&b, &a)] {
+                let (table, extra) = compare(one, other, 0.0, 1e-12).unwrap();
+                assert_eq!((table.len(), table[1].ratio <= 1.0, extra.len()), (2, passes, 0));
+            }
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ pub mod ablation;
 pub mod accuracy;
 mod compare;
 pub mod cost;
+pub mod error_bars;
 mod outcome;
 mod scale;
 mod verify;

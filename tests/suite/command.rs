@@ -266,6 +266,61 @@ fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
 }
 
 #[test]
+fn run_reaches_an_accuracy_and_says_with_what() {
+    let folder = Folder::new("accuracy");
+    folder.write("deck.toml", GOOD);
+    let output = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-5"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("estimated error at most") && text.contains("[[beam]]  # beam arm"), "{text}");
+    let record: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.0.join("results/deck/run.json")).unwrap()).unwrap();
+    let found = &record["accuracy"];
+    assert!(found["columns"]["tip.uz"][1].as_f64().unwrap() <= 1e-5);
+    let settings: Vec<&str> = found["settings"].as_array().unwrap().iter().map(|s| s.as_str().unwrap()).collect();
+    let history = fs::read(folder.0.join("results/deck/history.csv")).unwrap();
+    let again: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+    assert_eq!(status(&folder.beamsim(&[&["run", "deck.toml", "--out", "again"][..], &again].concat())), 0);
+    assert_eq!(history, fs::read(folder.0.join("again/history.csv")).unwrap());
+
+    // The same from the deck; and what a budget does not allow is refused.
+    folder.write("wanted.toml", &format!("accuracy = 1e-5\n{GOOD}"));
+    assert_eq!(status(&folder.beamsim(&["run", "wanted.toml"])), 0);
+    assert_eq!(history, fs::read(folder.0.join("results/wanted/history.csv")).unwrap());
+    let refused = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-5", "--budget", "0s", "--out", "none"]);
+    assert_eq!((status(&refused), folder.0.join("none").exists()), (2, false));
+    assert!(last_line(&refused).starts_with("error[limit]: "));
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--accuracy", "2"])), 2);
+}
+
+#[test]
+fn error_bars_hold_the_error() {
+    let folder = Folder::new("error_bars");
+    folder.write("deck.toml", GOOD);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--error-bars", "--out", "bars"])), 0);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-8", "--out", "exact"])), 0);
+    let [bars, exact] = ["bars", "exact"]
+        .map(|run| beamsim::output::HistoryReader::read(&folder.0.join(run).join("history.csv")).unwrap());
+    for name in ["tip.ux", "tip.uz", "tip.ry"] {
+        let last = |history: &beamsim::output::HistoryReader, name: &str| {
+            history.rows.last().unwrap()[history.names.iter().position(|n| n == name).unwrap()]
+        };
+        let (error, bar) = ((last(&bars, name) - last(&exact, name)).abs(), last(&bars, &format!("{name}.err")));
+        assert!(error <= bar && bar <= 10.0 * error, "{name}: {error:e} in {bar:e}");
+    }
+    // The stored history is within the bars, and not without them.
+    let compare =
+        |files: [&str; 2]| status(&folder.beamsim(&["compare", files[0], files[1], "--rtol", "0", "--atol", "1e-15"]));
+    assert_eq!(compare(["exact/history.csv", "bars/history.csv"]), 0);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--out", "plain"])), 0);
+    assert_eq!(compare(["exact/history.csv", "plain/history.csv"]), 1);
+
+    folder.write("path.toml", &GOOD.replace("kind = \"static\"", "kind = \"static\"\ncontrol = \"arc_length\""));
+    let refused = folder.beamsim(&["run", "path.toml", "--error-bars"]);
+    assert_eq!((status(&refused), last_line(&refused)), (2, "error[deck]: 1 error in path.toml".into()));
+}
+
+#[test]
 fn cost_within_a_budget_tells_what_it_left_out_and_goes_on() {
     let folder = Folder::new("cost_budget");
     folder.write("deck.toml", GOOD);

@@ -1,7 +1,8 @@
 //! The study of what accuracy costs.
 
-use beamsim::deck::{self, Deck};
+use beamsim::deck::{self, Accuracy, Deck};
 use beamsim::scene::{self, Scene};
+use beamsim::study::accuracy::{Found, reach};
 use beamsim::study::cost::{Against, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
 use std::path::Path;
 
@@ -231,4 +232,53 @@ fn runs_that_fail_are_told_and_the_others_stay() {
     );
     assert!(rest.iter().all(|run| status(run) == "finished" && run.error.is_finite()));
     assert!(found.to_csv().is_ok_and(|table| !String::from_utf8(table).unwrap().contains("NaN")));
+}
+
+fn reached(text: &str, wanted: &Accuracy) -> Result<Found, Refusal> {
+    let (deck, scene) = read(text);
+    let options = Options {
+        against: &Against::Finest,
+        threads: 2,
+        budget: None,
+        interrupted: &|| None,
+        tell: &mut |_, _| (),
+        journal: &mut Journal::default(),
+    };
+    reach(text, &deck, &scene, wanted, options)
+}
+
+/// The error of a deck with settings, against what it expects, or a finer run.
+fn error_with(text: &str, found: &Found, against: &Against) -> f64 {
+    let (family, pasted) = (&found.point.family, deck::apply(text, &found.settings).unwrap());
+    let (order, word) = (family.order.unwrap(), family.interpolation.unwrap().word());
+    let step = if matches!(found.point.pace, Pace::Steps(_)) { "step = 1\n" } else { "" };
+    let alone = format!("{pasted}[cost]\nelements = 1\norder = {order}\ninterpolation = \"{word}\"\n{step}");
+    let study = costs(&alone, against, 2);
+    assert_eq!(study.runs.len(), 1);
+    study.runs[0].error
+}
+
+#[test]
+fn a_wanted_accuracy_is_reached_and_estimates_are_above_errors() {
+    for wanted in [1e-2, 1e-4, 1e-6] {
+        for (text, against) in [(quarter(TIP), Against::Expectations), (SWINGING.into(), Against::Finest)] {
+            let Ok(found) = reached(&text, &Accuracy::All(wanted)) else { panic!("refused") };
+            assert!(found.reached && found.ratio <= 1.0);
+            let (error, (column, estimate)) =
+                (error_with(&text, &found, &against), found.worst(&Accuracy::All(wanted)));
+            assert!(estimate <= wanted && column.starts_with("tip."), "{estimate:e} of {column}");
+            assert!(error <= wanted && error <= 1.1 * estimate, "{error:e} of {wanted:e}, estimated {estimate:e}");
+        }
+    }
+}
+
+#[test]
+fn only_outputs_that_are_named_must_be_accurate() {
+    let of = |names: &[(&str, f64)]| Accuracy::Columns(names.iter().map(|(n, a)| (n.to_string(), *a)).collect());
+    let nodes = |wanted: &Accuracy| match reached(SWINGING, wanted) {
+        Ok(found) => found.point.count() * found.point.family.order.unwrap(),
+        Err(_) => panic!("refused"),
+    };
+    assert!(nodes(&of(&[("tip.ux", 1e-5)])) > nodes(&of(&[("tip.ux", 1e-2)])));
+    assert!(matches!(reached(SWINGING, &of(&[("tip.vx", 1e-2)])), Err(Refusal::Deck(_))));
 }

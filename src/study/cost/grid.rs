@@ -166,7 +166,7 @@ fn paces(deck: &Deck, step: Option<Vec<f64>>, step_tolerance: Option<Vec<f64>>) 
 }
 
 /// The dynamic stages of a deck with their numbers, from 0.
-pub(super) fn dynamic_stages(deck: &Deck) -> impl Iterator<Item = (usize, StageBody)> {
+pub(in crate::study) fn dynamic_stages(deck: &Deck) -> impl Iterator<Item = (usize, StageBody)> {
     let stages = deck.stages.iter().enumerate().map(|(k, stage)| (k, stage.body));
     stages.filter(|(_, body)| matches!(body, StageBody::Dynamic { .. }))
 }

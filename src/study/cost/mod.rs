@@ -20,7 +20,7 @@ pub use reference::Reference;
 pub use trial::{Seconds, Trial};
 
 pub(in crate::study) use crew::Crew;
-pub(in crate::study) use grid::Mesher;
+pub(in crate::study) use grid::{Mesher, dynamic_stages};
 pub(in crate::study) use sample::{Sampler, Samples};
 
 use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord, Spanned, nearest};

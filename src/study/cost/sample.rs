@@ -213,7 +213,7 @@ impl Sampler {
     }
 
     /// A rotation has two vectors of up to 2 pi: takes those that are nearer to another row's.
-    fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
+    pub fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
         let names = &self.columns[first..first + row.len()];
         for k in
             (0..row.len().saturating_sub(2)).filter(|&k| names[k].ends_with(".rx") && names[k + 2].ends_with(".rz"))

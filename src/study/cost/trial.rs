@@ -80,7 +80,8 @@ pub fn makes_sense(text: &str, settings: &[String], sampler: &Sampler) -> bool {
     read(text, settings, sampler).is_ok()
 }
 
-fn simulate(
+/// Runs the deck `text` with settings; `Err` where there is no such scene.
+pub fn simulate(
     text: &str,
     settings: &[String],
     sampler: &Sampler,

@@ -1,0 +1,141 @@
+//! Error bars: the history of a run beside those of two coarser ones, of half its elements and of twice its step.
+//!
+//! What is told at a row is the largest estimate so far: an error does not vanish where two histories cross. See [`super::accuracy`] for the
+//! estimate.
+
+use super::accuracy::{divisor_in_space, divisor_in_time};
+use super::cost::{Family, Mesher, Pace, Point, Refusal, Sampler, dynamic_stages, trial};
+use super::outcome::Outcome;
+use crate::deck::{Deck, Diagnostic, StageBody};
+use crate::drive::Failure;
+use crate::output::Beside;
+use crate::scene::Scene;
+use std::thread;
+
+/// Instants that lie closer, relative to their size, are the same.
+const SAME: f64 = 1e-9;
+
+/// The step tolerance of a companion whose steps adapt, over that of the run.
+const LOOSER: f64 = 10.0;
+
+/// A run beside the one that is told about.
+struct Companion {
+    outcome: Outcome,
+    /// By what differences are divided to be errors of the run
+    divisor: f64,
+    /// The first row that was not compared yet
+    next: usize,
+}
+
+/// Errors of a history, row by row.
+pub struct ErrorBars {
+    sampler: Sampler,
+    companions: Vec<Companion>,
+    /// Of each column, the largest estimate of each companion so far
+    largest: Vec<Vec<f64>>,
+}
+
+/// Runs the companions of a deck, whose text is `text`, beside each other. `interrupted` tells of signals.
+pub fn error_bars(
+    text: &str,
+    deck: &Deck,
+    scene: &Scene,
+    interrupted: &(dyn Fn() -> Option<i32> + Sync),
+) -> Result<ErrorBars, Refusal> {
+    refuse_paths(deck).map_err(Refusal::Deck)?;
+    let sampler = Sampler::of_rows(deck, scene, Vec::new(), Pace::Timeless);
+    let variants = companions(text, deck, &sampler);
+    let run = |point: &Point| trial::simulate(text, &point.settings(deck, text), &sampler, interrupted);
+    let outcomes: Vec<Result<Outcome, String>> = thread::scope(|scope| {
+        let started: Vec<_> = variants.iter().map(|(point, _)| scope.spawn(|| run(point))).collect();
+        started.into_iter().map(|thread| thread.join().unwrap_or(Err("it broke off".into()))).collect()
+    });
+    let mut found = Vec::new();
+    for ((_, divisor), outcome) in variants.iter().zip(outcomes) {
+        let trouble =
+            |why: String| Refusal::Failure(Failure::Limit(format!("no error bars: a coarser run failed, {why}")));
+        let outcome = outcome.map_err(trouble)?;
+        match &outcome.ended {
+            Err(failure @ Failure::Interrupted { .. }) => return Err(Refusal::Failure(failure.clone())),
+            Err(failure) => return Err(trouble(format!("{}: {failure}", failure.name()))),
+            Ok(()) => found.push(Companion { outcome, divisor: *divisor, next: 0 }),
+        }
+    }
+    let columns = scene.probes.iter().map(|probe| probe.names.len()).sum();
+    Ok(ErrorBars { sampler, largest: vec![vec![0.0; columns]; found.len()], companions: found })
+}
+
+/// The variants that errors are told from, with the divisors of differences to them.
+fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, f64)> {
+    let makes_sense = |_: Option<usize>, elements: &[Vec<usize>]| {
+        trial::makes_sense(text, &point(elements.to_vec(), Pace::Timeless).settings(deck, text), sampler)
+    };
+    let mesher = Mesher { deck, makes_sense: &makes_sense };
+    let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
+    let count = |elements: &[Vec<usize>]| elements.iter().flatten().sum::<usize>() as f64;
+    let mut found = Vec::new();
+    if let Some(order) = deck.beams.iter().map(|beam| beam.order).min() {
+        // One element has no half: then a finer mesh tells.
+        let other = [0.5, 2.0, 4.0].map(|factor| mesher.elements(None, factor)).into_iter().find(|other| *other != own);
+        if let Some(other) = other {
+            let ratio = count(&own) / count(&other);
+            found.push((point(other, as_given(deck)), divisor_in_space(ratio, order)));
+        }
+    }
+    let adapts = |(_, body)| if let StageBody::Dynamic { step_tolerance, .. } = body { step_tolerance } else { None };
+    let pace = match (dynamic_stages(deck).next().is_some(), dynamic_stages(deck).find_map(adapts)) {
+        (false, _) => return found,
+        (true, Some(tolerance)) => (Pace::Adapts(LOOSER * tolerance), 1.0),
+        (true, None) => (Pace::Steps(2.0), divisor_in_time()),
+    };
+    found.push((point(own, pace.0), pace.1));
+    found
+}
+
+fn as_given(deck: &Deck) -> Pace {
+    let mut bodies = dynamic_stages(deck).map(|(_, body)| body);
+    match bodies.next() {
+        Some(StageBody::Dynamic { step_tolerance: None, .. }) => Pace::Steps(1.0),
+        _ => Pace::Timeless,
+    }
+}
+
+fn point(elements: Vec<Vec<usize>>, pace: Pace) -> Point {
+    Point { family: Family { order: None, interpolation: None, scheme: None }, elements, pace, newton: 1.0 }
+}
+
+/// Rows of paths lie where increments end, and those of steps that adapt where these do: nothing that two runs share.
+fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
+    for stage in &deck.stages {
+        let message = match stage.body {
+            StageBody::Path { .. } => "error bars need rows that runs share: paths by arc length have none",
+            StageBody::Dynamic { step_tolerance: Some(_), .. } if deck.output.interval.is_none() => {
+                "error bars need rows that runs share: steps adapt, so name instants by [output] interval"
+            }
+            _ => continue,
+        };
+        return Err(Diagnostic::error(message, stage.span.clone()));
+    }
+    Ok(())
+}
+
+impl Beside for ErrorBars {
+    fn names(&self, columns: &[String]) -> Vec<String> {
+        columns.iter().map(|column| format!("{column}.err")).collect()
+    }
+
+    fn at(&mut self, stage: usize, clock: f64, row: &[f64]) -> Vec<f64> {
+        for (companion, largest) in self.companions.iter_mut().zip(&mut self.largest) {
+            let Outcome { clocks, rows, .. } = &companion.outcome;
+            let hit = |&(s, c): &(usize, f64)| s == stage && (c - clock).abs() <= SAME * clock.abs().max(SAME);
+            let Some(after) = clocks[companion.next..].iter().position(hit) else { continue };
+            companion.next += after;
+            let mut nearest = rows[companion.next].clone();
+            self.sampler.take_nearest_rotations(0, &mut nearest, row);
+            for ((largest, a), b) in largest.iter_mut().zip(&nearest).zip(row) {
+                *largest = largest.max((a - b).abs() / companion.divisor);
+            }
+        }
+        (0..row.len()).map(|k| self.largest.iter().map(|of_companion| of_companion[k]).sum()).collect()
+    }
+}
