@@ -8,7 +8,7 @@ use crate::output::Reached;
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Against, Journal, Options, Pace, Point};
-use crate::study::error_bars::{ErrorBars, error_bars};
+use crate::study::error_bars::{ErrorBars, error_bars, refuse_paths};
 use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -47,6 +47,9 @@ impl Target {
         let Some(wanted) = self.accuracy.map(Accuracy::All).or(loaded.deck.accuracy.clone()) else {
             return self.with_bars(path, loaded, None);
         };
+        if self.error_bars {
+            refuse_paths(&loaded.deck).map_err(|why| refused(cost::Refusal::Deck(why), path, &loaded))?;
+        }
         let start = Instant::now();
         let found = self.search(name, path, &loaded, &wanted)?;
         tell(name, &loaded.deck, &found, &wanted);
@@ -103,7 +106,6 @@ impl Target {
 pub fn refused(refusal: cost::Refusal, path: &Path, loaded: &Loaded) -> Refusal {
     match refusal {
         cost::Refusal::Failure(failure) => Refusal::of(run::status_of(&failure), failure.name(), failure.to_string()),
-        cost::Refusal::Io(error) => Refusal::of(Status::Io, "io", error.to_string()),
         cost::Refusal::Deck(diagnostic) => Refusal {
             details: diagnostic.render(&path.display().to_string(), &loaded.text, say::styled()),
             ..Refusal::of(Status::Wrong, "deck", format!("1 error in {}", path.display()))
@@ -113,7 +115,7 @@ pub fn refused(refusal: cost::Refusal, path: &Path, loaded: &Loaded) -> Refusal 
 
 fn tell(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {
     let (column, estimate) = found.worst(wanted);
-    say::line(&format!("{name}: estimated error at most {estimate:.1e}, of {column} ({} runs to find)", found.runs));
+    say::line(&format!("{name}: estimated error {estimate:.1e}, of {column} ({} runs to find)", found.runs));
     say::line(&format!("  {}", describe(&found.point)));
     lines(deck, &found.settings).iter().for_each(|line| say::line(&format!("    {line}")));
 }
@@ -152,10 +154,14 @@ pub fn lines(deck: &Deck, settings: &[String]) -> Vec<String> {
                 Some(beam) => format!("beam {}", beam.name.value),
                 None => format!("{list} {}", number + 1),
             };
-            lines.push(format!("[[{list}]]  # {which}"));
+            lines.push(format!("in [[{list}]] of {which}:"));
         }
-        lines.push(format!("{key} = {value}"));
+        lines.push(format!("  {key} = {value}"));
     }
-    lines.push(format!("or: --set {}", settings.join(" --set ").replace('"', "")));
+    let words = settings.iter().map(|setting| {
+        let bare = setting.replace('"', "");
+        if bare.contains(['[', ' ']) { format!("--set '{bare}'") } else { format!("--set {bare}") }
+    });
+    lines.push(format!("or: {}", words.collect::<Vec<_>>().join(" ")));
     lines
 }

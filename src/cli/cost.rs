@@ -6,7 +6,7 @@ use super::progress::Progress;
 use super::run::{folder, twin};
 use super::{Status, Verdict, load, say, signals};
 use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
-use crate::study::cost::{Against, Family, Journal, Options, Order, Orders, Run, Study, study};
+use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -75,19 +75,24 @@ fn setting(vary: &str) -> String {
         Err(_) => format!("{:?}", value.trim()),
     };
     let values: Vec<String> = values.split(',').map(quoted).collect();
-    format!("cost.{}=[{}]", key.trim(), values.join(", "))
+    match &values[..] {
+        [one] => format!("cost.{}={one}", key.trim()),
+        _ => format!("cost.{}=[{}]", key.trim(), values.join(", ")),
+    }
 }
 
 fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path) -> Result<(), Refusal> {
     let io = |error: std::io::Error| Refusal::of(Status::Io, "io", format!("{}: {error}", folder.display()));
-    let against = match &wanted.reference {
-        None => Against::Finest,
-        Some(word) if word.as_os_str() == "expect" => Against::Expectations,
+    let (against, given) = match &wanted.reference {
+        None => (Against::Finest, String::new()),
+        Some(word) if word.as_os_str() == "expect" => (Against::Expectations, "expect".into()),
         Some(path) => {
-            Against::Table(HistoryReader::read(path).map_err(|e| Refusal::of(Status::Io, "io", e.to_string()))?)
+            let table = HistoryReader::read(path).map_err(|e| Refusal::of(Status::Io, "io", e.to_string()))?;
+            let identity = format!("{table:?}");
+            (Against::Table(table), identity)
         }
     };
-    let identity = format!("beamsim {}\n{:?}\n{}", env!("CARGO_PKG_VERSION"), wanted.reference, loaded.text);
+    let identity = format!("beamsim {}\n{given}\n{}", env!("CARGO_PKG_VERSION"), loaded.text);
     let mut journal = Journal::open(folder, &identity).map_err(io)?;
     if !journal.is_empty() {
         say::note(&format!("{name}: goes on after {} runs of a study that was stopped", journal.len()));
@@ -105,24 +110,31 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
     };
     let found = study(&loaded.text, &loaded.deck, &loaded.scene, options);
     progress.done();
+    if signals::caught().is_some() && !journal.is_empty() {
+        say::note(&format!("{name}: {} runs are kept; the same command goes on after them", journal.len()));
+    }
     let found = found.map_err(|refusal| refused(refusal, path, loaded))?;
     tell_study(name, loaded, &found, wanted.accuracy);
     let table = found.to_csv().map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))?;
     let title = loaded.scene.title.as_deref().unwrap_or(name);
-    for (file, content) in [("cost.csv", table), ("cost.svg", plot(title, &found).into_bytes())] {
+    let drawn = frontier(&found).first().map(|_| ("cost.svg", plot(title, &found).into_bytes()));
+    for (file, content) in std::iter::once(("cost.csv", table)).chain(drawn) {
         let written = PartFile::written(folder, file, &content).and_then(|(part, open)| part.finish(&open, file));
         written.map_err(io)?;
         say::line(&format!("  {}", folder.join(file).display()));
     }
-    let whole = found.runs.iter().all(|run| run.trial.is_some());
-    if whole { journal.close().map_err(io) } else { Ok(()) }
+    if let Some(error) = journal.trouble() {
+        say::note(&format!("warning: runs were not kept for another time: {error}"));
+    }
+    let whole = |run: &Run| run.trial.is_some() && (!run.frontier || run.timing.alone > 0);
+    if found.runs.iter().all(whole) { journal.close().map_err(io) } else { Ok(()) }
 }
 
 fn tell_study(name: &str, loaded: &Loaded, found: &Study, accuracy: f64) {
     say::line(&format!("{name}: {}", loaded.scene.title.as_deref().unwrap_or("(no title)")));
     tell_measure(found);
     tell_runs(found);
-    say::line(&format!("  {:>9}  {:>10}  {:>6}  {:<10} with", "error", "cpu", "±", "limited by"));
+    say::line(&format!("  {:>9}  {:>10}  {:>6}  {:<10} with", "error", "cpu", "spread", "limited by"));
     let mut told = f64::INFINITY;
     for run in frontier(found) {
         if run.error < WORTH_TELLING * told {
@@ -144,7 +156,11 @@ fn tell_measure(found: &Study) {
     if found.ends_only {
         say::line("  compared at the ends of stages only: steps adapt, and [output] interval names no instants");
     }
-    say::line(&format!("  reference: {}; uncertain by {:.1e}", found.reference.made, found.reference.uncertainty));
+    let sure = match found.reference.uncertainty {
+        0.0 => "taken as exact".into(),
+        uncertainty => format!("uncertain by {uncertainty:.1e}"),
+    };
+    say::line(&format!("  reference: {}; {sure}", found.reference.made));
 }
 
 /// How many runs there are, and what became of those that are not on the table.
@@ -158,6 +174,9 @@ fn tell_runs(found: &Study) {
     }
     let failed: Vec<String> = failed.iter().map(|(status, count)| format!(", {count} {status}")).collect();
     say::line(&format!("  {} runs{}", found.runs.len(), failed.concat()));
+    if found.runs.iter().any(|run| run.trial.is_none()) {
+        say::line("  the same command without the budget, or with another, goes on");
+    }
 }
 
 /// Runs of the frontier, the least accurate first.
@@ -171,7 +190,7 @@ fn tell_run(run: &Run, found: &Study) {
     let told = 2.0 * found.reference.uncertainty;
     let error = if run.error < told { format!("< {told:.1e}") } else { format!("{:.1e}", run.error) };
     let limit = run.limit.map_or("", |knob| knob.name());
-    let spread = format!("{:.0} %", 100.0 * run.timing.spread);
+    let spread = if run.timing.alone > 1 { format!("{:.0} %", 100.0 * run.timing.spread) } else { "–".into() };
     let cpu = say::time(run.timing.seconds.cpu);
     say::line(&format!("  {error:>9}  {cpu:>10}  {spread:>6}  {limit:<10} {}", describe(&run.point)));
 }
@@ -190,7 +209,13 @@ fn tell_orders(orders: &[Orders]) {
 
 fn tell_order(of: &str, order: Order) -> String {
     let seen = order.observed.map_or("none".into(), |p| format!("{p:.1}"));
-    let expected = order.expected.map_or("–".into(), |p| p.to_string());
+    let expected =
+        order.expected.map_or(
+            "–".into(),
+            |Expected { order, at_least }| {
+                if at_least { format!("at least {order}") } else { order.to_string() }
+            },
+        );
     let remark = order.remark().map_or(String::new(), |remark| format!(" {remark}"));
     format!("{of} {seen} ({expected}){remark}")
 }
@@ -198,7 +223,14 @@ fn tell_order(of: &str, order: Order) -> String {
 /// The lines of a deck that reach an accuracy for the least time.
 fn tell_lines(loaded: &Loaded, found: &Study, accuracy: f64) {
     let Some(run) = frontier(found).into_iter().find(|run| run.error <= accuracy) else {
-        return say::line(&format!("  {accuracy:e} is not reached by any run: try --vary elements=4,8,16"));
+        let finest = frontier(found).pop().and_then(|run| run.limit);
+        let advice = match finest {
+            _ if 2.0 * found.reference.uncertainty > accuracy => "the reference is not that certain",
+            Some(Knob::Step) => "try smaller steps, --vary step=0.25,0.125,0.0625",
+            Some(Knob::Newton) => "try a smaller `tolerance` of the stages",
+            _ => "try finer meshes, --vary elements=4,8,16",
+        };
+        return say::line(&format!("  {accuracy:e} is not reached by any run: {advice}"));
     };
     say::line(&format!("  {accuracy:e} costs {}: {}", say::time(run.timing.seconds.cpu), describe(&run.point)));
     lines(&loaded.deck, &run.settings).iter().for_each(|line| say::line(&format!("    {line}")));

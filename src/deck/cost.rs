@@ -97,12 +97,19 @@ fn one_or_more<T>(context: &Context, item: &Item, read: impl Fn(&Context, &Item)
     array.iter().map(|entry| read(context, entry)).collect()
 }
 
+/// Factors and tolerances are no further from one than this.
+const FARTHEST: f64 = 1e12;
+
 fn positive(table: &Table, key: &str) -> Option<Vec<f64>> {
+    let farthest = if key == "step_tolerance" { FARTHEST } else { FARTHEST.sqrt().sqrt() };
     one_or_more(table.context, table.get(key)?, |context, item| {
         let number = context.number(item)?;
-        match number.value > 0.0 {
+        match (1.0 / farthest..=farthest).contains(&number.value) {
             true => Some(number.value),
-            false => context.wrong(number.span, format!("`{key}` must be positive, found {}", number.value)),
+            false => {
+                let message = format!("`{key}` lies from {:e} to {farthest:e}, found {}", 1.0 / farthest, number.value);
+                context.wrong(number.span, message)
+            }
         }
     })
 }

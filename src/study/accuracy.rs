@@ -27,15 +27,31 @@ fn order_in_space(order: usize) -> f64 {
     order as f64 + 0.5
 }
 
+/// The lowest order that is believed.
+const LEAST_ORDER: f64 = 0.5;
+
+/// What Newton's method leaves of its tolerance.
+pub(super) const LEFT_BY_NEWTON: f64 = 1e-2;
+
 /// By what the difference to a run with other elements is divided to be the error: `ratio` is that of the widths of the other elements and
 /// the own.
 pub(super) fn divisor_in_space(ratio: f64, order: usize) -> f64 {
-    (ratio.powf(order_in_space(order)) - 1.0).abs()
+    divisor(ratio, order_in_space(order))
 }
 
-/// And to a run with twice the step.
-pub(super) fn divisor_in_time() -> f64 {
-    2.0_f64.powf(ORDER_IN_TIME) - 1.0
+/// And to a run with other steps.
+pub(super) fn divisor_in_time(ratio: f64) -> f64 {
+    divisor(ratio, ORDER_IN_TIME)
+}
+
+fn divisor(ratio: f64, order: f64) -> f64 {
+    (ratio.powf(order) - 1.0).abs()
+}
+
+/// The order from two rounds, each with a width and the difference between two runs; at most that which is assumed.
+fn order_seen(assumed: f64, before: (f64, f64), now: (f64, f64)) -> f64 {
+    let seen = (before.1 / now.1).ln() / (before.0 / now.0).ln();
+    if before.0 > now.0 && seen < assumed { seen.max(LEAST_ORDER) } else { assumed }
 }
 
 /// The first step over the deck's, at most; and how many steps a stage must have then.
@@ -47,9 +63,6 @@ const FIRST_MESH: f64 = 0.5;
 
 /// How much finer a mesh may become from round to round, and how little is worth a round.
 const MESH_GROWS: [f64; 2] = [1.5, 4.0];
-
-/// How often elements are doubled until there are more of them.
-const MOST_DOUBLINGS: u32 = 6;
 
 /// How often a step may be halved from round to round.
 const MOST_HALVINGS: i32 = 3;
@@ -92,7 +105,7 @@ impl Found {
 /// nodes, the best one that was found.
 pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options: Options) -> Result<Found, Refusal> {
     let pace = first_pace(deck);
-    let sampler = Sampler::of_rows(deck, scene, outputs(wanted, scene)?, coarser(pace));
+    let sampler = Sampler::of_histories(deck, scene, outputs(wanted, scene)?, coarser(pace));
     let interpolation = |word| Family { order: None, interpolation: word, scheme: None };
     let relative = Point {
         family: interpolation(Some(InterpolationWord::Relative)),
@@ -113,7 +126,20 @@ pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options:
     let mesher = Mesher { deck, makes_sense: &makes_sense };
     let tolerance = deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max);
     let newton = (NEWTON * wanted.least() / tolerance).min(1.0);
-    let mut search = Search { text, deck, wanted, sampler: &sampler, mesher, family, newton, mesh: FIRST_MESH, pace };
+    let mut search = Search {
+        text,
+        deck,
+        wanted,
+        sampler: &sampler,
+        mesher,
+        family,
+        newton,
+        mesh: FIRST_MESH,
+        pace,
+        ratio: 1.0,
+        in_space: Knob::default(),
+        in_time: Knob::default(),
+    };
     search.run(Crew::new(text, deck, &sampler, options))
 }
 
@@ -128,6 +154,41 @@ struct Search<'a> {
     /// Factor of the nodes of the deck
     mesh: f64,
     pace: Pace,
+    /// How many times as wide elements of the coarser mesh of a round are
+    ratio: f64,
+    in_space: Knob,
+    in_time: Knob,
+}
+
+/// What is known of how an error falls.
+#[derive(Default)]
+struct Knob {
+    /// Of the round before: a width, and the largest difference over what is wanted
+    before: Option<(f64, f64)>,
+    /// The order of the last round
+    order: Option<f64>,
+}
+
+impl Knob {
+    /// The order that an error falls with: the assumed one, or that from round to round where it is lower. Waves with fronts, for one, have a
+    /// low one.
+    fn order(&mut self, assumed: f64, now: (f64, f64)) -> f64 {
+        let order = self.before.map_or(assumed, |before| order_seen(assumed, before, now));
+        (self.before, self.order) = (Some(now), Some(order));
+        order
+    }
+}
+
+/// The difference of each column to a finer run.
+fn differences(sampler: &Sampler, coarse: &Samples, fine: &Samples) -> Vec<f64> {
+    sampler.differences(coarse, fine, &sampler.scales(fine))
+}
+
+/// The largest over what is wanted; infinite where nothing can be compared: columns that are always zero cannot.
+fn largest(sampler: &Sampler, wanted: &Accuracy, differences: &[f64]) -> f64 {
+    let over = |&k: &usize| differences[k] / wanted.of(&sampler.columns[k]);
+    let largest = sampler.outputs.iter().map(over).fold(f64::NAN, f64::max);
+    if largest.is_nan() { f64::INFINITY } else { largest }
 }
 
 /// Estimated errors of a round, over what is wanted: the largest of all outputs. Infinite where a run failed.
@@ -141,6 +202,7 @@ impl Search<'_> {
     fn run(&mut self, mut crew: Crew) -> Result<Found, Refusal> {
         let mut best: Option<Found> = None;
         let mut runs = 0;
+        let mut ended = String::from(" within the budget");
         for _ in 0..MOST_ROUNDS {
             let points = self.round();
             if points[0].count() * self.family.order.unwrap_or(1) > MOST_NODES {
@@ -150,6 +212,10 @@ impl Search<'_> {
             let trials = crew.run(&points)?;
             let Some(trials) = trials.into_iter().collect::<Option<Vec<Trial>>>() else { break };
             runs += trials.len();
+            ended = format!("; the last of {runs} ended with `{}`", trials[0].status);
+            if ["singular", "deck"].contains(&trials[0].status.as_str()) {
+                break; // No mesh mends that.
+            }
             let estimate = self.estimate(&points, &trials);
             let ratio = estimate.mesh + estimate.step;
             let found = Found {
@@ -170,12 +236,13 @@ impl Search<'_> {
             self.refine(&estimate);
         }
         best.map(|best| Found { runs, ..best }).ok_or_else(|| {
-            Refusal::Failure(Failure::Limit("no run whose error could be estimated came to its end in time".into()))
+            let message = format!("no run came to its end whose error could be estimated{ended}");
+            Refusal::Failure(Failure::Limit(message))
         })
     }
 
     /// The variant of a round, and those that its error is estimated with.
-    fn round(&self) -> Vec<Point> {
+    fn round(&mut self) -> Vec<Point> {
         let order = self.family.order;
         let fine = self.mesher.elements(order, self.mesh);
         let point = |elements: &Vec<Vec<usize>>, pace| Point {
@@ -185,16 +252,12 @@ impl Search<'_> {
             newton: self.newton,
         };
         let mut points = vec![point(&fine, self.pace)];
+        self.ratio = 1.0;
         if order.is_some() {
-            let coarse = self.mesher.elements(order, 0.5 * self.mesh);
-            if coarse == fine {
-                // One element has no half: a finer mesh stands for the variant then.
-                let finer = (1..MOST_DOUBLINGS).map(|k| self.mesher.elements(order, self.mesh * f64::from(1 << k)));
-                let finer = finer.into_iter().find(|finer| *finer != fine).unwrap_or(fine);
-                points.insert(0, point(&finer, self.pace));
-            } else {
-                points.push(point(&coarse, self.pace));
-            }
+            let (other, ratio) = self.mesher.companion(order, &fine);
+            // Where some piece has but one element, the finer mesh stands for the variant.
+            points.insert(if ratio > 1.0 { 1 } else { 0 }, point(&other, self.pace));
+            self.ratio = ratio.max(1.0 / ratio);
         }
         if matches!(self.pace, Pace::Steps(_)) {
             let elements = points[0].elements.clone();
@@ -203,36 +266,41 @@ impl Search<'_> {
         points
     }
 
-    fn estimate(&self, points: &[Point], trials: &[Trial]) -> Estimate {
-        let infinite = Estimate { mesh: f64::INFINITY, step: f64::INFINITY, columns: Vec::new() };
-        if !trials[0].finished() {
-            return infinite;
-        }
-        let fine: &Samples = &trials[0].samples;
-        let scales = self.sampler.scales(fine);
-        let mut columns = vec![0.0; self.sampler.columns.len()];
-        let mut share = |other: usize, divisor: f64| {
-            if !trials[other].finished() {
-                return f64::INFINITY;
-            }
-            let differences = self.sampler.differences(&trials[other].samples, fine, &scales);
-            let errors: Vec<f64> = differences.iter().map(|d| d / divisor).collect();
-            columns.iter_mut().zip(&errors).for_each(|(sum, e)| *sum += e);
-            let over = |&k: &usize| errors[k] / self.wanted.of(&self.sampler.columns[k]);
-            // Columns that are always zero cannot be compared; where none can, nothing is known.
-            let largest = self.sampler.outputs.iter().map(over).fold(f64::NAN, f64::max);
-            if largest.is_nan() { f64::INFINITY } else { largest }
-        };
+    fn estimate(&mut self, points: &[Point], trials: &[Trial]) -> Estimate {
+        let mut columns = vec![self.left_by_newton(); self.sampler.columns.len()];
         let mut estimate = Estimate { mesh: 0.0, step: 0.0, columns: Vec::new() };
-        for (k, point) in points.iter().enumerate().skip(1) {
-            if point.pace == points[0].pace {
-                let ratio = point.width() / points[0].width();
-                estimate.mesh = share(k, divisor_in_space(ratio, point.family.order.unwrap_or(1)));
-            } else {
-                estimate.step = share(k, divisor_in_time());
-            }
+        if !trials[0].finished() {
+            return Estimate { mesh: f64::INFINITY, step: f64::INFINITY, columns };
+        }
+        let step = |point: &Point| point.step(self.deck).unwrap_or(1.0);
+        let own = step(&points[0]);
+        for (point, trial) in points.iter().zip(trials).skip(1) {
+            let in_space = point.pace == points[0].pace;
+            let (width, ratio, order) = match in_space {
+                true => (1.0 / self.mesh, self.ratio, order_in_space(point.family.order.unwrap_or(1))),
+                false => (own, step(point) / own, ORDER_IN_TIME),
+            };
+            let knob = if in_space { &mut self.in_space } else { &mut self.in_time };
+            let share = match trial.finished() && ratio > 1.0 {
+                true => {
+                    let differences = differences(self.sampler, &trial.samples, &trials[0].samples);
+                    let largest = largest(self.sampler, self.wanted, &differences);
+                    let divisor = divisor(ratio, knob.order(order, (width, largest)));
+                    columns.iter_mut().zip(&differences).for_each(|(sum, d)| *sum += d / divisor);
+                    largest / divisor
+                }
+                // Nothing is known of what a run that failed would tell, or one that is the same.
+                false => f64::INFINITY,
+            };
+            *(if in_space { &mut estimate.mesh } else { &mut estimate.step }) = share;
         }
         Estimate { columns, ..estimate }
+    }
+
+    /// What Newton's method leaves, about: its last iteration does better than it must.
+    fn left_by_newton(&self) -> f64 {
+        let tolerance = self.deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max);
+        LEFT_BY_NEWTON * self.newton * tolerance
     }
 
     /// Makes finer what the error comes from, by as much as its order tells: half of what is wanted is for each.
@@ -240,14 +308,18 @@ impl Search<'_> {
         let steps = matches!(self.pace, Pace::Steps(_));
         let share = if steps && self.family.order.is_some() { 0.5 } else { 1.0 };
         if estimate.mesh > share {
-            let order = order_in_space(self.family.order.unwrap_or(1));
+            let order = self.in_space.order.unwrap_or(1.0);
             let factor = if estimate.mesh.is_finite() { (estimate.mesh / share).powf(1.0 / order) } else { 2.0 };
             self.mesh *= factor.clamp(MESH_GROWS[0], MESH_GROWS[1]);
         }
         if let Pace::Steps(factor) = self.pace
             && estimate.step > share
         {
-            let halvings = if estimate.step.is_finite() { (estimate.step / share).log2() / 2.0 } else { 1.0 };
+            let halvings = if estimate.step.is_finite() {
+                (estimate.step / share).log2() / self.in_time.order.unwrap_or(1.0)
+            } else {
+                1.0
+            };
             self.pace = Pace::Steps(factor * 0.5_f64.powi((halvings.ceil() as i32).clamp(1, MOST_HALVINGS)));
         }
     }

@@ -3,7 +3,7 @@
 //! What is told at a row is the largest estimate so far: an error does not vanish where two histories cross. See [`super::accuracy`] for the
 //! estimate.
 
-use super::accuracy::{divisor_in_space, divisor_in_time};
+use super::accuracy::{LEFT_BY_NEWTON, divisor_in_space, divisor_in_time};
 use super::cost::{Family, Mesher, Pace, Point, Refusal, Sampler, dynamic_stages, trial};
 use super::outcome::Outcome;
 use crate::deck::{Deck, Diagnostic, StageBody};
@@ -33,6 +33,10 @@ pub struct ErrorBars {
     companions: Vec<Companion>,
     /// Of each column, the largest estimate of each companion so far
     largest: Vec<Vec<f64>>,
+    /// Of each column, the largest value of its kind so far
+    values: Vec<f64>,
+    /// What Newton's method leaves of them
+    tolerance: f64,
 }
 
 /// Runs the companions of a deck, whose text is `text`, beside each other. `interrupted` tells of signals.
@@ -62,7 +66,9 @@ pub fn error_bars(
         }
     }
     let columns = scene.probes.iter().map(|probe| probe.names.len()).sum();
-    Ok(ErrorBars { sampler, largest: vec![vec![0.0; columns]; found.len()], companions: found })
+    let tolerance = LEFT_BY_NEWTON * deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max);
+    let largest = vec![vec![0.0; columns]; found.len()];
+    Ok(ErrorBars { sampler, largest, values: vec![0.0; columns], tolerance, companions: found })
 }
 
 /// The variants that errors are told from, with the divisors of differences to them.
@@ -72,32 +78,22 @@ fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, f64)> {
     };
     let mesher = Mesher { deck, makes_sense: &makes_sense };
     let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
-    let count = |elements: &[Vec<usize>]| elements.iter().flatten().sum::<usize>() as f64;
     let mut found = Vec::new();
     if let Some(order) = deck.beams.iter().map(|beam| beam.order).min() {
-        // One element has no half: then a finer mesh tells.
-        let other = [0.5, 2.0, 4.0].map(|factor| mesher.elements(None, factor)).into_iter().find(|other| *other != own);
-        if let Some(other) = other {
-            let ratio = count(&own) / count(&other);
-            found.push((point(other, as_given(deck)), divisor_in_space(ratio, order)));
-        }
+        let (other, ratio) = mesher.companion(None, &own);
+        found.push((point(other, Pace::Timeless), divisor_in_space(ratio, order)));
     }
     let adapts = |(_, body)| if let StageBody::Dynamic { step_tolerance, .. } = body { step_tolerance } else { None };
-    let pace = match (dynamic_stages(deck).next().is_some(), dynamic_stages(deck).find_map(adapts)) {
-        (false, _) => return found,
-        (true, Some(tolerance)) => (Pace::Adapts(LOOSER * tolerance), 1.0),
-        (true, None) => (Pace::Steps(2.0), divisor_in_time()),
-    };
-    found.push((point(own, pace.0), pace.1));
-    found
-}
-
-fn as_given(deck: &Deck) -> Pace {
-    let mut bodies = dynamic_stages(deck).map(|(_, body)| body);
-    match bodies.next() {
-        Some(StageBody::Dynamic { step_tolerance: None, .. }) => Pace::Steps(1.0),
-        _ => Pace::Timeless,
+    if let Some(tolerance) = dynamic_stages(deck).find_map(adapts) {
+        found.push((point(own, Pace::Adapts(LOOSER * tolerance)), 1.0));
+    } else if dynamic_stages(deck).next().is_some() {
+        // Where an interval leaves no longer step, a shorter one tells.
+        let with = |factor| point(own.clone(), Pace::Steps(factor));
+        let ratio = |point: &Point| point.step(deck).unwrap_or(1.0) / with(1.0).step(deck).unwrap_or(1.0);
+        let other = [2.0, 0.5].map(with).into_iter().find(|other| ratio(other) != 1.0);
+        found.extend(other.map(|other| (other.clone(), divisor_in_time(ratio(&other)))));
     }
+    found
 }
 
 fn point(elements: Vec<Vec<usize>>, pace: Pace) -> Point {
@@ -105,7 +101,7 @@ fn point(elements: Vec<Vec<usize>>, pace: Pace) -> Point {
 }
 
 /// Rows of paths lie where increments end, and those of steps that adapt where these do: nothing that two runs share.
-fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
+pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
     for stage in &deck.stages {
         let message = match stage.body {
             StageBody::Path { .. } => "error bars need rows that runs share: paths by arc length have none",
@@ -136,6 +132,11 @@ impl Beside for ErrorBars {
                 *largest = largest.max((a - b).abs() / companion.divisor);
             }
         }
-        (0..row.len()).map(|k| self.largest.iter().map(|of_companion| of_companion[k]).sum()).collect()
+        let mut with_modes = row.to_vec();
+        with_modes.resize(self.sampler.columns.len(), f64::NAN);
+        let kinds = self.sampler.scales(&with_modes);
+        self.values.iter_mut().zip(&kinds).for_each(|(largest, value)| *largest = largest.max(*value));
+        let estimate = |k: usize| self.largest.iter().map(|of_companion| of_companion[k]).sum::<f64>();
+        (0..row.len()).map(|k| estimate(k) + self.tolerance * self.values[k]).collect()
     }
 }

@@ -255,7 +255,7 @@ fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
         folder.beamsim(&["cost", "deck.toml", "--vary", "order=1,2", "--vary", "elements=1,2,4", "--accuracy", "1e-3"]);
     assert_eq!(status(&output), 0, "{}", last_line(&output));
     let text = String::from_utf8_lossy(&output.stdout);
-    for part in ["reference: ", "orders of convergence", "1e-3 costs ", "[[beam]]  # beam arm", "--set beam.0."] {
+    for part in ["reference: ", "orders of convergence", "1e-3 costs ", "in [[beam]] of beam arm:", "--set beam.0."] {
         assert!(text.contains(part), "{part} is not in\n{text}");
     }
     assert_eq!(folder.names("results/deck"), ["cost.csv", "cost.svg"]);
@@ -272,7 +272,7 @@ fn run_reaches_an_accuracy_and_says_with_what() {
     let output = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-5"]);
     assert_eq!(status(&output), 0, "{}", last_line(&output));
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(text.contains("estimated error at most") && text.contains("[[beam]]  # beam arm"), "{text}");
+    assert!(text.contains("estimated error ") && text.contains("in [[beam]] of beam arm:"), "{text}");
     let record: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.0.join("results/deck/run.json")).unwrap()).unwrap();
     let found = &record["accuracy"];

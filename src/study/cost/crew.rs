@@ -7,6 +7,7 @@ use super::trial::{self, Seconds, Trial};
 use super::{Options, Refusal, Run, Timing};
 use crate::deck::Deck;
 use crate::drive::{Failure, Moment};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::mpsc;
 use std::thread;
@@ -61,7 +62,7 @@ impl<'a, 'o> Crew<'a, 'o> {
 
     /// Runs what everything else needs: a budget that does not suffice for it leaves trials that were interrupted.
     pub fn run_needed(&mut self, points: &[Point]) -> Result<Vec<Trial>, Refusal> {
-        let lost = || Trial::interrupted();
+        let lost = || Trial::ended("interrupted");
         Ok(self.run(points)?.into_iter().map(|trial| trial.unwrap_or_else(lost)).collect())
     }
 
@@ -82,14 +83,15 @@ impl<'a, 'o> Crew<'a, 'o> {
         let signals = self.options.interrupted;
         let stopped = move || signals().or_else(|| deadline.is_over().then_some(0));
         let (sender, receiver) = mpsc::channel();
-        let mut trouble = None;
         thread::scope(|scope| {
             for _ in 0..self.options.threads.max(1) {
                 let (queue, settings, sender) = (&queue, &settings, sender.clone());
                 scope.spawn(move || {
                     let next = || queue.lock().ok()?.pop();
                     while let Some(k) = (stopped().is_none()).then(next).flatten() {
-                        let trial = trial::run(text, &settings[k], sampler, &stopped);
+                        // A fault of the program in one run is none of the others'.
+                        let run = || trial::run(text, &settings[k], sampler, &stopped);
+                        let trial = catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|_| Trial::ended("broke off"));
                         if trial.status == "interrupted" || sender.send((k, trial)).is_err() {
                             return;
                         }
@@ -100,16 +102,13 @@ impl<'a, 'o> Crew<'a, 'o> {
             for (k, trial) in receiver {
                 self.done += 1;
                 (self.options.tell)(self.done, self.expected);
-                if let Err(error) = self.options.journal.keep(&keys[k], &trial) {
-                    trouble.get_or_insert(error);
-                }
+                self.options.journal.keep(&keys[k], &trial);
                 trials[k] = Some(trial);
             }
         });
-        match (signals(), trouble) {
-            (Some(signal), _) => Err(Refusal::Failure(interrupted(signal))),
-            (None, Some(error)) => Err(Refusal::Io(error)),
-            (None, None) => Ok(trials),
+        match signals() {
+            Some(signal) => Err(Refusal::Failure(interrupted(signal))),
+            None => Ok(trials),
         }
     }
 

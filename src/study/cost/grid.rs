@@ -1,6 +1,7 @@
 //! Which variants of a deck a study of cost runs: families of elements, interpolations and schemes, each on several meshes and with
 //! several steps.
 
+use super::order::Expected;
 use crate::deck::{Beam, Cost, Deck, InterpolationWord, SchemeWord, StageBody};
 
 /// Orders, unless the deck names some.
@@ -14,7 +15,7 @@ const ELEMENTS_DYNAMIC: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Factors of steps.
 const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 /// Tolerances of steps that adapt.
-const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
+const TOLERANCES: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 
 /// Largest part of the elements of a deck that is tried.
 const MOST_PARTS: usize = 8;
@@ -124,6 +125,23 @@ pub struct Mesher<'a> {
     pub makes_sense: &'a MakesSense<'a>,
 }
 
+impl Mesher<'_> {
+    /// A mesh to compare another with, and how many times as wide its elements are, at least: one with half the elements of each piece, or,
+    /// where some piece has but one, with twice as many.
+    pub fn companion(&self, order: Option<usize>, elements: &[Vec<usize>]) -> (Vec<Vec<usize>>, f64) {
+        let each = |change: &dyn Fn(usize) -> usize| -> Vec<Vec<usize>> {
+            elements.iter().map(|beam| beam.iter().map(|&count| change(count)).collect()).collect()
+        };
+        let coarse = each(&|count| count.div_ceil(2));
+        let pairs = elements.iter().flatten().zip(coarse.iter().flatten());
+        let ratio = pairs.map(|(&fine, &coarse)| fine as f64 / coarse as f64).fold(2.0, f64::min);
+        if ratio > 1.0 && (self.makes_sense)(order, &coarse) {
+            return (coarse, ratio);
+        }
+        (each(&|count| count.saturating_mul(2)), 0.5)
+    }
+}
+
 /// Whether a deck makes sense with an order, and elements of each piece of each beam.
 pub type MakesSense<'a> = dyn Fn(Option<usize>, &[Vec<usize>]) -> bool + 'a;
 
@@ -180,6 +198,14 @@ impl Point {
     /// How coarse its mesh is: the order of an error is a power of this.
     pub fn width(&self) -> f64 {
         1.0 / self.count().max(1) as f64
+    }
+
+    /// The step of the first dynamic stage: where rows are wanted at multiples of an interval, an equal part of that.
+    pub fn step(&self, deck: &Deck) -> Option<f64> {
+        let Pace::Steps(factor) = self.pace else { return None };
+        let StageBody::Dynamic { step, .. } = dynamic_stages(deck).next()?.1 else { return None };
+        let step = step * factor;
+        Some(deck.output.interval.map_or(step, |interval| interval / (interval / step - 1e-9).ceil().max(1.0)))
     }
 
     /// About how much work it is, for runs of one deck.
@@ -267,7 +293,7 @@ impl Point {
 }
 
 /// The order of the scheme of a family's dynamic stages; `None` where they differ.
-pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<f64> {
+pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<Expected> {
     let of_stage = |(_, body)| match body {
         // A change of scheme is to its usual coefficients.
         StageBody::Dynamic { scheme: SchemeWord::Newmark(_, gamma), .. } if family.scheme.is_none() && gamma != 0.5 => {
@@ -277,7 +303,7 @@ pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<f64> {
     };
     let mut orders = dynamic_stages(deck).map(of_stage);
     let first = orders.next()?;
-    orders.all(|order| order == first).then_some(first)
+    orders.all(|order| order == first).then_some(Expected { order: first, at_least: false })
 }
 
 fn word_of(scheme: SchemeWord) -> &'static str {

@@ -1,6 +1,7 @@
 //! Runs that have ended, kept on disk while a study is under way: one that was stopped goes on where it was.
 
 use super::trial::{Seconds, Trial};
+use crate::output::PartFile;
 use csv::{ReaderBuilder, WriterBuilder};
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -10,28 +11,30 @@ use std::path::{Path, PathBuf};
 /// The name of the file.
 const NAME: &str = "cost.journal";
 
+/// What stands at the end of a line that is whole: half a number is a number too.
+const END: &str = ".";
+
 /// Keeps runs by their settings.
 #[derive(Default)]
 pub struct Journal {
     known: HashMap<String, Trial>,
     file: Option<(PathBuf, File)>,
+    /// Why nothing is written any more
+    trouble: Option<io::Error>,
 }
 
 impl Journal {
     /// Opens the journal in a folder; what it holds of the study `identity` is known, what it holds of any other is forgotten.
     pub fn open(folder: &Path, identity: &str) -> io::Result<Self> {
-        fs::create_dir_all(folder)?;
         let path = folder.join(NAME);
         let known = fs::read(&path).ok().and_then(|bytes| read(&bytes, identity)).unwrap_or_default();
-        let mut journal = Self { known, file: None };
-        // Written anew: the last line of a stopped study may be half a line.
-        let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(&path)?;
-        file.write_all(&line(&[identity.to_string()]))?;
-        for (key, trial) in &journal.known {
-            file.write_all(&line(&record(key, trial)))?;
-        }
-        journal.file = Some((path, file));
-        Ok(journal)
+        // Written anew, as a whole: the last line of a stopped study may be half a line.
+        let mut content = line(&[identity.to_string()]);
+        known.iter().for_each(|(key, trial)| content.extend(line(&record(key, trial))));
+        let (part, file) = PartFile::written(folder, NAME, &content)?;
+        part.finish(&file, NAME)?;
+        let file = OpenOptions::new().append(true).open(&path)?;
+        Ok(Self { known, file: Some((path, file)), trouble: None })
     }
 
     /// How many runs are known.
@@ -49,13 +52,19 @@ impl Journal {
         self.known.get(key).cloned()
     }
 
-    /// Keeps a run.
-    pub fn keep(&mut self, key: &str, trial: &Trial) -> io::Result<()> {
+    /// Keeps a run. One that cannot be written is known all the same, and [`Journal::trouble`] tells.
+    pub fn keep(&mut self, key: &str, trial: &Trial) {
         self.known.insert(key.into(), trial.clone());
-        match &mut self.file {
-            Some((_, file)) => file.write_all(&line(&record(key, trial))),
-            None => Ok(()),
+        let written = self.file.as_mut().map_or(Ok(()), |(_, file)| file.write_all(&line(&record(key, trial))));
+        if let Err(error) = written {
+            self.file = None;
+            self.trouble = Some(error);
         }
+    }
+
+    /// Why runs are not written any more.
+    pub fn trouble(&self) -> Option<&io::Error> {
+        self.trouble.as_ref()
     }
 
     /// The study is done: nothing is left to go on with.
@@ -78,6 +87,7 @@ fn record(key: &str, trial: &Trial) -> Vec<String> {
     fields.extend([seconds.cpu, seconds.wall].map(|x| format!("{x:?}")));
     fields.push(samples.len().to_string());
     fields.extend(samples.iter().map(|x| format!("{x:?}")));
+    fields.push(END.into());
     fields
 }
 
@@ -93,9 +103,9 @@ fn read(bytes: &[u8], identity: &str) -> Option<HashMap<String, Trial>> {
 fn parse(record: &csv::StringRecord) -> Option<(String, Trial)> {
     let whole = |k: usize| record.get(k)?.parse::<u64>().ok();
     let number = |k: usize| record.get(k)?.parse::<f64>().ok();
-    let count = whole(7)? as usize;
-    let samples: Vec<f64> = (8..record.len()).map(number).collect::<Option<_>>()?;
-    (samples.len() == count).then_some(())?;
+    let end = record.len().checked_sub(1).filter(|&end| end >= 8 && &record[end] == END)?;
+    let samples: Vec<f64> = (8..end).map(number).collect::<Option<_>>()?;
+    (samples.len() as u64 == whole(7)?).then_some(())?;
     let trial = Trial {
         status: record.get(1)?.into(),
         samples,

@@ -15,7 +15,7 @@ pub use crew::Deadline;
 pub use frontier::Knob;
 pub use grid::{Family, Pace, Point};
 pub use journal::Journal;
-pub use order::Order;
+pub use order::{Expected, Order};
 pub use reference::Reference;
 pub use trial::{Seconds, Trial};
 
@@ -122,8 +122,6 @@ pub enum Refusal {
     Deck(Diagnostic),
     /// A run could not be made
     Failure(Failure),
-    /// The journal could not be written
-    Io(std::io::Error),
 }
 
 /// Studies a deck, whose text is `text`.
@@ -194,7 +192,7 @@ fn sampler(
     against: &Against,
 ) -> Result<(Sampler, Option<Reference>), Diagnostic> {
     let outputs = outputs(deck, scene)?;
-    let (sampler, samples, made) = match against {
+    let (mut sampler, samples, made) = match against {
         Against::Finest => return Ok((Sampler::of_rows(deck, scene, outputs, grid.paces[0]), None)),
         Against::Table(table) => {
             let stored = Outcome::of_table(scene, table);
@@ -207,7 +205,10 @@ fn sampler(
             (sampler, samples, "what the deck expects")
         }
     };
-    if sampler.outputs.iter().all(|&k| !sampler.scales(&samples)[k].is_finite() || sampler.scales(&samples)[k] == 0.0) {
+    let scales = sampler.scales(&samples);
+    let compared = sampler.differences(&samples, &samples, &scales);
+    sampler.outputs.retain(|&k| !compared[k].is_nan());
+    if sampler.outputs.is_empty() {
         return Err(Diagnostic::whole(format!("{made} has no number for any output of the deck")));
     }
     Ok((sampler, Some(Reference { samples, uncertainty: 0.0, made: made.into() })))

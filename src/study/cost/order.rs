@@ -12,16 +12,27 @@ pub struct Order {
     /// From the finest three runs whose differences are no noise; `None` where there are none
     pub observed: Option<f64>,
     /// Of smooth solutions on fine meshes; `None` where the outputs have different ones
-    pub expected: Option<f64>,
+    pub expected: Option<Expected>,
+}
+
+/// An order that is expected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expected {
+    /// The order
+    pub order: f64,
+    /// Whether it may well be higher
+    pub at_least: bool,
 }
 
 impl Order {
     /// What it means where the two disagree.
     pub fn remark(&self) -> Option<&'static str> {
         let (observed, expected) = (self.observed?, self.expected?);
-        match observed - expected {
-            d if d < -0.2 * expected => Some("lower than expected: too coarse still, or the scene is not smooth"),
-            d if d > 0.2 * expected => Some("higher than expected: errors cancel, or it is too coarse still"),
+        match observed / expected.order {
+            part if part < 0.8 => Some("lower than expected: too coarse still, or the scene is not smooth"),
+            part if part > 1.2 && !expected.at_least => {
+                Some("higher than expected: errors cancel, or it is too coarse still")
+            }
             _ => None,
         }
     }

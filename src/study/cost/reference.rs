@@ -13,7 +13,7 @@ const FINER: f64 = 2.0;
 const SURE: f64 = 3.0;
 
 /// Halved steps bring differences down to a quarter; where they do so within these bounds, what is left is extrapolated.
-const FALLS: [f64; 2] = [2.8, 5.6];
+const FALLS: [f64; 2] = [3.3, 4.8];
 
 /// What errors are measured against.
 pub struct Reference {
@@ -36,10 +36,14 @@ pub fn points(mesher: &Mesher, grid: &Grid) -> Vec<Point> {
         Pace::Steps(factor) => [1.0, 0.5, 0.25].map(|part| Pace::Steps(factor * part)).to_vec(),
         Pace::Adapts(tolerance) => [1.0, 0.1, 0.01].map(|part| Pace::Adapts(tolerance * part)).to_vec(),
     };
-    let [fine, coarse] = [1.0, 0.5].map(|part| mesher.elements(family.order, part * FINER * finest));
+    let elements = mesher.elements(family.order, FINER * finest);
+    let (fine, coarse) = match mesher.companion(family.order, &elements) {
+        (coarse, ratio) if ratio > 1.0 => (elements, coarse),
+        (finer, _) => (finer, elements),
+    };
     let point =
         |elements: &Vec<_>, pace| Point { family: family.clone(), elements: elements.clone(), pace, newton: 1.0 };
-    let coarse = (coarse != fine).then(|| point(&coarse, paces[0]));
+    let coarse = bent.then(|| point(&coarse, paces[0]));
     paces.iter().map(|&pace| point(&fine, pace)).chain(coarse).collect()
 }
 
@@ -52,7 +56,10 @@ pub fn establish(sampler: &Sampler, points: &[Point], trials: &[Trial]) -> Resul
     let scales = sampler.scales(samples(0));
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, &scales);
     let coarse = points.iter().position(|point| point.elements != points[0].elements);
-    let in_space = coarse.map_or(0.0, |k| distance(samples(0), samples(k)) / SURE);
+    // Of meshes of which one is not twice as fine all over, less is sure.
+    let halved = coarse.is_none_or(|k| points[0].count() >= 2 * points[k].count());
+    let sure = if halved { SURE } else { 1.0 };
+    let in_space = coarse.map_or(0.0, |k| distance(samples(0), samples(k)) / sure);
     let last = coarse.unwrap_or(points.len()) - 1;
     let (found, in_time, how) = match (points[0].pace, last) {
         (Pace::Steps(_), 2) => in_time(sampler, [samples(0), samples(1), samples(2)], &scales),

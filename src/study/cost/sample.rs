@@ -1,7 +1,9 @@
 //! Which numbers of a run are compared with those of another.
 
 use super::grid::{Pace, dynamic_stages};
+use super::order::Expected;
 use crate::deck::{Deck, NormWord, Path, StageBody};
+use crate::probe::Quantity;
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, columns, columns_of_history};
 use crate::study::scale::{kind, scales};
@@ -26,6 +28,8 @@ pub struct Sampler {
     of_history: usize,
     /// Diagonal of the scene
     length: f64,
+    /// First columns of rotation vectors that are not continued from turn to turn
+    rotations: Vec<usize>,
     /// Whether the initial line of a beam is one that elements only come near
     curved: bool,
     /// Whether something is lumped to nodes where rotations are relative
@@ -59,6 +63,11 @@ impl Sampler {
         Self { outputs, looks, ..Self::new(deck, scene, columns(scene), columns_of_history(scene)) }
     }
 
+    /// The same, over whole histories whatever the deck says of studies.
+    pub fn of_histories(deck: &Deck, scene: &Scene, outputs: Vec<usize>, pace: Pace) -> Self {
+        Self { norm: NormWord::History, ..Self::of_rows(deck, scene, outputs, pace) }
+    }
+
     /// For the columns of a scene, compared with a table that has rows with these stages and clocks.
     pub fn of_table(deck: &Deck, scene: &Scene, outputs: Vec<usize>, instants: Vec<(usize, f64)>) -> Self {
         Self { outputs, looks: Look::At(instants), ..Self::new(deck, scene, columns(scene), columns_of_history(scene)) }
@@ -68,7 +77,7 @@ impl Sampler {
     pub fn of_expectations(deck: &Deck, scene: &Scene) -> (Self, Samples) {
         let (names, values): (Vec<_>, Vec<_>) = expected_values(&scene.expectations).into_iter().unzip();
         let count = names.len();
-        (Self { norm: NormWord::End, ..Self::new(deck, scene, names, count) }, values)
+        (Self { norm: NormWord::End, rotations: Vec::new(), ..Self::new(deck, scene, names, count) }, values)
     }
 
     fn new(deck: &Deck, scene: &Scene, columns: Vec<String>, of_history: usize) -> Self {
@@ -78,6 +87,7 @@ impl Sampler {
             norm: deck.cost.norm.unwrap_or_default(),
             of_history,
             length: scene.plan.model.length,
+            rotations: rotations(scene),
             curved: deck.beams.iter().any(|beam| matches!(beam.path, Path::Arc(_))),
             lumped: scene.reasons.iter().any(|reason| reason.active && LUMPED.contains(&reason.name)),
             looks: Look::Expected,
@@ -110,7 +120,7 @@ impl Sampler {
             NormWord::Max => {
                 let largest =
                     |best: Vec<f64>, row: &Vec<f64>| best.iter().zip(row).map(|(b, v)| b.max(v.abs())).collect();
-                outcome.rows.iter().fold(vec![0.0; self.of_history], largest)
+                outcome.rows.iter().fold(nothing(), largest)
             }
             NormWord::History | NormWord::Rms => self.rows(instants, outcome),
         };
@@ -200,24 +210,27 @@ impl Sampler {
 
     /// The order over the width of elements of an order at which errors of smooth scenes fall: twice that at nodes, or that at which the elements
     /// come near a curved line, and at which nodes stand for what is lumped to them; one more than that between nodes; `None` where outputs count that are not motions.
-    pub fn order_in_space(&self, order: usize, relative: bool) -> Option<f64> {
+    pub fn order_in_space(&self, order: usize, relative: bool) -> Option<Expected> {
         let motion = |&k: &usize| MOTIONS.contains(&kind(&self.columns[k]));
         let between = |&k: &usize| {
-            let place = self.columns[k].split_once('@').map(|(_, rest)| rest);
-            place.is_some_and(|rest| !rest.starts_with("start") && !rest.starts_with("end"))
+            let node = self.columns[k].rsplit_once('.').map_or("", |(node, _)| node);
+            let place = node.split_once('@').map_or("", |(_, place)| place);
+            node.contains(':') || !["", "start", "end"].contains(&place)
         };
         // An even order's errors of the line itself cancel from end to end of an element.
-        let line = if self.curved || (relative && self.lumped) { 2 * ((order + 2) / 2) } else { 2 * order };
-        let expected = if self.outputs.iter().any(between) { 1 + order } else { line };
-        self.outputs.iter().all(motion).then_some(expected as f64)
+        let line = 2 * ((order + 2) / 2);
+        let (expected, at_least) = match () {
+            () if self.outputs.iter().any(between) => (1 + order, true),
+            () if self.curved || (relative && self.lumped) => (line.min(2 * order), line < 2 * order),
+            () => (2 * order, false),
+        };
+        self.outputs.iter().all(motion).then_some(Expected { order: expected as f64, at_least })
     }
 
     /// A rotation has two vectors of up to 2 pi: takes those that are nearer to another row's.
     pub fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
-        let names = &self.columns[first..first + row.len()];
-        for k in
-            (0..row.len().saturating_sub(2)).filter(|&k| names[k].ends_with(".rx") && names[k + 2].ends_with(".rz"))
-        {
+        let own = first..first + row.len();
+        for k in self.rotations.iter().filter(|&k| own.contains(k)).map(|k| k - first) {
             let (r, goal): ([f64; 3], [f64; 3]) = ([row[k], row[k + 1], row[k + 2]], [to[k], to[k + 1], to[k + 2]]);
             let angle = r.iter().map(|x| x * x).sum::<f64>().sqrt();
             if angle == 0.0 {
@@ -232,6 +245,19 @@ impl Sampler {
     }
 }
 
+/// The first columns of rotation vectors, which have another of up to 2 pi that means the same.
+fn rotations(scene: &Scene) -> Vec<usize> {
+    let mut first = 0;
+    let mut found = Vec::new();
+    for probe in &scene.probes {
+        if matches!(probe.quantity, Quantity::Rotation(_)) {
+            found.push(first);
+        }
+        first += probe.names.len();
+    }
+    found
+}
+
 /// Levels of static stages, and multiples of the coarsest step of dynamic ones; paths have no instants in common but their ends.
 fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
     let mut all = Vec::new();
@@ -242,13 +268,15 @@ fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
                 all.extend(thinned(steps).map(|level| (k + 1, level as f64 / steps as f64)));
             }
             StageBody::Dynamic { end, step, .. } => {
-                let step = match coarsest {
-                    Pace::Steps(factor) => Some(step * factor),
-                    _ => deck.output.interval,
+                let own = if let Pace::Steps(factor) = coarsest { Some(step * factor) } else { None };
+                // Rows at multiples of an interval are there with any step.
+                let (first, apart) = match deck.output.interval {
+                    Some(interval) => ((start / interval * (1.0 + SAME)).floor() * interval, Some(interval)),
+                    None => (start, own),
                 };
-                if let Some(step) = step {
-                    let count = ((end - start) / step * (1.0 + SAME)).floor() as usize;
-                    all.extend(thinned(count).map(|n| (k + 1, start + n as f64 * step)));
+                if let Some(apart) = apart {
+                    let count = ((end - first) / apart * (1.0 + SAME)).floor() as usize;
+                    all.extend(thinned(count).map(|n| (k + 1, first + n as f64 * apart)));
                 }
                 all.push((k + 1, end));
                 start = end;
@@ -262,5 +290,5 @@ fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
 /// Numbers from 1 to `count`, evenly, not too many.
 fn thinned(count: usize) -> impl Iterator<Item = usize> {
     let stride = count.div_ceil(MOST_INSTANTS).max(1);
-    (1..=count).filter(move |n| n % stride == 0)
+    (stride..=count).step_by(stride)
 }

@@ -11,6 +11,8 @@ use std::time::Instant;
 /// What takes more attempts than so many times its steps, and some, would not end in any time that a user waits.
 const MOST_ATTEMPTS: f64 = 50.0;
 const FEW_ATTEMPTS: u64 = 1000;
+/// Steps of a stage whose steps adapt.
+const MOST_ADAPTED: f64 = 1e5;
 
 /// What came of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,9 +42,9 @@ pub struct Seconds {
 
 impl Trial {
     /// One that did not come to its end.
-    pub(super) fn interrupted() -> Self {
+    pub(super) fn ended(status: &str) -> Self {
         let seconds = Seconds { cpu: f64::NAN, wall: f64::NAN };
-        Self { status: "interrupted".into(), samples: Vec::new(), steps: 0, iterations: 0, factorisations: 0, seconds }
+        Self { status: status.into(), samples: Vec::new(), steps: 0, iterations: 0, factorisations: 0, seconds }
     }
 
     /// Whether there is something to compare.
@@ -71,7 +73,7 @@ pub fn run(text: &str, settings: &[String], sampler: &Sampler, interrupted: &dyn
                 seconds,
             }
         }
-        Err(_) => Trial { status: "deck".into(), seconds, ..Trial::interrupted() },
+        Err(_) => Trial { seconds, ..Trial::ended("deck") },
     }
 }
 
@@ -113,10 +115,10 @@ fn attempts(deck: &Deck) -> u64 {
         steps += match stage.body {
             StageBody::Static { steps, .. } => steps as f64,
             StageBody::Path { max_steps, .. } => max_steps as f64,
-            StageBody::Dynamic { end, step, .. } => {
+            StageBody::Dynamic { end, step, step_tolerance, .. } => {
                 let count = (end - start) / step;
                 start = end;
-                count
+                if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
             }
             StageBody::Modal { .. } | StageBody::Buckling { .. } => 1.0,
         };
