@@ -7,7 +7,7 @@ use crate::deck::{Accuracy, Deck};
 use crate::output::Reached;
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
-use crate::study::cost::{self, Against, Journal, Options, Pace, Point};
+use crate::study::cost::{self, Journal, Options, Pace, Point};
 use crate::study::error_bars::{ErrorBars, error_bars, refuse_paths};
 use std::num::NonZero;
 use std::path::Path;
@@ -78,7 +78,6 @@ impl Target {
             progress.tell(done as f64 / all as f64, || format!("looking for the accuracy: {done} of {all} runs"));
         };
         let options = Options {
-            against: &Against::Finest,
             threads: std::thread::available_parallelism().map_or(1, NonZero::get),
             budget: self.budget,
             interrupted: &signals::caught,

@@ -1,20 +1,30 @@
 //! `beamsim check`
 
+use super::load::Loaded;
 use super::{Status, Verdict, load, say};
+use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
+use crate::study::forecast::{Forecast, forecast};
 use crate::tensor::{Mat3, Vec3};
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
-/// Reads decks and tells what would be simulated.
+/// How long a run is watched to tell how long it will take.
+const PATIENCE: Duration = Duration::from_millis(250);
+
+/// Reads decks and tells what would be simulated, and how long it will take.
 pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
     let mut verdict = Verdict::default();
     for path in decks {
-        match load::scene(path, settings) {
-            Ok(scene) => {
-                say::line(&format!("{}: {}", path.display(), scene.title.as_deref().unwrap_or("(no title)")));
-                if let Err(message) = tell(&scene) {
-                    verdict.fail(Status::Wrong, "deck", message);
+        let begun = Instant::now();
+        match load::deck(path, settings) {
+            Ok(loaded) => {
+                let reading = begun.elapsed();
+                say::line(&format!("{}: {}", path.display(), loaded.scene.title.as_deref().unwrap_or("(no title)")));
+                match tell(&loaded.scene) {
+                    Ok(()) => tell_time(&loaded, reading),
+                    Err(message) => verdict.fail(Status::Wrong, "deck", message),
                 }
             }
             Err(refusal) => verdict.refuse(refusal),
@@ -41,6 +51,30 @@ fn tell(scene: &Scene) -> Result<(), String> {
         say::line(&format!("  {mark} {:<width$}  {}{added}", reason.name, reason.reason));
     }
     size.map(|_| ())
+}
+
+/// How long a run will take. One that an accuracy is wanted of begins with a search among other meshes and steps.
+fn tell_time(loaded: &Loaded, reading: Duration) {
+    let Forecast { seconds, watched, ended, at } = forecast(&loaded.scene, PATIENCE);
+    let whole = duration(seconds + reading.as_secs_f64());
+    let Moment { stage, time, load } = at;
+    let how = match ended {
+        Some(Ok(())) => "it was run to its end".into(),
+        Some(Err(failure)) => format!("it was run, and ends with `{}`", failure.name()),
+        None => format!("{} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}", duration(watched)),
+    };
+    let own = if loaded.deck.accuracy.is_some() { ", with its own elements and steps" } else { "" };
+    say::line(&format!("run: about {whole} on this machine{own} ({how})"));
+}
+
+/// Two digits are more than is known.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.95 => format!("{:.1} ms", 1e3 * s),
+        s if s < 99.5 => format!("{s:.1} s"),
+        s if s < 99.5 * 60.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
 }
 
 fn tell_beams(mesh: &Mesh) {

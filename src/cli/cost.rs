@@ -3,7 +3,7 @@
 use super::accuracy::{describe, lines, refused};
 use super::load::{Loaded, Refusal};
 use super::progress::Progress;
-use super::run::{folder, twin};
+use super::run::{folder, refuse_twins};
 use super::{Status, Verdict, load, say, signals};
 use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
 use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
@@ -42,9 +42,7 @@ pub fn cost(decks: &[PathBuf], settings: &[String], wanted: &Wanted, out: Option
         verdict.fail(Status::Wrong, "usage", "--accuracy must be positive".into());
         return verdict.finish(1);
     }
-    if let Some(twin) = twin(decks) {
-        let message = format!("two decks are called `{twin}`: their results would overwrite each other");
-        verdict.fail(Status::Wrong, "usage", message);
+    if refuse_twins(decks, &mut verdict) {
         return verdict.finish(1);
     }
     let settings: Vec<String> = settings.iter().cloned().chain(wanted.vary.iter().map(|vary| setting(vary))).collect();
@@ -101,14 +99,13 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
     let mut tell =
         |done: usize, all: usize| progress.tell(done as f64 / all as f64, || format!("{done} of {all} runs"));
     let options = Options {
-        against: &against,
         threads: wanted.threads.or(std::thread::available_parallelism().ok()).map_or(1, NonZero::get),
         budget: wanted.budget,
         interrupted: &signals::caught,
         tell: &mut tell,
         journal: &mut journal,
     };
-    let found = study(&loaded.text, &loaded.deck, &loaded.scene, options);
+    let found = study(&loaded.text, &loaded.deck, &loaded.scene, &against, options);
     progress.done();
     if signals::caught().is_some() && !journal.is_empty() {
         say::note(&format!("{name}: {} runs are kept; the same command goes on after them", journal.len()));
@@ -187,7 +184,7 @@ fn frontier(found: &Study) -> Vec<&Run> {
 }
 
 fn tell_run(run: &Run, found: &Study) {
-    let told = 2.0 * found.reference.uncertainty;
+    let told = found.reference.least_told();
     let error = if run.error < told { format!("< {told:.1e}") } else { format!("{:.1e}", run.error) };
     let limit = run.limit.map_or("", |knob| knob.name());
     let spread = if run.timing.alone > 1 { format!("{:.0} %", 100.0 * run.timing.spread) } else { "–".into() };
@@ -225,7 +222,7 @@ fn tell_lines(loaded: &Loaded, found: &Study, accuracy: f64) {
     let Some(run) = frontier(found).into_iter().find(|run| run.error <= accuracy) else {
         let finest = frontier(found).pop().and_then(|run| run.limit);
         let advice = match finest {
-            _ if 2.0 * found.reference.uncertainty > accuracy => "the reference is not that certain",
+            _ if found.reference.least_told() > accuracy => "the reference is not that certain",
             Some(Knob::Step) => "try smaller steps, --vary step=0.25,0.125,0.0625",
             Some(Knob::Newton) => "try a smaller `tolerance` of the stages",
             _ => "try finer meshes, --vary elements=4,8,16",
@@ -273,6 +270,7 @@ fn plot(title: &str, found: &Study) -> String {
         x: "CPU time / s".into(),
         y: format!("error of {outputs}, relative"),
         lines: std::iter::once(all).chain(families.iter().map(line)).collect(),
+        level: Some((found.reference.least_told(), "the reference tells no less".into())),
     }
     .to_log_log_svg()
 }

@@ -1,6 +1,6 @@
 //! `beamsim effects`
 
-use super::run::{folder, status_of, twin};
+use super::run::{folder, refuse_twins, status_of};
 use super::{Status, Verdict, load, say, signals};
 use crate::deck::EffectWord;
 use crate::output::PartFile;
@@ -14,9 +14,7 @@ pub fn effects(decks: &[PathBuf], settings: &[String], tolerance: f64, out: Opti
         verdict.fail(Status::Wrong, "usage", "--tolerance must be finite and not negative".into());
         return verdict.finish(1);
     }
-    if let Some(twin) = twin(decks) {
-        let message = format!("two decks are called `{twin}`: their results would overwrite each other");
-        verdict.fail(Status::Wrong, "usage", message);
+    if refuse_twins(decks, &mut verdict) {
         return verdict.finish(1);
     }
     signals::caught();

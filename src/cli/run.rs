@@ -14,12 +14,7 @@ use std::time::Instant;
 /// Runs decks one after the other; where an accuracy is wanted, after a search for elements and steps.
 pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
-    if let Some(twin) = twin(decks) {
-        verdict.fail(
-            Status::Wrong,
-            "usage",
-            format!("two decks are called `{twin}`: their results would overwrite each other"),
-        );
+    if refuse_twins(decks, &mut verdict) {
         return verdict.finish(1);
     }
     for path in decks {
@@ -27,7 +22,7 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
         match target.aim(&name, path, settings) {
             Ok(Aimed { scene, reached, bars }) => {
                 let folder = folder(out, &name, decks.len() > 1);
-                let finished = simulate(&scene, &name, Some(&folder), Beyond { reached, bars });
+                let finished = simulate(&scene, &name, Some(&folder), None, Beyond { reached, bars });
                 summarise(&name, &scene, &finished, &folder);
                 if let Err(failure) = &finished.result {
                     verdict.fail(finished.status(), failure.name(), failure.to_string());
@@ -42,8 +37,16 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
     verdict.finish(decks.len())
 }
 
+/// Whether results of decks would overwrite each other, which is said.
+pub fn refuse_twins(decks: &[PathBuf], verdict: &mut Verdict) -> bool {
+    let Some(twin) = twin(decks) else { return false };
+    let message = format!("two decks are called `{twin}`: their results would overwrite each other");
+    verdict.fail(Status::Wrong, "usage", message);
+    true
+}
+
 /// A name that two decks share.
-pub fn twin(decks: &[PathBuf]) -> Option<String> {
+fn twin(decks: &[PathBuf]) -> Option<String> {
     let names: Vec<String> = decks.iter().map(|deck| load::name(deck)).collect();
     names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)).map(|(_, name)| name.clone())
 }
@@ -63,8 +66,6 @@ pub struct Finished {
     pub result: Result<(), Failure>,
     /// With what work
     pub counters: Counters,
-    /// What was expected on the way
-    pub recorder: Recorder,
     /// Wall-clock seconds
     pub seconds: f64,
 }
@@ -88,18 +89,18 @@ pub fn status_of(failure: &Failure) -> Status {
 }
 
 /// What watches a run from the command line.
-struct Watcher {
+struct Watcher<'r> {
     history: Option<HistoryWriter>,
-    recorder: Recorder,
+    /// What is expected on the way, where that is judged
+    recorder: Option<&'r mut Recorder>,
     progress: Progress,
     dynamic: Vec<bool>,
     modes: ModesWriter,
 }
 
-impl Observer for Watcher {
+impl Observer for Watcher<'_> {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
-        self.recorder.row(snapshot);
-
+        self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
         let Some(history) = &mut self.history else { return Ok(()) };
         match history.row(snapshot, self.dynamic[snapshot.stage - 1]).map_err(io_failure)? {
             None => Ok(()),
@@ -111,13 +112,13 @@ impl Observer for Watcher {
     }
 
     fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.recorder.modes(modes);
+        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
         self.modes.push_modes(stage, modes);
         Ok(())
     }
 
     fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
-        self.recorder.buckling(loads);
+        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.modes.push_loads(stage, loads);
         Ok(())
     }
@@ -148,8 +149,14 @@ pub struct Beyond {
     pub bars: Option<ErrorBars>,
 }
 
-/// Runs a scene; with a folder it leaves its results there.
-pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, beyond: Beyond) -> Finished {
+/// Runs a scene; with a folder it leaves its results there, and a recorder follows what is expected.
+pub fn simulate(
+    scene: &Scene,
+    name: &str,
+    folder: Option<&Path>,
+    recorder: Option<&mut Recorder>,
+    beyond: Beyond,
+) -> Finished {
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
@@ -163,7 +170,7 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, beyond: Beyond
     };
     let mut watcher = Watcher {
         history,
-        recorder: Recorder::new(scene),
+        recorder,
         progress: Progress::new(name),
         modes: ModesWriter::default(),
         dynamic: scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect(),
@@ -183,7 +190,7 @@ pub fn simulate(scene: &Scene, name: &str, folder: Option<&Path>, beyond: Beyond
             result = Err(io_failure(error));
         }
     }
-    Finished { result, counters, recorder: watcher.recorder, seconds }
+    Finished { result, counters, seconds }
 }
 
 /// Both files are whole before either gets its name.

@@ -2,7 +2,7 @@
 
 use super::run::{Beyond, folder, simulate};
 use super::{Status, Verdict, load, say, signals};
-use crate::study::{Judgement, expected_failure, judge};
+use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
 /// Runs decks and prints what was expected, what came, the error, the time. A folder stands for the decks in it.
@@ -25,12 +25,13 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
         let judgements = match load::scene(path, settings) {
             Ok(scene) => {
                 let folder = out.map(|out| folder(Some(out), &name, decks.len() > 1));
-                let finished = simulate(&scene, &name, folder.as_deref(), Beyond::default());
+                let mut recorder = Recorder::new(&scene);
+                let finished = simulate(&scene, &name, folder.as_deref(), Some(&mut recorder), Beyond::default());
                 if let Some(signal) = signals::caught() {
                     say::error("interrupted", &format!("stopped by signal {signal}"));
                     return if signal == 15 { Status::Terminated } else { Status::Interrupted };
                 }
-                let judgements = judge(&finished.recorder, &finished.result, &finished.counters);
+                let judgements = judge(&recorder, &finished.result, &finished.counters);
                 report(path, &judgements, finished.seconds);
                 judgements
             }

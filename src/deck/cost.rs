@@ -97,11 +97,13 @@ fn one_or_more<T>(context: &Context, item: &Item, read: impl Fn(&Context, &Item)
     array.iter().map(|entry| read(context, entry)).collect()
 }
 
-/// Factors and tolerances are no further from one than this.
-const FARTHEST: f64 = 1e12;
+/// Factors are no further from one than this.
+const FARTHEST_FACTOR: f64 = 1e3;
+/// And tolerances.
+const FARTHEST_TOLERANCE: f64 = 1e12;
 
 fn positive(table: &Table, key: &str) -> Option<Vec<f64>> {
-    let farthest = if key == "step_tolerance" { FARTHEST } else { FARTHEST.sqrt().sqrt() };
+    let farthest = if key == "step_tolerance" { FARTHEST_TOLERANCE } else { FARTHEST_FACTOR };
     one_or_more(table.context, table.get(key)?, |context, item| {
         let number = context.number(item)?;
         match (1.0 / farthest..=farthest).contains(&number.value) {

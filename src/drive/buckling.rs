@@ -58,7 +58,8 @@ impl Run<'_> {
             // Of the loads on this side of the present one it is number `before`.
             let before = passed[usize::from(back)];
             passed[usize::from(back)] += 1;
-            loads[number] = self.follow(workshop, loads[number], before)?;
+            let done = number as f64 / loads.len() as f64;
+            loads[number] = self.follow(workshop, loads[number], before, done)?;
             self.state.copy_from(&start);
             self.good.copy_from(&start);
         }
@@ -68,8 +69,8 @@ impl Run<'_> {
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the
-    /// last point before it, since behind it the way back is not sure to be the same.
-    fn follow(&mut self, workshop: &mut Workshop, estimate: f64, before: usize) -> Result<f64, Failure> {
+    /// last point before it, since behind it the way back is not sure to be the same. `done` is the part of the stage that lies behind.
+    fn follow(&mut self, workshop: &mut Workshop, estimate: f64, before: usize, done: f64) -> Result<f64, Failure> {
         let way = (estimate - self.state.load).signum();
         let none = self.negative_pivots(workshop);
         let mut search = Search {
@@ -91,7 +92,7 @@ impl Run<'_> {
             let target = search.target();
             self.state.copy_from(&search.here);
             self.good.copy_from(&search.here);
-            self.observer.progress(self.moment(), self.static_progress(0.5))?;
+            self.observer.progress(self.moment(), self.static_progress(done))?;
             if !self.continue_path(workshop, target) || self.has_leapt(workshop, &search.here)? {
                 // Load control ends at limit points, or comes down on another branch.
                 search.end_at(target);
@@ -102,7 +103,7 @@ impl Run<'_> {
                 // Without a count of pivots the tangent itself must do.
                 self.state.copy_from(&search.here);
                 self.good.copy_from(&search.here);
-                return self.follow_nearest(workshop, search.estimate, before);
+                return self.follow_nearest(workshop, search.estimate, before, done);
             };
             if passed > before {
                 search.beyond = Some(target);
@@ -140,9 +141,15 @@ impl Run<'_> {
     }
 
     /// Goes from estimate to estimate, each what the critical load looks like from the last.
-    fn follow_nearest(&mut self, workshop: &mut Workshop, mut critical: f64, before: usize) -> Result<f64, Failure> {
+    fn follow_nearest(
+        &mut self,
+        workshop: &mut Workshop,
+        mut critical: f64,
+        before: usize,
+        done: f64,
+    ) -> Result<f64, Failure> {
         for _ in 0..MOST_LOOKS {
-            self.observer.progress(self.moment(), self.static_progress(0.5))?;
+            self.observer.progress(self.moment(), self.static_progress(done))?;
             let from = self.state.load;
             let near = self.critical_loads(workshop, before + 4)?;
             // Those that were passed lie behind: it is the one that looks most like the last estimate.

@@ -34,8 +34,11 @@ impl Rows {
 pub trait Beside {
     /// The names of its columns, beside these
     fn names(&self, columns: &[String]) -> Vec<String>;
-    /// Its row beside that of a stage (from 1) and clock: the time, or in static stages the load factor
-    fn at(&mut self, stage: usize, clock: f64, row: &[f64]) -> Vec<f64>;
+    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor. Whether all is known that stands beside it
+    /// and the rows before: else they wait for a later row.
+    fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool;
+    /// What stands beside the rows that were taken since it was asked last, as far as is known
+    fn numbers(&self) -> Vec<f64>;
 }
 
 /// Writes the history of a run.
@@ -50,7 +53,10 @@ pub struct HistoryWriter {
     text: String,
     seen: u64,
     record: csv::ByteRecord,
+    /// Whether the last row was not wanted, and so is not written yet
     pending: bool,
+    /// Wanted rows that wait for what stands beside them
+    waiting: Vec<csv::ByteRecord>,
 }
 
 impl HistoryWriter {
@@ -74,6 +80,7 @@ impl HistoryWriter {
             seen: 0,
             record: csv::ByteRecord::new(),
             pending: false,
+            waiting: Vec::new(),
         })
     }
 
@@ -89,37 +96,57 @@ impl HistoryWriter {
             let mut names = self.probes.iter().flat_map(|probe| &probe.names);
             return Ok(names.nth(k.saturating_sub(2)).cloned().or(Some("time".into())));
         }
-        if let Some(beside) = &mut self.beside {
-            let clock = if dynamic { at.state.time } else { at.state.load };
-            let more = beside.at(at.stage, clock, &self.values[2..]);
-            self.values.extend(more);
-        }
         self.record.clear();
         self.record.push_field(at.stage.to_string().as_bytes());
-        for value in &self.values {
-            self.text.clear();
-            // Debug formatting is the shortest text that reads back to the same float, with an exponent where shorter.
-            let _ = write!(self.text, "{value:?}");
-            self.record.push_field(self.text.as_bytes());
-        }
+        push(&mut self.record, &mut self.text, &self.values);
         self.pending = !self.rows.contains(self.seen, dynamic, at.state.time);
         self.seen += 1;
-        if !self.pending {
+        if self.beside.is_some() {
+            self.wait_for_what_stands_beside(at, dynamic)?;
+        } else if !self.pending {
             self.writer.write_byte_record(&self.record)?;
         }
         Ok(None)
     }
 
+    fn wait_for_what_stands_beside(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
+        if !self.pending {
+            self.waiting.push(self.record.clone());
+        }
+        let clock = if dynamic { at.state.time } else { at.state.load };
+        let known = self.beside.as_mut().is_some_and(|beside| beside.take(at.stage, clock, &self.values[2..]));
+        if known { self.write_waiting() } else { Ok(()) }
+    }
+
+    fn write_waiting(&mut self) -> io::Result<()> {
+        let beside = self.beside.as_ref().map_or(Vec::new(), |beside| beside.numbers());
+        for mut record in self.waiting.drain(..) {
+            push(&mut record, &mut self.text, &beside);
+            self.writer.write_byte_record(&record)?;
+        }
+        Ok(())
+    }
+
     /// Ends the history: `history.csv` if the run finished, else `history.partial.csv`.
     pub fn finish(mut self, finished: bool) -> io::Result<()> {
         if self.pending {
-            self.writer.write_byte_record(&self.record).map_err(io::Error::from)?;
+            self.waiting.push(std::mem::take(&mut self.record));
         }
+        self.write_waiting()?;
         let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
         let (name, other) =
             if finished { ("history.csv", "history.partial.csv") } else { ("history.partial.csv", "history.csv") };
         self.part.finish(&file, name)?;
         remove_if_there(&self.folder, other)
+    }
+}
+
+/// Debug formatting is the shortest text that reads back to the same float, with an exponent where shorter.
+fn push(record: &mut csv::ByteRecord, text: &mut String, values: &[f64]) {
+    for value in values {
+        text.clear();
+        let _ = write!(text, "{value:?}");
+        record.push_field(text.as_bytes());
     }
 }
 

@@ -25,6 +25,8 @@ pub struct LinePlots {
     pub y: String,
     /// The lines
     pub lines: Vec<NamedLine>,
+    /// A level of the vertical axis, and what it means
+    pub level: Option<(f64, String)>,
 }
 
 /// A line of a plot.
@@ -64,7 +66,10 @@ impl LinePlots {
                 plots.push(marks(points).with_size(4.0).with_legend(line.name.as_str()).into());
             }
         }
-        let layout = Layout::auto_from_plots(&plots)
+        let layout = Layout::auto_from_plots(&plots);
+        let level = self.level.iter().filter(|(level, _)| *level > 0.0);
+        let layout = level.fold(layout, |layout, (level, name)| with_level(layout, *level, name));
+        let layout = with_room_for_marks(layout)
             .with_log_scale()
             .with_title(self.title.as_str())
             .with_x_label(self.x.as_str())
@@ -75,6 +80,24 @@ impl LinePlots {
             .with_height(480.0);
         render_to_svg(plots, layout)
     }
+}
+
+/// Axes end at powers of ten: this is for marks that lie next to one.
+const ROOM: f64 = 1.15;
+
+fn with_room_for_marks(mut layout: Layout) -> Layout {
+    for range in [&mut layout.data_x_range, &mut layout.data_y_range] {
+        *range = range.map(|(from, to)| (from / ROOM, to * ROOM));
+    }
+    layout
+}
+
+/// A dashed line across, where it does not make the plot much higher.
+fn with_level(mut layout: Layout, level: f64, name: &str) -> Layout {
+    const FAR_BELOW: f64 = 0.03;
+    let Some((from, to)) = layout.data_y_range.filter(|(from, _)| level > FAR_BELOW * from) else { return layout };
+    layout.data_y_range = Some((from.min(level), to.max(level)));
+    layout.with_reference_line(ReferenceLine::horizontal(level).with_color("#555555").with_label(name))
 }
 
 /// 0.002, 0.5, 20, 1e-6.

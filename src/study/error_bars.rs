@@ -1,19 +1,16 @@
 //! Error bars: the history of a run beside those of two coarser ones, of half its elements and of twice its step.
 //!
-//! What is told at a row is the largest estimate so far: an error does not vanish where two histories cross. See [`super::accuracy`] for the
+//! What is told at a row is the largest estimate so far, and up to the next row that all have: an error does not vanish where two histories cross. See [`super::accuracy`] for the
 //! estimate.
 
-use super::accuracy::{LEFT_BY_NEWTON, divisor_in_space, divisor_in_time};
+use super::accuracy::{divisor_in_space, divisor_in_time, left_by_newton};
 use super::cost::{Family, Mesher, Pace, Point, Refusal, Sampler, dynamic_stages, trial};
-use super::outcome::Outcome;
+use super::outcome::{Look, Outcome};
 use crate::deck::{Deck, Diagnostic, StageBody};
 use crate::drive::Failure;
 use crate::output::Beside;
 use crate::scene::Scene;
 use std::thread;
-
-/// Instants that lie closer, relative to their size, are the same.
-const SAME: f64 = 1e-9;
 
 /// The step tolerance of a companion whose steps adapt, over that of the run.
 const LOOSER: f64 = 10.0;
@@ -66,38 +63,31 @@ pub fn error_bars(
         }
     }
     let columns = scene.probes.iter().map(|probe| probe.names.len()).sum();
-    let tolerance = LEFT_BY_NEWTON * deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max);
+    let tolerance = left_by_newton(deck);
     let largest = vec![vec![0.0; columns]; found.len()];
     Ok(ErrorBars { sampler, largest, values: vec![0.0; columns], tolerance, companions: found })
 }
 
 /// The variants that errors are told from, with the divisors of differences to them.
 fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, f64)> {
-    let makes_sense = |_: Option<usize>, elements: &[Vec<usize>]| {
-        trial::makes_sense(text, &point(elements.to_vec(), Pace::Timeless).settings(deck, text), sampler)
-    };
-    let mesher = Mesher { deck, makes_sense: &makes_sense };
+    let mesher = Mesher { text, deck, sampler, interpolation: None };
     let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
     let mut found = Vec::new();
     if let Some(order) = deck.beams.iter().map(|beam| beam.order).min() {
         let (other, ratio) = mesher.companion(None, &own);
-        found.push((point(other, Pace::Timeless), divisor_in_space(ratio, order)));
+        found.push((Point::new(Family::default(), other, Pace::Timeless), divisor_in_space(ratio, order)));
     }
     let adapts = |(_, body)| if let StageBody::Dynamic { step_tolerance, .. } = body { step_tolerance } else { None };
     if let Some(tolerance) = dynamic_stages(deck).find_map(adapts) {
-        found.push((point(own, Pace::Adapts(LOOSER * tolerance)), 1.0));
+        found.push((Point::new(Family::default(), own, Pace::Adapts(LOOSER * tolerance)), 1.0));
     } else if dynamic_stages(deck).next().is_some() {
         // Where an interval leaves no longer step, a shorter one tells.
-        let with = |factor| point(own.clone(), Pace::Steps(factor));
+        let with = |factor| Point::new(Family::default(), own.clone(), Pace::Steps(factor));
         let ratio = |point: &Point| point.step(deck).unwrap_or(1.0) / with(1.0).step(deck).unwrap_or(1.0);
         let other = [2.0, 0.5].map(with).into_iter().find(|other| ratio(other) != 1.0);
         found.extend(other.map(|other| (other.clone(), divisor_in_time(ratio(&other)))));
     }
     found
-}
-
-fn point(elements: Vec<Vec<usize>>, pace: Pace) -> Point {
-    Point { family: Family { order: None, interpolation: None, scheme: None }, elements, pace, newton: 1.0 }
 }
 
 /// Rows of paths lie where increments end, and those of steps that adapt where these do: nothing that two runs share.
@@ -120,23 +110,34 @@ impl Beside for ErrorBars {
         columns.iter().map(|column| format!("{column}.err")).collect()
     }
 
-    fn at(&mut self, stage: usize, clock: f64, row: &[f64]) -> Vec<f64> {
+    fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool {
+        let mut known = true;
         for (companion, largest) in self.companions.iter_mut().zip(&mut self.largest) {
-            let Outcome { clocks, rows, .. } = &companion.outcome;
-            let hit = |&(s, c): &(usize, f64)| s == stage && (c - clock).abs() <= SAME * clock.abs().max(SAME);
-            let Some(after) = clocks[companion.next..].iter().position(hit) else { continue };
-            companion.next += after;
-            let mut nearest = rows[companion.next].clone();
+            let there = match companion.outcome.look_at(companion.next, stage, clock) {
+                Look::Row(there) => there,
+                Look::Between => {
+                    known = false;
+                    continue;
+                }
+                Look::Over => continue,
+            };
+            companion.next = there;
+            let mut nearest = companion.outcome.rows[there].clone();
             self.sampler.take_nearest_rotations(0, &mut nearest, row);
             for ((largest, a), b) in largest.iter_mut().zip(&nearest).zip(row) {
-                *largest = largest.max((a - b).abs() / companion.divisor);
+                let difference = (a - b).abs() / companion.divisor;
+                *largest = if difference.is_nan() { f64::INFINITY } else { largest.max(difference) };
             }
         }
         let mut with_modes = row.to_vec();
         with_modes.resize(self.sampler.columns.len(), f64::NAN);
         let kinds = self.sampler.scales(&with_modes);
         self.values.iter_mut().zip(&kinds).for_each(|(largest, value)| *largest = largest.max(*value));
+        known
+    }
+
+    fn numbers(&self) -> Vec<f64> {
         let estimate = |k: usize| self.largest.iter().map(|of_companion| of_companion[k]).sum::<f64>();
-        (0..row.len()).map(|k| estimate(k) + self.tolerance * self.values[k]).collect()
+        (0..self.values.len()).map(|k| estimate(k) + self.tolerance * self.values[k]).collect()
     }
 }

@@ -5,6 +5,7 @@ pub mod accuracy;
 mod compare;
 pub mod cost;
 pub mod error_bars;
+pub mod forecast;
 mod outcome;
 mod scale;
 mod verify;

@@ -47,7 +47,41 @@ impl Outcome {
     }
 }
 
+/// Instants that lie closer, relative to their size, are the same.
+const SAME: f64 = 1e-9;
+
+fn slack(clock: f64) -> f64 {
+    SAME * clock.abs().max(SAME)
+}
+
+/// What a run has at an instant of a stage.
+pub(in crate::study) enum Look {
+    /// The row with this number
+    Row(usize),
+    /// No row, but later ones
+    Between,
+    /// The stage is over
+    Over,
+}
+
 impl Outcome {
+    /// The number of the row of a stage (from 1) and clock, not before row `from`.
+    pub(in crate::study) fn row_at(&self, from: usize, stage: usize, clock: f64) -> Option<usize> {
+        let hit = |&(s, c): &(usize, f64)| s == stage && (c - clock).abs() <= slack(clock);
+        self.clocks[from..].iter().position(hit).map(|after| from + after)
+    }
+
+    /// What there is of a stage (from 1) at a clock, not before row `from`, where clocks only rise within stages.
+    pub(in crate::study) fn look_at(&self, from: usize, stage: usize, clock: f64) -> Look {
+        let early = |&(s, c): &(usize, f64)| (s, c) < (stage, clock - slack(clock));
+        let next = from + self.clocks[from..].partition_point(early);
+        match self.clocks.get(next) {
+            Some(&(s, c)) if s == stage && c <= clock + slack(clock) => Look::Row(next),
+            Some(&(s, _)) if s == stage => Look::Between,
+            _ => Look::Over,
+        }
+    }
+
     /// A stored history as the outcome of a run: columns of the scene that it lacks are NaN.
     pub(in crate::study) fn of_table(scene: &Scene, table: &HistoryReader) -> Self {
         let find = |name: &str| table.names.iter().position(|known| known == name);

@@ -2,12 +2,17 @@
 
 use crate::deck::{Instant, Reduce};
 use crate::drive::{Counters, Failure, Mode, Snapshot};
+use crate::probe::Probe;
 use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
 
 /// Follows the expected columns through every converged state.
 pub struct Recorder {
     expectations: Vec<Expectation>,
     rows: Vec<Vec<Row>>,
+    /// What is read in each state; several expectations may be about one quantity
+    probes: Vec<Probe>,
+    /// Of each expectation that has a column, its place among the columns of all probes
+    places: Vec<Option<usize>>,
     scratch: Vec<f64>,
     /// Of the last stages that had some
     modes: Vec<Mode>,
@@ -44,7 +49,9 @@ impl Recorder {
     pub fn new(scene: &Scene) -> Self {
         let expectations = scene.expectations.clone();
         let rows = vec![Vec::new(); expectations.len()];
-        Self { rows, expectations, scratch: Vec::new(), modes: Vec::new(), critical: Vec::new() }
+        let mut probes: Vec<Probe> = Vec::new();
+        let places = expectations.iter().map(|expectation| place(expectation, &mut probes)).collect();
+        Self { rows, expectations, probes, places, scratch: Vec::new(), modes: Vec::new(), critical: Vec::new() }
     }
 
     /// Takes the modes of a stage.
@@ -77,19 +84,26 @@ impl Recorder {
 
     /// Takes a converged state.
     pub fn row(&mut self, at: &Snapshot) {
-        for (expectation, rows) in self.expectations.iter().zip(&mut self.rows) {
-            if let ExpectationKind::Column { probe, component, .. } = &expectation.kind {
-                self.scratch.clear();
-                probe.read(at, &mut self.scratch);
-                rows.push(Row {
-                    stage: at.stage,
-                    time: at.state.time,
-                    load: at.state.load,
-                    value: self.scratch[*component],
-                });
-            }
+        self.scratch.clear();
+        for probe in &self.probes {
+            probe.read(at, &mut self.scratch);
+        }
+        let moment = |value| Row { stage: at.stage, time: at.state.time, load: at.state.load, value };
+        for (place, rows) in self.places.iter().zip(&mut self.rows) {
+            rows.extend(place.map(|place| moment(self.scratch[place])));
         }
     }
+}
+
+/// The place of an expectation's column among those of all probes, to which its own is added where it is not there.
+fn place(expectation: &Expectation, probes: &mut Vec<Probe>) -> Option<usize> {
+    let ExpectationKind::Column { probe, component, .. } = &expectation.kind else { return None };
+    let known = probes.iter().position(|known| known.names == probe.names);
+    let number = known.unwrap_or(probes.len());
+    if known.is_none() {
+        probes.push(probe.clone());
+    }
+    Some(probes[..number].iter().map(|before| before.names.len()).sum::<usize>() + component)
 }
 
 /// What is expected of a run, and the values: of those expectations that name one, but for counters.

@@ -225,9 +225,27 @@ fn check_tells_what_would_be_simulated() {
         "mass 1,",
         "on  beam elasticity",
         "off gravity on beams",
+        "ms on this machine (it was run to its end)",
     ] {
         assert!(text.contains(words), "{words:?} is missing in\n{text}");
     }
+    folder.write("long.toml", &swinging(1e6));
+    let text = String::from_utf8_lossy(&folder.beamsim(&["check", "long.toml"]).stdout).into_owned();
+    assert!(text.contains(" of it led to stage 1, time "), "{text}");
+    folder.write("loose.toml", &GOOD.replace("fix = \"all\"", "fix = \"pin\""));
+    let output = folder.beamsim(&["check", "loose.toml"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(status(&output) == 0 && text.contains("it was run, and ends with `singular`"), "{text}");
+}
+
+/// A cantilever whose load comes smoothly, and stays.
+fn swinging(end: f64) -> String {
+    let load = "force = [0, 0, \"f\"]\nhistory = \"h\"\n[history.h]\ntimes = [0, 0.5]\nvalues = [0, 1]\nsmooth = true";
+    let (head, _) = GOOD.split_once("[[stage]]").unwrap();
+    let head = head.replace("force = [0, 0, \"f\"]", load);
+    format!(
+        "{head}[[stage]]\nkind = \"dynamic\"\nend = {end:?}\nstep = 0.01\n[output]\nnodes = [\"tip\"]\ncolumns = [\"u\", \"r\", \"energy\"]\n"
+    )
 }
 
 #[test]
@@ -318,6 +336,61 @@ fn error_bars_hold_the_error() {
     folder.write("path.toml", &GOOD.replace("kind = \"static\"", "kind = \"static\"\ncontrol = \"arc_length\""));
     let refused = folder.beamsim(&["run", "path.toml", "--error-bars"]);
     assert_eq!((status(&refused), last_line(&refused)), (2, "error[deck]: 1 error in path.toml".into()));
+}
+
+#[test]
+fn error_bars_hold_the_errors_of_a_motion_from_its_first_row_on() {
+    let folder = Folder::new("error_bars_of_a_motion");
+    folder.write("deck.toml", &swinging(0.5));
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--error-bars", "--out", "bars"])), 0);
+    let finer = ["beam.0.elements=8", "beam.0.order=3", "stage.0.step=0.00125"];
+    let words: Vec<&str> = finer.iter().flat_map(|setting| ["--set", setting]).collect();
+    assert_eq!(status(&folder.beamsim(&[&["run", "deck.toml", "--out", "exact"][..], &words].concat())), 0);
+    // Rows of the coarser steps are every other one; those between have the bar of the next.
+    let read = |run: &str| beamsim::output::HistoryReader::read(&folder.0.join(run).join("history.csv")).unwrap();
+    let [bars, exact] = ["bars", "exact"].map(read);
+    let column = |history: &beamsim::output::HistoryReader, name: &str| {
+        history.names.iter().position(|known| known == name).unwrap()
+    };
+    for name in ["tip.ux", "tip.uz", "tip.ry", "energy.kinetic", "energy.strain"] {
+        let (own, bar, other) = (column(&bars, name), column(&bars, &format!("{name}.err")), column(&exact, name));
+        let mut largest = 0.0_f64;
+        for (k, row) in bars.rows.iter().enumerate() {
+            let error = (row[own] - exact.rows[8 * k][other]).abs();
+            assert!(error <= row[bar] + 1e-15, "{name} at row {k}: {error:e} in {:e}", row[bar]);
+            largest = largest.max(error);
+        }
+        let last = bars.rows.last().unwrap()[bar];
+        assert!(last <= 10.0 * largest && largest > 0.0, "{name}: {largest:e} in {last:e}");
+    }
+    assert_eq!(bars.rows.len(), 51);
+}
+
+#[test]
+fn the_lines_of_a_study_of_a_motion_give_their_errors_again() {
+    let folder = Folder::new("lines_of_a_study");
+    folder.write("deck.toml", &swinging(0.5));
+    let finer = ["--set", "beam.0.elements=16", "--set", "beam.0.order=3", "--set", "stage.0.step=0.00125"];
+    assert_eq!(status(&folder.beamsim(&[&["run", "deck.toml", "--out", "exact"][..], &finer].concat())), 0);
+    let cost = |words: &[&str], out: &str| -> Vec<std::collections::HashMap<String, String>> {
+        let all = [&["cost", "deck.toml", "--reference", "exact/history.csv", "--out", out][..], words].concat();
+        let output = folder.beamsim(&all);
+        assert_eq!(status(&output), 0, "{}", last_line(&output));
+        let table = fs::read(folder.0.join(out).join("cost.csv")).unwrap();
+        csv::Reader::from_reader(&table[..]).deserialize().map(|row| row.unwrap()).collect()
+    };
+    let frontier: Vec<_> =
+        cost(&["--vary", "step=2,1,0.5"], "all").into_iter().filter(|run| run["frontier"] == "true").collect();
+    assert!(frontier.len() > 3);
+    for run in frontier {
+        let settings: Vec<&str> =
+            run["settings"].split(' ').filter(|s| !s.is_empty()).flat_map(|s| ["--set", s]).collect();
+        let vary = [format!("order={}", run["order"]), format!("interpolation={}", run["interpolation"])];
+        let one = ["--vary", &vary[0], "--vary", &vary[1], "--vary", "elements=1", "--vary", "step=1"];
+        let again = cost(&[&settings[..], &one].concat(), "one");
+        assert_eq!((again.len(), &again[0]["error"]), (1, &run["error"]), "{}", run["settings"]);
+        assert_eq!(again[0]["iterations"], run["iterations"]);
+    }
 }
 
 #[test]

@@ -26,8 +26,8 @@ fn stopped(
     let mut tell = |_: usize, _: usize| {
         count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     };
-    let options = Options { against, threads, budget: None, interrupted: &interrupted, tell: &mut tell, journal };
-    let found = study(text, &deck, &scene, options);
+    let options = Options { threads, budget: None, interrupted: &interrupted, tell: &mut tell, journal };
+    let found = study(text, &deck, &scene, against, options);
     (found, count.into_inner())
 }
 
@@ -239,7 +239,6 @@ fn runs_that_fail_are_told_and_the_others_stay() {
 fn reached(text: &str, wanted: &Accuracy) -> Result<Found, Refusal> {
     let (deck, scene) = read(text);
     let options = Options {
-        against: &Against::Finest,
         threads: 2,
         budget: None,
         interrupted: &|| None,
@@ -335,4 +334,20 @@ fn scenes_whose_steps_adapt_can_be_as_accurate_as_asked_for() {
     let finished = |run: &&Run| run.trial.as_ref().unwrap().status == "finished";
     assert!(study.runs.iter().filter(finished).count() == study.runs.len() && !study.ends_only);
     assert!(study.runs.iter().any(|run| run.point.pace == Pace::Adapts(1e-5) && run.error < 1e-2));
+}
+
+#[test]
+fn a_forecast_watches_no_longer_than_it_may_and_reckons_with_the_rest() {
+    use beamsim::study::forecast::forecast;
+    use std::time::Duration;
+    let (_, scene) = read(&SWINGING.replace("end = 0.5", "end = 1e5"));
+    let long = forecast(&scene, Duration::from_millis(20));
+    let steps = long.at.time / 0.01;
+    assert!(long.ended.is_none() && steps > 0.0, "{steps}");
+    // Ten million steps at the pace of those that were seen, within what a busy machine makes of 20 ms.
+    let expected = long.watched / steps * 1e7;
+    assert!((0.1..10.0).contains(&(long.seconds / expected)), "{} against {expected}", long.seconds);
+    let (_, scene) = read(SWINGING);
+    let short = forecast(&scene, Duration::from_secs(3600));
+    assert!(matches!(short.ended, Some(Ok(()))) && short.seconds == short.watched);
 }

@@ -24,11 +24,11 @@ const NEAR: f64 = 1.5;
 
 /// The moment after which no run is begun, and running ones are given up.
 #[derive(Clone, Copy)]
-pub struct Deadline(Option<Instant>);
+struct Deadline(Option<Instant>);
 
 impl Deadline {
     /// From now on.
-    pub fn after(budget: Option<Duration>) -> Self {
+    fn after(budget: Option<Duration>) -> Self {
         Self(budget.map(|budget| Instant::now() + budget))
     }
 
@@ -113,9 +113,9 @@ impl<'a, 'o> Crew<'a, 'o> {
     }
 
     /// Runs those that are, or may be, on the frontier again, one at a time and in turns, for their time.
-    pub fn time_alone(&mut self, runs: &mut [Run], uncertainty: f64) -> Result<(), Refusal> {
+    pub fn time_alone(&mut self, runs: &mut [Run], least_told: f64) -> Result<(), Refusal> {
         for _ in 0..ROUNDS {
-            let near = frontier::near(runs, uncertainty, NEAR);
+            let near = frontier::near(runs, least_told, NEAR);
             let chosen: Vec<usize> = near.into_iter().filter(|&k| runs[k].timing.alone == 0).collect();
             if chosen.is_empty() || self.deadline.is_over() {
                 break;

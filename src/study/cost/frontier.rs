@@ -5,9 +5,6 @@ use super::grid::{Pace, Point};
 use super::sample::Samples;
 use super::{Refusal, Run};
 
-/// Errors below this times the uncertainty of the reference cannot be told apart.
-const TOLD: f64 = 2.0;
-
 /// The factor of Newton's tolerance with which its share in an error is found.
 const TIGHTER: f64 = 1e-2;
 
@@ -34,19 +31,19 @@ impl Knob {
 }
 
 /// The error of a run as far as the reference can tell; infinite where the run cannot be compared.
-fn error_of(run: &Run, uncertainty: f64) -> f64 {
-    if run.error.is_nan() { f64::INFINITY } else { run.error.max(TOLD * uncertainty) }
+fn error_of(run: &Run, least_told: f64) -> f64 {
+    if run.error.is_nan() { f64::INFINITY } else { run.error.max(least_told) }
 }
 
 /// The numbers of runs that are at most `near` times as slow as the fastest one of at least their accuracy.
-pub(super) fn near(runs: &[Run], uncertainty: f64, near: f64) -> Vec<usize> {
-    let known = |k: &usize| error_of(&runs[*k], uncertainty).is_finite();
+pub(super) fn near(runs: &[Run], least_told: f64, near: f64) -> Vec<usize> {
+    let known = |k: &usize| error_of(&runs[*k], least_told).is_finite();
     let time = |k: usize| runs[k].timing.seconds.cpu;
     let mut order: Vec<usize> = (0..runs.len()).filter(known).collect();
-    order.sort_by(|&a, &b| error_of(&runs[a], uncertainty).total_cmp(&error_of(&runs[b], uncertainty)));
+    order.sort_by(|&a, &b| error_of(&runs[a], least_told).total_cmp(&error_of(&runs[b], least_told)));
     let mut best = f64::INFINITY;
     let mut chosen = Vec::new();
-    for group in order.chunk_by(|&a, &b| error_of(&runs[a], uncertainty) == error_of(&runs[b], uncertainty)) {
+    for group in order.chunk_by(|&a, &b| error_of(&runs[a], least_told) == error_of(&runs[b], least_told)) {
         best = group.iter().map(|&k| time(k)).fold(best, f64::min);
         chosen.extend(group.iter().copied().filter(|&k| time(k) <= near * best));
     }
@@ -55,8 +52,8 @@ pub(super) fn near(runs: &[Run], uncertainty: f64, near: f64) -> Vec<usize> {
 }
 
 /// Marks the runs that no other run beats in both error and time; of equal ones the first.
-pub(super) fn mark(runs: &mut [Run], uncertainty: f64) {
-    let key = |run: &Run| (error_of(run, uncertainty), run.timing.seconds.cpu);
+pub(super) fn mark(runs: &mut [Run], least_told: f64) {
+    let key = |run: &Run| (error_of(run, least_told), run.timing.seconds.cpu);
     for k in 0..runs.len() {
         let (error, time) = key(&runs[k]);
         let beaten = |(j, other): (usize, &Run)| {

@@ -2,6 +2,8 @@
 //! several steps.
 
 use super::order::Expected;
+use super::sample::Sampler;
+use super::trial;
 use crate::deck::{Beam, Cost, Deck, InterpolationWord, SchemeWord, StageBody};
 
 /// Orders, unless the deck names some.
@@ -20,14 +22,14 @@ const TOLERANCES: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 /// Largest part of the elements of a deck that is tried.
 const MOST_PARTS: usize = 8;
 
-/// What the runs of one line of the plot share; `None` where the deck has nothing of the kind.
-#[derive(Clone, Debug, PartialEq)]
+/// What the runs of one line of the plot share; `None` for what the deck says, or has nothing of.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Family {
     /// Polynomial order of all elements
     pub order: Option<usize>,
     /// Interpolation of all beams
     pub interpolation: Option<InterpolationWord>,
-    /// Scheme of all dynamic stages; `None` also for those of the deck
+    /// Scheme of all dynamic stages
     pub scheme: Option<&'static str>,
 }
 
@@ -106,7 +108,7 @@ impl Grid {
             for &mesh in &self.meshes {
                 let elements = mesher.elements(family.order, mesh);
                 for &pace in &self.paces {
-                    let point = Point { family: family.clone(), elements: elements.clone(), pace, newton: 1.0 };
+                    let point = Point::new(family.clone(), elements.clone(), pace);
                     if !points.contains(&point) {
                         points.push(point);
                     }
@@ -117,33 +119,17 @@ impl Grid {
     }
 }
 
-/// Finds meshes on which a deck still makes sense.
+/// Finds meshes on which a deck still makes sense: there are nodes where something acts.
 pub struct Mesher<'a> {
+    /// The text of the deck
+    pub text: &'a str,
     /// The deck
     pub deck: &'a Deck,
-    /// Whether it does with these elements of an order: there are nodes where something acts
-    pub makes_sense: &'a MakesSense<'a>,
+    /// What is looked at
+    pub sampler: &'a Sampler,
+    /// The interpolation of all beams; `None` for those of the deck
+    pub interpolation: Option<InterpolationWord>,
 }
-
-impl Mesher<'_> {
-    /// A mesh to compare another with, and how many times as wide its elements are, at least: one with half the elements of each piece, or,
-    /// where some piece has but one, with twice as many.
-    pub fn companion(&self, order: Option<usize>, elements: &[Vec<usize>]) -> (Vec<Vec<usize>>, f64) {
-        let each = |change: &dyn Fn(usize) -> usize| -> Vec<Vec<usize>> {
-            elements.iter().map(|beam| beam.iter().map(|&count| change(count)).collect()).collect()
-        };
-        let coarse = each(&|count| count.div_ceil(2));
-        let pairs = elements.iter().flatten().zip(coarse.iter().flatten());
-        let ratio = pairs.map(|(&fine, &coarse)| fine as f64 / coarse as f64).fold(2.0, f64::min);
-        if ratio > 1.0 && (self.makes_sense)(order, &coarse) {
-            return (coarse, ratio);
-        }
-        (each(&|count| count.saturating_mul(2)), 0.5)
-    }
-}
-
-/// Whether a deck makes sense with an order, and elements of each piece of each beam.
-pub type MakesSense<'a> = dyn Fn(Option<usize>, &[Vec<usize>]) -> bool + 'a;
 
 impl Mesher<'_> {
     /// Elements of each piece of each beam, as many as span a factor times the nodes of the deck; where that leaves something without its node,
@@ -155,7 +141,7 @@ impl Mesher<'_> {
             self.deck.beams.iter().map(of_beam).collect()
         };
         let rounded = each(&|beam, n| (n as f64 * ratio(beam)).round().max(1.0) as usize);
-        if (self.makes_sense)(order, &rounded) {
+        if self.makes_sense(order, &rounded) {
             return rounded;
         }
         let parts = (2..=MOST_PARTS).rev().filter(|q| {
@@ -164,7 +150,29 @@ impl Mesher<'_> {
         });
         let parts = parts.map(|q| each(&|_, n| n / q));
         let multiples = (0..MOST_PARTS).map(|more| each(&|beam, n| n * (ratio(beam).ceil() as usize + more)));
-        parts.chain(multiples).find(|elements| (self.makes_sense)(order, elements)).unwrap_or(rounded)
+        parts.chain(multiples).find(|elements| self.makes_sense(order, elements)).unwrap_or(rounded)
+    }
+
+    /// A mesh to compare another with, and how many times as wide its elements are, at least: one with half the elements of each piece, or,
+    /// where some piece has but one, with twice as many.
+    pub fn companion(&self, order: Option<usize>, elements: &[Vec<usize>]) -> (Vec<Vec<usize>>, f64) {
+        let each = |change: &dyn Fn(usize) -> usize| -> Vec<Vec<usize>> {
+            elements.iter().map(|beam| beam.iter().map(|&count| change(count)).collect()).collect()
+        };
+        let coarse = each(&|count| count.div_ceil(2));
+        let pairs = elements.iter().flatten().zip(coarse.iter().flatten());
+        let ratio = pairs.map(|(&fine, &coarse)| fine as f64 / coarse as f64).fold(2.0, f64::min);
+        if ratio > 1.0 && self.makes_sense(order, &coarse) {
+            return (coarse, ratio);
+        }
+        (each(&|count| count.saturating_mul(2)), 0.5)
+    }
+
+    /// Whether the deck makes sense with these elements of an order.
+    pub fn makes_sense(&self, order: Option<usize>, elements: &[Vec<usize>]) -> bool {
+        let family = Family { order, interpolation: self.interpolation, ..Family::default() };
+        let point = Point::new(family, elements.to_vec(), Pace::Timeless);
+        trial::makes_sense(self.text, &point.settings(self.deck, self.text), self.sampler)
     }
 }
 
@@ -190,6 +198,11 @@ pub(in crate::study) fn dynamic_stages(deck: &Deck) -> impl Iterator<Item = (usi
 }
 
 impl Point {
+    /// With Newton's method as in the deck.
+    pub fn new(family: Family, elements: Vec<Vec<usize>>, pace: Pace) -> Self {
+        Self { family, elements, pace, newton: 1.0 }
+    }
+
     /// Elements of a mesh of all beams, as far as their numbers stand in the deck.
     pub fn count(&self) -> usize {
         self.elements.iter().flatten().sum()

@@ -11,7 +11,6 @@ mod sample;
 mod table;
 pub(in crate::study) mod trial;
 
-pub use crew::Deadline;
 pub use frontier::Knob;
 pub use grid::{Family, Pace, Point};
 pub use journal::Journal;
@@ -43,8 +42,6 @@ pub enum Against {
 
 /// How a study is done.
 pub struct Options<'a> {
-    /// What errors are held against
-    pub against: &'a Against,
     /// Runs at a time
     pub threads: usize,
     /// Runs are begun no later than this
@@ -125,17 +122,12 @@ pub enum Refusal {
 }
 
 /// Studies a deck, whose text is `text`.
-pub fn study(text: &str, deck: &Deck, scene: &Scene, options: Options) -> Result<Study, Refusal> {
+pub fn study(text: &str, deck: &Deck, scene: &Scene, against: &Against, options: Options) -> Result<Study, Refusal> {
     let grid = Grid::of(deck);
-    let (sampler, given) = sampler(deck, scene, &grid, options.against).map_err(Refusal::Deck)?;
+    let (sampler, given) = sampler(deck, scene, &grid, against).map_err(Refusal::Deck)?;
     let mut crew = Crew::new(text, deck, &sampler, options);
 
-    let makes_sense = |order: Option<usize>, elements: &[Vec<usize>]| {
-        let family = Family { order, interpolation: None, scheme: None };
-        let point = Point { family, elements: elements.to_vec(), pace: Pace::Timeless, newton: 1.0 };
-        trial::makes_sense(text, &point.settings(deck, text), &sampler)
-    };
-    let mesher = Mesher { deck, makes_sense: &makes_sense };
+    let mesher = Mesher { text, deck, sampler: &sampler, interpolation: None };
     let points = grid.points(&mesher);
     crew.expect(points.len());
     let reference = match given {
@@ -150,8 +142,8 @@ pub fn study(text: &str, deck: &Deck, scene: &Scene, options: Options) -> Result
         .zip(trials)
         .map(|(point, trial)| Run::new(deck, text, &sampler, &reference.samples, &scales, point, trial))
         .collect();
-    crew.time_alone(&mut runs, reference.uncertainty)?;
-    frontier::mark(&mut runs, reference.uncertainty);
+    crew.time_alone(&mut runs, reference.least_told())?;
+    frontier::mark(&mut runs, reference.least_told());
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, &scales);
     frontier::find_limits(&mut runs, &mut crew, &distance)?;
     let orders = orders(deck, &grid, &sampler, &runs, &distance);

@@ -25,11 +25,24 @@ pub struct Reference {
     pub made: String,
 }
 
+/// Errors below this times the uncertainty of the reference cannot be told apart.
+const TOLD: f64 = 2.0;
+
+impl Reference {
+    /// The smallest error that can be told.
+    pub fn least_told(&self) -> f64 {
+        TOLD * self.uncertainty
+    }
+}
+
 /// The runs that a reference is made of, the finest mesh first, and of each mesh the coarsest pace.
 pub fn points(mesher: &Mesher, grid: &Grid) -> Vec<Point> {
     let bent = !mesher.deck.beams.is_empty();
-    let family =
-        Family { order: bent.then_some(3), interpolation: bent.then_some(InterpolationWord::Relative), scheme: None };
+    let family = Family {
+        order: bent.then_some(3),
+        interpolation: bent.then_some(InterpolationWord::Relative),
+        ..Family::default()
+    };
     let finest = grid.meshes.last().copied().unwrap_or(1.0);
     let paces = match grid.paces.last().copied().unwrap_or(Pace::Timeless) {
         Pace::Timeless => vec![Pace::Timeless],
@@ -41,8 +54,7 @@ pub fn points(mesher: &Mesher, grid: &Grid) -> Vec<Point> {
         (coarse, ratio) if ratio > 1.0 => (elements, coarse),
         (finer, _) => (finer, elements),
     };
-    let point =
-        |elements: &Vec<_>, pace| Point { family: family.clone(), elements: elements.clone(), pace, newton: 1.0 };
+    let point = |elements: &Vec<_>, pace| Point::new(family.clone(), elements.clone(), pace);
     let coarse = bent.then(|| point(&coarse, paces[0]));
     paces.iter().map(|&pace| point(&fine, pace)).chain(coarse).collect()
 }

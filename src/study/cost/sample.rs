@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 /// Instants of a stage that are compared, at most.
 const MOST_INSTANTS: usize = 200;
 
-/// Instants that lie closer, relative to their size, are the same.
+/// Round-off of counts of steps, relative.
 const SAME: f64 = 1e-9;
 
 /// Where a run is looked at, and how differences are measured.
@@ -133,12 +133,10 @@ impl Sampler {
         let mut samples = Vec::new();
         let mut from = 0;
         for &(stage, clock) in instants {
-            let slack = SAME * clock.abs().max(SAME);
-            let hit = |&(s, c): &(usize, f64)| s == stage && (c - clock).abs() <= slack;
-            match outcome.clocks[from..].iter().position(hit) {
-                Some(after) => {
-                    from += after;
-                    samples.extend(&outcome.rows[from]);
+            match outcome.row_at(from, stage, clock) {
+                Some(row) => {
+                    from = row;
+                    samples.extend(&outcome.rows[row]);
                 }
                 None => samples.resize(samples.len() + self.of_history, f64::NAN),
             }

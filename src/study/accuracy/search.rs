@@ -1,0 +1,284 @@
+//! The search for a variant of a deck that is accurate enough.
+
+use super::estimate::{Fall, Share, Source, left_by_newton, order_in_space};
+use super::{Found, coarser};
+use crate::deck::Accuracy;
+use crate::drive::Failure;
+use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Trial};
+
+/// The first mesh over that of the deck, in nodes.
+const FIRST_MESH: f64 = 0.5;
+
+/// How much finer a mesh may become from round to round, and how little is worth a round; and how much coarser.
+const MESH_GROWS: [f64; 2] = [1.3, 4.0];
+const MESH_SHRINKS: [f64; 2] = [0.8, 0.25];
+
+/// How often a step may be halved from round to round.
+const MOST_HALVINGS: f64 = 3.0;
+
+/// The order that steps are planned with. A step that turns out too long costs little: the next round needs it to compare with.
+const PLANNED_ORDER: f64 = 2.0;
+
+/// Half way from what estimates count on to what errors at nodes of smooth scenes fall with.
+fn planned_order(order: usize) -> f64 {
+    0.5 * (order_in_space(order) + 2.0 * order as f64)
+}
+
+/// What is aimed at, of what is allowed.
+const AIM: f64 = 0.9;
+
+/// The lesser share of the error may stay as it is up to this.
+const MOST_OF_THE_LESSER: f64 = 0.7;
+
+/// A share of the error below this part of what is wanted is not looked at again when only the other changes.
+const NEGLIGIBLE: f64 = 0.05;
+
+/// A share of the coarsest mesh below this part of what it may be calls for elements of a lower order.
+const LOWER_ORDER: f64 = 1e-2;
+
+/// Rounds, and nodes, at most.
+const MOST_ROUNDS: usize = 24;
+const MOST_NODES: usize = 200_000;
+
+/// What one share of the error may be beside the other, over what is wanted: what the other leaves of it, or half.
+fn allowed(share: f64, other: f64) -> f64 {
+    match (share < other, share < MOST_OF_THE_LESSER, other < MOST_OF_THE_LESSER) {
+        // The larger one makes room for it.
+        (true, true, _) => MOST_OF_THE_LESSER,
+        (false, _, true) => AIM * (1.0 - other),
+        _ => AIM * 0.5,
+    }
+}
+
+pub struct Search<'a> {
+    wanted: &'a Accuracy,
+    mesher: Mesher<'a>,
+    family: Family,
+    newton: f64,
+    /// Factor of the nodes of the deck
+    mesh: f64,
+    pace: Pace,
+    longest: Pace,
+    in_space: Axis<(Option<usize>, Vec<Vec<usize>>)>,
+    in_time: Axis<Pace>,
+}
+
+/// What is known of one of both shares.
+struct Axis<T> {
+    fall: Fall,
+    /// The meshes, or paces, of the last round with their shares
+    last: Vec<(T, Share)>,
+}
+
+impl<T: PartialEq> Axis<T> {
+    fn new() -> Self {
+        Self { fall: Fall::default(), last: Vec::new() }
+    }
+
+    /// The share of a mesh, or pace, where it is known and negligible.
+    fn negligible(&self, of: &T) -> Option<Share> {
+        let known = self.last.iter().find(|(last, share)| last == of && share.largest < NEGLIGIBLE);
+        known.map(|(_, share)| share.clone())
+    }
+}
+
+/// The variants of a round: one, and those that tell the shares of its error, with ratios of widths.
+struct Round {
+    own: Point,
+    on_coarser_mesh: Option<(Point, f64)>,
+    with_longer_step: Option<(Point, f64)>,
+}
+
+impl Round {
+    fn points(&self) -> Vec<Point> {
+        let others = [&self.on_coarser_mesh, &self.with_longer_step].into_iter().flatten();
+        std::iter::once(&self.own).chain(others.map(|(point, _)| point)).cloned().collect()
+    }
+}
+
+/// The error of a variant.
+struct Estimate {
+    mesh: Share,
+    step: Share,
+}
+
+impl Estimate {
+    /// The largest of all outputs, over what is wanted of it
+    fn ratio(&self) -> f64 {
+        self.mesh.largest + self.step.largest
+    }
+}
+
+impl<'a> Search<'a> {
+    pub fn new(wanted: &'a Accuracy, mesher: Mesher<'a>, family: Family, pace: Pace, newton: f64) -> Self {
+        let (in_space, in_time) = (Axis::new(), Axis::new());
+        Self { wanted, mesher, family, newton, mesh: FIRST_MESH, pace, longest: pace, in_space, in_time }
+    }
+
+    pub fn run(&mut self, mut crew: Crew) -> Result<Found, Refusal> {
+        let mut best: Option<Found> = None;
+        let mut runs = 0;
+        let mut ended = String::from(" within the budget");
+        for _ in 0..MOST_ROUNDS {
+            let round = self.round();
+            if round.own.count() * self.family.order.unwrap_or(1) > MOST_NODES {
+                break;
+            }
+            let points = round.points();
+            crew.expect(points.len());
+            let trials = crew.run(&points)?;
+            let Some(trials) = trials.into_iter().collect::<Option<Vec<Trial>>>() else { break };
+            runs += trials.len();
+            ended = format!("; the last of {runs} ended with `{}`", trials[0].status);
+            if ["singular", "deck"].contains(&trials[0].status.as_str()) {
+                break; // No mesh mends that.
+            }
+            let estimate = self.estimate(&round, &trials);
+            let found = self.cheapest(round, &estimate, runs);
+            if found.reached {
+                return Ok(found);
+            }
+            if found.ratio.is_finite() && best.as_ref().is_none_or(|best| found.ratio < best.ratio) {
+                best = Some(found);
+            }
+            self.refine(&estimate);
+        }
+        best.map(|best| Found { runs, ..best }).ok_or_else(|| {
+            let message = format!("no run came to its end whose error could be estimated{ended}");
+            Refusal::Failure(Failure::Limit(message))
+        })
+    }
+
+    fn round(&self) -> Round {
+        let order = self.family.order;
+        let point = |elements: &Vec<Vec<usize>>, pace| Point {
+            newton: self.newton,
+            ..Point::new(self.family.clone(), elements.clone(), pace)
+        };
+        let mesh = self.mesher.elements(order, self.mesh);
+        let known = self.in_space.negligible(&(order, mesh.clone())).is_some();
+        let (own, coarse) = match order.filter(|_| !known).map(|_| self.mesher.companion(order, &mesh)) {
+            None => (mesh, None),
+            Some((other, ratio)) if ratio > 1.0 => (mesh, Some((other, ratio))),
+            // Where some piece has but one element, the finer mesh stands for the variant.
+            Some((other, ratio)) => (other, Some((mesh, 1.0 / ratio))),
+        };
+        let on_coarser_mesh = coarse.map(|(coarse, ratio)| (point(&coarse, self.pace), ratio));
+        let own = point(&own, self.pace);
+        let step = |point: &Point| point.step(self.mesher.deck).unwrap_or(1.0);
+        let longer = matches!(self.pace, Pace::Steps(_)) && self.in_time.negligible(&self.pace).is_none();
+        let longer = longer.then(|| point(&own.elements, coarser(self.pace)));
+        let with_longer_step = longer.map(|longer| (longer.clone(), step(&longer) / step(&own)));
+        Round { own, on_coarser_mesh, with_longer_step }
+    }
+
+    fn estimate(&mut self, round: &Round, trials: &[Trial]) -> Estimate {
+        let (sampler, wanted) = (self.mesher.sampler, self.wanted);
+        let unknown = || Share::unknown(sampler.columns.len());
+        let none = || Share::none(sampler.columns.len());
+        let mut others = trials[1..].iter();
+        let mut share = |fall: &mut Fall, source, width, ratio: f64| match others.next() {
+            Some(other) if other.finished() && trials[0].finished() && ratio > 1.0 => {
+                let samples = (&trials[0].samples, &other.samples);
+                fall.share(source, (width, ratio), samples, (sampler, wanted))
+            }
+            // Nothing is known of what a run that failed would tell, or one that is the same.
+            _ => unknown(),
+        };
+        let mesh = (self.family.order, round.own.elements.clone());
+        let of_mesh = match (&round.on_coarser_mesh, self.in_space.negligible(&mesh)) {
+            (Some((_, ratio)), _) => {
+                let source = Source::Mesh(self.family.order.unwrap_or(1));
+                share(&mut self.in_space.fall, source, round.own.width(), *ratio)
+            }
+            (None, known) => known.unwrap_or_else(none),
+        };
+        let of_step = match (&round.with_longer_step, self.in_time.negligible(&self.pace)) {
+            (Some((_, ratio)), _) => {
+                let width = round.own.step(self.mesher.deck).unwrap_or(1.0);
+                share(&mut self.in_time.fall, Source::Steps, width, *ratio)
+            }
+            (None, known) => known.unwrap_or_else(none),
+        };
+        let failed = !trials[0].finished();
+        let coarser_mesh = round.on_coarser_mesh.as_ref().map(|(point, _)| (self.family.order, point.elements.clone()));
+        self.in_space.last = vec![(mesh, of_mesh.clone())];
+        self.in_space.last.extend(coarser_mesh.map(|mesh| (mesh, of_mesh.of_coarser())));
+        self.in_time.last = vec![(self.pace, of_step.clone())];
+        if failed { Estimate { mesh: unknown(), step: unknown() } } else { Estimate { mesh: of_mesh, step: of_step } }
+    }
+
+    /// The cheapest variant of a round that is accurate enough, or its own.
+    fn cheapest(&self, round: Round, own: &Estimate, runs: usize) -> Found {
+        let mesh = |(point, _)| (point, Estimate { mesh: own.mesh.of_coarser(), step: own.step.clone() });
+        let step = |(point, _)| (point, Estimate { mesh: own.mesh.clone(), step: own.step.of_coarser() });
+        let others = round.on_coarser_mesh.map(mesh).into_iter().chain(round.with_longer_step.map(step));
+        let enough = others.filter(|(_, estimate)| estimate.ratio() <= 1.0);
+        let cheapest = enough.min_by(|(a, _), (b, _)| a.work().total_cmp(&b.work()));
+        match cheapest {
+            Some((point, estimate)) => self.found(point, &estimate, runs),
+            None => self.found(round.own, own, runs),
+        }
+    }
+
+    fn found(&self, point: Point, estimate: &Estimate, runs: usize) -> Found {
+        let left = self.newton * left_by_newton(self.mesher.deck);
+        let shares = estimate.mesh.columns.iter().zip(&estimate.step.columns);
+        Found {
+            settings: point.settings(self.mesher.deck, self.mesher.text),
+            reached: estimate.ratio() <= 1.0,
+            columns: self.mesher.sampler.columns.clone(),
+            estimates: shares.map(|(mesh, step)| left + mesh + step).collect(),
+            ratio: estimate.ratio(),
+            runs,
+            point,
+        }
+    }
+
+    /// Makes finer what the error comes from, by as much as its order tells, and coarser what is finer than it must be.
+    fn refine(&mut self, estimate: &Estimate) {
+        let (mesh, step) = (estimate.mesh.largest, estimate.step.largest);
+        let (of_mesh, of_step) = (allowed(mesh, step), allowed(step, mesh));
+        self.change_mesh(mesh / of_mesh, step > of_step);
+        self.change_step(step / of_step, mesh > of_mesh);
+    }
+
+    /// `over` is the share of the mesh over what it may be.
+    fn change_mesh(&mut self, over: f64, other_changes: bool) {
+        let Some(order) = self.family.order else { return };
+        if over > 1.0 {
+            let order = self.in_space.fall.low_order.unwrap_or(planned_order(order));
+            let factor = if over.is_finite() { over.powf(1.0 / order) } else { 2.0 };
+            self.mesh *= factor.clamp(MESH_GROWS[0], MESH_GROWS[1]);
+        } else if other_changes && over < LOWER_ORDER && order > 1 && self.is_coarsest() {
+            self.family.order = Some(order - 1);
+            self.in_space.fall = Fall::default();
+        } else if other_changes {
+            // At nodes errors of smooth scenes fall, and rise, with twice the order.
+            let factor = over.powf(0.5 / order as f64);
+            if factor < MESH_SHRINKS[0] {
+                self.mesh *= factor.max(MESH_SHRINKS[1]);
+            }
+        }
+    }
+
+    /// Whether every piece has one element.
+    fn is_coarsest(&self) -> bool {
+        self.mesher.elements(self.family.order, self.mesh).iter().flatten().all(|&count| count == 1)
+    }
+
+    fn change_step(&mut self, over: f64, other_changes: bool) {
+        let Pace::Steps(factor) = self.pace else { return };
+        if over > 1.0 {
+            let order = self.in_time.fall.low_order.unwrap_or(PLANNED_ORDER);
+            let halvings = if over.is_finite() { over.log2() / order } else { 1.0 };
+            self.pace = Pace::Steps(factor * 0.5_f64.powf(halvings.round().clamp(1.0, MOST_HALVINGS)));
+        } else if other_changes
+            && over.is_finite()
+            && over * 2.0_f64.powf(2.0 * PLANNED_ORDER) < 1.0
+            && self.pace != self.longest
+        {
+            self.pace = coarser(self.pace);
+        }
+    }
+}

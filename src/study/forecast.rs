@@ -1,0 +1,121 @@
+//! How long a run will take, from its first moments on this machine.
+
+use crate::drive::{Counters, Failure, Moment, Observer, Run, Snapshot, StageWork};
+use crate::scene::Scene;
+use std::fmt::Write;
+use std::time::{Duration, Instant};
+
+/// What steps, levels, modes and critical loads take, in iterations, where none were seen.
+const ITERATIONS_OF_A_LEVEL: f64 = 6.0;
+const ITERATIONS_OF_A_STEP: f64 = 3.0;
+const ITERATIONS_OF_A_MODE: f64 = 10.0;
+const ITERATIONS_OF_A_CRITICAL_LOAD: f64 = 60.0;
+
+/// What is known of a run before it.
+pub struct Forecast {
+    /// Wall-clock seconds of the whole run
+    pub seconds: f64,
+    /// Seconds that it was watched
+    pub watched: f64,
+    /// How it ended within these, if it did
+    pub ended: Option<Result<(), Failure>>,
+    /// Where it was then
+    pub at: Moment,
+}
+
+/// Watches a run until the patience is over, or it ends, and tells how long all of it will take: a stage under way goes on as
+/// in the later half of what was seen of it, later ones take so many iterations as are usual.
+pub fn forecast(scene: &Scene, patience: Duration) -> Forecast {
+    let at = Moment { stage: 1, time: 0.0, load: 0.0 };
+    let mut watch =
+        Watch { scene, begun: Instant::now(), patience, seen: Vec::new(), at, watched: None, row: String::new() };
+    let (result, counters) = Run::new(scene.plan.clone(), &mut watch).finish();
+    let watched = watch.begun.elapsed().as_secs_f64();
+    let gave_up = matches!(result, Err(Failure::Interrupted { .. }));
+    let left = if gave_up { watch.left(watched, &counters) } else { 0.0 };
+    Forecast { seconds: watched + left, watched, ended: (!gave_up).then_some(result), at: watch.at }
+}
+
+/// An attempt at a step or level.
+struct Attempt {
+    /// Seconds from the start of the run
+    elapsed: f64,
+    /// Stage, from 0
+    stage: usize,
+    /// How far it has come in the stage, from 0 to 1
+    done: f64,
+}
+
+struct Watch<'a> {
+    scene: &'a Scene,
+    begun: Instant,
+    patience: Duration,
+    seen: Vec<Attempt>,
+    at: Moment,
+    /// What `until` of a stage watches: the stage, the value at its first row, and how far it has come from there to where it ends the stage
+    watched: Option<(usize, f64, f64)>,
+    row: String,
+}
+
+impl Watch<'_> {
+    /// Seconds from now to the end.
+    fn left(&self, watched: f64, counters: &Counters) -> f64 {
+        let Some(last) = self.seen.last() else { return 0.0 };
+        let of_stage: Vec<&Attempt> = self.seen.iter().filter(|attempt| attempt.stage == last.stage).collect();
+        let (first, middle) = (of_stage[0], of_stage[of_stage.len() / 2]);
+        let an_iteration = watched / counters.work.iterations.max(1) as f64;
+        let pace = |from: &Attempt| (last.elapsed - from.elapsed) / (last.done - from.done);
+        let of_this = [middle, first].into_iter().map(pace).find(|pace| pace.is_finite() && *pace > 0.0);
+        let of_this = of_this.unwrap_or(an_iteration * self.iterations(last.stage));
+        let later = last.stage + 1..self.scene.plan.stages.len();
+        of_this * (1.0 - last.done) + later.map(|stage| an_iteration * self.iterations(stage)).sum::<f64>()
+    }
+
+    fn look_at_until(&mut self, at: &Snapshot) {
+        let stage = at.stage - 1;
+        let Some(until) = &self.scene.plan.stages[stage].until else { return };
+        let value = (until.column)(at);
+        let first = self.watched.filter(|(watched, ..)| *watched == stage).map_or(value, |(_, first, _)| first);
+        let come = |bound: f64| ((value - first) / (bound - first)).clamp(0.0, 1.0);
+        let come = [until.below, until.above].into_iter().flatten().map(come).fold(0.0, f64::max);
+        self.watched = Some((stage, first, come));
+    }
+
+    /// Those that a stage usually takes.
+    fn iterations(&self, stage: usize) -> f64 {
+        let end = |work: &StageWork| if let StageWork::Dynamic { end, .. } = work { Some(*end) } else { None };
+        let start = || self.scene.plan.stages[..stage].iter().rev().find_map(|s| end(&s.work)).unwrap_or(0.0);
+        match self.scene.plan.stages[stage].work {
+            StageWork::Static { steps, .. } => steps as f64 * ITERATIONS_OF_A_LEVEL,
+            StageWork::Path { max_steps, .. } => max_steps as f64 * ITERATIONS_OF_A_LEVEL,
+            StageWork::Dynamic { end, step, .. } => (end - start()) / step * ITERATIONS_OF_A_STEP,
+            StageWork::Modal { modes } => modes as f64 * ITERATIONS_OF_A_MODE,
+            StageWork::Buckling { modes } => modes as f64 * ITERATIONS_OF_A_CRITICAL_LOAD,
+        }
+    }
+}
+
+impl Observer for Watch<'_> {
+    /// Writes the row as a run would, but to nowhere.
+    fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
+        let mut values = Vec::new();
+        self.scene.probes.iter().for_each(|probe| probe.read(at, &mut values));
+        self.row.clear();
+        for value in values {
+            let _ = write!(self.row, "{value:?},");
+        }
+        self.look_at_until(at);
+        Ok(())
+    }
+
+    fn progress(&mut self, at: Moment, done: f64) -> Result<(), Failure> {
+        let elapsed = self.begun.elapsed();
+        let stages = self.scene.plan.stages.len() as f64;
+        let stage = at.stage - 1;
+        self.at = at;
+        let come = self.watched.filter(|(watched, ..)| *watched == stage).map_or(0.0, |(.., come)| come);
+        let done = (done * stages - stage as f64).max(come);
+        self.seen.push(Attempt { elapsed: elapsed.as_secs_f64(), stage, done });
+        if elapsed < self.patience { Ok(()) } else { Err(Failure::Interrupted { at, signal: 0 }) }
+    }
+}
