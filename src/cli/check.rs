@@ -67,10 +67,11 @@ fn tell_time(loaded: &Loaded, reading: Duration) {
     say::line(&format!("run: about {whole} on this machine{own} ({how})"));
 }
 
-/// Two digits are more than is known.
+/// In few digits: more are not known.
 fn duration(seconds: f64) -> String {
     match seconds {
-        s if s < 0.95 => format!("{:.1} ms", 1e3 * s),
+        s if s < 0.0095 => format!("{:.1} ms", 1e3 * s),
+        s if s < 0.95 => format!("{:.0} ms", 1e3 * s),
         s if s < 99.5 => format!("{s:.1} s"),
         s if s < 99.5 * 60.0 => format!("{:.0} min", s / 60.0),
         s => format!("{:.0} h", s / 3600.0),

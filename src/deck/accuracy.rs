@@ -9,8 +9,8 @@ use toml::de::DeValue;
 pub enum Accuracy {
     /// Of all columns
     All(f64),
-    /// Of some columns
-    Columns(Vec<(String, f64)>),
+    /// Of some columns, with the places of their names
+    Columns(Vec<(Spanned<String>, f64)>),
 }
 
 impl Accuracy {
@@ -25,9 +25,9 @@ impl Accuracy {
         };
         let DeValue::Table(_) = item.get_ref() else { return context.number(item).and_then(checked).map(Self::All) };
         let table = Table::of_names(context, item, "`accuracy`")?;
-        let columns: Vec<(String, f64)> = table
+        let columns: Vec<(Spanned<String>, f64)> = table
             .entries()
-            .map(|(name, item)| Some((name.value, context.number(item).and_then(checked)?)))
+            .map(|(name, item)| Some((name, context.number(item).and_then(checked)?)))
             .collect::<Option<_>>()?;
         if columns.is_empty() {
             context.report(Diagnostic::error("`accuracy` names no column", table.span.clone()));
@@ -40,7 +40,7 @@ impl Accuracy {
         match self {
             Self::All(wanted) => *wanted,
             Self::Columns(columns) => {
-                columns.iter().find(|(name, _)| name == column).map_or(f64::INFINITY, |(_, wanted)| *wanted)
+                columns.iter().find(|(name, _)| name.value == column).map_or(f64::INFINITY, |(_, wanted)| *wanted)
             }
         }
     }
@@ -54,8 +54,8 @@ impl Accuracy {
     }
 
     /// The columns that are named.
-    pub fn columns(&self) -> impl Iterator<Item = &String> {
-        let named: &[(String, f64)] = if let Self::Columns(columns) = self { columns } else { &[] };
+    pub fn columns(&self) -> impl Iterator<Item = &Spanned<String>> {
+        let named: &[(Spanned<String>, f64)] = if let Self::Columns(columns) = self { columns } else { &[] };
         named.iter().map(|(name, _)| name)
     }
 }

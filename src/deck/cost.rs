@@ -1,8 +1,9 @@
 //! `[cost]`: what a study of accuracy and time varies, and what it looks at.
 
-use super::diagnostic::Spanned;
+use super::diagnostic::{Diagnostic, Spanned};
 use super::geometry::InterpolationWord;
 use super::reader::{Context, Item, Table, choose};
+use super::{Deck, StageBody};
 use toml::de::DeValue;
 
 /// `[cost]`; what is left out is chosen by the study.
@@ -85,6 +86,22 @@ impl Cost {
             step: positive(&table, "step"),
             step_tolerance: positive(&table, "step_tolerance"),
         }
+    }
+}
+
+/// Keys that vary what the deck has nothing of.
+pub fn warn_of_idle_keys(top: &Table, deck: &Deck) {
+    let Some(DeValue::Table(given)) = top.get("cost").map(|item| item.get_ref()) else { return };
+    let moves = deck.stages.iter().any(|stage| matches!(stage.body, StageBody::Dynamic { .. }));
+    for key in given.keys() {
+        let message = match key.get_ref().as_ref() {
+            "elements" | "order" | "interpolation" if deck.beams.is_empty() => {
+                "there are no beams whose mesh could vary"
+            }
+            "step" | "step_tolerance" | "scheme" if !moves => "there is no dynamic stage whose steps could vary",
+            _ => continue,
+        };
+        top.context.report(Diagnostic::warning(message, key.span()));
     }
 }
 

@@ -158,7 +158,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     ]
     .concat();
     let broken = defined_names(document).into_iter().filter(|name| !read.contains(&name.as_str())).collect();
-    Deck {
+    let deck = Deck {
         broken,
         stage_count: 0,
         title: top.text("title").map(|t| t.value),
@@ -185,7 +185,9 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
         expects: listed(&top, "expect", procedure::read_expect),
         parameters: Parameters::default(),
         resolved: serde_json::Value::Null,
-    }
+    };
+    cost::warn_of_idle_keys(&top, &deck);
+    deck
 }
 
 /// Every name that the text defines, whether its table can be read or not.

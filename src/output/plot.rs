@@ -83,7 +83,7 @@ impl LinePlots {
 }
 
 /// Axes end at powers of ten: this is for marks that lie next to one.
-const ROOM: f64 = 1.15;
+const ROOM: f64 = 1.3;
 
 fn with_room_for_marks(mut layout: Layout) -> Layout {
     for range in [&mut layout.data_x_range, &mut layout.data_y_range] {

@@ -5,7 +5,7 @@
 
 use super::accuracy::{divisor_in_space, divisor_in_time, left_by_newton};
 use super::cost::{Family, Mesher, Pace, Point, Refusal, Sampler, dynamic_stages, trial};
-use super::outcome::{Look, Outcome};
+use super::outcome::{Outcome, Presence};
 use crate::deck::{Deck, Diagnostic, StageBody};
 use crate::drive::Failure;
 use crate::output::Beside;
@@ -83,8 +83,14 @@ fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, f64)> {
     } else if dynamic_stages(deck).next().is_some() {
         // Where an interval leaves no longer step, a shorter one tells.
         let with = |factor| Point::new(Family::default(), own.clone(), Pace::Steps(factor));
-        let ratio = |point: &Point| point.step(deck).unwrap_or(1.0) / with(1.0).step(deck).unwrap_or(1.0);
-        let other = [2.0, 0.5].map(with).into_iter().find(|other| ratio(other) != 1.0);
+        let step = |point: &Point| point.step(deck).unwrap_or(1.0);
+        let ratio = |point: &Point| step(point) / step(&with(1.0));
+        // An interval may have cut the deck's own.
+        let cut = dynamic_stages(deck).find_map(|(_, body)| match body {
+            StageBody::Dynamic { step: wanted, .. } => Some(step(&with(1.0)) / wanted),
+            _ => None,
+        });
+        let other = [2.0, 0.5 * cut.unwrap_or(1.0)].map(with).into_iter().find(|other| ratio(other) != 1.0);
         found.extend(other.map(|other| (other.clone(), divisor_in_time(ratio(&other)))));
     }
     found
@@ -113,13 +119,13 @@ impl Beside for ErrorBars {
     fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool {
         let mut known = true;
         for (companion, largest) in self.companions.iter_mut().zip(&mut self.largest) {
-            let there = match companion.outcome.look_at(companion.next, stage, clock) {
-                Look::Row(there) => there,
-                Look::Between => {
+            let there = match companion.outcome.presence(companion.next, stage, clock) {
+                Presence::Row(there) => there,
+                Presence::Between => {
                     known = false;
                     continue;
                 }
-                Look::Over => continue,
+                Presence::Over => continue,
             };
             companion.next = there;
             let mut nearest = companion.outcome.rows[there].clone();

@@ -27,8 +27,8 @@ pub struct Forecast {
 /// in the later half of what was seen of it, later ones take so many iterations as are usual.
 pub fn forecast(scene: &Scene, patience: Duration) -> Forecast {
     let at = Moment { stage: 1, time: 0.0, load: 0.0 };
-    let mut watch =
-        Watch { scene, begun: Instant::now(), patience, seen: Vec::new(), at, watched: None, row: String::new() };
+    let (begun, seen) = (Instant::now(), Vec::new());
+    let mut watch = Watch { scene, begun, patience, seen, at, under_way: 0.0, watched: None, row: String::new() };
     let (result, counters) = Run::new(scene.plan.clone(), &mut watch).finish();
     let watched = watch.begun.elapsed().as_secs_f64();
     let gave_up = matches!(result, Err(Failure::Interrupted { .. }));
@@ -36,13 +36,13 @@ pub fn forecast(scene: &Scene, patience: Duration) -> Forecast {
     Forecast { seconds: watched + left, watched, ended: (!gave_up).then_some(result), at: watch.at }
 }
 
-/// An attempt at a step or level.
+/// An attempt at a step or level begins.
 struct Attempt {
     /// Seconds from the start of the run
     elapsed: f64,
     /// Stage, from 0
     stage: usize,
-    /// How far it has come in the stage, from 0 to 1
+    /// How much of the stage lies behind, from 0 to 1
     done: f64,
 }
 
@@ -52,6 +52,8 @@ struct Watch<'a> {
     patience: Duration,
     seen: Vec<Attempt>,
     at: Moment,
+    /// How much of the stage will lie behind after the attempt under way
+    under_way: f64,
     /// What `until` of a stage watches: the stage, the value at its first row, and how far it has come from there to where it ends the stage
     watched: Option<(usize, f64, f64)>,
     row: String,
@@ -63,7 +65,8 @@ impl Watch<'_> {
         let Some(last) = self.seen.last() else { return 0.0 };
         let of_stage: Vec<&Attempt> = self.seen.iter().filter(|attempt| attempt.stage == last.stage).collect();
         let (first, middle) = (of_stage[0], of_stage[of_stage.len() / 2]);
-        let an_iteration = watched / counters.work.iterations.max(1) as f64;
+        // What comes before the first attempt is done once.
+        let an_iteration = (watched - self.seen[0].elapsed) / counters.work.iterations.max(1) as f64;
         let pace = |from: &Attempt| (last.elapsed - from.elapsed) / (last.done - from.done);
         let of_this = [middle, first].into_iter().map(pace).find(|pace| pace.is_finite() && *pace > 0.0);
         let of_this = of_this.unwrap_or(an_iteration * self.iterations(last.stage));
@@ -76,7 +79,7 @@ impl Watch<'_> {
         let Some(until) = &self.scene.plan.stages[stage].until else { return };
         let value = (until.column)(at);
         let first = self.watched.filter(|(watched, ..)| *watched == stage).map_or(value, |(_, first, _)| first);
-        let come = |bound: f64| ((value - first) / (bound - first)).clamp(0.0, 1.0);
+        let come = |bound: f64| if bound == first { 0.0 } else { ((value - first) / (bound - first)).clamp(0.0, 1.0) };
         let come = [until.below, until.above].into_iter().flatten().map(come).fold(0.0, f64::max);
         self.watched = Some((stage, first, come));
     }
@@ -114,8 +117,13 @@ impl Observer for Watch<'_> {
         let stage = at.stage - 1;
         self.at = at;
         let come = self.watched.filter(|(watched, ..)| *watched == stage).map_or(0.0, |(.., come)| come);
-        let done = (done * stages - stage as f64).max(come);
-        self.seen.push(Attempt { elapsed: elapsed.as_secs_f64(), stage, done });
-        if elapsed < self.patience { Ok(()) } else { Err(Failure::Interrupted { at, signal: 0 }) }
+        let begins = self.seen.last().is_none_or(|last| last.stage != stage);
+        let behind = if begins { 0.0 } else { self.under_way };
+        self.under_way = done * stages - stage as f64;
+        // At least one attempt is seen to its end.
+        let is_over =
+            self.seen.first().is_some_and(|first| elapsed.as_secs_f64() - first.elapsed > self.patience.as_secs_f64());
+        self.seen.push(Attempt { elapsed: elapsed.as_secs_f64(), stage, done: behind.max(come) });
+        if is_over { Err(Failure::Interrupted { at, signal: 0 }) } else { Ok(()) }
     }
 }

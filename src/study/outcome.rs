@@ -1,5 +1,6 @@
 //! A run of a scene: all its outputs, and what they took.
 
+use crate::deck::{Diagnostic, Spanned, nearest};
 use crate::drive::{Counters, Failure, Mode, Observer, Run, Snapshot, Stage, StageWork};
 use crate::model::StageKind;
 use crate::output::HistoryReader;
@@ -12,6 +13,8 @@ use std::time::Instant;
 pub struct Outcome {
     /// How it ended
     pub ended: Result<(), Failure>,
+    /// For each stage whether its clock is the time
+    dynamic: Vec<bool>,
     /// Stage and clock of each row: the time, or in static stages the load factor
     pub(in crate::study) clocks: Vec<(usize, f64)>,
     /// Row by row
@@ -43,7 +46,8 @@ impl Outcome {
         let seconds = start.elapsed().as_secs_f64();
         let Columns { recorder, clocks, rows, modes, attempts, .. } = columns;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
-        Self { ended, clocks, rows, modes, expected, attempts, counters, seconds }
+        let dynamic = scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect();
+        Self { ended, dynamic, clocks, rows, modes, expected, attempts, counters, seconds }
     }
 }
 
@@ -55,7 +59,7 @@ fn slack(clock: f64) -> f64 {
 }
 
 /// What a run has at an instant of a stage.
-pub(in crate::study) enum Look {
+pub(in crate::study) enum Presence {
     /// The row with this number
     Row(usize),
     /// No row, but later ones
@@ -71,14 +75,19 @@ impl Outcome {
         self.clocks[from..].iter().position(hit).map(|after| from + after)
     }
 
-    /// What there is of a stage (from 1) at a clock, not before row `from`, where clocks only rise within stages.
-    pub(in crate::study) fn look_at(&self, from: usize, stage: usize, clock: f64) -> Look {
-        let early = |&(s, c): &(usize, f64)| (s, c) < (stage, clock - slack(clock));
-        let next = from + self.clocks[from..].partition_point(early);
-        match self.clocks.get(next) {
-            Some(&(s, c)) if s == stage && c <= clock + slack(clock) => Look::Row(next),
-            Some(&(s, _)) if s == stage => Look::Between,
-            _ => Look::Over,
+    /// What there is of a stage (from 1) at a clock, not before row `from`.
+    pub(in crate::study) fn presence(&self, from: usize, stage: usize, clock: f64) -> Presence {
+        let first = from + self.clocks[from..].partition_point(|&(s, _)| s < stage);
+        let end = first + self.clocks[first..].partition_point(|&(s, _)| s == stage);
+        // Times only rise; load factors may fall on a detour.
+        let rises = self.dynamic.get(stage - 1) == Some(&true);
+        let begin = first + self.clocks[first..end].partition_point(|&(_, c)| rises && c < clock - slack(clock));
+        let last = if rises { end.min(begin + 1) } else { end };
+        let here = |&(_, c): &(usize, f64)| (c - clock).abs() <= slack(clock);
+        match self.clocks[begin..last].iter().position(here) {
+            Some(after) => Presence::Row(begin + after),
+            None if begin < end => Presence::Between,
+            None => Presence::Over,
         }
     }
 
@@ -97,6 +106,7 @@ impl Outcome {
         let row = |row: &Vec<f64>| history.iter().map(|&place| cell(row, place).unwrap_or(f64::NAN)).collect();
         Self {
             ended: Ok(()),
+            dynamic: Vec::new(),
             clocks: table.rows.iter().map(clock).collect(),
             rows: table.rows.iter().map(row).collect(),
             modes: vec![f64::NAN; places.len() - history.len()],
@@ -113,6 +123,17 @@ pub(in crate::study) fn columns(scene: &Scene) -> Vec<String> {
     let mut columns: Vec<String> = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
     columns.extend(scene.plan.stages.iter().enumerate().flat_map(|(k, stage)| columns_of(k + 1, stage)));
     columns
+}
+
+/// The number of a column that a deck names.
+pub(in crate::study) fn find_column(columns: &[String], name: &Spanned<String>) -> Result<usize, Diagnostic> {
+    columns.iter().position(|column| *column == name.value).ok_or_else(|| {
+        let diagnostic = Diagnostic::error(format!("`{}` is no column of the history", name.value), name.span.clone());
+        match nearest(&name.value, columns.iter().map(String::as_str)) {
+            Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
+            None => diagnostic.help("columns are chosen in [output]"),
+        }
+    })
 }
 
 /// How many of these are columns of the history.

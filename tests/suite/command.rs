@@ -367,6 +367,31 @@ fn error_bars_hold_the_errors_of_a_motion_from_its_first_row_on() {
 }
 
 #[test]
+fn error_bars_know_the_error_of_steps_that_an_interval_cuts() {
+    let folder = Folder::new("error_bars_of_an_interval");
+    folder.write("deck.toml", &format!("{}interval = 0.02\n", swinging(0.5).replace("step = 0.01", "step = 0.1")));
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--error-bars", "--out", "bars"])), 0);
+    let finer = ["--set", "stage.0.step=0.001", "--out", "exact"];
+    assert_eq!(status(&folder.beamsim(&[&["run", "deck.toml"][..], &finer].concat())), 0);
+    let compare = |rtol| {
+        status(&folder.beamsim(&[
+            "compare",
+            "exact/history.csv",
+            "bars/history.csv",
+            "--rtol",
+            rtol,
+            "--atol",
+            "1e-12",
+        ]))
+    };
+    assert_eq!(compare("0"), 0);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--out", "plain"])), 0);
+    let plain =
+        folder.beamsim(&["compare", "exact/history.csv", "plain/history.csv", "--rtol", "0", "--atol", "1e-12"]);
+    assert_eq!(status(&plain), 1);
+}
+
+#[test]
 fn the_lines_of_a_study_of_a_motion_give_their_errors_again() {
     let folder = Folder::new("lines_of_a_study");
     folder.write("deck.toml", &swinging(0.5));

@@ -1,6 +1,6 @@
 //! The study of what accuracy costs.
 
-use beamsim::deck::{self, Accuracy, Deck};
+use beamsim::deck::{self, Accuracy, Deck, Spanned};
 use beamsim::scene::{self, Scene};
 use beamsim::study::accuracy::{Found, reach};
 use beamsim::study::cost::{Against, Expected, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
@@ -275,13 +275,29 @@ fn a_wanted_accuracy_is_reached_and_estimates_are_above_errors() {
 
 #[test]
 fn only_outputs_that_are_named_must_be_accurate() {
-    let of = |names: &[(&str, f64)]| Accuracy::Columns(names.iter().map(|(n, a)| (n.to_string(), *a)).collect());
+    let name = |name: &str| Spanned { value: name.to_string(), span: 3..7 };
+    let of = |names: &[(&str, f64)]| Accuracy::Columns(names.iter().map(|(n, a)| (name(n), *a)).collect());
     let nodes = |wanted: &Accuracy| match reached(SWINGING, wanted) {
         Ok(found) => found.point.count() * found.point.family.order.unwrap(),
         Err(_) => panic!("refused"),
     };
     assert!(nodes(&of(&[("tip.ux", 1e-5)])) > nodes(&of(&[("tip.ux", 1e-2)])));
-    assert!(matches!(reached(SWINGING, &of(&[("tip.vx", 1e-2)])), Err(Refusal::Deck(_))));
+    let Err(Refusal::Deck(diagnostic)) = reached(SWINGING, &of(&[("tip.vx", 1e-2)])) else { panic!("not refused") };
+    assert_eq!(diagnostic.span, Some(3..7));
+}
+
+#[test]
+fn a_mechanism_is_told_by_its_own_name_and_place() {
+    let text = quarter(TIP).replace("fix = \"all\"", "fix = \"pin\"");
+    let Err(Refusal::Failure(failure)) = reached(&text, &Accuracy::All(1e-2)) else { panic!("not refused") };
+    assert!(failure.name() == "singular" && failure.to_string().contains("b"), "{failure}");
+}
+
+#[test]
+fn keys_that_vary_nothing_are_told() {
+    let warnings = |text: &str| deck::read(text).unwrap().1.iter().filter(|d| d.is_warning()).count();
+    assert_eq!(warnings(&quarter("[cost]\nelements = [1, 2]\nstep = 0.5\nscheme = \"hht\"\n")), 2);
+    assert_eq!(warnings(&format!("{SWINGING}[cost]\nelements = [1, 2]\nstep = 0.5\n")), 0);
 }
 
 #[test]
@@ -347,6 +363,15 @@ fn a_forecast_watches_no_longer_than_it_may_and_reckons_with_the_rest() {
     // Ten million steps at the pace of those that were seen, within what a busy machine makes of 20 ms.
     let expected = long.watched / steps * 1e7;
     assert!((0.1..10.0).contains(&(long.seconds / expected)), "{} against {expected}", long.seconds);
+    // A condition that holds when the stage begins is not what it comes to.
+    let until = "end = 1e5\nuntil = { column = \"tip.uy\", below = 0 }";
+    let (_, scene) = read(
+        &SWINGING
+            .replace("end = 0.5", until)
+            .replace("force = [0, 3, 2]", "force = [0, -3, 2]")
+            .replace("below = 0", "above = 0"),
+    );
+    assert!(forecast(&scene, Duration::from_millis(20)).seconds > 1.0);
     let (_, scene) = read(SWINGING);
     let short = forecast(&scene, Duration::from_secs(3600));
     assert!(matches!(short.ended, Some(Ok(()))) && short.seconds == short.watched);

@@ -87,10 +87,28 @@ impl Share {
 /// How an error falls from round to round.
 #[derive(Default)]
 pub struct Fall {
-    /// Of the round before: a width, and the largest difference over what is wanted
-    before: Option<(f64, f64)>,
+    /// Of the round before
+    before: Option<Difference>,
     /// The order that was seen, if it was lower than the assumed one
     pub low_order: Option<f64>,
+}
+
+/// How far a run is from a coarser one.
+#[derive(Clone, Copy)]
+struct Difference {
+    /// Of an element or a step of the run
+    width: f64,
+    /// And of the coarser one, over that
+    ratio: f64,
+    /// Over what is wanted
+    size: f64,
+}
+
+impl Difference {
+    /// Of an error that is the width to the power of an order.
+    fn of_order(&self, order: f64) -> f64 {
+        self.width.powf(order) * (self.ratio.powf(order) - 1.0)
+    }
 }
 
 impl Fall {
@@ -103,29 +121,36 @@ impl Fall {
         (sampler, wanted): (&Sampler, &Accuracy),
     ) -> Share {
         let differences = sampler.differences(coarser, own, &sampler.scales(own));
-        let largest = largest(sampler, wanted, &differences);
-        let growth = ratio.powf(self.order(source.assumed_order(), (width, largest)));
+        let size = largest(sampler, wanted, &differences);
+        let growth = ratio.powf(self.order(source.assumed_order(), Difference { width, ratio, size }));
         let columns = differences.iter().map(|difference| difference / (growth - 1.0)).collect();
-        Share { largest: largest / (growth - 1.0), columns, growth }
+        Share { largest: size / (growth - 1.0), columns, growth }
     }
 
     /// The order that an error falls with: the assumed one, or that from round to round where it is lower. Waves with fronts, for one, have a
     /// low one.
-    fn order(&mut self, assumed: f64, now: (f64, f64)) -> f64 {
-        self.low_order = self.before.and_then(|before| low_order(assumed, before, now)).or(match self.before {
+    fn order(&mut self, assumed: f64, now: Difference) -> f64 {
+        match self.before {
             // Nothing new is seen of the same width.
-            Some(before) if before.0 == now.0 => self.low_order,
-            _ => None,
-        });
+            Some(before) if before.width == now.width => {}
+            Some(before) if before.width > now.width => self.low_order = low_order(assumed, before, now),
+            Some(before) => self.low_order = low_order(assumed, now, before),
+            None => {}
+        }
         self.before = Some(now);
         self.low_order.unwrap_or(assumed)
     }
 }
 
-/// The order from two rounds, each with a width and the difference between two runs, if it is lower than that which is assumed.
-fn low_order(assumed: f64, before: (f64, f64), now: (f64, f64)) -> Option<f64> {
-    let seen = (before.1 / now.1).ln() / (before.0 / now.0).ln();
-    (before.0 > now.0 && seen < assumed).then_some(seen.max(LEAST_ORDER))
+/// The order from a difference of a coarse run and of a fine one, if it is lower than that which is assumed: the two need not have the same
+/// ratio, so it is sought by halves.
+fn low_order(assumed: f64, coarse: Difference, fine: Difference) -> Option<f64> {
+    let too_high = |order| coarse.of_order(order) * fine.size > fine.of_order(order) * coarse.size;
+    let halve = |(low, high): (f64, f64), _| match 0.5 * (low + high) {
+        middle if too_high(middle) => (low, middle),
+        middle => (middle, high),
+    };
+    too_high(assumed).then(|| (0..20).fold((LEAST_ORDER, assumed), halve).0)
 }
 
 /// The largest over what is wanted; infinite where nothing can be compared: columns that are always zero cannot.
@@ -133,4 +158,30 @@ fn largest(sampler: &Sampler, wanted: &Accuracy, differences: &[f64]) -> f64 {
     let over = |&k: &usize| differences[k] / wanted.of(&sampler.columns[k]);
     let largest = sampler.outputs.iter().map(over).fold(f64::NAN, f64::max);
     if largest.is_nan() { f64::INFINITY } else { largest }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a fall makes of errors of an order on meshes of these widths, each compared with one of `ratio` times the width.
+    fn orders(assumed: f64, order: f64, meshes: &[(f64, f64)]) -> Vec<f64> {
+        let mut fall = Fall::default();
+        let seen = |&(width, ratio): &(f64, f64)| {
+            let size = Difference { width, ratio, size: 0.0 }.of_order(order);
+            fall.order(assumed, Difference { width, ratio, size })
+        };
+        meshes.iter().map(seen).collect()
+    }
+
+    #[test]
+    fn the_assumed_order_is_believed_unless_a_lower_one_is_seen() {
+        // Companions are not always twice as wide, and a search goes back to wider elements too.
+        let meshes = [(1.0 / 3.0, 1.5), (0.25, 2.0), (0.2, 5.0 / 3.0), (0.5, 2.0), (0.5, 2.0), (0.125, 2.0)];
+        assert_eq!(orders(3.5, 4.0, &meshes), [3.5; 6]);
+        for order in orders(2.5, 1.0, &meshes)[1..].iter() {
+            assert!((order - 1.0).abs() < 1e-5, "{order}");
+        }
+        assert!(orders(2.5, 0.1, &meshes)[1..].iter().all(|&order| (order - LEAST_ORDER).abs() < 1e-5));
+    }
 }

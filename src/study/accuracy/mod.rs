@@ -18,7 +18,7 @@ use estimate::largest_tolerance;
 pub(super) use estimate::{divisor_in_space, divisor_in_time, left_by_newton};
 
 use super::cost::{Crew, Family, Mesher, Options, Pace, Point, Refusal, Sampler};
-use crate::deck::{Accuracy, Deck, Diagnostic, InterpolationWord, StageBody};
+use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use search::Search;
 
@@ -109,9 +109,8 @@ fn first_pace(deck: &Deck) -> Pace {
 /// Numbers of the columns of which an accuracy is wanted.
 fn outputs(wanted: &Accuracy, scene: &Scene) -> Result<Vec<usize>, Refusal> {
     let columns = super::outcome::columns(scene);
-    if let Some(unknown) = wanted.columns().find(|name| !columns.contains(name)) {
-        let message = format!("`accuracy` names `{unknown}`, which is no column of the history");
-        return Err(Refusal::Deck(Diagnostic::whole(message)));
+    for name in wanted.columns() {
+        super::outcome::find_column(&columns, name).map_err(Refusal::Deck)?;
     }
     Ok((0..columns.len()).filter(|&k| wanted.of(&columns[k]).is_finite()).collect())
 }

@@ -2,7 +2,7 @@
 
 use super::estimate::{Fall, Share, Source, left_by_newton, order_in_space};
 use super::{Found, coarser};
-use crate::deck::Accuracy;
+use crate::deck::{Accuracy, StageBody};
 use crate::drive::Failure;
 use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Trial};
 
@@ -36,9 +36,10 @@ const NEGLIGIBLE: f64 = 0.05;
 /// A share of the coarsest mesh below this part of what it may be calls for elements of a lower order.
 const LOWER_ORDER: f64 = 1e-2;
 
-/// Rounds, and nodes, at most.
+/// Rounds, nodes, and steps to the end of the run, at most.
 const MOST_ROUNDS: usize = 24;
 const MOST_NODES: usize = 200_000;
+const MOST_STEPS: f64 = 2e6;
 
 /// What one share of the error may be beside the other, over what is wanted: what the other leaves of it, or half.
 fn allowed(share: f64, other: f64) -> f64 {
@@ -121,7 +122,8 @@ impl<'a> Search<'a> {
         let mut ended = String::from(" within the budget");
         for _ in 0..MOST_ROUNDS {
             let round = self.round();
-            if round.own.count() * self.family.order.unwrap_or(1) > MOST_NODES {
+            if self.is_too_large(&round.own) {
+                ended = format!(" with fewer than {MOST_NODES} nodes and {MOST_STEPS:e} steps");
                 break;
             }
             let points = round.points();
@@ -130,8 +132,11 @@ impl<'a> Search<'a> {
             let Some(trials) = trials.into_iter().collect::<Option<Vec<Trial>>>() else { break };
             runs += trials.len();
             ended = format!("; the last of {runs} ended with `{}`", trials[0].status);
-            if ["singular", "deck"].contains(&trials[0].status.as_str()) {
-                break; // No mesh mends that.
+            match trials[0].status.as_str() {
+                // No mesh mends that.
+                "singular" if best.is_none() => return Err(Refusal::Failure(crew.failure_of(&round.own))),
+                "singular" | "deck" => break,
+                _ => {}
             }
             let estimate = self.estimate(&round, &trials);
             let found = self.cheapest(round, &estimate, runs);
@@ -147,6 +152,15 @@ impl<'a> Search<'a> {
             let message = format!("no run came to its end whose error could be estimated{ended}");
             Refusal::Failure(Failure::Limit(message))
         })
+    }
+
+    fn is_too_large(&self, point: &Point) -> bool {
+        let ends = self.mesher.deck.stages.iter().filter_map(|stage| match stage.body {
+            StageBody::Dynamic { end, .. } => Some(end),
+            _ => None,
+        });
+        let steps = point.step(self.mesher.deck).map_or(0.0, |step| ends.fold(0.0, f64::max) / step);
+        point.count() * self.family.order.unwrap_or(1) > MOST_NODES || steps > MOST_STEPS
     }
 
     fn round(&self) -> Round {
@@ -253,7 +267,7 @@ impl<'a> Search<'a> {
         } else if other_changes && over < LOWER_ORDER && order > 1 && self.is_coarsest() {
             self.family.order = Some(order - 1);
             self.in_space.fall = Fall::default();
-        } else if other_changes {
+        } else if other_changes && !self.is_coarsest() {
             // At nodes errors of smooth scenes fall, and rise, with twice the order.
             let factor = over.powf(0.5 / order as f64);
             if factor < MESH_SHRINKS[0] {

@@ -112,6 +112,15 @@ impl<'a, 'o> Crew<'a, 'o> {
         }
     }
 
+    /// What a variant that did not finish ends with, place and all.
+    pub fn failure_of(&self, point: &Point) -> Failure {
+        let settings = point.settings(self.deck, self.text);
+        match trial::simulate(self.text, &settings, self.sampler, &self.options.interrupted) {
+            Ok(outcome) => outcome.ended.err().unwrap_or(Failure::Limit("what failed once did not fail again".into())),
+            Err(why) => Failure::Deck(why),
+        }
+    }
+
     /// Runs those that are, or may be, on the frontier again, one at a time and in turns, for their time.
     pub fn time_alone(&mut self, runs: &mut [Run], least_told: f64) -> Result<(), Refusal> {
         for _ in 0..ROUNDS {

@@ -255,7 +255,7 @@ impl Point {
         let interpolation = self.family.interpolation.unwrap_or(beam.interpolation);
         let list = |counts: &[usize]| match counts {
             [one] => one.to_string(),
-            several => format!("{several:?}"),
+            several => format!("{several:?}").replace(' ', ""),
         };
         let mut settings = Vec::new();
         if elements != beam.elements.value {

@@ -22,11 +22,11 @@ pub(in crate::study) use crew::Crew;
 pub(in crate::study) use grid::{Mesher, dynamic_stages};
 pub(in crate::study) use sample::{Sampler, Samples};
 
-use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord, Spanned, nearest};
+use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord};
 use crate::drive::Failure;
 use crate::output::HistoryReader;
 use crate::scene::Scene;
-use crate::study::outcome::{Outcome, columns};
+use crate::study::outcome::{Outcome, columns, find_column};
 use grid::Grid;
 use std::time::Duration;
 
@@ -210,17 +210,7 @@ fn sampler(
 fn outputs(deck: &Deck, scene: &Scene) -> Result<Vec<usize>, Diagnostic> {
     let columns = columns(scene);
     let Some(names) = &deck.cost.outputs else { return Ok((0..columns.len()).collect()) };
-    let find = |name: &Spanned<String>| {
-        columns.iter().position(|column| *column == name.value).ok_or_else(|| {
-            let diagnostic =
-                Diagnostic::error(format!("`{}` is no column of the history", name.value), name.span.clone());
-            match nearest(&name.value, columns.iter().map(String::as_str)) {
-                Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
-                None => diagnostic.help("columns are chosen in [output]"),
-            }
-        })
-    };
-    names.iter().map(find).collect()
+    names.iter().map(|name| find_column(&columns, name)).collect()
 }
 
 impl Run {

@@ -116,7 +116,7 @@ fn attempts(deck: &Deck) -> u64 {
             StageBody::Static { steps, .. } => steps as f64,
             StageBody::Path { max_steps, .. } => max_steps as f64,
             StageBody::Dynamic { end, step, step_tolerance, .. } => {
-                let count = (end - start) / step;
+                let count = (end - start) / deck.output.interval.map_or(step, |interval| step.min(interval));
                 start = end;
                 if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
             }
