@@ -111,6 +111,15 @@ impl<T: Real> ElementSystem<T> {
         if weights == Weights::NONE { self.clear_force() } else { self.clear() }
     }
 
+    /// Adds the force of another system of the same blocks, and the tangent where it has one.
+    pub fn add_system(&mut self, other: &Self, tangent: bool) {
+        let add = |to: &mut [T], of: &[T]| to.iter_mut().zip(of).for_each(|(sum, part)| *sum += *part);
+        add(self.force.as_flattened_mut(), other.force.as_flattened());
+        if tangent {
+            add(self.tangent.as_flattened_mut(), other.tangent.as_flattened());
+        }
+    }
+
     /// The number of 3-vectors.
     #[inline(always)]
     pub fn blocks(&self) -> usize {

@@ -114,7 +114,7 @@ impl State {
     /// The rate of the unknown at a rotation slot.
     pub fn rotation_rate(&self, slot: Slot) -> RotationRate {
         let given = self.v[slot as usize];
-        let Some(turn) = self.turn(slot) else { return RotationRate { rate: given, over_unknown: None } };
+        let Some(turn) = self.turn(slot) else { return RotationRate::of_vector(given) };
         let spin = turn.spin(self.q[slot as usize], given, self.a[slot as usize]);
         let inverse = spin.rotation.t_inverse();
         let rate = inverse * given;
@@ -157,6 +157,11 @@ pub struct RotationRate {
 }
 
 impl RotationRate {
+    /// Of a total rotation vector.
+    pub fn of_vector(rate: Vec3) -> Self {
+        Self { rate, over_unknown: None }
+    }
+
     /// What the derivative of something over the rate of the unknown means for the unknown rate of the state, and for the
     /// unknown itself.
     pub fn pull_back(&self, over_rate: Vec3) -> (Vec3, Vec3) {
