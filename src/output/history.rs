@@ -34,10 +34,10 @@ impl Rows {
 pub trait Beside {
     /// The names of its columns, beside these
     fn names(&self, columns: &[String]) -> Vec<String>;
-    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor. Whether all is known that stands beside it
-    /// and the rows before: else they wait for a later row.
+    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor. Whether all is known that stands beside the
+    /// rows before: else they wait for a later row.
     fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool;
-    /// What stands beside the rows that were taken since it was asked last, as far as is known
+    /// What stands beside the rows that wait, as far as is known
     fn numbers(&self) -> Vec<f64>;
 }
 
@@ -110,12 +110,14 @@ impl HistoryWriter {
     }
 
     fn wait_for_what_stands_beside(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
+        let clock = if dynamic { at.state.time } else { at.state.load };
+        if self.beside.as_mut().is_some_and(|beside| beside.take(at.stage, clock, &self.values[2..])) {
+            self.write_waiting()?;
+        }
         if !self.pending {
             self.waiting.push(self.record.clone());
         }
-        let clock = if dynamic { at.state.time } else { at.state.load };
-        let known = self.beside.as_mut().is_some_and(|beside| beside.take(at.stage, clock, &self.values[2..]));
-        if known { self.write_waiting() } else { Ok(()) }
+        Ok(())
     }
 
     fn write_waiting(&mut self) -> io::Result<()> {

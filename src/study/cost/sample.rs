@@ -285,8 +285,23 @@ fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
     all
 }
 
-/// Numbers from 1 to `count`, evenly, not too many.
+/// Numbers from 1 to `count`, evenly, not too many; and, as motions begin with what jumps, some of the first.
 fn thinned(count: usize) -> impl Iterator<Item = usize> {
     let stride = count.div_ceil(MOST_INSTANTS).max(1);
-    (stride..=count).step_by(stride)
+    let first = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(move |&n| n < stride);
+    first.chain((stride..=count).step_by(stride))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_instants_are_all_compared_and_many_evenly_after_the_first() {
+        assert!(thinned(200).eq(1..=200));
+        let many: Vec<usize> = thinned(2000).collect();
+        assert_eq!(many[..6], [1, 2, 4, 8, 10, 20]);
+        assert_eq!((many.len(), many.last()), (204, Some(&2000)));
+        assert_eq!(thinned(0).count(), 0);
+    }
 }
