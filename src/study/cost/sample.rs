@@ -13,6 +13,9 @@ use std::f64::consts::TAU;
 /// Instants of a stage that are compared, at most.
 const MOST_INSTANTS: usize = 200;
 
+/// How often the coarsest step of a search may be halved for its first instant to be compared.
+const HALVINGS: i32 = 10;
+
 /// Round-off of counts of steps, relative.
 const SAME: f64 = 1e-9;
 
@@ -59,13 +62,15 @@ pub type Samples = Vec<f64>;
 impl Sampler {
     /// For the columns of a scene, compared with a run of the same deck at the coarsest pace of the study.
     pub fn of_rows(deck: &Deck, scene: &Scene, outputs: Vec<usize>, pace: Pace) -> Self {
-        let looks = Look::At(instants(deck, pace));
+        let looks = Look::At(instants(deck, pace, 0));
         Self { outputs, looks, ..Self::new(deck, scene, columns(scene), columns_of_history(scene)) }
     }
 
-    /// The same, over whole histories whatever the deck says of studies.
+    /// The same, over whole histories whatever the deck says of studies, and also at first instants that only shorter steps have: what a
+    /// jump leaves after one step is less than what it leaves after a longer one.
     pub fn of_histories(deck: &Deck, scene: &Scene, outputs: Vec<usize>, pace: Pace) -> Self {
-        Self { norm: NormWord::History, ..Self::of_rows(deck, scene, outputs, pace) }
+        let looks = Look::At(instants(deck, pace, HALVINGS));
+        Self { norm: NormWord::History, looks, ..Self::of_rows(deck, scene, outputs, pace) }
     }
 
     /// For the columns of a scene, compared with a table that has rows with these stages and clocks.
@@ -256,8 +261,9 @@ fn rotations(scene: &Scene) -> Vec<usize> {
     found
 }
 
-/// Levels of static stages, and multiples of the coarsest step of dynamic ones; paths have no instants in common but their ends.
-fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
+/// Levels of static stages, and multiples of the coarsest step of dynamic ones, after that step halved some times; paths have no instants in
+/// common but their ends.
+fn instants(deck: &Deck, coarsest: Pace, halvings: i32) -> Vec<(usize, f64)> {
     let mut all = Vec::new();
     let mut start = 0.0;
     for (k, stage) in deck.stages.iter().enumerate() {
@@ -273,6 +279,7 @@ fn instants(deck: &Deck, coarsest: Pace) -> Vec<(usize, f64)> {
                     None => (start, own),
                 };
                 if let Some(apart) = apart {
+                    all.extend((1..=halvings).rev().map(|n| (k + 1, first + apart * 0.5_f64.powi(n))));
                     let count = ((end - first) / apart * (1.0 + SAME)).floor() as usize;
                     all.extend(thinned(count).map(|n| (k + 1, first + n as f64 * apart)));
                 }
