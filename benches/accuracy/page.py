@@ -32,6 +32,8 @@ def tables(store):
     if (store / "bars.csv").exists():
         rows = read(store / "bars.csv")
         found |= {"bars": bars(rows), "bars in short": bars_in_short(rows)}
+    if (store / "forecasts.csv").exists():
+        found["forecasts in short"] = forecasts_in_short(read(store / "forecasts.csv"))
     return found
 
 
@@ -102,8 +104,13 @@ def settings(run):
     words += [run[key] for key in ("interpolation", "scheme") if run[key]]
     if run["elements"]:
         words.append(f"{run['elements']} element{'' if run['elements'] == '1' else 's'}")
-    words += [f"h = {float(run['step']):g}"] if run["step"] else []
+    words += [steps(float(run["step"]))] if run["step"] else []
     return ", ".join(words)
+
+
+def steps(factor):
+    """Over the step of the deck."""
+    return {2.0: "double step", 1.0: "step of the deck", 0.5: "half step", 0.25: "quarter step"}.get(factor, f"step x {factor:g}")
 
 
 def time(seconds):
@@ -178,4 +185,14 @@ def bars_in_short(rows):
     return [
         f"Of {len(rows)} outputs of {len({row['deck'] for row in rows})} scenes {share('inside_at_the_end'):.0f} % have their largest error inside the bar at the last row, and {share('inside'):.0f} % theirs at every single row. "
         f"Bars are {statistics.median(widths):.2g} times as wide as the error (median; nine in ten below {tenth(widths):.2g}, the widest {widths[-1]:.2g}).",
+    ]
+
+
+def forecasts_in_short(rows):
+    ratios = sorted(float(row["foretold"]) / float(row["seconds"]) for row in rows)
+    right = sum(0.5 <= ratio <= 2.0 for ratio in ratios)
+    longest = max(float(row["seconds"]) for row in rows)
+    return [
+        f"Of the {len(rows)} decks of `decks/` that take 0.1 s and more, up to {longest / 60:.1f} minutes, {right} took between half and twice of what was foretold; "
+        f"over what they took it is from {ratios[0]:.2f} to {ratios[-1]:.2f}, the median {statistics.median(ratios):.2f}.",
     ]

@@ -5,12 +5,13 @@
     python3 benches/accuracy/run.py                 # all of it, about an hour
     python3 benches/accuracy/run.py --only tables   # the tables of the page from what is stored
 
-What is measured is stored in `docs/accuracy/`: a study of each scene (`.csv`, `.svg`), `targets.csv` and `bars.csv`.
+What is measured is stored in `docs/accuracy/`: a study of each scene (`.csv`, `.svg`), `targets.csv`, `bars.csv` and `forecasts.csv`.
 Errors are held against runs with more elements and shorter steps, by arithmetic of its own (`errors.py`).
 """
 
 import argparse
 import csv
+import re
 import shutil
 import sys
 import tempfile
@@ -28,6 +29,7 @@ BUDGET = scenes.BUDGET  # seconds on the wall
 # Of the reference of a run, over that run.
 ELEMENTS, STEPS = 2, 4
 REPEATS = 5
+SHORTEST_FORECAST = 0.1  # seconds
 
 
 def studies(program, work, only):
@@ -116,6 +118,27 @@ def bars(program, work, only):
     return rows
 
 
+def forecasts(program, work, only):
+    """How long `check` says that decks will take, and how long they took: those of a tenth of a second and more."""
+    rows = []
+    for deck in sorted((variants.ROOT / "decks").rglob("*.toml"), key=lambda deck: ("long" in deck.parts, deck)):
+        deck = str(deck.relative_to(variants.ROOT))
+        if only and only not in deck:
+            continue
+        status, output, _, seconds = variants.process(program, "run", deck, "--out", work / "run")
+        if seconds >= SHORTEST_FORECAST and output:
+            told = foretold(variants.process(program, "check", deck)[1].stdout)
+            print(f"{deck}: {seconds:.2f} s, foretold {told:.2f} s", "" if status == 0 else f"(exit {status})", flush=True)
+            rows.append({"deck": deck, "status": status, "seconds": seconds, "foretold": told})
+    return rows
+
+
+def foretold(text):
+    """Seconds in `run: about 3.2 s on this machine`."""
+    number, unit = re.search(r"^run: about (\S+) (\w+)", text, re.M).groups()
+    return float(number) * {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}[unit]
+
+
 def store(name, rows):
     """Writes a table; columns in the order in which they were met."""
     columns = list(dict.fromkeys(column for row in rows for column in row))
@@ -128,7 +151,7 @@ def store(name, rows):
 def main():
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("--program", default=str(variants.ROOT / "target" / "release" / "beamsim"))
-    words.add_argument("--only", choices=["studies", "targets", "bars", "tables"])
+    words.add_argument("--only", choices=["studies", "targets", "bars", "forecasts", "tables"])
     words.add_argument("--scene", help="only decks whose path has this in it; nothing is stored")
     given = words.parse_args()
     STORE.mkdir(exist_ok=True)
@@ -137,7 +160,7 @@ def main():
         work = Path(work)
         if chosen("studies"):
             studies(given.program, work, given.scene)
-        for part, measure in (("targets", targets), ("bars", bars)):
+        for part, measure in (("targets", targets), ("bars", bars), ("forecasts", forecasts)):
             if chosen(part):
                 rows = measure(given.program, work, given.scene)
                 if not given.scene:

@@ -14,6 +14,13 @@ LONGEST = 900
 
 def beamsim(program, *words, longest=LONGEST):
     """Runs it, with its exit status, the last line of its errors, and CPU and wall seconds of the process."""
+    status, output, cpu, wall = process(program, *words, longest=longest)
+    last = output.stderr.strip().splitlines()[-1:] if output else ["took too long"]
+    return status, " ".join(last), cpu, wall
+
+
+def process(program, *words, longest=LONGEST):
+    """Runs it, with its exit status, what it says, and CPU and wall seconds of the process."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     try:
         done = subprocess.run([program, *map(str, words)], cwd=ROOT, capture_output=True, text=True, timeout=longest)
@@ -21,9 +28,7 @@ def beamsim(program, *words, longest=LONGEST):
     except subprocess.TimeoutExpired:
         status, output = None, None
     after, wall = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter() - start
-    cpu = (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime)
-    last = output.stderr.strip().splitlines()[-1:] if output else ["took too long"]
-    return status, " ".join(last), cpu, wall
+    return status, output, (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime), wall
 
 
 def run(program, deck, settings, out, *words, longest=LONGEST):

@@ -392,6 +392,30 @@ fn error_bars_know_the_error_of_steps_that_an_interval_cuts() {
 }
 
 #[test]
+fn a_wanted_accuracy_holds_after_the_first_step_behind_a_jump() {
+    let folder = Folder::new("accuracy_behind_a_jump");
+    folder.write("deck.toml", &std::fs::read_to_string("decks/minimal/damping.toml").unwrap());
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--accuracy", "3e-3", "--out", "wanted"])), 0);
+    let record: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.0.join("wanted/run.json")).unwrap()).unwrap();
+    let mut finer = vec!["run".to_string(), "deck.toml".into(), "--out".into(), "finer".into()];
+    for setting in record["accuracy"]["settings"].as_array().unwrap() {
+        let (key, value) = setting.as_str().unwrap().split_once('=').unwrap();
+        let value =
+            if key == "stage.1.step" { format!("{:?}", value.parse::<f64>().unwrap() / 4.0) } else { value.into() };
+        finer.extend(["--set".into(), format!("{key}={value}")]);
+    }
+    assert_eq!(status(&folder.beamsim(&finer.iter().map(String::as_str).collect::<Vec<_>>())), 0);
+    let [wanted, finer] = ["wanted", "finer"]
+        .map(|run| beamsim::output::HistoryReader::read(&folder.0.join(run).join("history.csv")).unwrap());
+    // Rows are the start, one load level, then steps.
+    let column = wanted.names.iter().position(|name| name == "energy.damped").unwrap();
+    let error = (wanted.rows[2][column] - finer.rows[5][column]).abs() / 0.005;
+    assert!((wanted.rows[2][1] - finer.rows[5][1]).abs() < 1e-12, "rows at the same time");
+    assert!(error > 0.0 && error <= 3e-3, "{error:e}");
+}
+
+#[test]
 fn the_lines_of_a_study_of_a_motion_give_their_errors_again() {
     let folder = Folder::new("lines_of_a_study");
     folder.write("deck.toml", &swinging(0.5));
