@@ -193,6 +193,6 @@ def forecasts_in_short(rows):
     right = sum(0.5 <= ratio <= 2.0 for ratio in ratios)
     longest = max(float(row["seconds"]) for row in rows)
     return [
-        f"Of the {len(rows)} decks of `decks/` that take 0.1 s and more, up to {longest / 60:.1f} minutes, {right} took between half and twice of what was foretold; "
+        f"Of the {len(rows)} decks of `decks/` (without `hard/long`) that take 0.1 s and more, up to {longest:.0f} s, {right} took between half and twice of what was foretold; "
         f"over what they took it is from {ratios[0]:.2f} to {ratios[-1]:.2f}, the median {statistics.median(ratios):.2f}.",
     ]

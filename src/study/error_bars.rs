@@ -3,7 +3,7 @@
 //! What is told at a row is the largest estimate so far, and up to the next row that all have: an error does not vanish where two histories
 //! cross, and one that begins to grow shows in them late. See [`super::accuracy`] for the estimate.
 
-use super::accuracy::{divisor_in_space, divisor_in_time, left_by_newton};
+use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::cost::{Family, Mesher, Pace, Point, Refusal, Sampler, dynamic_stages, trial};
 use super::outcome::{Outcome, Presence};
 use crate::deck::{Deck, Diagnostic, StageBody};
@@ -22,8 +22,8 @@ const SAFETY: f64 = 1.25;
 /// A run beside the one that is told about.
 struct Companion {
     outcome: Outcome,
-    /// By what differences are divided to be errors of the run
-    divisor: f64,
+    /// By what differences of columns are divided to be errors of the run
+    divisors: Vec<f64>,
     /// The first row that was not compared yet
     next: usize,
 }
@@ -56,14 +56,14 @@ pub fn error_bars(
         started.into_iter().map(|thread| thread.join().unwrap_or(Err("it broke off".into()))).collect()
     });
     let mut found = Vec::new();
-    for ((_, divisor), outcome) in variants.iter().zip(outcomes) {
+    for ((_, divisors), outcome) in variants.into_iter().zip(outcomes) {
         let trouble =
             |why: String| Refusal::Failure(Failure::Limit(format!("no error bars: a coarser run failed, {why}")));
         let outcome = outcome.map_err(trouble)?;
         match &outcome.ended {
             Err(failure @ Failure::Interrupted { .. }) => return Err(Refusal::Failure(failure.clone())),
             Err(failure) => return Err(trouble(format!("{}: {failure}", failure.name()))),
-            Ok(()) => found.push(Companion { outcome, divisor: *divisor, next: 0 }),
+            Ok(()) => found.push(Companion { outcome, divisors, next: 0 }),
         }
     }
     let columns = scene.probes.iter().map(|probe| probe.names.len()).sum();
@@ -73,17 +73,19 @@ pub fn error_bars(
 }
 
 /// The variants that errors are told from, with the divisors of differences to them.
-fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, f64)> {
+fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, Vec<f64>)> {
     let mesher = Mesher { text, deck, sampler, interpolation: None };
     let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
     let mut found = Vec::new();
+    let all = |divisor| vec![divisor; sampler.columns.len()];
     if let Some(order) = deck.beams.iter().map(|beam| beam.order).min() {
         let (other, ratio) = mesher.companion(None, &own);
-        found.push((Point::new(Family::default(), other, Pace::Timeless), divisor_in_space(ratio, order)));
+        let divisors = divisors_in_space(ratio, order, &sampler.columns);
+        found.push((Point::new(Family::default(), other, Pace::Timeless), divisors));
     }
     let adapts = |(_, body)| if let StageBody::Dynamic { step_tolerance, .. } = body { step_tolerance } else { None };
     if let Some(tolerance) = dynamic_stages(deck).find_map(adapts) {
-        found.push((Point::new(Family::default(), own, Pace::Adapts(LOOSER * tolerance)), 1.0));
+        found.push((Point::new(Family::default(), own, Pace::Adapts(LOOSER * tolerance)), all(1.0)));
     } else if dynamic_stages(deck).next().is_some() {
         // Where an interval leaves no longer step, a shorter one tells.
         let with = |factor| Point::new(Family::default(), own.clone(), Pace::Steps(factor));
@@ -95,7 +97,7 @@ fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, f64)> {
             _ => None,
         });
         let other = [2.0, 0.5 * cut.unwrap_or(1.0)].map(with).into_iter().find(|other| ratio(other) != 1.0);
-        found.extend(other.map(|other| (other.clone(), divisor_in_time(ratio(&other)))));
+        found.extend(other.map(|other| (other.clone(), all(divisor_in_time(ratio(&other))))));
     }
     found
 }
@@ -134,8 +136,8 @@ impl Beside for ErrorBars {
             companion.next = there;
             let mut nearest = companion.outcome.rows[there].clone();
             self.sampler.take_nearest_rotations(0, &mut nearest, row);
-            for ((largest, a), b) in largest.iter_mut().zip(&nearest).zip(row) {
-                let difference = (a - b).abs() / companion.divisor;
+            for (((largest, a), b), divisor) in largest.iter_mut().zip(&nearest).zip(row).zip(&companion.divisors) {
+                let difference = (a - b).abs() / divisor;
                 *largest = if difference.is_nan() { f64::INFINITY } else { largest.max(difference) };
             }
         }

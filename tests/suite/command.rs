@@ -339,6 +339,43 @@ fn error_bars_hold_the_error() {
 }
 
 #[test]
+fn resultants_are_worth_an_order_less_than_places() {
+    let folder = Folder::new("resultants");
+    // A force across what it bends: resultants vary along the beam.
+    folder.write(
+        "deck.toml",
+        &GOOD.replace(
+            "[[expect]]",
+            "[output]\nnodes = [\"root\", \"tip\"]\ncolumns = [\"u\", \"resultant\"]\n[[expect]]",
+        ),
+    );
+    let finer = ["--set", "beam.0.elements=24", "--set", "beam.0.order=3", "--set", "beam.0.numbering=4"];
+    assert_eq!(status(&folder.beamsim(&[&["run", "deck.toml", "--out", "finer"][..], &finer].concat())), 0);
+    let read = |run: &str| beamsim::output::HistoryReader::read(&folder.0.join(run).join("history.csv")).unwrap();
+    let finer = read("finer");
+    let last = |history: &beamsim::output::HistoryReader, name: &str| {
+        let column = history.names.iter().position(|known| known == name).unwrap_or_else(|| panic!("{name}"));
+        history.rows.last().unwrap()[column]
+    };
+    for (number, order) in ["1", "2", "3"].into_iter().enumerate() {
+        let setting = format!("beam.0.order={order}");
+        let words =
+            ["run", "deck.toml", "--error-bars", "--set", &setting, "--set", "beam.0.elements=12", "--out", order];
+        assert_eq!(status(&folder.beamsim(&words)), 0);
+        let bars = read(order);
+        for name in ["root.N1", "root.M2", "root.M3", "tip.N3", "tip.M2"] {
+            let (error, bar) = ((last(&bars, name) - last(&finer, name)).abs(), last(&bars, &format!("{name}.err")));
+            assert!(error <= bar, "{name} of order {}: {error:e} in {bar:e}", number + 1);
+        }
+    }
+    let column = r#"accuracy={ "root.M2" = 1e-4 }"#;
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--set", column, "--out", "wanted"])), 0);
+    let wanted = read("wanted");
+    let (error, moment) = (last(&wanted, "root.M2") - last(&finer, "root.M2"), last(&finer, "root.M2"));
+    assert!(error.abs() <= 1e-4 * moment.abs() && error != 0.0, "{error:e} of {moment:e}");
+}
+
+#[test]
 fn error_bars_hold_the_errors_of_a_motion_from_its_first_row_on() {
     let folder = Folder::new("error_bars_of_a_motion");
     folder.write("deck.toml", &swinging(0.5));
@@ -398,17 +435,15 @@ fn a_wanted_accuracy_holds_after_the_first_step_behind_a_jump() {
     assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--accuracy", "3e-3", "--out", "wanted"])), 0);
     let record: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.0.join("wanted/run.json")).unwrap()).unwrap();
-    let mut finer = vec!["run".to_string(), "deck.toml".into(), "--out".into(), "finer".into()];
-    for setting in record["accuracy"]["settings"].as_array().unwrap() {
-        let (key, value) = setting.as_str().unwrap().split_once('=').unwrap();
-        let value =
-            if key == "stage.1.step" { format!("{:?}", value.parse::<f64>().unwrap() / 4.0) } else { value.into() };
-        finer.extend(["--set".into(), format!("{key}={value}")]);
-    }
-    assert_eq!(status(&folder.beamsim(&finer.iter().map(String::as_str).collect::<Vec<_>>())), 0);
-    let [wanted, finer] = ["wanted", "finer"]
-        .map(|run| beamsim::output::HistoryReader::read(&folder.0.join(run).join("history.csv")).unwrap());
+    let read = |run: &str| beamsim::output::HistoryReader::read(&folder.0.join(run).join("history.csv")).unwrap();
     // Rows are the start, one load level, then steps.
+    let wanted = read("wanted");
+    let step = format!("stage.1.step={:?}", wanted.rows[2][1] / 4.0);
+    let settings = record["accuracy"]["settings"].as_array().unwrap().iter().map(|setting| setting.as_str().unwrap());
+    let words = settings.chain([&*step]).flat_map(|setting| ["--set", setting]);
+    let finer = ["run", "deck.toml", "--out", "finer"].into_iter().chain(words);
+    assert_eq!(status(&folder.beamsim(&finer.collect::<Vec<_>>())), 0);
+    let finer = read("finer");
     let column = wanted.names.iter().position(|name| name == "energy.damped").unwrap();
     let error = (wanted.rows[2][column] - finer.rows[5][column]).abs() / 0.005;
     assert!((wanted.rows[2][1] - finer.rows[5][1]).abs() < 1e-12, "rows at the same time");

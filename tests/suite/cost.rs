@@ -208,6 +208,25 @@ fn a_stored_history_can_be_the_reference() {
 }
 
 #[test]
+fn a_reference_that_ends_early_is_refused() {
+    let names = ["stage", "time", "load", "tip.uz"].map(String::from).to_vec();
+    for (text, last) in [
+        (SWINGING.to_string(), [1.0, 0.3, 0.0, 0.1]),
+        (format!("{SWINGING}[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.01\n"), [1.0, 0.5, 1.0, 0.1]),
+    ] {
+        let rows = vec![vec![1.0, 0.0, 0.0, 0.0], last.to_vec()];
+        let table = beamsim::output::HistoryReader { names: names.clone(), rows };
+        let (deck, scene) = read(&text);
+        let mut journal = Journal::default();
+        let options =
+            Options { threads: 1, budget: None, interrupted: &|| None, tell: &mut |_, _| {}, journal: &mut journal };
+        let refused = study(&text, &deck, &scene, &Against::Table(table), options);
+        let Err(Refusal::Deck(diagnostic)) = refused else { panic!("not refused") };
+        assert!(diagnostic.message.contains("before the deck does") && diagnostic.span.is_some());
+    }
+}
+
+#[test]
 fn meshes_keep_nodes_where_something_acts() {
     let text = quarter(
         "[[spring]]\nat = \"b@0.5\"\nstiffness = [1, 1, 1, 0, 0, 0]\n[[load]]\nat = \"b:3\"\nforce = [0, 1, 0]\n",

@@ -2,13 +2,36 @@
 
 use crate::deck::{Accuracy, Deck};
 use crate::study::cost::{Sampler, Samples};
+use crate::study::scale::kind;
 
-/// The order of the error over the step that estimates count on.
+/// The order of the error over the step that estimates count on, and that of smooth motions.
 const ORDER_IN_TIME: f64 = 1.5;
+const SMOOTH_IN_TIME: f64 = 2.0;
 
-/// And over the width of elements of an order.
-pub fn order_in_space(order: usize) -> f64 {
-    order as f64 + 0.5
+/// What a column tells of, as far as its error falls with the width of elements.
+#[derive(Clone, Copy, PartialEq)]
+enum Falls {
+    /// Where nodes are, and what follows from it
+    Places,
+    /// Resultants: they follow slopes, and fall with one order less
+    Slopes,
+}
+
+impl Falls {
+    const ALL: [Self; 2] = [Self::Places, Self::Slopes];
+
+    fn of(column: &str) -> Self {
+        if ["N", "M"].contains(&kind(column)) { Self::Slopes } else { Self::Places }
+    }
+
+    /// The order over the width of elements of an order that is assumed, and that at nodes of smooth scenes.
+    fn in_space(self, order: usize) -> (f64, f64) {
+        let order = order as f64;
+        match self {
+            Self::Places => (order + 0.5, 2.0 * order),
+            Self::Slopes => (order - 0.5, order),
+        }
+    }
 }
 
 /// The lowest order that is believed.
@@ -26,10 +49,11 @@ pub fn largest_tolerance(deck: &Deck) -> f64 {
     deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max)
 }
 
-/// By what the difference to a run with other elements is divided to be the error: `ratio` is that of the widths of the other elements and
-/// the own.
-pub fn divisor_in_space(ratio: f64, order: usize) -> f64 {
-    (ratio.powf(order_in_space(order)) - 1.0).abs()
+/// By what differences of columns to a run with other elements are divided to be errors: `ratio` is that of the widths of the other
+/// elements and the own.
+pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String]) -> Vec<f64> {
+    let divisor = |column: &String| (ratio.powf(Falls::of(column).in_space(order).0) - 1.0).abs();
+    columns.iter().map(divisor).collect()
 }
 
 /// And to a run with other steps.
@@ -47,10 +71,11 @@ pub enum Source {
 }
 
 impl Source {
-    fn assumed_order(self) -> f64 {
+    /// The order that is assumed, and that at nodes of smooth scenes.
+    fn orders(self, falls: Falls) -> (f64, f64) {
         match self {
-            Self::Mesh(order) => order_in_space(order),
-            Self::Steps => ORDER_IN_TIME,
+            Self::Mesh(order) => falls.in_space(order),
+            Self::Steps => (ORDER_IN_TIME, SMOOTH_IN_TIME),
         }
     }
 }
@@ -62,35 +87,47 @@ pub struct Share {
     pub largest: f64,
     /// Of each output
     pub columns: Vec<f64>,
-    /// How many times as large it is for the coarser run that it is known from
-    pub growth: f64,
+    /// The same of the coarser run that it is known from
+    coarser: (f64, Vec<f64>),
 }
 
 impl Share {
     /// Nothing.
     pub fn none(columns: usize) -> Self {
-        Self { largest: 0.0, columns: vec![0.0; columns], growth: 1.0 }
+        Self { largest: 0.0, columns: vec![0.0; columns], coarser: (0.0, vec![0.0; columns]) }
     }
 
     /// Nothing is known.
     pub fn unknown(columns: usize) -> Self {
-        Self { largest: f64::INFINITY, ..Self::none(columns) }
+        let none = Self::none(columns);
+        Self { largest: f64::INFINITY, coarser: (f64::INFINITY, none.coarser.1), ..none }
     }
 
     /// That of the coarser run.
     pub fn of_coarser(&self) -> Self {
-        let columns = self.columns.iter().map(|error| error * self.growth).collect();
-        Self { largest: self.largest * self.growth, columns, growth: 1.0 }
+        let (largest, columns) = self.coarser.clone();
+        Self { largest, columns, coarser: self.coarser.clone() }
     }
 }
 
 /// How an error falls from round to round.
 #[derive(Default)]
 pub struct Fall {
+    /// By what columns tell of
+    traces: [Trace; 2],
+    /// Which of them has the largest error
+    leading: usize,
+}
+
+/// How the largest error of some columns falls.
+#[derive(Default)]
+struct Trace {
     /// Of the round before
     before: Option<Difference>,
-    /// The order that was seen, if it was lower than the assumed one
-    pub low_order: Option<f64>,
+    /// The order that was seen from round to round
+    seen: Option<f64>,
+    /// That, if it was lower than the assumed one
+    low: Option<f64>,
 }
 
 /// How far a run is from a coarser one.
@@ -112,6 +149,17 @@ impl Difference {
 }
 
 impl Fall {
+    /// The order that was seen of the largest error, if it was lower than the assumed one.
+    pub fn low_order(&self) -> Option<f64> {
+        self.traces[self.leading].low
+    }
+
+    /// Half way from the order that estimates of the largest error count on to that of smooth scenes, for elements of an order; and that.
+    pub fn planned_orders(&self, order: usize) -> (f64, f64) {
+        let (assumed, smooth) = Falls::ALL[self.leading].in_space(order);
+        (0.5 * (assumed + smooth), smooth)
+    }
+
     /// The share of the error of a run of a `width` that a coarser one tells, whose width is `ratio` times that.
     pub fn share(
         &mut self,
@@ -120,44 +168,67 @@ impl Fall {
         (own, coarser): (&Samples, &Samples),
         (sampler, wanted): (&Sampler, &Accuracy),
     ) -> Share {
-        let differences = sampler.differences(coarser, own, &sampler.scales(own));
-        let size = largest(sampler, wanted, &differences);
-        let growth = ratio.powf(self.order(source.assumed_order(), Difference { width, ratio, size }));
-        let columns = differences.iter().map(|difference| difference / (growth - 1.0)).collect();
-        Share { largest: size / (growth - 1.0), columns, growth }
-    }
-
-    /// The order that an error falls with: the assumed one, or that from round to round where it is lower. Waves with fronts, for one, have a
-    /// low one.
-    fn order(&mut self, assumed: f64, now: Difference) -> f64 {
-        match self.before {
-            // Nothing new is seen of the same width.
-            Some(before) if before.width == now.width => {}
-            Some(before) if before.width > now.width => self.low_order = low_order(assumed, before, now),
-            Some(before) => self.low_order = low_order(assumed, now, before),
-            None => {}
+        let mut differences = sampler.differences(coarser, own, &sampler.scales(own));
+        let mut of_coarser = differences.clone();
+        let falls: Vec<Falls> = sampler.columns.iter().map(|column| Falls::of(column)).collect();
+        let mut largest = [f64::NAN; 2];
+        let mut coarser = f64::NAN;
+        for (number, one) in Falls::ALL.into_iter().enumerate() {
+            let size = largest_of(sampler, wanted, &differences, |k| falls[k] == one);
+            if size.is_nan() {
+                continue;
+            }
+            let growth = ratio.powf(self.traces[number].order(source.orders(one), Difference { width, ratio, size }));
+            for k in (0..falls.len()).filter(|&k| falls[k] == one) {
+                differences[k] /= growth - 1.0;
+                of_coarser[k] = differences[k] * growth;
+            }
+            largest[number] = size / (growth - 1.0);
+            coarser = coarser.max(largest[number] * growth);
         }
-        self.before = Some(now);
-        self.low_order.unwrap_or(assumed)
+        let rank = |value: f64| if value.is_nan() { -1.0 } else { value };
+        self.leading = usize::from(rank(largest[1]) > rank(largest[0]));
+        let known = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
+        Share {
+            largest: known(largest[0].max(largest[1])),
+            columns: differences,
+            coarser: (known(coarser), of_coarser),
+        }
     }
 }
 
-/// The order from a difference of a coarse run and of a fine one, if it is lower than that which is assumed: the two need not have the same
-/// ratio, so it is sought by halves.
-fn low_order(assumed: f64, coarse: Difference, fine: Difference) -> Option<f64> {
+impl Trace {
+    /// The order that an error is taken to fall with: the assumed one, or what was seen from round to round where that is lower, as it is
+    /// for waves with fronts; half way to it where it is higher.
+    fn order(&mut self, (assumed, smooth): (f64, f64), now: Difference) -> f64 {
+        match self.before {
+            // Nothing new is seen of the same width.
+            Some(before) if before.width == now.width => {}
+            Some(before) if before.width > now.width => self.seen = Some(seen_order(smooth, before, now)),
+            Some(before) => self.seen = Some(seen_order(smooth, now, before)),
+            None => {}
+        }
+        self.before = Some(now);
+        self.low = self.seen.filter(|&seen| seen < assumed);
+        self.low.unwrap_or(0.5 * (assumed + self.seen.unwrap_or(assumed)))
+    }
+}
+
+/// The order that explains a difference of a coarse run and one of a fine run, not above that of smooth scenes: the two need not have the
+/// same ratio, so it is sought by halves.
+fn seen_order(smooth: f64, coarse: Difference, fine: Difference) -> f64 {
     let too_high = |order| coarse.of_order(order) * fine.size > fine.of_order(order) * coarse.size;
     let halve = |(low, high): (f64, f64), _| match 0.5 * (low + high) {
         middle if too_high(middle) => (low, middle),
         middle => (middle, high),
     };
-    too_high(assumed).then(|| (0..20).fold((LEAST_ORDER, assumed), halve).0)
+    if too_high(smooth) { (0..20).fold((LEAST_ORDER, smooth), halve).0 } else { smooth }
 }
 
-/// The largest over what is wanted; infinite where nothing can be compared: columns that are always zero cannot.
-fn largest(sampler: &Sampler, wanted: &Accuracy, differences: &[f64]) -> f64 {
+/// The largest of some columns over what is wanted; NaN where nothing can be compared: columns that are always zero cannot.
+fn largest_of(sampler: &Sampler, wanted: &Accuracy, differences: &[f64], of: impl Fn(usize) -> bool) -> f64 {
     let over = |&k: &usize| differences[k] / wanted.of(&sampler.columns[k]);
-    let largest = sampler.outputs.iter().map(over).fold(f64::NAN, f64::max);
-    if largest.is_nan() { f64::INFINITY } else { largest }
+    sampler.outputs.iter().filter(|&&k| of(k)).map(over).fold(f64::NAN, f64::max)
 }
 
 #[cfg(test)]
@@ -165,23 +236,23 @@ mod tests {
     use super::*;
 
     /// What a fall makes of errors of an order on meshes of these widths, each compared with one of `ratio` times the width.
-    fn orders(assumed: f64, order: f64, meshes: &[(f64, f64)]) -> Vec<f64> {
-        let mut fall = Fall::default();
+    fn orders(believed: (f64, f64), order: f64, meshes: &[(f64, f64)]) -> Vec<f64> {
+        let mut fall = Trace::default();
         let seen = |&(width, ratio): &(f64, f64)| {
             let size = Difference { width, ratio, size: 0.0 }.of_order(order);
-            fall.order(assumed, Difference { width, ratio, size })
+            fall.order(believed, Difference { width, ratio, size })
         };
         meshes.iter().map(seen).collect()
     }
 
     #[test]
-    fn the_assumed_order_is_believed_unless_a_lower_one_is_seen() {
+    fn a_lower_order_is_believed_and_a_higher_one_half() {
         // Companions are not always twice as wide, and a search goes back to wider elements too.
         let meshes = [(1.0 / 3.0, 1.5), (0.25, 2.0), (0.2, 5.0 / 3.0), (0.5, 2.0), (0.5, 2.0), (0.125, 2.0)];
-        assert_eq!(orders(3.5, 4.0, &meshes), [3.5; 6]);
-        for order in orders(2.5, 1.0, &meshes)[1..].iter() {
-            assert!((order - 1.0).abs() < 1e-5, "{order}");
+        let near = |order: f64, of: f64| (order - of).abs() < 1e-5;
+        for (order, believed) in [(0.1, LEAST_ORDER), (1.0, 1.0), (2.5, 2.5), (3.0, 2.75), (4.0, 3.25), (7.0, 3.25)] {
+            let all = orders((2.5, 4.0), order, &meshes);
+            assert!(all[0] == 2.5 && all[1..].iter().all(|&seen| near(seen, believed)), "{order}: {all:?}");
         }
-        assert!(orders(2.5, 0.1, &meshes)[1..].iter().all(|&order| (order - LEAST_ORDER).abs() < 1e-5));
     }
 }

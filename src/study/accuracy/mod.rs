@@ -8,14 +8,15 @@
 //! e = |U - U_coarse| / (r^q - 1)
 //! ```
 //!
-//! where q is half an order less than smooth scenes have at the least, 2 for steps and one more than the order of elements: so estimates are
-//! above errors. The error of the coarser run is r^q times that, so the cheapest of the three that is accurate enough is what is found.
+//! where q is half an order less than smooth scenes have at the least, 2 for steps, the order of elements for resultants and one more for all else, or half way from
+//! there to what is seen from round to round: so estimates are above errors. The error of the coarser run is r^q times that, so the cheapest
+//! of the three that is accurate enough is what is found.
 
 mod estimate;
 mod search;
 
 use estimate::largest_tolerance;
-pub(super) use estimate::{divisor_in_space, divisor_in_time, left_by_newton};
+pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 
 use super::cost::{Crew, Family, Mesher, Options, Pace, Point, Refusal, Sampler};
 use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
@@ -26,7 +27,7 @@ use search::Search;
 const CUBIC: f64 = 3e-3;
 
 /// The first step over the deck's, at most; and how many steps a stage must have then.
-const FIRST_STEP: f64 = 4.0;
+const FIRST_STEP: f64 = 2.0;
 const LEAST_STEPS: f64 = 32.0;
 
 /// The tolerance of Newton's method over the wanted accuracy, at most.

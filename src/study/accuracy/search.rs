@@ -1,6 +1,6 @@
 //! The search for a variant of a deck that is accurate enough.
 
-use super::estimate::{Fall, Share, Source, left_by_newton, order_in_space};
+use super::estimate::{Fall, Share, Source, left_by_newton};
 use super::{Found, coarser};
 use crate::deck::{Accuracy, StageBody};
 use crate::drive::Failure;
@@ -18,11 +18,6 @@ const MOST_HALVINGS: f64 = 3.0;
 
 /// The order that steps are planned with. A step that turns out too long costs little: the next round needs it to compare with.
 const PLANNED_ORDER: f64 = 2.0;
-
-/// Half way from what estimates count on to what errors at nodes of smooth scenes fall with.
-fn planned_order(order: usize) -> f64 {
-    0.5 * (order_in_space(order) + 2.0 * order as f64)
-}
 
 /// What is aimed at, of what is allowed.
 const AIM: f64 = 0.9;
@@ -261,15 +256,14 @@ impl<'a> Search<'a> {
     fn change_mesh(&mut self, over: f64, other_changes: bool) {
         let Some(order) = self.family.order else { return };
         if over > 1.0 {
-            let order = self.in_space.fall.low_order.unwrap_or(planned_order(order));
+            let order = self.in_space.fall.low_order().unwrap_or(self.in_space.fall.planned_orders(order).0);
             let factor = if over.is_finite() { over.powf(1.0 / order) } else { 2.0 };
             self.mesh *= factor.clamp(MESH_GROWS[0], MESH_GROWS[1]);
         } else if other_changes && over < LOWER_ORDER && order > 1 && self.is_coarsest() {
             self.family.order = Some(order - 1);
             self.in_space.fall = Fall::default();
         } else if other_changes && !self.is_coarsest() {
-            // At nodes errors of smooth scenes fall, and rise, with twice the order.
-            let factor = over.powf(0.5 / order as f64);
+            let factor = over.powf(1.0 / self.in_space.fall.planned_orders(order).1);
             if factor < MESH_SHRINKS[0] {
                 self.mesh *= factor.max(MESH_SHRINKS[1]);
             }
@@ -284,7 +278,7 @@ impl<'a> Search<'a> {
     fn change_step(&mut self, over: f64, other_changes: bool) {
         let Pace::Steps(factor) = self.pace else { return };
         if over > 1.0 {
-            let order = self.in_time.fall.low_order.unwrap_or(PLANNED_ORDER);
+            let order = self.in_time.fall.low_order().unwrap_or(PLANNED_ORDER);
             let halvings = if over.is_finite() { over.log2() / order } else { 1.0 };
             self.pace = Pace::Steps(factor * 0.5_f64.powf(halvings.round().clamp(1.0, MOST_HALVINGS)));
         } else if other_changes

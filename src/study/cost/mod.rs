@@ -22,7 +22,7 @@ pub(in crate::study) use crew::Crew;
 pub(in crate::study) use grid::{Mesher, dynamic_stages};
 pub(in crate::study) use sample::{Sampler, Samples};
 
-use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord};
+use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord, StageBody};
 use crate::drive::Failure;
 use crate::output::HistoryReader;
 use crate::scene::Scene;
@@ -188,6 +188,7 @@ fn sampler(
         Against::Finest => return Ok((Sampler::of_rows(deck, scene, outputs, grid.paces[0]), None)),
         Against::Table(table) => {
             let stored = Outcome::of_table(scene, table);
+            reaches_the_end(deck, &stored)?;
             let sampler = Sampler::of_table(deck, scene, outputs, stored.clocks.clone());
             let samples = sampler.of(&stored);
             (sampler, samples, "the given history")
@@ -204,6 +205,26 @@ fn sampler(
         return Err(Diagnostic::whole(format!("{made} has no number for any output of the deck")));
     }
     Ok((sampler, Some(Reference { samples, uncertainty: 0.0, made: made.into() })))
+}
+
+/// Refuses a history that ends before the deck does: nothing is known of what follows.
+fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
+    let rows = |body: &StageBody| !matches!(body, StageBody::Modal { .. } | StageBody::Buckling { .. });
+    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| rows(&stage.body)) else {
+        return Ok(());
+    };
+    let (stage, clock) = stored.clocks.last().copied().unwrap_or((1, 0.0));
+    let early = match last.body {
+        StageBody::Dynamic { end, .. } if stage == k + 1 => last.until.is_none() && clock < end * (1.0 - 1e-9),
+        _ => stage < k + 1,
+    };
+    if early {
+        let message = format!("the given history ends at {clock:.6} of stage {stage}, before the deck does");
+        let mut diagnostic = Diagnostic::error(message, last.span.clone());
+        diagnostic.help = Some("give one of the whole deck, or shorten the deck by --set".into());
+        return Err(diagnostic);
+    }
+    Ok(())
 }
 
 /// Numbers of the columns whose error counts.
