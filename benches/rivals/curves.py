@@ -43,7 +43,7 @@ FAMILIES = {
     "OpenSees, ExactFrame": {"program": "opensees", "library": "xara"},
 }
 EXTRA = {("exudyn", "S1"): {"rotations": "vector"}, ("exudyn", "S3"): {"modified": True}, ("exudyn", "S5"): {"modified": True}}
-ABSENT = {("opensees", "S5")}  # it has no moving frame without supports there
+ABSENT = {("opensees", "S5")}  # not set up there
 
 ELEMENTS = {"S1": {1: [10, 20, 50, 100, 200, 500, 1000, 2000], 2: [4, 8, 16, 32, 64, 128], 3: [2, 4, 8, 16, 32]},
             "S2": {1: [4, 8, 16, 32, 64, 128, 256, 512, 1024], 2: [2, 4, 8, 16, 32, 64], 3: [2, 4, 8, 16]},
