@@ -29,6 +29,11 @@ const SEEN: f64 = 1e-3;
 const LEAP: f64 = 8.0;
 /// States of one load that lie nearer together than this are one.
 const SAME: f64 = 1e-5;
+/// A step along the path moves nothing further than this, in lengths of the scene and radians: a longer one may come down on
+/// another branch.
+const STRIDE: f64 = 0.5;
+/// The path is not followed in steps smaller than this part of the way.
+const SMALLEST_PART: f64 = 1e-4;
 /// Imaginary part up to which a critical load counts as real, relative; double ones come apart a little.
 const REAL: f64 = 1e-3;
 
@@ -184,7 +189,8 @@ impl Run<'_> {
         Pivots::new(system, &self.model.multipliers, Some(&newton.solver))?.negative(system)
     }
 
-    /// Goes along the path to a load factor in steps that shrink where they must.
+    /// Goes along the path to a load factor in steps that shrink where they must; `false` where it does not get there, or the
+    /// mesh does not tell the shape.
     fn continue_path(&mut self, workshop: &mut Workshop, target: f64) -> bool {
         let start = self.state.load;
         let (mut done, mut part) = (0.0, 1.0_f64);
@@ -192,22 +198,32 @@ impl Run<'_> {
         while done < 1.0 {
             let next = (done + part).min(1.0);
             let load = if next == 1.0 { target } else { start + (target - start) * next };
-            if self.attempt(workshop, load).is_ok() {
-                charts::freeze(&mut self.state, &self.model.charted.elements);
-                charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
-                self.model.remember(&mut self.state);
-                self.good.copy_from(&self.state);
-                done = next;
-                part *= 2.0;
-            } else {
+            let Some(moved) = self.step_along(workshop, load) else {
                 self.state.copy_from(&self.good);
                 part *= 0.25;
-                if part < 1e-4 {
+                if part < SMALLEST_PART {
                     return false;
                 }
+                continue;
+            };
+            charts::freeze(&mut self.state, &self.model.charted.elements);
+            charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
+            if self.judge_mesh().is_err() {
+                return false;
             }
+            self.model.remember(&mut self.state);
+            self.good.copy_from(&self.state);
+            done = next;
+            part *= if moved < 0.5 * STRIDE { 2.0 } else { 1.0 };
         }
         true
+    }
+
+    /// One step along the path: how far it moved, where it came down near by.
+    fn step_along(&mut self, workshop: &mut Workshop, load: f64) -> Option<f64> {
+        self.attempt(workshop, load).ok()?;
+        let moved = distance(&self.model, &self.good, &self.state);
+        (self.is_linear() || moved <= STRIDE).then_some(moved)
     }
 
     /// The critical loads as they look from the present state.
