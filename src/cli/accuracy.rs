@@ -41,10 +41,13 @@ impl Target {
     /// Reads a deck, and searches for the wanted accuracy where there is one.
     pub fn aim(&self, name: &str, path: &Path, settings: &[String]) -> Result<Aimed, Refusal> {
         let loaded = load::deck(path, settings)?;
-        if let Some(wrong) = self.accuracy.filter(|a| !(*a > 0.0 && *a < 1.0)) {
-            return Err(Refusal::of(Status::Wrong, "usage", format!("--accuracy is between 0 and 1, not {wrong}")));
-        }
+        let usage = |why: String| Refusal::of(Status::Wrong, "usage", why);
+        self.accuracy.map(Accuracy::check).transpose().map_err(|why| usage(format!("--accuracy: {why}")))?;
         let Some(wanted) = self.accuracy.map(Accuracy::All).or(loaded.deck.accuracy.clone()) else {
+            if self.budget.is_some() {
+                let why = "--budget bounds the search for an accuracy: give --accuracy, or `accuracy` in the deck";
+                return Err(usage(why.into()));
+            }
             return self.with_bars(path, loaded, None);
         };
         if self.error_bars {
@@ -97,7 +100,12 @@ impl Target {
             describe(&found.point)
         );
         lines(&loaded.deck, &found.settings).iter().for_each(|line| say::note(line));
-        Err(Refusal::of(Status::Wrong, "limit", message))
+        match found.stopped {
+            Some(stopped) => {
+                Err(Refusal::of(run::status_of(&stopped), stopped.name(), format!("the search was stopped: {message}")))
+            }
+            None => Err(Refusal::of(Status::Wrong, "limit", message)),
+        }
     }
 }
 

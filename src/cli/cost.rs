@@ -5,6 +5,7 @@ use super::load::{Loaded, Refusal};
 use super::progress::Progress;
 use super::run::{folder, refuse_twins};
 use super::{Status, Verdict, load, say, signals};
+use crate::deck::Accuracy;
 use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
 use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
 use std::collections::BTreeMap;
@@ -38,8 +39,11 @@ pub struct Wanted {
 /// Studies decks one after the other.
 pub fn cost(decks: &[PathBuf], settings: &[String], wanted: &Wanted, out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
-    if !(wanted.accuracy.is_finite() && wanted.accuracy > 0.0) {
-        verdict.fail(Status::Wrong, "usage", "--accuracy must be positive".into());
+    let lists = wanted.vary.iter().find(|vary| !vary.contains('='));
+    let unread = lists.map(|vary| format!("--vary {vary}: expected KEY=V1,V2,…"));
+    let why = Accuracy::check(wanted.accuracy).map_err(|why| format!("--accuracy: {why}")).err().or(unread);
+    if let Some(why) = why {
+        verdict.fail(Status::Wrong, "usage", why);
         return verdict.finish(1);
     }
     if refuse_twins(decks, &mut verdict) {
@@ -67,7 +71,7 @@ pub fn cost(decks: &[PathBuf], settings: &[String], wanted: &Wanted, out: Option
 
 /// `order=1,2` as a setting of the deck.
 fn setting(vary: &str) -> String {
-    let Some((key, values)) = vary.split_once('=') else { return format!("cost.{vary}") };
+    let (key, values) = vary.split_once('=').unwrap_or((vary, ""));
     let quoted = |value: &str| match value.trim().parse::<f64>() {
         Ok(_) => value.trim().to_string(),
         Err(_) => format!("{:?}", value.trim()),

@@ -43,13 +43,14 @@ pub fn time(seconds: f64) -> String {
 
 /// A time as it stands on a command line: 90, 90s, 1.5m, 2h.
 pub fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || "a time is a number with s, m or h: 90s, 5m, 1h";
     let number = text.trim_end_matches(['s', 'm', 'h']);
     let unit = match &text[number.len()..] {
         "" | "s" => 1.0,
         "m" => 60.0,
         "h" => 3600.0,
-        _ => return Err("a time is a number with s, m or h".into()),
+        _ => return Err(wrong().into()),
     };
-    let seconds = number.trim().parse::<f64>().map_err(|error| error.to_string())? * unit;
+    let seconds = number.trim().parse::<f64>().map_err(|_| wrong())? * unit;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }

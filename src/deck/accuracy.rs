@@ -13,15 +13,24 @@ pub enum Accuracy {
     Columns(Vec<(Spanned<String>, f64)>),
 }
 
+/// Errors below this are round-off.
+const LEAST: f64 = 1e-12;
+
 impl Accuracy {
+    /// Refuses what is no accuracy.
+    pub fn check(value: f64) -> Result<f64, String> {
+        if (LEAST..1.0).contains(&value) {
+            return Ok(value);
+        }
+        Err(format!("an accuracy lies between {LEAST:e} and 1, found {value:?}"))
+    }
+
     pub(super) fn read(top: &Table) -> Option<Self> {
         let item = top.get("accuracy")?;
         let context: &Context = top.context;
-        let checked = |number: Spanned<f64>| {
-            if number.value > 0.0 && number.value < 1.0 {
-                return Some(number.value);
-            }
-            context.wrong(number.span, format!("an accuracy is between 0 and 1, found {}", number.value))
+        let checked = |number: Spanned<f64>| match Self::check(number.value) {
+            Ok(value) => Some(value),
+            Err(why) => context.wrong(number.span, why),
         };
         let DeValue::Table(_) = item.get_ref() else { return context.number(item).and_then(checked).map(Self::All) };
         let table = Table::of_names(context, item, "`accuracy`")?;
@@ -39,9 +48,10 @@ impl Accuracy {
     pub fn of(&self, column: &str) -> f64 {
         match self {
             Self::All(wanted) => *wanted,
-            Self::Columns(columns) => {
-                columns.iter().find(|(name, _)| name.value == column).map_or(f64::INFINITY, |(_, wanted)| *wanted)
-            }
+            Self::Columns(columns) => columns
+                .iter()
+                .find(|(name, _)| is_named(column, &name.value))
+                .map_or(f64::INFINITY, |(_, wanted)| *wanted),
         }
     }
 
@@ -58,4 +68,10 @@ impl Accuracy {
         let named: &[(Spanned<String>, f64)] = if let Self::Columns(columns) = self { columns } else { &[] };
         named.iter().map(|(name, _)| name)
     }
+}
+
+/// Whether a deck means a column by a name: `mode1.omega` is `stage2.mode1.omega` too.
+pub fn is_named(column: &str, name: &str) -> bool {
+    let bare = column.strip_prefix("stage").and_then(|rest| rest.split_once('.')).map(|(_, bare)| bare);
+    column == name || bare == Some(name)
 }

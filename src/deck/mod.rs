@@ -15,7 +15,7 @@ mod procedure;
 mod reader;
 mod resolved;
 
-pub use accuracy::Accuracy;
+pub use accuracy::{Accuracy, is_named};
 pub use action::{
     Axes, Body, Frame, HistoryBody, HistoryTable, Initial, InitialTarget, Joint, JointKind, JointParts, Load,
     LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,

@@ -302,6 +302,8 @@ impl fmt::Display for Failure {
                 f,
                 "the total energy has grown by {grown:.3e}, where the largest energies so far add up to {largest:.3e} ({at})"
             ),
+            // Between the runs of a study.
+            Self::Interrupted { at, signal } if at.stage == 0 => write!(f, "stopped by signal {signal}"),
             Self::Interrupted { at, signal } => write!(f, "stopped by signal {signal} at {at}"),
         }
     }

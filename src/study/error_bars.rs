@@ -61,7 +61,9 @@ pub fn error_bars(
             |why: String| Refusal::Failure(Failure::Limit(format!("no error bars: a coarser run failed, {why}")));
         let outcome = outcome.map_err(trouble)?;
         match &outcome.ended {
-            Err(failure @ Failure::Interrupted { .. }) => return Err(Refusal::Failure(failure.clone())),
+            Err(failure @ (Failure::Interrupted { .. } | Failure::Singular { .. })) => {
+                return Err(Refusal::Failure(failure.clone()));
+            }
             Err(failure) => return Err(trouble(format!("{}: {failure}", failure.name()))),
             Ok(()) => found.push(Companion { outcome, divisors, next: 0 }),
         }

@@ -1,6 +1,6 @@
 //! A run of a scene: all its outputs, and what they took.
 
-use crate::deck::{Diagnostic, Spanned, nearest};
+use crate::deck::{Diagnostic, Spanned, is_named, nearest};
 use crate::drive::{Counters, Failure, Mode, Observer, Run, Snapshot, Stage, StageWork};
 use crate::model::StageKind;
 use crate::output::HistoryReader;
@@ -127,7 +127,7 @@ pub(in crate::study) fn columns(scene: &Scene) -> Vec<String> {
 
 /// The number of a column that a deck names.
 pub(in crate::study) fn find_column(columns: &[String], name: &Spanned<String>) -> Result<usize, Diagnostic> {
-    columns.iter().position(|column| *column == name.value).ok_or_else(|| {
+    columns.iter().position(|column| is_named(column, &name.value)).ok_or_else(|| {
         let diagnostic = Diagnostic::error(format!("`{}` is no column of the history", name.value), name.span.clone());
         match nearest(&name.value, columns.iter().map(String::as_str)) {
             Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),

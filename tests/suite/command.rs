@@ -308,7 +308,12 @@ fn run_reaches_an_accuracy_and_says_with_what() {
     let refused = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-5", "--budget", "0s", "--out", "none"]);
     assert_eq!((status(&refused), folder.0.join("none").exists()), (2, false));
     assert!(last_line(&refused).starts_with("error[limit]: "));
-    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--accuracy", "2"])), 2);
+    for wrong in ["2", "0", "1e-303"] {
+        assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--accuracy", wrong])), 2);
+        assert_eq!(status(&folder.beamsim(&["cost", "deck.toml", "--accuracy", wrong])), 2);
+    }
+    assert_eq!(status(&folder.beamsim(&["cost", "deck.toml", "--vary", "order"])), 2);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--budget", "5s"])), 2);
 }
 
 #[test]
@@ -499,7 +504,7 @@ fn wrong_words_for_a_study_are_told() {
         (&["--set", "cost.outputs=tip.vx"], "1 error in deck.toml"),
         (&["--reference", "expect", "--set", "expect.0.fails=limit"], "1 error in deck.toml"),
         (&["--budget", "soon"], "invalid"),
-        (&["--accuracy", "0"], "--accuracy must be positive"),
+        (&["--accuracy", "0"], "--accuracy: an accuracy lies between"),
         (&["--reference", "nothing.csv"], "nothing.csv"),
     ] {
         let output = folder.beamsim(&[&["cost", "deck.toml"], arguments].concat());

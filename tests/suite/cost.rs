@@ -1,9 +1,11 @@
 //! The study of what accuracy costs.
 
 use beamsim::deck::{self, Accuracy, Deck, Spanned};
+use beamsim::drive::Failure;
 use beamsim::scene::{self, Scene};
 use beamsim::study::accuracy::{Found, reach};
 use beamsim::study::cost::{Against, Expected, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
+use beamsim::study::error_bars::error_bars;
 use std::path::Path;
 
 fn read(text: &str) -> (Deck, Scene) {
@@ -201,10 +203,20 @@ fn a_stored_history_can_be_the_reference() {
     let rows = vec![vec![1.0, 0.0, 1.0, exact - 10.0, exact, 0.0]];
     let table = beamsim::output::HistoryReader { names, rows };
     let found = costs(&text, &Against::Table(table), 2);
+    assert_eq!(found.reference.made, "the given history");
     let by_deck = costs(&text, &Against::Expectations, 2);
     for (a, b) in found.runs.iter().zip(&by_deck.runs) {
         assert!((a.error - b.error).abs() < 1e-12, "{} against {}", a.error, b.error);
     }
+}
+
+#[test]
+fn outputs_that_a_reference_lacks_are_told() {
+    let names = ["stage", "time", "load", "tip.uy"].map(String::from).to_vec();
+    let table = beamsim::output::HistoryReader { names, rows: vec![vec![1.0, 0.0, 1.0, 6.366]] };
+    let found = costs(&quarter(TIP), &Against::Table(table), 2);
+    assert_eq!(found.reference.made, "the given history (which says nothing of tip.ux, tip.uz)");
+    assert_eq!(found.outputs, [1]);
 }
 
 #[test]
@@ -307,9 +319,61 @@ fn only_outputs_that_are_named_must_be_accurate() {
 
 #[test]
 fn a_mechanism_is_told_by_its_own_name_and_place() {
-    let text = quarter(TIP).replace("fix = \"all\"", "fix = \"pin\"");
-    let Err(Refusal::Failure(failure)) = reached(&text, &Accuracy::All(1e-2)) else { panic!("not refused") };
-    assert!(failure.name() == "singular" && failure.to_string().contains("b"), "{failure}");
+    // Nodes of the deck's own mesh, whatever mesh it was found on.
+    let text = quarter(TIP).replace("fix = \"all\"", "fix = \"pin\"").replace("elements = 4", "elements = 2");
+    let (deck, scene) = read(&text);
+    let refusals = [
+        reached(&text, &Accuracy::All(1e-5)).err(),
+        stopped(&text, &Against::Finest, 1, usize::MAX, &mut Journal::default()).0.err(),
+        error_bars(&text, &deck, &scene, &|| None).err(),
+    ];
+    for refusal in refusals {
+        let Some(Refusal::Failure(failure)) = refusal else { panic!("not refused") };
+        let own = ["b:1", "root", "tip"].iter().any(|node| failure.to_string().contains(&format!("\"{node}\"")));
+        assert!(failure.name() == "singular" && own, "{failure}");
+    }
+}
+
+#[test]
+fn scenes_whose_outputs_stay_zero_are_refused() {
+    let text = quarter(TIP).replace("\"5*pi\"", "0");
+    let refusals = [
+        reached(&text, &Accuracy::All(1e-2)).err(),
+        stopped(&text, &Against::Finest, 1, usize::MAX, &mut Journal::default()).0.err(),
+    ];
+    for refusal in refusals {
+        let Some(Refusal::Deck(diagnostic)) = refusal else { panic!("not refused") };
+        assert!(diagnostic.message.contains("zero from beginning to end"), "{}", diagnostic.message);
+    }
+}
+
+#[test]
+fn a_search_that_is_stopped_tells_the_best_so_far() {
+    let (deck, scene) = read(SWINGING);
+    let count = std::cell::Cell::new(0);
+    let tried = std::sync::atomic::AtomicUsize::new(0);
+    let interrupted = || (tried.load(std::sync::atomic::Ordering::Relaxed) > 4).then_some(2);
+    let mut tell = |done: usize, _: usize| {
+        count.set(done);
+        tried.store(done, std::sync::atomic::Ordering::Relaxed);
+    };
+    let journal = &mut Journal::default();
+    let options = Options { threads: 1, budget: None, interrupted: &interrupted, tell: &mut tell, journal };
+    let Ok(found) = reach(SWINGING, &deck, &scene, &Accuracy::All(1e-6), options) else { panic!("nothing is told") };
+    assert!(!found.reached && found.runs == 3 && found.ratio.is_finite());
+    assert!(matches!(found.stopped, Some(Failure::Interrupted { signal: 2, .. })), "{:?}", found.stopped);
+}
+
+#[test]
+fn modes_are_named_as_expectations_name_them() {
+    let text =
+        format!("{}[[stage]]\nkind = \"modal\"\nmodes = 2\n", quarter(TIP).replace("EI = 100", "EI = 100\nrhoA = 1"));
+    let wanted = |name: &str| Accuracy::Columns(vec![(Spanned { value: name.into(), span: 0..1 }, 1e-3)]);
+    let [short, long] = ["mode1.omega", "stage2.mode1.omega"].map(|name| match reached(&text, &wanted(name)) {
+        Ok(found) => (found.reached, found.settings),
+        Err(_) => panic!("{name}: refused"),
+    });
+    assert!(short.0 && short == long);
 }
 
 #[test]

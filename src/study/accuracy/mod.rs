@@ -20,6 +20,7 @@ pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 
 use super::cost::{Crew, Family, Mesher, Options, Pace, Point, Refusal, Sampler};
 use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
+use crate::drive::Failure;
 use crate::scene::Scene;
 use search::Search;
 
@@ -47,6 +48,8 @@ pub struct Found {
     pub estimates: Vec<f64>,
     /// The largest estimate over what is wanted of its output
     pub ratio: f64,
+    /// What stopped the search before it came to its end
+    pub stopped: Option<Failure>,
     /// Variants that were run
     pub runs: usize,
 }

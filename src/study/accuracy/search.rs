@@ -123,13 +123,28 @@ impl<'a> Search<'a> {
             }
             let points = round.points();
             crew.expect(points.len());
-            let trials = crew.run(&points)?;
+            let trials = match (crew.run(&points), best.take()) {
+                (Err(Refusal::Failure(stopped)), Some(found)) => {
+                    return Ok(Found { runs, stopped: Some(stopped), ..found });
+                }
+                (trials, found) => {
+                    best = found;
+                    trials?
+                }
+            };
             let Some(trials) = trials.into_iter().collect::<Option<Vec<Trial>>>() else { break };
             runs += trials.len();
             ended = format!("; the last of {runs} ended with `{}`", trials[0].status);
             match trials[0].status.as_str() {
                 // No mesh mends that.
-                "singular" if best.is_none() => return Err(Refusal::Failure(crew.failure_of(&round.own))),
+                "singular" if best.is_none() => {
+                    let again = || Failure::Limit("the first run of the search ended with `singular`".into());
+                    return Err(Refusal::Failure(crew.own_failure().unwrap_or_else(again)));
+                }
+                "finished" => {
+                    let scales = self.mesher.sampler.scales(&trials[0].samples);
+                    self.mesher.sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
+                }
                 "singular" | "deck" => break,
                 _ => {}
             }
@@ -239,6 +254,7 @@ impl<'a> Search<'a> {
             columns: self.mesher.sampler.columns.clone(),
             estimates: shares.map(|(mesh, step)| left + mesh + step).collect(),
             ratio: estimate.ratio(),
+            stopped: None,
             runs,
             point,
         }

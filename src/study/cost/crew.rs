@@ -112,13 +112,11 @@ impl<'a, 'o> Crew<'a, 'o> {
         }
     }
 
-    /// What a variant that did not finish ends with, place and all.
-    pub fn failure_of(&self, point: &Point) -> Failure {
-        let settings = point.settings(self.deck, self.text);
-        match trial::simulate(self.text, &settings, self.sampler, &self.options.interrupted) {
-            Ok(outcome) => outcome.ended.err().unwrap_or(Failure::Limit("what failed once did not fail again".into())),
-            Err(why) => Failure::Deck(why),
-        }
+    /// What the deck itself ends with, where a variant of it ended as `singular`: a mechanism is one on every mesh, and named by
+    /// a node of the deck's own.
+    pub fn own_failure(&self) -> Option<Failure> {
+        let outcome = trial::simulate(self.text, &[], self.sampler, &self.options.interrupted);
+        outcome.ok()?.ended.err()
     }
 
     /// Runs those that are, or may be, on the frontier again, one at a time and in turns, for their time.

@@ -30,6 +30,9 @@ use crate::study::outcome::{Outcome, columns, find_column};
 use grid::Grid;
 use std::time::Duration;
 
+/// Outputs that a reference lacks, named one by one.
+const LISTED: usize = 4;
+
 /// What errors are held against.
 pub enum Against {
     /// Runs finer than all others
@@ -136,6 +139,7 @@ pub fn study(text: &str, deck: &Deck, scene: &Scene, against: &Against, options:
     };
     let trials = crew.run(&points)?;
     let scales = sampler.scales(&reference.samples);
+    sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
 
     let mut runs: Vec<Run> = points
         .into_iter()
@@ -163,8 +167,10 @@ fn finest(mesher: &Mesher, grid: &Grid, sampler: &Sampler, crew: &mut Crew) -> R
     let points = reference::points(mesher, grid);
     crew.expect(points.len());
     let trials = crew.run_needed(&points)?;
-    reference::establish(sampler, &points, &trials)
-        .map_err(|status| Refusal::Failure(Failure::Limit(no_reference(&status))))
+    reference::establish(sampler, &points, &trials).map_err(|status| {
+        let own = (status == "singular").then(|| crew.own_failure()).flatten();
+        Refusal::Failure(own.unwrap_or(Failure::Limit(no_reference(&status))))
+    })
 }
 
 fn no_reference(status: &str) -> String {
@@ -200,11 +206,18 @@ fn sampler(
     };
     let scales = sampler.scales(&samples);
     let compared = sampler.differences(&samples, &samples, &scales);
-    sampler.outputs.retain(|&k| !compared[k].is_nan());
-    if sampler.outputs.is_empty() {
+    let (known, lacking): (Vec<usize>, Vec<usize>) = sampler.outputs.iter().partition(|&&k| !compared[k].is_nan());
+    if known.is_empty() {
         return Err(Diagnostic::whole(format!("{made} has no number for any output of the deck")));
     }
-    Ok((sampler, Some(Reference { samples, uncertainty: 0.0, made: made.into() })))
+    let lacking: Vec<&str> = lacking.iter().map(|&k| sampler.columns[k].as_str()).collect();
+    let made = match lacking.len() {
+        0 => made.to_string(),
+        1..=LISTED => format!("{made} (which says nothing of {})", lacking.join(", ")),
+        more => format!("{made} (which says nothing of {more} outputs: {}, …)", lacking[..LISTED].join(", ")),
+    };
+    sampler.outputs = known;
+    Ok((sampler, Some(Reference { samples, uncertainty: 0.0, made })))
 }
 
 /// Refuses a history that ends before the deck does: nothing is known of what follows.

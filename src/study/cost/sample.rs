@@ -2,7 +2,7 @@
 
 use super::grid::{Pace, dynamic_stages};
 use super::order::Expected;
-use crate::deck::{Deck, NormWord, Path, StageBody};
+use crate::deck::{Deck, Diagnostic, NormWord, Path, StageBody};
 use crate::probe::Quantity;
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, columns, columns_of_history};
@@ -156,6 +156,15 @@ impl Sampler {
     /// The largest value of each column's kind.
     pub fn scales(&self, samples: &Samples) -> Vec<f64> {
         scales(&self.columns, self.length, self.split(samples))
+    }
+
+    /// Outputs that are zero throughout have no size that an error could be measured by.
+    pub fn refuse_nothing(&self, scales: &[f64]) -> Result<(), Diagnostic> {
+        if self.outputs.iter().any(|&k| scales[k] > 0.0) {
+            return Ok(());
+        }
+        let message = "all outputs are zero from beginning to end: no error can be measured of them";
+        Err(Diagnostic::whole(message).help("does a load act on what [output] names? name other `nodes` or `columns`"))
     }
 
     /// Rows of the history, then the modes, each with the number of the column that it begins with.
