@@ -71,7 +71,8 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
     Ok(Loaded { text, deck, scene })
 }
 
-fn text(path: &Path) -> Result<String, Refusal> {
+/// The text of a file.
+pub fn text(path: &Path) -> Result<String, Refusal> {
     let refuse = |why: String| Refusal::of(Status::Io, "io", format!("{}: {why}", path.display()));
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|e| refuse(e.to_string()))?;
@@ -95,7 +96,8 @@ fn expected_failures(deck: &Deck) -> Vec<String> {
     deck.expects.iter().filter_map(name).collect()
 }
 
-fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
+/// Messages as the user sees them.
+pub fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));
     sorted.iter().map(|d| d.render(path, text, say::styled()) + "\n").collect::<Vec<_>>().join("\n")

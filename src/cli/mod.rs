@@ -10,6 +10,7 @@ mod progress;
 mod run;
 mod say;
 mod signals;
+mod sweep;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -97,9 +98,11 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// Many runs of one deck (not supported yet)
-    #[command(hide = true)]
-    Sweep(Rest),
+    /// Run many variants of one deck and write one table of what came of them
+    Sweep {
+        #[command(flatten)]
+        wanted: sweep::Wanted,
+    },
     /// The JSON Schema of the deck (not supported yet)
     #[command(hide = true)]
     Schema(Rest),
@@ -184,7 +187,7 @@ pub fn main() -> ExitCode {
         Command::Effects { input, tolerance, out } => {
             effects::effects(&input.decks, &input.set, tolerance, out.as_deref())
         }
-        Command::Sweep(rest) => not_yet("sweep", &rest),
+        Command::Sweep { wanted } => sweep::sweep(&wanted),
         Command::Schema(rest) => not_yet("schema", &rest),
         Command::Completions(rest) => not_yet("completions", &rest),
     };

@@ -21,8 +21,8 @@ impl Progress {
     /// For a run of this name.
     pub fn new(name: &str) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{msg} [{bar:30}] {percent:>3} % {elapsed} (left {eta})");
-            let bar = ProgressBar::new(10_000).with_message(name.to_string());
+            let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} % {elapsed} (left {eta}) {msg}");
+            let bar = ProgressBar::new(10_000).with_prefix(name.to_string());
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
         Self { bar, name: name.into(), last: Instant::now() }
@@ -36,7 +36,10 @@ impl Progress {
         }
         self.last = Instant::now();
         match &self.bar {
-            Some(bar) => bar.set_position((done * 10_000.0) as u64),
+            Some(bar) => {
+                bar.set_message(place());
+                bar.set_position((done * 10_000.0) as u64);
+            }
             None => say::note(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),
         }
     }

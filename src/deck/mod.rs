@@ -9,11 +9,13 @@ mod diagnostic;
 mod effects;
 mod expression;
 mod geometry;
+mod looked_at;
 mod overrides;
 mod parameters;
 mod procedure;
 mod reader;
 mod resolved;
+mod sweep;
 
 pub use accuracy::{Accuracy, is_named};
 pub use action::{
@@ -27,12 +29,15 @@ pub use expression::{Expression, Jet};
 pub use geometry::{
     Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape,
 };
+pub use looked_at::{Looked, looking_at};
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use procedure::{
     Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage, StageBody,
     Until,
 };
+
+pub use sweep::{SweepFile, VaryBody, VaryTable};
 
 use reader::{Context, Table};
 use std::cell::RefCell;
@@ -141,7 +146,7 @@ fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
 
 fn read_tables(context: &Context, document: &DeTable) -> Deck {
     let keys: Vec<&str> = KEYS.into_iter().chain(["damping", "expect"]).collect();
-    let top = Table::top(context, document, &keys, &[]);
+    let top = Table::top(context, document, "the deck", &keys);
     let points = geometry::read_points(&top);
     let materials = named(&top, "material", geometry::read_material);
     let sections = named(&top, "section", geometry::read_section);

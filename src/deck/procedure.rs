@@ -159,6 +159,27 @@ pub enum Reduce {
     Drift,
 }
 
+const REDUCTIONS: [Reduce; 5] = [Reduce::Max, Reduce::Min, Reduce::AbsMax, Reduce::Mean, Reduce::Drift];
+
+impl Reduce {
+    /// What the deck calls it; an instant has no word.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::At(_) => "",
+            Self::Max => "max",
+            Self::Min => "min",
+            Self::AbsMax => "absmax",
+            Self::Mean => "mean",
+            Self::Drift => "drift",
+        }
+    }
+
+    /// The reduction over all rows with this word.
+    pub fn of(word: &str) -> Option<Self> {
+        REDUCTIONS.into_iter().find(|reduce| reduce.word() == word)
+    }
+}
+
 /// One instant of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Instant {
@@ -492,13 +513,7 @@ fn read_reduce(table: &Table) -> Option<Reduce> {
     match (table.get("at"), table.get("reduce")) {
         (None, None) => Some(Reduce::At(Instant::End)),
         (Some(item), None) => read_instant(context, item).map(Reduce::At),
-        (None, Some(_)) => Some(match table.word("reduce", &["max", "min", "absmax", "mean", "drift"])?.value {
-            "max" => Reduce::Max,
-            "min" => Reduce::Min,
-            "absmax" => Reduce::AbsMax,
-            "mean" => Reduce::Mean,
-            _ => Reduce::Drift,
-        }),
+        (None, Some(_)) => Reduce::of(table.word("reduce", &REDUCTIONS.map(|reduce| reduce.word()))?.value),
         (Some(_), Some(item)) => context
             .wrong(item.span(), "an expectation looks `at` one instant or takes a `reduce` over all rows, not both"),
     }

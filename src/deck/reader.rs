@@ -201,10 +201,10 @@ impl<'a> Table<'a> {
         Some(Self { context, what, span: item.span(), entries, misspelt: Vec::new() })
     }
 
-    /// The top level of the deck.
-    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, keys: &[&str], unsupported: Unsupported) -> Self {
-        let mut table = Self { context, what: "the deck".into(), span: 0..0, entries, misspelt: Vec::new() };
-        table.refuse_unknown(keys, unsupported);
+    /// The top level of a file.
+    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, what: &str, keys: &[&str]) -> Self {
+        let mut table = Self { context, what: what.into(), span: 0..0, entries, misspelt: Vec::new() };
+        table.refuse_unknown(keys, &[]);
         table
     }
 

@@ -28,10 +28,15 @@ impl PartFile {
         Ok((part, file))
     }
 
-    /// Gives the part, which must be flushed, its final name.
+    /// Gives the part, which must be flushed, its final name, when it is safe on the disk.
     pub fn finish(self, file: &File, name: &str) -> io::Result<()> {
+        file.sync_all().map_err(|e| about(&self.part, &e)).and_then(|()| self.rename(name))
+    }
+
+    /// Gives the part its final name at once: for what can be made again if the machine loses it.
+    pub fn rename(self, name: &str) -> io::Result<()> {
         let done = self.folder.join(name);
-        file.sync_all().and_then(|()| fs::rename(&self.part, &done)).map_err(|e| about(&done, &e))
+        fs::rename(&self.part, &done).map_err(|e| about(&done, &e))
     }
 }
 

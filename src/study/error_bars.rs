@@ -74,6 +74,27 @@ pub fn error_bars(
     Ok(ErrorBars { sampler, largest, values: vec![0.0; columns], tolerance, companions: found })
 }
 
+/// Errors of what a deck expects, whatever its values, from the same companions; `came` is what came of the run.
+pub fn of_expected(
+    text: &str,
+    deck: &Deck,
+    scene: &Scene,
+    came: &[f64],
+    interrupted: &dyn Fn() -> Option<i32>,
+) -> Result<Vec<f64>, Failure> {
+    let (sampler, _) = Sampler::of_expectations(deck, scene);
+    let mut errors: Vec<f64> = came.iter().map(|value| left_by_newton(deck) * value.abs()).collect();
+    for (point, divisors) in companions(text, deck, &sampler) {
+        let outcome =
+            trial::simulate(text, &point.settings(deck, text), &sampler, interrupted).map_err(Failure::Limit)?;
+        outcome.ended?;
+        for (((error, a), b), divisor) in errors.iter_mut().zip(came).zip(&outcome.expected).zip(&divisors) {
+            *error += SAFETY * (a - b).abs() / divisor;
+        }
+    }
+    Ok(errors)
+}
+
 /// The variants that errors are told from, with the divisors of differences to them.
 fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<(Point, Vec<f64>)> {
     let mesher = Mesher { text, deck, sampler, interpolation: None };

@@ -4,10 +4,12 @@ pub mod ablation;
 pub mod accuracy;
 mod compare;
 pub mod cost;
+mod crowd;
 pub mod error_bars;
 pub mod forecast;
 mod outcome;
 mod scale;
+pub mod sweep;
 mod verify;
 
 pub use compare::{Comparison, compare};

@@ -177,11 +177,7 @@ fn describe(reduce: &Reduce) -> String {
         Reduce::At(Instant::End) => "at the end".into(),
         Reduce::At(Instant::Time(time)) => format!("at time {time}"),
         Reduce::At(Instant::Load(load)) => format!("at load {load}"),
-        Reduce::Max => "max".into(),
-        Reduce::Min => "min".into(),
-        Reduce::AbsMax => "absmax".into(),
-        Reduce::Mean => "mean".into(),
-        Reduce::Drift => "drift".into(),
+        how => how.word().into(),
     }
 }
 

@@ -1,46 +1,10 @@
 //! The binary as a user meets it: files, exit statuses, last lines.
 
+use super::folder::{Folder, last_line, status};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-
-/// A folder of its own for a test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn write(&self, name: &str, text: &str) -> PathBuf {
-        let path = self.0.join(name);
-        fs::write(&path, text).unwrap();
-        path
-    }
-
-    fn beamsim(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_beamsim")).args(arguments).current_dir(&self.0).output().unwrap()
-    }
-
-    fn names(&self, folder: &str) -> Vec<String> {
-        let entries = fs::read_dir(self.0.join(folder)).unwrap();
-        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
-fn status(output: &Output) -> i32 {
-    output.status.code().unwrap()
-}
-
-fn last_line(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).trim_end().lines().last().unwrap_or_default().to_string()
-}
 
 const GOOD: &str = r#"
 title = "cantilever"

@@ -7,10 +7,7 @@ use super::trial::{self, Seconds, Trial};
 use super::{Options, Refusal, Run, Timing};
 use crate::deck::Deck;
 use crate::drive::{Failure, Moment};
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
-use std::sync::mpsc;
-use std::thread;
+use crate::study::crowd::side_by_side;
 use std::time::{Duration, Instant};
 
 /// A run alone is repeated until it has taken so many seconds in all.
@@ -78,33 +75,19 @@ impl<'a, 'o> Crew<'a, 'o> {
             open.reverse();
         }
         self.done += points.len() - open.len();
-        let queue = Mutex::new(open);
         let (text, sampler, deadline) = (self.text, self.sampler, self.deadline);
         let signals = self.options.interrupted;
-        let stopped = move || signals().or_else(|| deadline.is_over().then_some(0));
-        let (sender, receiver) = mpsc::channel();
-        thread::scope(|scope| {
-            for _ in 0..self.options.threads.max(1) {
-                let (queue, settings, sender) = (&queue, &settings, sender.clone());
-                scope.spawn(move || {
-                    let next = || queue.lock().ok()?.pop();
-                    while let Some(k) = (stopped().is_none()).then(next).flatten() {
-                        // A fault of the program in one run is none of the others'.
-                        let run = || trial::run(text, &settings[k], sampler, &stopped);
-                        let trial = catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|_| Trial::ended("broke off"));
-                        if trial.status == "interrupted" || sender.send((k, trial)).is_err() {
-                            return;
-                        }
-                    }
-                });
-            }
-            drop(sender);
-            for (k, trial) in receiver {
-                self.done += 1;
-                (self.options.tell)(self.done, self.expected);
-                self.options.journal.keep(&keys[k], &trial);
-                trials[k] = Some(trial);
-            }
+        let stopped = || signals().or_else(|| deadline.is_over().then_some(0));
+        let run = |k: usize| {
+            let trial = trial::run(text, &settings[k], sampler, &stopped);
+            (trial.status != "interrupted").then_some(trial)
+        };
+        let broken = |_| Trial::ended("broke off");
+        side_by_side(self.options.threads, open, &|| stopped().is_some(), &run, &broken, |k, trial| {
+            self.done += 1;
+            (self.options.tell)(self.done, self.expected);
+            self.options.journal.keep(&keys[k], &trial);
+            trials[k] = Some(trial);
         });
         match signals() {
             Some(signal) => Err(Refusal::Failure(interrupted(signal))),

@@ -1,0 +1,142 @@
+//! `sweep.toml`: what `beamsim sweep` varies, in a file.
+
+use super::parameters::Parameters;
+use super::reader::{Context, Item, Table, kind_of, literal};
+use super::{Diagnostic, Spanned};
+use std::cell::RefCell;
+use toml::de::{DeTable, DeValue};
+
+/// A sweep as it stands in its file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SweepFile {
+    /// The deck, seen from the folder of the file
+    pub deck: String,
+    /// Changes to the deck for all points, as in `--set`
+    pub set: Vec<String>,
+    /// What is varied, in order
+    pub vary: Vec<VaryTable>,
+    /// Whether the first values of all keys make the first point, and so on
+    pub zip: bool,
+    /// How many samples are drawn
+    pub sample: Option<usize>,
+    /// What random numbers begin with
+    pub seed: Option<u64>,
+    /// What is looked at
+    pub outputs: Vec<String>,
+    /// Whether errors of these are estimated
+    pub error_bars: bool,
+}
+
+/// A key that is varied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VaryTable {
+    /// As in `--set`
+    pub key: Spanned<String>,
+    /// Its values
+    pub body: VaryBody,
+}
+
+/// Values of a key.
+#[derive(Clone, Debug, PartialEq)]
+pub enum VaryBody {
+    /// These, each as TOML
+    List(Vec<String>),
+    /// Some between two numbers, or any
+    Range {
+        /// The first
+        from: f64,
+        /// The last
+        to: f64,
+        /// How many; none: samples are drawn
+        count: Option<usize>,
+        /// Whether equal steps are equal factors
+        log: bool,
+    },
+}
+
+const KEYS: [&str; 8] = ["deck", "vary", "set", "zip", "sample", "seed", "outputs", "error_bars"];
+const MOST_SAMPLES: usize = 10_000_000;
+
+impl SweepFile {
+    /// Whether a text is one: it names a deck.
+    pub fn is_one(text: &str) -> bool {
+        DeTable::parse(text).is_ok_and(|document| document.get_ref().contains_key("deck"))
+    }
+
+    /// Reads one.
+    pub fn read(text: &str) -> Result<Self, Vec<Diagnostic>> {
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        if !syntax.is_empty() {
+            return Err(super::describe_syntax(&syntax));
+        }
+        let context = Context {
+            parameters: Parameters::default(),
+            stage_count: 0,
+            diagnostics: RefCell::default(),
+            resolved: RefCell::default(),
+        };
+        let file = Self::of(&context, document.get_ref());
+        let found = context.diagnostics.take();
+        file.filter(|_| found.is_empty()).ok_or(found)
+    }
+
+    fn of(context: &Context, document: &DeTable) -> Option<Self> {
+        let top = Table::top(context, document, "the sweep", &KEYS);
+        let texts = |key: &str| top.get(key).map_or(Some(Vec::new()), |item| context.texts(item));
+        let plain = |texts: Vec<Spanned<String>>| texts.into_iter().map(|text| text.value).collect();
+        let whole = |key: &str, least| top.get(key).and_then(|item| context.whole(item, least, MOST_SAMPLES));
+        let vary = Table::of_names(context, top.required("vary")?, "[vary]")?;
+        Some(Self {
+            deck: context.text(top.required("deck")?)?.value,
+            set: plain(texts("set")?),
+            vary: vary.entries().filter_map(|(key, item)| read_vary(context, key, item)).collect(),
+            zip: top.flag("zip").unwrap_or(false),
+            sample: whole("sample", 1).map(|count| count.value),
+            seed: whole("seed", 0).map(|seed| seed.value as u64),
+            outputs: plain(texts("outputs")?),
+            error_bars: top.flag("error_bars").unwrap_or(false),
+        })
+    }
+}
+
+fn read_vary<'a>(context: &'a Context, key: Spanned<String>, item: &'a Item<'a>) -> Option<VaryTable> {
+    let body = match item.get_ref() {
+        DeValue::Array(values) => {
+            VaryBody::List(values.iter().map(|value| as_toml(context, value)).collect::<Option<_>>()?)
+        }
+        DeValue::Table(_) => {
+            let table = Table::new(context, item, format!("`{}`", key.value), &["from", "to", "count", "log"], &[])?;
+            let number = |key: &str| context.number(table.required(key)?).map(|number| number.value);
+            let (from, to) = (number("from"), number("to"));
+            let count = table.get("count").map(|item| context.whole(item, 1, MOST_SAMPLES));
+            VaryBody::Range {
+                from: from?,
+                to: to?,
+                count: count.map_or(Some(None), |count| Some(Some(count?.value)))?,
+                log: table.flag("log").unwrap_or(false),
+            }
+        }
+        other => {
+            let message = format!("a list of values, or {{ from = …, to = …, count = … }}, found {}", kind_of(other));
+            return context.wrong(item.span(), message);
+        }
+    };
+    Some(VaryTable { key, body })
+}
+
+/// A value as it would stand in a deck.
+fn as_toml(context: &Context, item: &Item) -> Option<String> {
+    match item.get_ref() {
+        DeValue::String(text) => Some(toml_edit::Value::from(text.as_ref()).to_string()),
+        DeValue::Boolean(value) => Some(value.to_string()),
+        DeValue::Array(values) => {
+            let values: Vec<String> = values.iter().map(|value| as_toml(context, value)).collect::<Option<_>>()?;
+            Some(format!("[{}]", values.join(", ")))
+        }
+        value => match (literal(value), value) {
+            (Some(number), DeValue::Integer(_)) => Some(format!("{number}")),
+            (Some(number), _) => Some(format!("{number:?}")),
+            (None, other) => context.wrong(item.span(), format!("a value of a deck is not {}", kind_of(other))),
+        },
+    }
+}

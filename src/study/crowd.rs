@@ -1,0 +1,37 @@
+//! Work that is done side by side, each piece once, in an order of the caller's.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::mpsc;
+use std::thread;
+
+/// Does the pieces `open`, the last first, on some threads until all are done or `stopped`; `take` sees what came of each as it ends, on
+/// this thread. `None` of `work` is a piece that was not brought to its end. A fault of the program in one piece is none of the others':
+/// `broken` stands for what would have come of it.
+pub fn side_by_side<T: Send>(
+    threads: usize,
+    open: Vec<usize>,
+    stopped: &(dyn Fn() -> bool + Sync),
+    work: &(dyn Fn(usize) -> Option<T> + Sync),
+    broken: &(dyn Fn(usize) -> T + Sync),
+    mut take: impl FnMut(usize, T),
+) {
+    let queue = Mutex::new(open);
+    let (sender, receiver) = mpsc::channel();
+    thread::scope(|scope| {
+        for _ in 0..threads.max(1) {
+            let (queue, sender) = (&queue, sender.clone());
+            scope.spawn(move || {
+                let next = || queue.lock().ok()?.pop();
+                while let Some(k) = (!stopped()).then(next).flatten() {
+                    let done = catch_unwind(AssertUnwindSafe(|| work(k))).unwrap_or_else(|_| Some(broken(k)));
+                    if done.is_none_or(|done| sender.send((k, done)).is_err()) {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        receiver.iter().for_each(|(k, done)| take(k, done));
+    });
+}

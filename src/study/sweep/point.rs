@@ -1,0 +1,92 @@
+//! One point of a sweep.
+
+use crate::deck::{self, Diagnostic};
+use crate::drive::Failure;
+use crate::scene;
+use crate::study::Recorder;
+use crate::study::error_bars::of_expected;
+use crate::study::outcome::Outcome as Run;
+
+/// What came of a point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// `finished`, or a failure's name
+    pub status: String,
+    /// What went wrong
+    pub message: String,
+    /// What was looked at; none where it failed
+    pub values: Vec<f64>,
+    /// Estimated errors of these, where they are wanted
+    pub errors: Vec<f64>,
+    /// Converged levels and steps, Newton iterations, factorisations
+    pub work: [u64; 3],
+    /// On the wall
+    pub seconds: f64,
+}
+
+impl Outcome {
+    /// The status of a point whose process was gone before it came to an end.
+    pub const KILLED: &str = "killed";
+
+    /// One without results.
+    pub fn failed(status: &str, message: String) -> Self {
+        Self { status: status.into(), message, ..Self::default() }
+    }
+
+    /// Whether it came to its end.
+    pub fn finished(&self) -> bool {
+        self.status == "finished"
+    }
+}
+
+/// Runs the deck `text`, which expects what is looked at, with settings.
+pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> Outcome {
+    let text = match deck::apply(text, settings) {
+        Ok(text) => text,
+        Err(why) => return Outcome::failed("deck", why),
+    };
+    let first = |found: Vec<Diagnostic>| {
+        let error = found.into_iter().find(|diagnostic| !diagnostic.is_warning());
+        Outcome::failed("deck", error.map_or("there is no such scene".into(), |error| error.message))
+    };
+    let (deck, found) = match deck::read(&text) {
+        Ok(read) => read,
+        Err(found) => return first(found),
+    };
+    let mut scene = match scene::from_deck(&deck, found) {
+        Ok((scene, _)) => scene,
+        Err(found) => return first(found),
+    };
+    // Rows of a history that nobody reads need not be kept.
+    let probes = std::mem::take(&mut scene.probes);
+    let run = Run::of(&scene, Some(Recorder::new(&scene)), u64::MAX, interrupted);
+    scene.probes = probes;
+    let counters = &run.counters;
+    let outcome = Outcome {
+        work: [counters.steps, counters.work.iterations, counters.work.factorisations],
+        seconds: run.seconds,
+        ..Outcome::default()
+    };
+    let failed = |failure: Failure, outcome| {
+        let (status, message) = (failure.name().to_string(), failure.to_string());
+        Outcome { status, message, ..outcome }
+    };
+    if let Err(failure) = run.ended {
+        return failed(failure, outcome);
+    }
+    let errors = match error_bars {
+        true => of_expected(&text, &deck, &scene, &run.expected, interrupted),
+        false => Ok(Vec::new()),
+    };
+    match errors {
+        Ok(errors) => Outcome { status: "finished".into(), values: run.expected, errors, ..outcome },
+        // What was run is worth having without.
+        Err(failure @ Failure::Interrupted { .. }) => failed(failure, outcome),
+        Err(failure) => Outcome {
+            status: "finished".into(),
+            message: format!("no error bars: {failure}"),
+            values: run.expected,
+            ..outcome
+        },
+    }
+}
