@@ -12,8 +12,9 @@ mod say;
 mod signals;
 mod sweep;
 mod verify;
+mod words;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -103,19 +104,34 @@ enum Command {
         #[command(flatten)]
         wanted: sweep::Wanted,
     },
-    /// The JSON Schema of the deck (not supported yet)
-    #[command(hide = true)]
-    Schema(Rest),
-    /// Shell completions (not supported yet)
-    #[command(hide = true)]
-    Completions(Rest),
-}
-
-/// Whatever follows a command that is not supported yet.
-#[derive(clap::Args)]
-struct Rest {
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
-    words: Vec<String>,
+    /// Write a commented deck to begin with
+    New {
+        /// Of what
+        #[arg(value_enum, default_value_t)]
+        template: words::Template,
+        /// The file (default: <template>.toml)
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// Tell what a key or a table of the deck means
+    Explain {
+        /// `elements`, `beam.elements`, `[[beam]]`; `deck` for all tables
+        key: String,
+    },
+    /// Print the JSON Schema of the deck, for editors
+    Schema,
+    /// Print completions for a shell
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write one for each command
+    Manual {
+        /// The folder they are written to
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }
 
 /// How a command ended.
@@ -188,8 +204,11 @@ pub fn main() -> ExitCode {
             effects::effects(&input.decks, &input.set, tolerance, out.as_deref())
         }
         Command::Sweep { wanted } => sweep::sweep(&wanted),
-        Command::Schema(rest) => not_yet("schema", &rest),
-        Command::Completions(rest) => not_yet("completions", &rest),
+        Command::New { template, out } => words::new(template, out.as_deref()),
+        Command::Explain { key } => words::explain(&key),
+        Command::Schema => words::schema(),
+        Command::Completions { shell } => words::completions(shell, Arguments::command()),
+        Command::Manual { out } => words::manual(Arguments::command(), out.as_deref()),
     };
     ExitCode::from(status as u8)
 }
@@ -212,11 +231,5 @@ fn explain(error: &clap::Error) -> Status {
         say::note(rest.trim());
     }
     say::error("usage", first.trim_start_matches("error: "));
-    Status::Wrong
-}
-
-fn not_yet(command: &str, rest: &Rest) -> Status {
-    let _ = &rest.words;
-    say::error("usage", &format!("`beamsim {command}` is not supported yet"));
     Status::Wrong
 }

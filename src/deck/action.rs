@@ -270,7 +270,7 @@ pub enum HistoryBody {
 const DIRECTIONS: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 
 pub(super) fn read_support<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Support> {
-    let table = Table::new(context, item, "[[support]]", &["at", "fix", "axes", "stages"], &[])?;
+    let table = Table::new(context, item, "[[support]]", &["at", "fix", "axes", "stages"])?;
     let at = required_text(&table, "at");
     let fix = table.required("fix").and_then(|item| read_fix(context, item));
     let (axes, stages) = (read_axes(&table), read_stages(&table));
@@ -372,7 +372,7 @@ fn read_stages(table: &Table) -> Option<Option<Vec<usize>>> {
 
 pub(super) fn read_motion<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Motion> {
     let keys = ["at", "ux", "uy", "uz", "rotate", "angle", "axes", "history", "stages"];
-    let table = Table::new(context, item, "[[motion]]", &keys, &[])?;
+    let table = Table::new(context, item, "[[motion]]", &keys)?;
     let at = required_text(&table, "at");
     let what = read_motion_what(&table);
     let (axes, stages, history) = (read_axes(&table), read_stages(&table), table.text("history"));
@@ -411,7 +411,7 @@ const JOINT_KEYS: [&str; 11] =
     ["kind", "at", "beams", "nodes", "axis", "axes", "stiffness", "damping", "angle", "displacement", "history"];
 
 pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Joint> {
-    let table = Table::new(context, item, "[[joint]]", &JOINT_KEYS, &[])?;
+    let table = Table::new(context, item, "[[joint]]", &JOINT_KEYS)?;
     table.required("kind")?;
     let kinds = ["spherical", "revolute", "universal", "prismatic", "rigid"];
     let kind = table.word("kind", &kinds).map(|word| match word.value {
@@ -529,7 +529,7 @@ fn refuse_drive_of_others(table: &Table, kind: JointKind) {
 }
 
 pub(super) fn read_body<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Body> {
-    let table = Table::new(context, item, "[[body]]", &["at", "mass", "inertia", "offset"], &[])?;
+    let table = Table::new(context, item, "[[body]]", &["at", "mass", "inertia", "offset"])?;
     let at = required_text(&table, "at");
     table.required("mass");
     let mass = table.positive("mass");
@@ -554,7 +554,7 @@ fn read_inertia(table: &Table, item: &Item) -> Option<[[f64; 3]; 3]> {
 const SPRING_KEYS: [&str; 8] = ["at", "between", "stiffness", "damping", "length", "tension_only", "axes", "stages"];
 
 pub(super) fn read_spring<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Spring> {
-    let table = Table::new(context, item, "[[spring]]", &SPRING_KEYS, &[])?;
+    let table = Table::new(context, item, "[[spring]]", &SPRING_KEYS)?;
     let stages = read_stages(&table);
     if table.has("at") && table.has("between") {
         return context
@@ -610,7 +610,7 @@ fn read_link(table: &Table) -> Option<SpringBody> {
 
 /// Rayleigh factors of mass and stiffness.
 pub(super) fn read_damping(top: &Table) -> Option<[f64; 2]> {
-    let table = Table::new(top.context, top.get("damping")?, "[damping]", &["mass", "stiffness"], &[])?;
+    let table = Table::new(top.context, top.get("damping")?, "[damping]", &["mass", "stiffness"])?;
     let factor = |key: &str| {
         if !table.has(key) {
             return Some(0.0);
@@ -625,7 +625,7 @@ pub(super) fn read_damping(top: &Table) -> Option<[f64; 2]> {
 
 pub(super) fn read_load<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Load> {
     let keys = ["at", "along", "force", "moment", "frame", "history", "stages"];
-    let table = Table::new(context, item, "[[load]]", &keys, &[])?;
+    let table = Table::new(context, item, "[[load]]", &keys)?;
     let target = match (table.get("at"), table.get("along")) {
         (Some(item), None) => context.text(item).map(LoadTarget::At),
         (None, Some(item)) => context.text(item).map(LoadTarget::Along),
@@ -686,7 +686,7 @@ fn read_load_vector(table: &Table, key: &str, along: bool) -> Option<Option<Load
 }
 
 pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Initial> {
-    let table = Table::new(context, item, "[[initial]]", &["beam", "at", "velocity", "spin", "about"], &[])?;
+    let table = Table::new(context, item, "[[initial]]", &["beam", "at", "velocity", "spin", "about"])?;
     let target = match (table.get("at"), table.get("beam")) {
         (Some(item), None) => context.text(item).map(InitialTarget::At),
         (None, Some(item)) => context.text(item).map(InitialTarget::Beam),
@@ -711,7 +711,7 @@ pub(super) fn read_history<'a>(
 ) -> Option<HistoryTable> {
     let name = check_name(context, name)?;
     let what = format!("[history.{}]", name.value);
-    let table = Table::new(context, item, what.clone(), &["times", "values", "smooth", "expr"], &[])?;
+    let table = Table::new(context, item, what.clone(), &["times", "values", "smooth", "expr"])?;
     if table.has("expr") {
         if let Some(key) = ["times", "values", "smooth"].into_iter().find(|key| table.has(key)) {
             return context.wrong(table.key_span(key), format!("{what} is `times` and `values`, or `expr`, not both"));

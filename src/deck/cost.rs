@@ -64,7 +64,7 @@ const KEYS: [&str; 8] = ["outputs", "norm", "elements", "order", "interpolation"
 impl Cost {
     pub(super) fn read(top: &Table) -> Self {
         let Some(item) = top.get("cost") else { return Self::default() };
-        let Some(table) = Table::new(top.context, item, "[cost]", &KEYS, &[]) else { return Self::default() };
+        let Some(table) = Table::new(top.context, item, "[cost]", &KEYS) else { return Self::default() };
         if let (true, true) = (table.has("step"), table.has("step_tolerance")) {
             let message = "give factors of `step`, or `step_tolerance` of steps that adapt, not both";
             table.context.wrong::<()>(table.key_span("step_tolerance"), message);

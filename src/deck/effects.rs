@@ -70,7 +70,7 @@ impl Effects {
     pub(super) fn read(top: &Table) -> Self {
         let Some(item) = top.get("effects") else { return Self::default() };
         let keys = EffectWord::ALL.map(EffectWord::key);
-        let Some(table) = Table::new(top.context, item, "[effects]", &keys, &[]) else { return Self::default() };
+        let Some(table) = Table::new(top.context, item, "[effects]", &keys) else { return Self::default() };
         let forced = |word: EffectWord| {
             let value = table.flag(word.key())?;
             Some((word, Spanned { value, span: table.key_span(word.key()) }))

@@ -181,7 +181,7 @@ pub(super) fn check_name(context: &Context, name: Spanned<String>) -> Option<Spa
 }
 
 pub(super) fn read_material<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<Material> {
-    let table = Table::new(context, item, format!("[material.{}]", name.value), &["E", "nu", "G", "rho"], &[])?;
+    let table = Table::new(context, item, format!("[material.{}]", name.value), &["E", "nu", "G", "rho"])?;
     table.required("E");
     let young = table.positive("E");
     let density = table.number("rho");
@@ -213,7 +213,7 @@ const SHAPE_KEYS: [&str; 7] = ["material", "shape", "radius", "thickness", "widt
 
 pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<Section> {
     let keys = [&RESULTANT_KEYS[..], &FULL_KEYS, &SHAPE_KEYS].concat();
-    let table = Table::new(context, item, format!("[section.{}]", name.value), &keys, &[])?;
+    let table = Table::new(context, item, format!("[section.{}]", name.value), &keys)?;
     let families = [&RESULTANT_KEYS[..], &FULL_KEYS, &SHAPE_KEYS];
     let used: Vec<usize> = (0..3).filter(|&k| families[k].iter().any(|key| table.has(key))).collect();
     let body = match used[..] {
@@ -368,7 +368,7 @@ const BEAM_KEYS: [&str; 12] = [
 ];
 
 pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Beam> {
-    let table = Table::new(context, item, "[[beam]]", &BEAM_KEYS, &[])?;
+    let table = Table::new(context, item, "[[beam]]", &BEAM_KEYS)?;
     let name = table.required("name").and_then(|item| context.text(item)).and_then(|name| check_name(context, name));
     let sections = table.required("section").and_then(|item| read_sections(context, item));
     let path = read_path(&table);

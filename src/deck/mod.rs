@@ -15,6 +15,7 @@ mod parameters;
 mod procedure;
 mod reader;
 mod resolved;
+mod schema;
 mod sweep;
 
 pub use accuracy::{Accuracy, is_named};
@@ -37,6 +38,7 @@ pub use procedure::{
     Until,
 };
 
+pub use schema::{Entry, SCHEMA, entries, explain};
 pub use sweep::{SweepFile, VaryBody, VaryTable};
 
 use reader::{Context, Table};

@@ -208,7 +208,7 @@ pub const FAILURES: [&str; 9] = [
 pub const MOST_STEPS: usize = 1_000_000_000;
 
 pub(super) fn read_units(top: &Table) -> Option<[String; 3]> {
-    let table = Table::new(top.context, top.get("units")?, "`units`", &["length", "force", "time"], &[])?;
+    let table = Table::new(top.context, top.get("units")?, "`units`", &["length", "force", "time"])?;
     let label = |key: &str| table.text(key).map_or(String::new(), |t| t.value);
     Some(["length", "force", "time"].map(label))
 }
@@ -223,8 +223,10 @@ const DYNAMIC: [&str; 10] =
 const ENERGY_LIMIT: f64 = 0.2;
 
 pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Stage> {
-    let known = [&COMMON[..], &STATIC, &DYNAMIC, &["modes"]].concat();
-    let table = Table::new(context, item, "[[stage]]", &known, &[])?;
+    // `adaptive` belongs to both kinds.
+    let dynamic: Vec<&str> = DYNAMIC.into_iter().filter(|key| !STATIC.contains(key)).collect();
+    let known = [&COMMON[..], &STATIC, &dynamic, &["modes"]].concat();
+    let table = Table::new(context, item, "[[stage]]", &known)?;
     table.required("kind")?;
     let kind = table.word("kind", &["static", "dynamic", "modal", "buckling"])?;
     let body = match kind.value {
@@ -319,7 +321,7 @@ fn read_path_control(table: &Table) -> Option<StageBody> {
 }
 
 fn read_frame<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<RotatingFrame> {
-    let table = Table::new(context, item, "`frame`", &["spin", "about"], &[])?;
+    let table = Table::new(context, item, "`frame`", &["spin", "about"])?;
     table.required("spin")?;
     let spin = table.vector::<3>("spin")?.value;
     let about = match table.get("about") {
@@ -414,7 +416,7 @@ fn read_tolerance(table: &Table) -> Option<f64> {
 }
 
 fn read_until<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Until> {
-    let table = Table::new(context, item, "`until`", &["column", "below", "above"], &[])?;
+    let table = Table::new(context, item, "`until`", &["column", "below", "above"])?;
     let column = table.required("column").and_then(|item| context.text(item));
     let (below, above) = (table.number("below").map(|v| v.value), table.number("above").map(|v| v.value));
     if !table.has("below") && !table.has("above") {
@@ -428,7 +430,7 @@ pub(super) fn read_output(top: &Table) -> Output {
     let Some(item) = top.get("output") else { return default };
     let context = top.context;
     let keys = ["nodes", "columns", "every", "interval", "vtk"];
-    let Some(table) = Table::new(context, item, "[output]", &keys, &[]) else { return default };
+    let Some(table) = Table::new(context, item, "[output]", &keys) else { return default };
     if table.flag("vtk") == Some(true) {
         context.report(Diagnostic::error("vtk = true is not supported yet", table.key_span("vtk")));
     }
@@ -448,7 +450,7 @@ const EXPECT_KEYS: [&str; 10] =
     ["column", "at", "reduce", "value", "rtol", "atol", "below", "above", "source", "fails"];
 
 pub(super) fn read_expect<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Expect> {
-    let table = Table::new(context, item, "[[expect]]", &EXPECT_KEYS, &[])?;
+    let table = Table::new(context, item, "[[expect]]", &EXPECT_KEYS)?;
     let source = table.text("source").map(|t| t.value);
     let body = if table.has("fails") { read_fails(&table) } else { read_column(&table) };
     Some(Expect { body: body?, source, span: table.span.clone() })
@@ -523,7 +525,7 @@ fn read_instant<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Instant>
     match item.get_ref() {
         DeValue::String(word) if word == "end" => Some(Instant::End),
         DeValue::Table(_) => {
-            let table = Table::new(context, item, "`at`", &["load"], &[])?;
+            let table = Table::new(context, item, "`at`", &["load"])?;
             context.number(table.required("load")?).map(|v| Instant::Load(v.value))
         }
         DeValue::Integer(_) | DeValue::Float(_) | DeValue::String(_) => {

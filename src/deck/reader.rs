@@ -162,9 +162,6 @@ pub fn kind_of(value: &DeValue) -> &'static str {
     }
 }
 
-/// A key that the contract knows but that this version does not simulate yet.
-pub type Unsupported = &'static [&'static str];
-
 /// One table of the deck.
 pub struct Table<'a> {
     /// What reading needs
@@ -180,15 +177,9 @@ pub struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// The table `item`; keys that are not in `keys` are errors.
-    pub fn new(
-        context: &'a Context,
-        item: &'a Item<'a>,
-        what: impl Into<String>,
-        keys: &[&str],
-        unsupported: Unsupported,
-    ) -> Option<Self> {
+    pub fn new(context: &'a Context, item: &'a Item<'a>, what: impl Into<String>, keys: &[&str]) -> Option<Self> {
         let mut table = Self::of_names(context, item, what)?;
-        table.refuse_unknown(keys, unsupported);
+        table.refuse_unknown(keys);
         Some(table)
     }
 
@@ -204,17 +195,14 @@ impl<'a> Table<'a> {
     /// The top level of a file.
     pub fn top(context: &'a Context, entries: &'a DeTable<'a>, what: &str, keys: &[&str]) -> Self {
         let mut table = Self { context, what: what.into(), span: 0..0, entries, misspelt: Vec::new() };
-        table.refuse_unknown(keys, &[]);
+        table.refuse_unknown(keys);
         table
     }
 
-    fn refuse_unknown(&mut self, keys: &[&str], unsupported: Unsupported) {
+    fn refuse_unknown(&mut self, keys: &[&str]) {
         for key in self.entries.keys() {
             let name: &str = key.get_ref();
-            if unsupported.contains(&name) {
-                let message = format!("`{name}` in {} is not supported yet", self.what);
-                self.context.report(Diagnostic::error(message, key.span()));
-            } else if !keys.contains(&name) {
+            if !keys.contains(&name) {
                 let mut diagnostic = Diagnostic::error(format!("unknown key `{name}` in {}", self.what), key.span());
                 diagnostic.help = Some(match nearest(name, keys.iter().copied()) {
                     Some(meant) => {

@@ -105,7 +105,7 @@ fn read_vary<'a>(context: &'a Context, key: Spanned<String>, item: &'a Item<'a>)
             VaryBody::List(values.iter().map(|value| as_toml(context, value)).collect::<Option<_>>()?)
         }
         DeValue::Table(_) => {
-            let table = Table::new(context, item, format!("`{}`", key.value), &["from", "to", "count", "log"], &[])?;
+            let table = Table::new(context, item, format!("`{}`", key.value), &["from", "to", "count", "log"])?;
             let number = |key: &str| context.number(table.required(key)?).map(|number| number.value);
             let (from, to) = (number("from"), number("to"));
             let count = table.get("count").map(|item| context.whole(item, 1, MOST_SAMPLES));

@@ -166,11 +166,6 @@ fn wrong_decks_and_missing_files_have_their_status() {
     assert_eq!(status(&huge), 2);
     assert!(last_line(&huge).starts_with("error[limit]: "));
     assert_eq!(status(&folder.beamsim(&["frobnicate"])), 2);
-    for command in ["sweep", "schema"] {
-        let refused = folder.beamsim(&[command, "bad.toml"]);
-        assert_eq!(status(&refused), 2);
-        assert!(last_line(&refused).contains("not supported yet"));
-    }
     folder.write("file", "");
     folder.write("good.toml", GOOD);
     assert_eq!(status(&folder.beamsim(&["run", "good.toml", "--out", "file"])), 4);

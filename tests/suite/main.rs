@@ -29,3 +29,4 @@ mod statics;
 mod sweep;
 mod tangents;
 mod turned;
+mod words;
