@@ -4,7 +4,9 @@ use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
 use super::{Status, Verdict, load, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
-use crate::output::{Beside, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, run_record};
+use crate::output::{
+    Beside, FieldsWriter, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, remove_fields, run_record,
+};
 use crate::scene::Scene;
 use crate::study::Recorder;
 use crate::study::error_bars::ErrorBars;
@@ -96,13 +98,16 @@ struct Watcher<'r> {
     progress: Progress,
     dynamic: Vec<bool>,
     modes: ModesWriter,
+    fields: Option<FieldsWriter>,
 }
 
 impl Observer for Watcher<'_> {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
+        let dynamic = self.dynamic[snapshot.stage - 1];
+        self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, dynamic)).map_err(io_failure)?;
         let Some(history) = &mut self.history else { return Ok(()) };
-        match history.row(snapshot, self.dynamic[snapshot.stage - 1]).map_err(io_failure)? {
+        match history.row(snapshot, dynamic).map_err(io_failure)? {
             None => Ok(()),
             Some(column) => {
                 let at = Moment { stage: snapshot.stage, time: snapshot.state.time, load: snapshot.state.load };
@@ -164,17 +169,16 @@ pub fn simulate(
     let Beyond { reached, bars } = beyond;
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
     let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows, beside)).transpose();
-    let (history, opened) = match history {
-        Ok(history) => (history, Ok(())),
-        Err(error) => (None, Err(io_failure(error))),
+    let dynamic: Vec<bool> =
+        scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect();
+    let timed = dynamic.iter().all(|dynamic| *dynamic);
+    let fields = folder.filter(|_| scene.vtk).map(|folder| FieldsWriter::create(folder, scene.figure(), rows, timed));
+    let (history, fields, opened) = match (history, fields.transpose()) {
+        (Ok(history), Ok(fields)) => (history, fields, Ok(())),
+        (Err(error), _) | (_, Err(error)) => (None, None, Err(io_failure(error))),
     };
-    let mut watcher = Watcher {
-        history,
-        recorder,
-        progress: Progress::new(name),
-        modes: ModesWriter::default(),
-        dynamic: scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect(),
-    };
+    let mut watcher =
+        Watcher { history, recorder, progress: Progress::new(name), modes: ModesWriter::default(), fields, dynamic };
     let (mut result, counters) = match opened {
         Ok(()) => Run::new(scene.plan.clone(), &mut watcher).finish(),
         Err(failure) => (Err(failure), Counters::default()),
@@ -185,7 +189,8 @@ pub fn simulate(
         let record =
             run_record(scene, &Outcome { result: &result, counters: &counters, seconds, reached: reached.as_ref() });
         let record = format!("{record:#}\n");
-        let written = write_results(history, &watcher.modes, folder, result.is_ok(), &record);
+        let fields = watcher.fields.take();
+        let written = write_results(history, fields, &watcher.modes, folder, result.is_ok(), &record);
         if let Err(error) = written {
             result = Err(io_failure(error));
         }
@@ -196,6 +201,7 @@ pub fn simulate(
 /// Both files are whole before either gets its name.
 fn write_results(
     history: HistoryWriter,
+    fields: Option<FieldsWriter>,
     modes: &ModesWriter,
     folder: &Path,
     finished: bool,
@@ -203,6 +209,10 @@ fn write_results(
 ) -> std::io::Result<()> {
     let (part, file) = PartFile::written(folder, "run.json", record.as_bytes())?;
     history.finish(finished)?;
+    match fields {
+        Some(fields) => fields.finish(finished)?,
+        None => remove_fields(folder)?,
+    }
     modes.finish(folder)?;
     part.finish(&file, "run.json")
 }

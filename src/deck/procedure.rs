@@ -109,6 +109,8 @@ pub struct Output {
     pub every: usize,
     /// Rows at multiples of this time
     pub interval: Option<f64>,
+    /// Whether the whole shape is written for ParaView
+    pub vtk: bool,
 }
 
 /// `[[expect]]`
@@ -431,9 +433,6 @@ pub(super) fn read_output(top: &Table) -> Output {
     let context = top.context;
     let keys = ["nodes", "columns", "every", "interval", "vtk"];
     let Some(table) = Table::new(context, item, "[output]", &keys) else { return default };
-    if table.flag("vtk") == Some(true) {
-        context.report(Diagnostic::error("vtk = true is not supported yet", table.key_span("vtk")));
-    }
     if table.has("every") && table.has("interval") {
         context.report(Diagnostic::error("give `every` or `interval`, not both", table.key_span("interval")));
     }
@@ -443,6 +442,7 @@ pub(super) fn read_output(top: &Table) -> Output {
         columns: list("columns"),
         every: table.get("every").and_then(|item| context.whole(item, 1, MOST_STEPS)).map_or(1, |n| n.value),
         interval: table.positive("interval").map(|v| v.value),
+        vtk: table.flag("vtk").unwrap_or(false),
     }
 }
 

@@ -18,7 +18,8 @@ pub struct Rows {
 }
 
 impl Rows {
-    fn contains(&self, number: u64, dynamic: bool, time: f64) -> bool {
+    /// Whether a row is written, but for the last.
+    pub fn contains(&self, number: u64, dynamic: bool, time: f64) -> bool {
         match self.interval {
             Some(interval) if dynamic => {
                 let turns = time / interval;

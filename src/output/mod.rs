@@ -1,11 +1,13 @@
 //! What a run leaves on disk. Files appear whole: a finished name never holds half a result.
 
+mod fields;
 mod files;
 mod history;
 mod modes;
 mod plot;
 mod record;
 
+pub use fields::{FieldsWriter, remove_fields};
 pub use files::{PartFile, remove_if_there};
 pub use history::{Beside, HistoryReader, HistoryWriter, Rows};
 pub use modes::ModesWriter;

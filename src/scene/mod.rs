@@ -3,6 +3,7 @@
 mod check;
 mod compose;
 mod constraints;
+mod figure;
 mod forced;
 mod joints;
 mod mesh;
@@ -18,10 +19,11 @@ pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
+use crate::effect::beam_elasticity::StressField;
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
 use crate::model::{Charted, ElementInfo, Model, SlotInfo, SlotKind};
-use crate::probe::{Probe, Quantity};
+use crate::probe::{Figure, Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
 use output::Columns;
@@ -37,6 +39,8 @@ pub struct Scene {
     pub probes: Vec<Probe>,
     /// Each n-th row is written.
     pub every: usize,
+    /// Whether fields are written
+    pub vtk: bool,
     /// What is expected
     pub expectations: Vec<Expectation>,
     /// Which effects act, and why
@@ -47,6 +51,15 @@ pub struct Scene {
     pub bodies: Vec<Body>,
     /// The deck with expressions replaced by numbers
     pub resolved: serde_json::Value,
+    /// What knows of resultants
+    elasticity: Vec<Arc<dyn StressField>>,
+}
+
+impl Scene {
+    /// Its whole shape, for pictures.
+    pub fn figure(&self) -> Figure {
+        figure::figure(&self.mesh, &self.bodies, &self.elasticity)
+    }
 }
 
 /// What is expected of a run.
@@ -222,11 +235,13 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         },
         probes,
         every: deck.output.every,
+        vtk: deck.output.vtk,
         expectations,
         reasons: [vec![planar], composition.reasons].concat(),
         mesh,
         bodies: composition.bodies,
         resolved: deck.resolved.clone(),
+        elasticity: composition.elasticity,
     })
 }
 

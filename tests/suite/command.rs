@@ -569,3 +569,22 @@ fn histories_do_not_depend_on_instructions() {
         assert!(history("baseline") == history("widest"), "{deck:?}");
     }
 }
+
+#[test]
+fn fields_belong_to_the_history_beside_them() {
+    let folder = Folder::new("fields");
+    folder.write("deck.toml", &format!("{GOOD}[output]\nvtk = true\n"));
+    let run = |settings: &[&str]| {
+        let words: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+        status(&folder.beamsim(&[&["run", "deck.toml", "--out", "r"][..], &words].concat()))
+    };
+    assert_eq!(run(&["output.every=3"]), 0);
+    // The start, the third level, and the last.
+    assert_eq!(folder.names("r/fields"), ["000000.vtu", "000001.vtu", "000002.vtu"]);
+    let index = fs::read_to_string(folder.0.join("r/fields.pvd")).unwrap();
+    assert!(index.contains("timestep=\"4.0\" part=\"0\" file=\"fields/000002.vtu\""), "{index}");
+    assert_eq!(run(&["support.0.fix=uz"]), 3);
+    assert_eq!(folder.names("r"), ["fields.partial", "fields.partial.pvd", "history.partial.csv", "run.json"]);
+    assert_eq!(run(&["output.vtk=false"]), 0);
+    assert_eq!(folder.names("r"), ["history.csv", "run.json"]);
+}

@@ -1,0 +1,213 @@
+//! fields.pvd and a .vtu file a row, for ParaView and everything else that reads VTK: the whole shape with its axes, strains and resultants.
+//!
+//! Elements are cells of their own order, so that curved ones are curved. Numbers stand raw behind the XML ("appended").
+
+use super::Rows;
+use super::files::PartFile;
+use crate::drive::Snapshot;
+use crate::probe::{Figure, Look};
+use std::fmt::Write;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// VTK's cells of two, three and four nodes on a line, and of one.
+const LINES: [u8; 3] = [3, 21, 35];
+const VERTEX: u8 = 1;
+
+/// Names of six numbers along and about the section axes.
+type Six = (&'static str, &'static str);
+
+/// Writes the fields of a run.
+pub struct FieldsWriter {
+    folder: PathBuf,
+    part: PathBuf,
+    figure: Figure,
+    rows: Rows,
+    /// Whether time alone tells rows apart
+    timed: bool,
+    seen: u64,
+    /// Files so far, with what ParaView takes for their time
+    written: Vec<(String, f64)>,
+    /// A row that is written only if no other follows
+    pending: Option<(Vec<u8>, f64)>,
+}
+
+impl FieldsWriter {
+    /// In the folder of results. `timed`: no row stands still in time.
+    pub fn create(folder: &Path, figure: Figure, rows: Rows, timed: bool) -> io::Result<Self> {
+        let part = folder.join(format!("fields.{}.part", std::process::id()));
+        let _ = fs::remove_dir_all(&part);
+        fs::create_dir_all(&part)?;
+        Ok(Self { folder: folder.into(), part, figure, rows, timed, seen: 0, written: Vec::new(), pending: None })
+    }
+
+    /// Takes a converged state; writes it if its row is wanted.
+    pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
+        let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
+        let time = if self.timed { at.state.time } else { self.seen as f64 };
+        let content = grid(&self.figure, at);
+        self.seen += 1;
+        self.pending = None;
+        if wanted { self.write(&content, time) } else { Ok(self.pending = Some((content, time))) }
+    }
+
+    fn write(&mut self, content: &[u8], time: f64) -> io::Result<()> {
+        let name = format!("{:06}.vtu", self.written.len());
+        fs::write(self.part.join(&name), content)?;
+        self.written.push((name, time));
+        Ok(())
+    }
+
+    /// Gives the fields their names: `fields`, or `fields.partial` where the run failed.
+    pub fn finish(mut self, finished: bool) -> io::Result<()> {
+        if let Some((content, time)) = self.pending.take() {
+            self.write(&content, time)?;
+        }
+        for name in ["fields", "fields.partial"] {
+            remove_folder(&self.folder.join(name))?;
+            super::remove_if_there(&self.folder, &format!("{name}.pvd"))?;
+        }
+        let name = if finished { "fields" } else { "fields.partial" };
+        fs::rename(&self.part, self.folder.join(name))?;
+        let index = index(name, &self.written);
+        let name = format!("{name}.pvd");
+        PartFile::written(&self.folder, &name, index.as_bytes()).and_then(|(part, file)| part.finish(&file, &name))
+    }
+}
+
+/// Of an earlier run: they belong to another history.
+pub fn remove_fields(folder: &Path) -> io::Result<()> {
+    for name in ["fields", "fields.partial"] {
+        super::remove_if_there(folder, &format!("{name}.pvd"))?;
+        remove_folder(&folder.join(name))?;
+    }
+    Ok(())
+}
+
+fn remove_folder(path: &Path) -> io::Result<()> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+fn index(folder: &str, written: &[(String, f64)]) -> String {
+    let mut text = String::from(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n",
+    );
+    for (name, time) in written {
+        let _ = writeln!(text, "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{folder}/{name}\"/>");
+    }
+    text + "</Collection>\n</VTKFile>\n"
+}
+
+/// The XML of a file, and the numbers behind it.
+#[derive(Default)]
+struct Grid {
+    xml: String,
+    raw: Vec<u8>,
+}
+
+impl Grid {
+    fn array(&mut self, name: &str, kind: &str, components: usize, bytes: Vec<u8>) {
+        let offset = self.raw.len();
+        let _ = writeln!(
+            self.xml,
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>"
+        );
+        self.raw.extend((bytes.len() as u64).to_le_bytes());
+        self.raw.extend(bytes);
+    }
+
+    fn floats(&mut self, name: &str, components: usize, values: impl Iterator<Item = f64>) {
+        self.array(name, "Float64", components, values.flat_map(f64::to_le_bytes).collect());
+    }
+
+    fn tag(&mut self, tag: &str) {
+        self.xml.push_str(tag);
+        self.xml.push('\n');
+    }
+}
+
+/// A state as an unstructured grid.
+fn grid(figure: &Figure, at: &Snapshot) -> Vec<u8> {
+    let looks = figure.looks(at.state);
+    let cells = Cells::of(figure);
+    let mut grid = Grid::default();
+    grid.tag("<?xml version=\"1.0\"?>");
+    grid.tag("<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">");
+    grid.tag("<UnstructuredGrid>\n<FieldData>");
+    for (name, value) in [("TimeValue", at.state.time), ("stage", at.stage as f64), ("load", at.state.load)] {
+        grid.tag(&format!(
+            "<DataArray type=\"Float64\" Name=\"{name}\" NumberOfTuples=\"1\" format=\"ascii\">{value:?}</DataArray>"
+        ));
+    }
+    grid.tag("</FieldData>");
+    grid.tag(&format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n<Points>", looks.len(), cells.types.len()));
+    grid.floats("position", 3, looks.iter().flat_map(|look| look.place.0));
+    grid.tag("</Points>\n<PointData Vectors=\"displacement\">");
+    point_data(&mut grid, &looks);
+    grid.tag("</PointData>\n<CellData>");
+    grid.array("beam", "Int32", 1, cells.beams.iter().flat_map(|beam| beam.to_le_bytes()).collect());
+    grid.tag("</CellData>\n<Cells>");
+    grid.array("connectivity", "Int64", 1, cells.nodes.iter().flat_map(|node| node.to_le_bytes()).collect());
+    grid.array("offsets", "Int64", 1, cells.ends.iter().flat_map(|end| end.to_le_bytes()).collect());
+    grid.array("types", "UInt8", 1, cells.types.clone());
+    grid.tag("</Cells>\n</Piece>\n</UnstructuredGrid>");
+    let Grid { xml, raw } = grid;
+    [xml.as_bytes(), b"<AppendedData encoding=\"raw\">\n_", &raw, b"\n</AppendedData>\n</VTKFile>\n"].concat()
+}
+
+fn point_data(grid: &mut Grid, looks: &[Look]) {
+    grid.floats("displacement", 3, looks.iter().flat_map(|look| look.u.0));
+    grid.floats("rotation", 3, looks.iter().flat_map(|look| look.r.0));
+    for (k, name) in ["d1", "d2", "d3"].into_iter().enumerate() {
+        grid.floats(name, 3, looks.iter().flat_map(|look| look.axes.column(k).0));
+    }
+    grid.floats("velocity", 3, looks.iter().flat_map(|look| look.velocity.0));
+    let pairs: [(Six, fn(&Look) -> &[f64; 6]); 2] =
+        [(("N", "M"), |look| &look.resultant), (("Gamma", "K"), |look| &look.strain)];
+    for ((along, about), of) in pairs {
+        grid.floats(along, 3, looks.iter().flat_map(|look| of(look)[..3].to_vec()));
+        grid.floats(about, 3, looks.iter().flat_map(|look| of(look)[3..].to_vec()));
+    }
+    grid.floats("strain_energy_per_length", 1, looks.iter().map(|look| look.energy));
+}
+
+/// Elements as cells.
+#[derive(Default)]
+struct Cells {
+    nodes: Vec<i64>,
+    ends: Vec<i64>,
+    types: Vec<u8>,
+    beams: Vec<i32>,
+}
+
+impl Cells {
+    fn of(figure: &Figure) -> Self {
+        let mut cells = Self::default();
+        let mut first = 0;
+        for (number, line) in figure.lines.iter().enumerate() {
+            let order = line.order;
+            for element in 0..(line.points.len() - 1) / order {
+                let start = first + element * order;
+                // VTK names both ends before what lies between.
+                let inner = (1..order).map(|k| start + k);
+                cells.push([start, start + order].into_iter().chain(inner), LINES[order - 1], number as i32);
+            }
+            first += line.points.len();
+        }
+        for body in 0..figure.bodies.len() {
+            cells.push(std::iter::once(first + body), VERTEX, -1);
+        }
+        cells
+    }
+
+    fn push(&mut self, nodes: impl Iterator<Item = usize>, kind: u8, beam: i32) {
+        self.nodes.extend(nodes.map(|node| node as i64));
+        self.ends.push(self.nodes.len() as i64);
+        self.types.push(kind);
+        self.beams.push(beam);
+    }
+}

@@ -1,0 +1,96 @@
+//! The whole shape of a scene, for pictures: every node of every beam with its section axes, strains and resultants.
+
+use super::place::{BeamPoint, Place};
+use crate::rotation::{Rotation, principal};
+use crate::system::State;
+use crate::tensor::{Mat3, Vec3};
+
+/// The shape of a scene.
+#[derive(Clone, Default)]
+pub struct Figure {
+    /// Its beams
+    pub lines: Vec<Line>,
+    /// Its rigid bodies
+    pub bodies: Vec<Place>,
+}
+
+/// A beam.
+#[derive(Clone)]
+pub struct Line {
+    /// Its name
+    pub name: String,
+    /// Nodes of an element, less one
+    pub order: usize,
+    /// Its nodes from start to end
+    pub points: Vec<LinePoint>,
+}
+
+/// A node of a beam. Where beams meet each has its own.
+#[derive(Clone)]
+pub struct LinePoint {
+    /// Where it is
+    pub place: Place,
+    /// What acts there
+    pub inside: BeamPoint,
+    /// Strains over resultants, section axes
+    pub compliance: [[f64; 6]; 6],
+}
+
+/// What a node shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Where it is
+    pub place: Vec3,
+    /// Displacement
+    pub u: Vec3,
+    /// Total rotation vector, |r| <= pi
+    pub r: Vec3,
+    /// Section axes as columns
+    pub axes: Mat3,
+    /// Velocity
+    pub velocity: Vec3,
+    /// Gamma and K, section axes
+    pub strain: [f64; 6],
+    /// N and M, section axes
+    pub resultant: [f64; 6],
+    /// Strain energy per length
+    pub energy: f64,
+}
+
+impl Figure {
+    /// All nodes of beams, then the bodies.
+    pub fn looks(&self, state: &State) -> Vec<Look> {
+        let points = self.lines.iter().flat_map(|line| &line.points);
+        points.map(|point| point.look(state)).chain(self.bodies.iter().map(|place| bare(place, state))).collect()
+    }
+
+    /// How many nodes of beams there are.
+    pub fn line_points(&self) -> usize {
+        self.lines.iter().map(|line| line.points.len()).sum()
+    }
+}
+
+impl LinePoint {
+    fn look(&self, state: &State) -> Look {
+        let [strain, resultant] = self.inside.strain_and_stress(state);
+        let row = |row: &[f64; 6]| row.iter().zip(&resultant).map(|(c, s)| c * s).sum::<f64>();
+        // Of the strains that have stress: those of heat have none.
+        let energy = 0.5 * self.compliance.iter().zip(&resultant).map(|(c, s)| s * row(c)).sum::<f64>();
+        Look { strain, resultant, energy, ..bare(&self.place, state) }
+    }
+}
+
+/// A place without anything inside.
+fn bare(place: &Place, state: &State) -> Look {
+    let motion = place.motion(state);
+    Look {
+        place: place.initial() + motion.u,
+        u: motion.u,
+        r: principal(motion.p),
+        axes: Rotation::new(motion.p).r * place.frame,
+        velocity: motion.u_rate,
+        strain: [0.0; 6],
+        resultant: [0.0; 6],
+        energy: 0.0,
+    }
+}

@@ -1,0 +1,41 @@
+//! The shape of a scene, for pictures.
+
+use super::mesh::{Mesh, MeshBeam};
+use crate::effect::beam_elasticity::StressField;
+use crate::effect::rigid_body::Body;
+use crate::probe::{BeamPoint, Figure, Line, LinePoint, Place};
+use crate::tensor::Mat3;
+use nalgebra::Matrix6;
+use std::sync::Arc;
+
+/// Every node of every beam, and the rigid bodies.
+pub fn figure(mesh: &Mesh, bodies: &[Body], elasticity: &[Arc<dyn StressField>]) -> Figure {
+    let line = |beam: &MeshBeam| Line {
+        name: beam.name.clone(),
+        order: beam.order,
+        points: (0..beam.nodes.len()).map(|k| point(mesh, beam, k, elasticity)).collect(),
+    };
+    let body =
+        |body: &Body| Place { nodes: vec![(body.node, body.place, 1.0)], frame: Mat3::IDENTITY, relative: false };
+    Figure { lines: mesh.beams.iter().map(line).collect(), bodies: bodies.iter().map(body).collect() }
+}
+
+fn point(mesh: &Mesh, beam: &MeshBeam, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {
+    let (node, fraction) = (&mesh.nodes[beam.nodes[k]], beam.fractions[k]);
+    let frame = beam.frame(fraction);
+    // Between two elements both have their say.
+    let side = |element: usize, at: usize| {
+        let number = beam.elements.start + element;
+        beam.elements.contains(&number).then_some((number as u32, 2.0 * at as f64 / beam.order as f64 - 1.0))
+    };
+    let (element, at) = (k / beam.order, k % beam.order);
+    let before = (at == 0 && element > 0).then(|| side(element - 1, beam.order)).flatten();
+    let sides = before.into_iter().chain(side(element, at)).collect();
+    let stiffness = beam.section.at(fraction).stiffness;
+    let compliance = Matrix6::from_fn(|i, j| stiffness[i][j]).try_inverse().unwrap_or_default();
+    LinePoint {
+        place: Place { nodes: vec![(node.node, node.place, 1.0)], frame, relative: false },
+        inside: BeamPoint { elasticity: elasticity.to_vec(), sides, frame },
+        compliance: std::array::from_fn(|i| std::array::from_fn(|j| compliance[(i, j)])),
+    }
+}
