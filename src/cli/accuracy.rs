@@ -29,6 +29,8 @@ pub struct Target {
 
 /// A scene that is ready to run.
 pub struct Aimed {
+    /// The deck as it was read
+    pub text: String,
     /// The scene
     pub scene: Scene,
     /// The accuracy that was wanted and reached
@@ -71,7 +73,7 @@ impl Target {
     fn with_bars(&self, path: &Path, loaded: Loaded, reached: Option<Reached>) -> Result<Aimed, Refusal> {
         let made = || error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
         let bars = self.error_bars.then(made).transpose().map_err(|refusal| refused(refusal, path, &loaded))?;
-        Ok(Aimed { scene: loaded.scene, reached, bars })
+        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, bars })
     }
 
     fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {

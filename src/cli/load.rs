@@ -42,11 +42,6 @@ pub struct Loaded {
 }
 
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
-pub fn scene(path: &Path, settings: &[String]) -> Result<Scene, Refusal> {
-    deck(path, settings).map(|loaded| loaded.scene)
-}
-
-/// The same, with the deck itself.
 pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
     let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
     // Settings may have moved lines.

@@ -7,6 +7,7 @@ mod cost;
 mod effects;
 mod load;
 mod progress;
+mod report;
 mod run;
 mod say;
 mod signals;
@@ -48,6 +49,9 @@ enum Command {
         input: DeckArguments,
         #[command(flatten)]
         target: accuracy::Target,
+        /// Also write report.html, a page that plays the run back
+        #[arg(long)]
+        report: bool,
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -86,6 +90,15 @@ enum Command {
         wanted: cost::Wanted,
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Write a page that plays a run back, with its histories, energies, effects and deck
+    Report {
+        /// Folders of results
+        #[arg(required = true, value_name = "RESULTS")]
+        folders: Vec<PathBuf>,
+        /// The page (default: report.html in the folder)
+        #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
     /// Take each effect out in turn and tell what it changes and costs
@@ -195,11 +208,14 @@ pub fn main() -> ExitCode {
         Err(error) => return ExitCode::from(explain(&error) as u8),
     };
     let status = match arguments.command {
-        Command::Run { input, target, out } => run::run(&input.decks, &input.set, &target, out.as_deref()),
+        Command::Run { input, target, report, out } => {
+            run::run(&input.decks, &input.set, &target, report, out.as_deref())
+        }
         Command::Check { input } => check::check(&input.decks, &input.set),
         Command::Verify { input, out } => verify::verify(&input.decks, &input.set, out.as_deref()),
         Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),
         Command::Cost { input, wanted, out } => cost::cost(&input.decks, &input.set, &wanted, out.as_deref()),
+        Command::Report { folders, out } => report::report(&folders, out.as_deref()),
         Command::Effects { input, tolerance, out } => {
             effects::effects(&input.decks, &input.set, tolerance, out.as_deref())
         }

@@ -2,19 +2,21 @@
 
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
-use super::{Status, Verdict, load, say, signals};
+use super::{Status, Verdict, load, report, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
-    Beside, FieldsWriter, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, remove_fields, run_record,
+    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, remove_fields,
+    remove_if_there, run_record,
 };
 use crate::scene::Scene;
 use crate::study::Recorder;
 use crate::study::error_bars::ErrorBars;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Runs decks one after the other; where an accuracy is wanted, after a search for elements and steps.
-pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<&Path>) -> Status {
+/// Runs decks one after the other; where an accuracy is wanted, after a search for elements and steps. `pictured`: with a report.
+pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, pictured: bool, out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
     if refuse_twins(decks, &mut verdict) {
         return verdict.finish(1);
@@ -22,10 +24,17 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
     for path in decks {
         let name = load::name(path);
         match target.aim(&name, path, settings) {
-            Ok(Aimed { scene, reached, bars }) => {
+            Ok(Aimed { text, scene, reached, bars }) => {
                 let folder = folder(out, &name, decks.len() > 1);
-                let finished = simulate(&scene, &name, Some(&folder), None, Beyond { reached, bars });
+                let film = pictured.then(|| report::film(&scene));
+                let beyond = Beyond { reached, bars, text: text.clone(), film };
+                let mut finished = simulate(&scene, &name, Some(&folder), None, beyond);
                 summarise(&name, &scene, &finished, &folder);
+                if let (Some(film), Some(record)) = (finished.film.take(), finished.record.take()) {
+                    let page = folder.join("report.html");
+                    let written = report::write(&scene, &name, &text, &record, film, &folder, &page);
+                    written.unwrap_or_else(|refusal| verdict.refuse(refusal));
+                }
                 if let Err(failure) = &finished.result {
                     verdict.fail(finished.status(), failure.name(), failure.to_string());
                 }
@@ -70,6 +79,10 @@ pub struct Finished {
     pub counters: Counters,
     /// Wall-clock seconds
     pub seconds: f64,
+    /// What filmed it
+    pub film: Option<Film>,
+    /// What stands in run.json
+    pub record: Option<Value>,
 }
 
 impl Finished {
@@ -99,6 +112,7 @@ struct Watcher<'r> {
     dynamic: Vec<bool>,
     modes: ModesWriter,
     fields: Option<FieldsWriter>,
+    film: Option<Film>,
 }
 
 impl Observer for Watcher<'_> {
@@ -106,6 +120,7 @@ impl Observer for Watcher<'_> {
         self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
         let dynamic = self.dynamic[snapshot.stage - 1];
         self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, dynamic)).map_err(io_failure)?;
+        self.film.iter_mut().for_each(|film| film.row(snapshot, dynamic));
         let Some(history) = &mut self.history else { return Ok(()) };
         match history.row(snapshot, dynamic).map_err(io_failure)? {
             None => Ok(()),
@@ -152,6 +167,10 @@ pub struct Beyond {
     pub reached: Option<Reached>,
     /// Error bars
     pub bars: Option<ErrorBars>,
+    /// The deck as it was read
+    pub text: String,
+    /// What films the run
+    pub film: Option<Film>,
 }
 
 /// Runs a scene; with a folder it leaves its results there, and a recorder follows what is expected.
@@ -166,7 +185,7 @@ pub fn simulate(
     // From here on signals are answered by the run.
     signals::caught();
     let rows = Rows { every: scene.every, interval: scene.plan.interval };
-    let Beyond { reached, bars } = beyond;
+    let Beyond { reached, bars, text, film } = beyond;
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
     let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows, beside)).transpose();
     let dynamic: Vec<bool> =
@@ -177,25 +196,34 @@ pub fn simulate(
         (Ok(history), Ok(fields)) => (history, fields, Ok(())),
         (Err(error), _) | (_, Err(error)) => (None, None, Err(io_failure(error))),
     };
-    let mut watcher =
-        Watcher { history, recorder, progress: Progress::new(name), modes: ModesWriter::default(), fields, dynamic };
+    let mut watcher = Watcher {
+        history,
+        recorder,
+        progress: Progress::new(name),
+        modes: ModesWriter::default(),
+        fields,
+        film,
+        dynamic,
+    };
     let (mut result, counters) = match opened {
         Ok(()) => Run::new(scene.plan.clone(), &mut watcher).finish(),
         Err(failure) => (Err(failure), Counters::default()),
     };
     watcher.progress.done();
     let seconds = start.elapsed().as_secs_f64();
+    let mut record = None;
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
-        let record =
-            run_record(scene, &Outcome { result: &result, counters: &counters, seconds, reached: reached.as_ref() });
-        let record = format!("{record:#}\n");
+        let outcome = Outcome { result: &result, counters: &counters, seconds, reached: reached.as_ref(), text: &text };
+        let told = run_record(scene, &outcome);
+        let text = format!("{told:#}\n");
+        record = Some(told);
         let fields = watcher.fields.take();
-        let written = write_results(history, fields, &watcher.modes, folder, result.is_ok(), &record);
+        let written = write_results(history, fields, &watcher.modes, folder, result.is_ok(), &text);
         if let Err(error) = written {
             result = Err(io_failure(error));
         }
     }
-    Finished { result, counters, seconds }
+    Finished { result, counters, seconds, film: watcher.film, record }
 }
 
 /// Both files are whole before either gets its name.
@@ -209,6 +237,7 @@ fn write_results(
 ) -> std::io::Result<()> {
     let (part, file) = PartFile::written(folder, "run.json", record.as_bytes())?;
     history.finish(finished)?;
+    remove_if_there(folder, "report.html")?;
     match fields {
         Some(fields) => fields.finish(finished)?,
         None => remove_fields(folder)?,

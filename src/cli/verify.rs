@@ -22,11 +22,17 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
     let (mut held, mut total) = (0, 0);
     for path in &decks {
         let name = load::name(path);
-        let judgements = match load::scene(path, settings) {
-            Ok(scene) => {
+        let judgements = match load::deck(path, settings) {
+            Ok(load::Loaded { text, scene, .. }) => {
                 let folder = out.map(|out| folder(Some(out), &name, decks.len() > 1));
                 let mut recorder = Recorder::new(&scene);
-                let finished = simulate(&scene, &name, folder.as_deref(), Some(&mut recorder), Beyond::default());
+                let finished = simulate(
+                    &scene,
+                    &name,
+                    folder.as_deref(),
+                    Some(&mut recorder),
+                    Beyond { text, ..Beyond::default() },
+                );
                 if let Some(signal) = signals::caught() {
                     say::error("interrupted", &format!("stopped by signal {signal}"));
                     return if signal == 15 { Status::Terminated } else { Status::Interrupted };

@@ -6,6 +6,7 @@ mod history;
 mod modes;
 mod plot;
 mod record;
+mod report;
 
 pub use fields::{FieldsWriter, remove_fields};
 pub use files::{PartFile, remove_if_there};
@@ -13,3 +14,4 @@ pub use history::{Beside, HistoryReader, HistoryWriter, Rows};
 pub use modes::ModesWriter;
 pub use plot::{LinePlots, NamedLine};
 pub use record::{Outcome, Reached, run_record};
+pub use report::{Film, Report};

@@ -14,6 +14,8 @@ pub struct Outcome<'a> {
     pub seconds: f64,
     /// The accuracy that was reached, where one was wanted
     pub reached: Option<&'a Reached>,
+    /// The deck as it was read
+    pub text: &'a str,
 }
 
 /// An accuracy that was wanted and reached.
@@ -37,6 +39,7 @@ pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         "version": env!("CARGO_PKG_VERSION"),
         "status": status,
         "deck": scene.resolved,
+        "text": outcome.text,
         "effects": effects,
         "counters": counters(outcome.counters),
         "events": events(outcome.counters),

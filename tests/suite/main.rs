@@ -21,6 +21,7 @@ mod mechanisms;
 mod planar;
 mod random;
 mod relative;
+mod report;
 mod rotations;
 mod scenes;
 mod schemes;

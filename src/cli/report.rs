@@ -1,0 +1,85 @@
+//! `beamsim report`: the page of results that are there.
+
+use super::load::Refusal;
+use super::run::{Beyond, simulate};
+use super::{Status, Verdict, load, say, signals};
+use crate::output::{Film, Report, Rows};
+use crate::scene::{self, Scene};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Writes report.html into folders of results.
+pub fn report(folders: &[PathBuf], out: Option<&Path>) -> Status {
+    let mut verdict = Verdict::default();
+    if out.is_some() && folders.len() > 1 {
+        verdict.fail(Status::Wrong, "usage", "--out names one file: give one folder of results".into());
+        return verdict.finish(1);
+    }
+    for folder in folders {
+        if let Err(refusal) = one(folder, out) {
+            verdict.refuse(refusal);
+        }
+        if signals::caught().is_some() {
+            break;
+        }
+    }
+    verdict.finish(folders.len())
+}
+
+fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
+    let record = record(folder)?;
+    let Some(text) = record["text"].as_str() else {
+        let message = format!("{}: run.json holds no deck: run it again", folder.display());
+        return Err(Refusal::of(Status::Io, "io", message));
+    };
+    let scene = scene::from_text(text).map(|(scene, _)| scene).map_err(|_| {
+        let message = format!("{}: this version of beamsim does not read the deck: run it again", folder.display());
+        Refusal::of(Status::Wrong, "deck", message)
+    })?;
+    let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::name(&path));
+    // A history holds the nodes that were asked for; the shape is that of the same run once more.
+    let film = filmed(&scene, &name)?;
+    let path = out.map_or_else(|| folder.join("report.html"), Path::to_path_buf);
+    write(&scene, &name, text, &record, film, folder, &path)
+}
+
+/// What run.json says.
+fn record(folder: &Path) -> Result<Value, Refusal> {
+    let path = folder.join("run.json");
+    let io = |why: String| Refusal::of(Status::Io, "io", format!("{}: {why}", path.display()));
+    let bytes = fs::read(&path).map_err(|error| io(error.to_string()))?;
+    serde_json::from_slice(&bytes).map_err(|error| io(error.to_string()))
+}
+
+fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
+    let beyond = Beyond { film: Some(film(scene)), ..Beyond::default() };
+    let finished = simulate(scene, name, None, None, beyond);
+    if signals::caught().is_some() {
+        let status = finished.status();
+        return Err(Refusal::of(status, "interrupted", "stopped before the report was written".into()));
+    }
+    finished.film.ok_or_else(|| Refusal::of(Status::Io, "io", "nothing was filmed".into()))
+}
+
+/// For a run of a scene.
+pub fn film(scene: &Scene) -> Film {
+    Film::of(scene, Rows { every: scene.every, interval: scene.plan.interval })
+}
+
+/// Writes the page, and says where.
+pub fn write(
+    scene: &Scene,
+    name: &str,
+    text: &str,
+    record: &Value,
+    film: Film,
+    results: &Path,
+    path: &Path,
+) -> Result<(), Refusal> {
+    let title = scene.title.as_deref().unwrap_or(name);
+    let written = Report { title, text, record }.write(results, film, path);
+    written.map_err(|error| Refusal::of(Status::Io, "io", format!("{}: {error}", path.display())))?;
+    say::line(&format!("  {}", path.display()));
+    Ok(())
+}

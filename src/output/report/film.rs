@@ -1,0 +1,317 @@
+//! The whole shape of a scene at the rows of its history, few enough to be carried about.
+
+use super::super::Rows;
+use super::encode::{base64, quantised};
+use crate::drive::Snapshot;
+use crate::model::SlotKind;
+use crate::probe::{Figure, Look, Place, Quantity};
+use crate::scene::Scene;
+use crate::system::Node;
+use crate::tensor::{Mat3, Vec3};
+use serde_json::{Value, json};
+
+/// Nodes that are shown, about; more are seen by nobody.
+const MOST_POINTS: usize = 2000;
+/// Nodes times frames, and frames.
+const MOST_LOOKS: usize = 250_000;
+const MOST_FRAMES: usize = 1500;
+const LEAST_FRAMES: usize = 60;
+
+/// Fields below this part of the largest of their kind are round-off.
+const NOTHING: f64 = 1e-9;
+
+/// What colours show, with the kind that each is compared with.
+const FIELDS: [(&str, &str, char); 7] = [
+    ("N1", "axial force N1", 'N'),
+    ("N2", "shear force N2", 'N'),
+    ("N3", "shear force N3", 'N'),
+    ("M1", "torque M1", 'M'),
+    ("M2", "bending moment M2", 'M'),
+    ("M3", "bending moment M3", 'M'),
+    ("energy", "strain energy per length", 'E'),
+];
+
+/// Watches a run.
+pub struct Film {
+    figure: Figure,
+    /// Numbers of the nodes that are shown, beam by beam, then the bodies
+    shown: Vec<Vec<usize>>,
+    names: Vec<(String, usize)>,
+    rows: Rows,
+    seen: u64,
+    /// Rows of the history so far
+    written: usize,
+    frames: Vec<Frame>,
+    /// Each n-th row has a frame
+    stride: usize,
+    pending: Option<Frame>,
+    events: Vec<Value>,
+    before: [u64; 2],
+    supports: Vec<usize>,
+    joints: Vec<usize>,
+}
+
+struct Frame {
+    /// Of the history
+    row: usize,
+    places: Vec<[f32; 3]>,
+    turns: Vec<[i16; 4]>,
+    fields: Vec<[f32; 7]>,
+}
+
+impl Film {
+    /// Of a scene.
+    pub fn of(scene: &Scene, rows: Rows) -> Self {
+        let figure = scene.figure();
+        let named = named(scene);
+        let shown = shown(&figure, &named);
+        let places = initial(&figure, &shown);
+        let names = named.iter().filter_map(|(name, place)| Some((name.clone(), nearest(&places, place)?))).collect();
+        let model = &scene.plan.model;
+        let directions = model.supports.iter().flat_map(|support| &support.directions);
+        let held: Vec<u32> = directions.map(|direction| direction.slot).collect();
+        let moves = |slot: u32| model.slots[slot as usize].kind == SlotKind::Displacement;
+        let held: Vec<u32> = held.into_iter().filter(|&slot| moves(slot)).collect();
+        let supports = (0..places.len()).filter(|&k| held.contains(&places[k].0.u)).collect();
+        // Where beams were parted two nodes are at one place.
+        let parted = |k: usize| places.iter().any(|(node, place)| *place == places[k].1 && node.p != places[k].0.p);
+        let joints = if places.len() > MOST_POINTS * 2 {
+            Vec::new()
+        } else {
+            (0..places.len()).filter(|&k| parted(k)).collect()
+        };
+        Self {
+            figure,
+            shown,
+            names,
+            rows,
+            seen: 0,
+            written: 0,
+            frames: Vec::new(),
+            stride: 1,
+            pending: None,
+            events: Vec::new(),
+            before: [0; 2],
+            supports,
+            joints,
+        }
+    }
+
+    /// Takes a converged state, if its row is written.
+    pub fn row(&mut self, at: &Snapshot, dynamic: bool) {
+        let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
+        self.seen += 1;
+        self.note_events(at);
+        let due = wanted && self.written.is_multiple_of(self.stride);
+        let frame = self.frame(at);
+        self.pending = None;
+        if due {
+            self.frames.push(frame);
+            self.thin();
+        } else {
+            // The last row is always written.
+            self.pending = Some(frame);
+        }
+        self.written += usize::from(wanted);
+    }
+
+    fn note_events(&mut self, at: &Snapshot) {
+        let now = [at.counters.work.chart_switches, at.counters.cutbacks];
+        for (k, (kind, one)) in [("chart_switch", "chart switch"), ("cutback", "cut-back")].into_iter().enumerate() {
+            let count = now[k] - self.before[k];
+            if count > 0 {
+                let text = if count == 1 { one.to_string() } else { format!("{count} × {one}") };
+                self.events.push(json!({ "row": self.written, "kind": kind, "text": text }));
+            }
+        }
+        self.before = now;
+    }
+
+    fn frame(&self, at: &Snapshot) -> Frame {
+        let looks = self.figure.looks(at.state);
+        let of = || self.shown.iter().flatten().map(|&k| &looks[k]);
+        Frame {
+            row: self.written,
+            places: of().map(|look| look.place.0.map(|x| x as f32)).collect(),
+            turns: of().map(|look| quaternion(look.axes)).collect(),
+            fields: of().map(fields).collect(),
+        }
+    }
+
+    /// Drops every other frame where there are too many.
+    fn thin(&mut self) {
+        let points: usize = self.shown.iter().map(Vec::len).sum();
+        let most = (MOST_LOOKS / points.max(1)).clamp(LEAST_FRAMES, MOST_FRAMES);
+        if self.frames.len() > 2 * most {
+            self.stride *= 2;
+            let stride = self.stride;
+            self.frames.retain(|frame| frame.row.is_multiple_of(stride));
+        }
+    }
+
+    /// Rows of the history that have a frame, after the run; the history has so many rows.
+    pub fn end(&mut self, rows: usize) -> Vec<usize> {
+        self.frames.extend(self.pending.take());
+        // A run that was stopped has written less than the one that was filmed for it.
+        self.frames.retain(|frame| frame.row < rows);
+        self.events.retain(|event| event["row"].as_u64().is_some_and(|row| (row as usize) < rows));
+        self.frames.iter().map(|frame| frame.row).collect()
+    }
+
+    /// As the page takes it; `row` gives the number of a row of the history among those that are shown.
+    pub fn to_json(&self, row: &dyn Fn(usize) -> usize) -> Value {
+        let places = initial(&self.figure, &self.shown);
+        let mut first = 0;
+        let mut beams = Vec::new();
+        for (line, shown) in self.figure.lines.iter().zip(&self.shown) {
+            // Of a thinned beam elements are not whole.
+            let order = if shown.len() == line.points.len() { line.order } else { 1 };
+            beams.push(json!({ "name": line.name, "nodes": (first..first + shown.len()).collect::<Vec<_>>(), "order": order, "closed": false }));
+            first += shown.len();
+        }
+        let nodes = |all: &[usize]| all.iter().map(|node| json!({ "node": node })).collect::<Vec<_>>();
+        let bodies: Vec<usize> = (first..places.len()).collect();
+        let frames = || self.frames.iter();
+        json!({
+            "nodes": places.len(),
+            "names": self.names.iter().map(|(name, node)| json!({ "name": name, "node": node })).collect::<Vec<_>>(),
+            "beams": beams,
+            "bodies": nodes(&bodies),
+            "supports": nodes(&self.supports),
+            "joints": nodes(&self.joints),
+            "initial": base64(places.iter().flat_map(|(_, place)| place.0).flat_map(|x| (x as f32).to_le_bytes())),
+            "rows": frames().map(|frame| row(frame.row)).collect::<Vec<_>>(),
+            "places": base64(frames().flat_map(|frame| frame.places.as_flattened()).flat_map(|x| x.to_le_bytes())),
+            "turns": base64(frames().flat_map(|frame| frame.turns.as_flattened()).flat_map(|x| x.to_le_bytes())),
+            "fields": self.fields(),
+            "events": self.events.iter().map(|event| at_row(event, row)).collect::<Vec<_>>(),
+        })
+    }
+
+    fn fields(&self) -> Vec<Value> {
+        let of = |k: usize| self.frames.iter().flat_map(move |frame| frame.fields.iter().map(move |all| all[k]));
+        let size = |k: usize| of(k).fold(0.0_f32, |size, x| size.max(x.abs()));
+        let largest = |kind: char| {
+            FIELDS.iter().enumerate().filter(|(_, field)| field.2 == kind).fold(0.0_f32, |s, (k, _)| s.max(size(k)))
+        };
+        let is_something = |k: &usize| size(*k) as f64 > NOTHING * largest(FIELDS[*k].2) as f64;
+        let some = (0..FIELDS.len()).filter(is_something);
+        some.map(|k| {
+            let (low, high, data) = quantised(of(k));
+            json!({ "name": FIELDS[k].0, "label": FIELDS[k].1, "low": low, "high": high, "data": data })
+        })
+        .collect()
+    }
+}
+
+/// An event at the row where it is shown.
+fn at_row(event: &Value, row: &dyn Fn(usize) -> usize) -> Value {
+    let mut event = event.clone();
+    event["row"] = json!(row(event["row"].as_u64().unwrap_or(0) as usize));
+    event
+}
+
+fn fields(look: &Look) -> [f32; 7] {
+    let [n1, n2, n3, m1, m2, m3] = look.resultant;
+    [n1, n2, n3, m1, m2, m3, look.energy].map(|x| x as f32)
+}
+
+/// The nodes of each beam that are shown: all, or each n-th, the ends and those with names; then the bodies.
+fn shown(figure: &Figure, named: &[(String, Place)]) -> Vec<Vec<usize>> {
+    let stride = figure.line_points().div_ceil(MOST_POINTS).max(1);
+    let mut first = 0;
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    for line in &figure.lines {
+        let last = line.points.len() - 1;
+        let is_named = |k: usize| {
+            let node = line.points[k].place.node();
+            stride > 1 && named.iter().any(|(_, place)| place.node() == node)
+        };
+        all.push(
+            (0..=last).filter(|&k| k.is_multiple_of(stride) || k == last || is_named(k)).map(|k| first + k).collect(),
+        );
+        first += line.points.len();
+    }
+    all.push((first..first + figure.bodies.len()).collect());
+    all
+}
+
+/// Node and place at the start of what is shown.
+fn initial(figure: &Figure, shown: &[Vec<usize>]) -> Vec<(Node, Vec3)> {
+    let places: Vec<&Place> = figure
+        .lines
+        .iter()
+        .flat_map(|line| line.points.iter().map(|point| &point.place))
+        .chain(&figure.bodies)
+        .collect();
+    shown.iter().flatten().filter_map(|&k| Some((places[k].node()?, places[k].initial()))).collect()
+}
+
+/// Places that columns of the history name.
+fn named(scene: &Scene) -> Vec<(String, Place)> {
+    let mut names: Vec<(String, Place)> = Vec::new();
+    for probe in &scene.probes {
+        let (Quantity::Displacement(place)
+        | Quantity::Position(place)
+        | Quantity::Rotation(place)
+        | Quantity::Wound(place)
+        | Quantity::Axes(place)
+        | Quantity::Velocity(place)
+        | Quantity::Spin(place)
+        | Quantity::Acceleration(place)
+        | Quantity::AngularAcceleration(place)) = &probe.quantity
+        else {
+            continue;
+        };
+        let name = probe.names.first().and_then(|name| name.rsplit_once('.')).map_or("", |(node, _)| node);
+        if !names.iter().any(|(known, _)| known == name) {
+            names.push((name.into(), place.clone()));
+        }
+    }
+    names
+}
+
+/// The node that a place is, or the one of its element that has most to say there.
+fn nearest(places: &[(Node, Vec3)], to: &Place) -> Option<usize> {
+    let (node, _, _) = to.nodes.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
+    places.iter().position(|(known, _)| known == node)
+}
+
+/// w x y z of a rotation, times 32767 (Shepperd 1978, doi:10.2514/3.55767b).
+fn quaternion(axes: Mat3) -> [i16; 4] {
+    let r = axes.0;
+    let trace = r[0][0] + r[1][1] + r[2][2];
+    let diagonal = [trace, r[0][0], r[1][1], r[2][2]];
+    let largest = (0..4).max_by(|&a, &b| diagonal[a].total_cmp(&diagonal[b])).unwrap_or(0);
+    let mut q = [0.0; 4];
+    if largest == 0 {
+        q = [1.0 + trace, r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]];
+    } else {
+        let (i, j, k) = (largest - 1, largest % 3, (largest + 1) % 3);
+        q[0] = r[k][j] - r[j][k];
+        q[i + 1] = 1.0 + r[i][i] - r[j][j] - r[k][k];
+        q[j + 1] = r[j][i] + r[i][j];
+        q[k + 1] = r[k][i] + r[i][k];
+    }
+    let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    q.map(|x| (32767.0 * x / norm).round() as i16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rotation::Rotation;
+
+    #[test]
+    fn quaternions_are_those_of_their_rotation_vectors() {
+        for vector in [[0.0, 0.0, 0.0], [0.3, -0.2, 0.9], [3.0, 0.2, 0.1], [0.1, 3.1, 0.0], [0.0, -0.2, 3.1]] {
+            let p = Vec3(vector);
+            let (angle, q) = (p.norm(), quaternion(Rotation::new(p).r));
+            let part = if angle == 0.0 { 0.0 } else { (0.5 * angle).sin() / angle };
+            let exact = [(0.5 * angle).cos(), part * vector[0], part * vector[1], part * vector[2]];
+            for (came, exact) in q.iter().zip(exact) {
+                assert!((f64::from(*came) - 32767.0 * exact).abs() < 0.51, "{vector:?}: {q:?}");
+            }
+        }
+    }
+}

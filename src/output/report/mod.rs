@@ -1,0 +1,84 @@
+//! report.html: one page that plays a run back, with its histories, energies, effects and deck. It needs no network and no server.
+
+mod encode;
+mod film;
+
+pub use film::Film;
+
+use super::{HistoryReader, PartFile};
+use encode::base64;
+use serde_json::{Value, json};
+use std::io;
+use std::path::Path;
+
+/// The page, which has places for a title and for data.
+const PAGE: &str = include_str!("page.html");
+
+/// Numbers of a history that a page carries.
+const MOST_NUMBERS: usize = 2_000_000;
+
+/// Where a report gets its words from.
+pub struct Report<'a> {
+    /// What it is about
+    pub title: &'a str,
+    /// The deck
+    pub text: &'a str,
+    /// The content of run.json
+    pub record: &'a Value,
+}
+
+impl Report<'_> {
+    /// Writes the page of results in a folder.
+    pub fn write(&self, results: &Path, film: Film, path: &Path) -> io::Result<()> {
+        let page = self.page(results, film)?;
+        let name = path.file_name().map_or("report.html".into(), |name| name.to_string_lossy().into_owned());
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        PartFile::written(folder, &name, page.as_bytes()).and_then(|(part, file)| part.finish(&file, &name))
+    }
+
+    fn page(&self, results: &Path, mut film: Film) -> io::Result<String> {
+        let names = ["history.csv", "history.partial.csv"].map(|name| results.join(name));
+        let history = names.iter().find(|path| path.exists()).map(|path| HistoryReader::read(path)).transpose()?;
+        let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
+        let shown = rows(&history, &film.end(history.rows.len()));
+        // The last row that is shown up to there.
+        let row = |of: usize| shown.partition_point(|&k| k <= of).saturating_sub(1);
+        let (bars, columns): (Vec<usize>, Vec<usize>) =
+            (0..history.names.len()).partition(|&k| is_bar(&history.names, k));
+        let mut run = self.record.clone();
+        if let Some(run) = run.as_object_mut() {
+            run.remove("text");
+        }
+        let data = json!({
+            "title": self.title,
+            "version": env!("CARGO_PKG_VERSION"),
+            "deck": self.text,
+            "run": run,
+            "history": table(&history, &shown, &columns, ""),
+            "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, ".err") },
+            "scene": film.to_json(&row),
+        });
+        let escaped = self.title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
+        let page = PAGE.replace("{{TITLE}}", &escaped);
+        let (before, after) = page.split_once("{{DATA}}").unwrap_or((&page, ""));
+        Ok([before, &data.to_string().replace("</", "<\\/"), after].concat())
+    }
+}
+
+/// Whether a column is the error bar of another.
+fn is_bar(names: &[String], k: usize) -> bool {
+    names[k].strip_suffix(".err").is_some_and(|of| names.iter().any(|name| name == of))
+}
+
+/// The rows that are shown: all, or each n-th and those with a frame.
+fn rows(history: &HistoryReader, frames: &[usize]) -> Vec<usize> {
+    let count = history.rows.len();
+    let stride = (count * history.names.len()).div_ceil(MOST_NUMBERS).max(1);
+    (0..count).filter(|k| k.is_multiple_of(stride) || frames.binary_search(k).is_ok() || k + 1 == count).collect()
+}
+
+fn table(history: &HistoryReader, rows: &[usize], columns: &[usize], suffix: &str) -> Value {
+    let names: Vec<&str> = columns.iter().map(|&k| history.names[k].trim_end_matches(suffix)).collect();
+    let numbers = columns.iter().flat_map(|&k| rows.iter().map(move |&row| history.rows[row][k]));
+    json!({ "columns": names, "rows": rows.len(), "data": base64(numbers.flat_map(f64::to_le_bytes)) })
+}
