@@ -6,6 +6,7 @@ mod compare;
 mod cost;
 mod effects;
 mod load;
+mod plot;
 mod progress;
 mod report;
 mod run;
@@ -91,6 +92,11 @@ enum Command {
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+    },
+    /// Draw histories as a picture (SVG)
+    Plot {
+        #[command(flatten)]
+        wanted: plot::Wanted,
     },
     /// Write a page that plays a run back, with its histories, energies, effects and deck
     Report {
@@ -215,6 +221,7 @@ pub fn main() -> ExitCode {
         Command::Verify { input, out } => verify::verify(&input.decks, &input.set, out.as_deref()),
         Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),
         Command::Cost { input, wanted, out } => cost::cost(&input.decks, &input.set, &wanted, out.as_deref()),
+        Command::Plot { wanted } => plot::plot(&wanted),
         Command::Report { folders, out } => report::report(&folders, out.as_deref()),
         Command::Effects { input, tolerance, out } => {
             effects::effects(&input.decks, &input.set, tolerance, out.as_deref())

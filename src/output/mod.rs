@@ -1,5 +1,6 @@
 //! What a run leaves on disk. Files appear whole: a finished name never holds half a result.
 
+mod curves;
 mod fields;
 mod files;
 mod history;
@@ -8,6 +9,7 @@ mod plot;
 mod record;
 mod report;
 
+pub use curves::{Curve, Curves};
 pub use fields::{FieldsWriter, remove_fields};
 pub use files::{PartFile, remove_if_there};
 pub use history::{Beside, HistoryReader, HistoryWriter, Rows};

@@ -3,7 +3,7 @@
 use kuva::prelude::*;
 
 /// Colours that differ in hue and lightness (Okabe and Ito).
-const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
+pub(super) const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
 
 /// Marks, of which neighbours differ.
 const MARKS: [MarkerShape; 6] = [

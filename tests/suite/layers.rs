@@ -21,7 +21,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("annotate_snippets", &["src/deck/"]),
     ("strsim", &["src/deck/"]),
     ("csv", &["src/output/", "src/study/"]),
-    ("kuva", &["src/output/plot.rs"]),
+    ("kuva", &["src/output/plot.rs", "src/output/curves.rs"]),
     ("cpu_time", &["src/study/cost/trial.rs"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),

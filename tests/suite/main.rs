@@ -19,6 +19,7 @@ mod layers;
 mod mechanics;
 mod mechanisms;
 mod planar;
+mod plot;
 mod random;
 mod relative;
 mod report;
