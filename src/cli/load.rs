@@ -43,27 +43,35 @@ pub struct Loaded {
 
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
 pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
-    let text = deck::apply(&text(path)?, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
+    let own = text(path)?;
+    let text = deck::apply(&own, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
     // Settings may have moved lines.
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());
-    let refuse = |found: &[Diagnostic], expected: Vec<String>| {
+    let refuse = |text: &str, found: &[Diagnostic], expected: Vec<String>| {
         let errors: Vec<_> = found.iter().filter(|d| !d.is_warning()).collect();
         let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
         let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
         Refusal {
-            details: render(&label, &text, found),
+            details: render(&label, text, found),
             expected,
             ..Refusal::of(Status::Wrong, name, format!("{count} in {}", path.display()))
         }
     };
-    let (deck, found) = deck::read(&text).map_err(|found| refuse(&found, Vec::new()))?;
+    let text = deck::import(&text, &|name| beside(path, name)).map_err(|found| refuse(&text, &found, Vec::new()))?;
+    let (deck, found) = deck::read(&text).map_err(|found| refuse(&text, &found, Vec::new()))?;
     let built = scene::from_deck(&deck, found);
-    let (scene, warnings) = built.map_err(|found| refuse(&found, expected_failures(&deck)))?;
+    let (scene, warnings) = built.map_err(|found| refuse(&text, &found, expected_failures(&deck)))?;
     if !warnings.is_empty() {
         say::note(&render(&label, &text, &warnings));
     }
     Ok(Loaded { text, deck, scene })
+}
+
+/// The text of a table that a deck names, seen from the deck's folder.
+fn beside(deck: &Path, name: &str) -> Result<String, String> {
+    let folder = deck.parent().unwrap_or(Path::new(""));
+    text(&folder.join(name)).map_err(|refusal| refusal.message)
 }
 
 /// The text of a file.

@@ -3,9 +3,8 @@
 use super::load::Refusal;
 use super::run::{Beyond, simulate};
 use super::{Status, Verdict, load, say, signals};
-use crate::output::{Film, Report, Rows};
+use crate::output::{Film, Record, Report, Rows};
 use crate::scene::{self, Scene};
-use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -28,8 +27,8 @@ pub fn report(folders: &[PathBuf], out: Option<&Path>) -> Status {
 }
 
 fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
-    let record = record(folder)?;
-    let Some(text) = record["text"].as_str() else {
+    let record = Record::read(folder).map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))?;
+    let Some(text) = record.text() else {
         let message = format!("{}: run.json holds no deck: run it again", folder.display());
         return Err(Refusal::of(Status::Io, "io", message));
     };
@@ -41,15 +40,7 @@ fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
     // A history holds the nodes that were asked for; the shape is that of the same run once more.
     let film = filmed(&scene, &name)?;
     let path = out.map_or_else(|| folder.join("report.html"), Path::to_path_buf);
-    write(&scene, &name, text, &record, film, folder, &path)
-}
-
-/// What run.json says.
-fn record(folder: &Path) -> Result<Value, Refusal> {
-    let path = folder.join("run.json");
-    let io = |why: String| Refusal::of(Status::Io, "io", format!("{}: {why}", path.display()));
-    let bytes = fs::read(&path).map_err(|error| io(error.to_string()))?;
-    serde_json::from_slice(&bytes).map_err(|error| io(error.to_string()))
+    write(&scene, &name, &record, film, folder, &path)
 }
 
 fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
@@ -71,14 +62,13 @@ pub fn film(scene: &Scene) -> Film {
 pub fn write(
     scene: &Scene,
     name: &str,
-    text: &str,
-    record: &Value,
+    record: &Record,
     film: Film,
     results: &Path,
     path: &Path,
 ) -> Result<(), Refusal> {
     let title = scene.title.as_deref().unwrap_or(name);
-    let written = Report { title, text, record }.write(results, film, path);
+    let written = Report { title, record }.write(results, film, path);
     written.map_err(|error| Refusal::of(Status::Io, "io", format!("{}: {error}", path.display())))?;
     say::line(&format!("  {}", path.display()));
     Ok(())

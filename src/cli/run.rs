@@ -5,13 +5,12 @@ use super::progress::Progress;
 use super::{Status, Verdict, load, report, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
-    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Rows, remove_fields,
-    remove_if_there, run_record,
+    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Rows, remove_fields,
+    remove_if_there,
 };
 use crate::scene::Scene;
 use crate::study::Recorder;
 use crate::study::error_bars::ErrorBars;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -27,12 +26,12 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, pictured: bo
             Ok(Aimed { text, scene, reached, bars }) => {
                 let folder = folder(out, &name, decks.len() > 1);
                 let film = pictured.then(|| report::film(&scene));
-                let beyond = Beyond { reached, bars, text: text.clone(), film };
+                let beyond = Beyond { reached, bars, text, film };
                 let mut finished = simulate(&scene, &name, Some(&folder), None, beyond);
                 summarise(&name, &scene, &finished, &folder);
                 if let (Some(film), Some(record)) = (finished.film.take(), finished.record.take()) {
                     let page = folder.join("report.html");
-                    let written = report::write(&scene, &name, &text, &record, film, &folder, &page);
+                    let written = report::write(&scene, &name, &record, film, &folder, &page);
                     written.unwrap_or_else(|refusal| verdict.refuse(refusal));
                 }
                 if let Err(failure) = &finished.result {
@@ -82,7 +81,7 @@ pub struct Finished {
     /// What filmed it
     pub film: Option<Film>,
     /// What stands in run.json
-    pub record: Option<Value>,
+    pub record: Option<Record>,
 }
 
 impl Finished {
@@ -214,8 +213,8 @@ pub fn simulate(
     let mut record = None;
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
         let outcome = Outcome { result: &result, counters: &counters, seconds, reached: reached.as_ref(), text: &text };
-        let told = run_record(scene, &outcome);
-        let text = format!("{told:#}\n");
+        let told = Record::of(scene, &outcome);
+        let text = told.to_string();
         record = Some(told);
         let fields = watcher.fields.take();
         let written = write_results(history, fields, &watcher.modes, folder, result.is_ok(), &text);

@@ -711,7 +711,14 @@ pub(super) fn read_history<'a>(
 ) -> Option<HistoryTable> {
     let name = check_name(context, name)?;
     let what = format!("[history.{}]", name.value);
-    let table = Table::new(context, item, what.clone(), &["times", "values", "smooth", "expr"])?;
+    let table = Table::new(context, item, what.clone(), &["times", "values", "smooth", "expr", "csv", "column"])?;
+    if let Some(key) = ["csv", "column"].into_iter().find(|key| table.has(key)) {
+        // Where the deck is a file, tables beside it stand in its text by now.
+        return context.wrong(
+            table.key_span(key),
+            format!("`{key}` of {what} names a table that was not read: `csv = \"file.csv\"`"),
+        );
+    }
     if table.has("expr") {
         if let Some(key) = ["times", "values", "smooth"].into_iter().find(|key| table.has(key)) {
             return context.wrong(table.key_span(key), format!("{what} is `times` and `values`, or `expr`, not both"));

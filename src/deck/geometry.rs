@@ -133,8 +133,10 @@ pub struct FreeStrain {
 pub struct Beam {
     /// Its name
     pub name: Spanned<String>,
-    /// One section, or two for a taper
+    /// One section, two for a taper, or more
     pub sections: Vec<Spanned<String>>,
+    /// Where they are, as fractions of the length; none: at start and end
+    pub stations: Vec<f64>,
     /// Its centre line
     pub path: Path,
     /// Elements of each piece; one number for all
@@ -352,9 +354,10 @@ fn read_shaped(table: &Table) -> Option<SectionBody> {
     Some(SectionBody::Shaped { shape, material, shear_factor })
 }
 
-const BEAM_KEYS: [&str; 12] = [
+const BEAM_KEYS: [&str; 13] = [
     "name",
     "section",
+    "stations",
     "through",
     "arc",
     "elements",
@@ -371,6 +374,7 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     let table = Table::new(context, item, "[[beam]]", &BEAM_KEYS)?;
     let name = table.required("name").and_then(|item| context.text(item)).and_then(|name| check_name(context, name));
     let sections = table.required("section").and_then(|item| read_sections(context, item));
+    let stations = read_stations(&table, sections.as_ref().map_or(0, Vec::len));
     let path = read_path(&table);
     let elements = table.required("elements").and_then(|item| read_counts(context, item, "elements"));
     let order = match table.get("order") {
@@ -392,6 +396,7 @@ pub(super) fn read_beam<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     Some(Beam {
         name: name?,
         sections: sections?,
+        stations: stations?,
         path: path?,
         elements: elements?,
         order: order?,
@@ -422,10 +427,36 @@ fn read_sections(context: &Context, item: &Item) -> Option<Vec<Spanned<String>>>
         return Some(vec![context.text(item)?]);
     }
     let names = context.texts(item)?;
-    if names.len() == 2 || names.len() == 1 {
-        return Some(names);
+    if names.is_empty() {
+        return context
+            .wrong(item.span(), "`section` is one name, two for a taper from start to end, or more with `stations`");
     }
-    context.wrong(item.span(), "`section` is one name, or two for a taper from start to end")
+    Some(names)
+}
+
+/// Fractions of the length, one for each of the sections; none for a taper from start to end.
+fn read_stations(table: &Table, sections: usize) -> Option<Vec<f64>> {
+    let context = table.context;
+    let Some(item) = table.get("stations") else {
+        if sections > 2 {
+            return context.wrong(
+                table.key_span("section"),
+                format!("{sections} sections need `stations`: the fraction of the length of each"),
+            );
+        }
+        return Some(Vec::new());
+    };
+    let stations = context.numbers(item, None)?;
+    let values = &stations.value;
+    if values.len() != sections || sections < 2 {
+        let message =
+            format!("`stations` are as many as sections, two or more: there are {} and {sections}", values.len());
+        return context.wrong(stations.span, message);
+    }
+    if values[0] != 0.0 || values[values.len() - 1] != 1.0 || !values.is_sorted_by(|a, b| a < b) {
+        return context.wrong(stations.span, "`stations` rise from 0, the start of the beam, to 1, its end");
+    }
+    Some(stations.value)
 }
 
 fn read_path(table: &Table) -> Option<Path> {

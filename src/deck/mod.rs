@@ -9,6 +9,7 @@ mod diagnostic;
 mod effects;
 mod expression;
 mod geometry;
+mod import;
 mod looked_at;
 mod overrides;
 mod parameters;
@@ -30,6 +31,7 @@ pub use expression::{Expression, Jet};
 pub use geometry::{
     Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape,
 };
+pub use import::import;
 pub use looked_at::{Looked, looking_at};
 pub use overrides::apply;
 pub use parameters::Parameters;

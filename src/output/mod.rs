@@ -15,5 +15,5 @@ pub use files::{PartFile, remove_if_there};
 pub use history::{Beside, HistoryReader, HistoryWriter, Rows};
 pub use modes::ModesWriter;
 pub use plot::{LinePlots, NamedLine};
-pub use record::{Outcome, Reached, run_record};
+pub use record::{Outcome, Reached, Record};
 pub use report::{Film, Report};

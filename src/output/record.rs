@@ -3,6 +3,9 @@
 use crate::drive::{Counters, Event, Failure, Moment, Place};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
+use std::fmt::{self, Display, Formatter};
+use std::path::Path;
+use std::{fs, io};
 
 /// How a run ended.
 pub struct Outcome<'a> {
@@ -31,7 +34,45 @@ pub struct Reached {
 }
 
 /// The content of run.json.
-pub fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
+#[derive(Clone, Debug)]
+pub struct Record(Value);
+
+impl Record {
+    /// Of a run.
+    pub fn of(scene: &Scene, outcome: &Outcome) -> Self {
+        Self(run_record(scene, outcome))
+    }
+
+    /// That of the results in a folder.
+    pub fn read(folder: &Path) -> io::Result<Self> {
+        let path = folder.join("run.json");
+        let wrong = |why: String| io::Error::other(format!("{}: {why}", path.display()));
+        let bytes = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
+        serde_json::from_slice(&bytes).map(Self).map_err(|error| wrong(error.to_string()))
+    }
+
+    /// The deck as it was read.
+    pub fn text(&self) -> Option<&str> {
+        self.0["text"].as_str()
+    }
+
+    /// Without the deck.
+    pub fn bare(&self) -> Value {
+        let mut bare = self.0.clone();
+        if let Some(entries) = bare.as_object_mut() {
+            entries.remove("text");
+        }
+        bare
+    }
+}
+
+impl Display for Record {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        writeln!(f, "{:#}", self.0)
+    }
+}
+
+fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
     let effects: Vec<Value> =
         scene.reasons.iter().map(|r| json!({ "name": r.name, "active": r.active, "reason": r.reason })).collect();
     let status = outcome.result.as_ref().map_or_else(Failure::name, |()| "finished");

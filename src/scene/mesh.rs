@@ -274,9 +274,15 @@ impl Mesh {
             found.ok_or_else(|| names::unknown("section", name, deck.sections.iter().map(|s| s.name.value.as_str())))
         };
         let section = match &beam.sections[..] {
-            [start, end] => section::taper([find(start)?, find(end)?], &deck.materials)?,
-            [one, ..] => SectionCourse::Uniform(section::matrices(find(one)?, &deck.materials)?),
             [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
+            [one] => SectionCourse::Uniform(section::matrices(find(one)?, &deck.materials)?),
+            [start, end] => section::taper([find(start)?, find(end)?], &deck.materials)?,
+            several => {
+                let pair =
+                    |pair: &[Spanned<String>]| section::taper([find(&pair[0])?, find(&pair[1])?], &deck.materials);
+                let courses = several.windows(2).map(pair).collect::<Result<_, _>>()?;
+                SectionCourse::Stations { fractions: beam.stations.clone(), courses }
+            }
         };
         let line = path::centre_line(beam, &|point| names::place(deck, point))?;
         let pieces = line.pieces.len();

@@ -43,6 +43,13 @@ pub enum SectionCourse {
     },
     /// Each entry linear in arc length
     Blended([SectionMatrices; 2]),
+    /// From station to station
+    Stations {
+        /// Where these are, from 0 to 1
+        fractions: Vec<f64>,
+        /// Between each two
+        courses: Vec<SectionCourse>,
+    },
     /// Another course, so stiff against these of its strains that they vanish
     Rigid(Box<SectionCourse>, [bool; 6]),
 }
@@ -65,6 +72,11 @@ impl SectionCourse {
                 shaped(shape, material, factor)
             }
             Self::Blended([a, b]) => blend(a, b, s),
+            Self::Stations { fractions, courses } => {
+                let next = fractions.partition_point(|&station| station <= s).clamp(1, courses.len());
+                let (from, to) = (fractions[next - 1], fractions[next]);
+                courses[next - 1].at(((s - from) / (to - from)).clamp(0.0, 1.0))
+            }
             Self::Rigid(course, strains) => {
                 let section = course.at(s);
                 // D C D scales what the flexibility C^-1 has of these strains, and what it couples them with.

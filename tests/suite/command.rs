@@ -588,3 +588,48 @@ fn fields_belong_to_the_history_beside_them() {
     assert_eq!(run(&["output.vtk=false"]), 0);
     assert_eq!(folder.names("r"), ["history.csv", "run.json"]);
 }
+
+/// What a table says is what a deck says that holds the same numbers; results, sweeps and reports know it by themselves.
+#[test]
+fn tables_beside_a_deck_are_read_from_its_folder() {
+    let folder = Folder::new("import");
+    fs::create_dir(folder.0.join("in")).unwrap();
+    folder.write("in/spine.csv", "x,y,z\n0,0,0\n1,0,0\n2,0.5,0\n");
+    folder.write("in/blade.csv", "# from another program\ns,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,4e3,4e3,4e3,40,40,30,2\n1,2e3,2e3,2e3,20,20,20,1\n4,1e3,1e3,1e3,10,10,10,1\n");
+    folder.write("in/gust.csv", "time,drag,lift\n0,0,0\n0.1,5,1\n0.2,5,0\n");
+    let rest = "[[support]]\nat = \"b@start\"\nfix = \"all\"\n[[load]]\nat = \"b@end\"\nforce = [0, 0, 3]\nhistory = \"gust\"\n\
+                [[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.02\n[output]\nnodes = [\"b@end\", \"b@0.6\"]\ncolumns = [\"u\", \"resultant\"]\n";
+    let tables = format!(
+        "[[beam]]\nname = \"b\"\nthrough = {{ csv = \"spine.csv\" }}\nsection = {{ csv = \"blade.csv\" }}\nelements = 4\n\
+         [history.gust]\ncsv = \"gust.csv\"\ncolumn = \"lift\"\n{rest}"
+    );
+    let section = |name: &str, x: f64, three: f64, mass: f64| {
+        format!(
+            "[section.{name}]\nEA = {0}\nGA = {0}\nGJ = {1}\nEI = [{1}, {three}]\nrhoA = {mass}\n",
+            1e3 * x,
+            10.0 * x
+        )
+    };
+    let whole = format!(
+        "[[beam]]\nname = \"b\"\nthrough = [[0, 0, 0], [1, 0, 0], [2, 0.5, 0]]\nsection = [\"p\", \"q\", \"r\"]\nstations = [0, 0.25, 1]\nelements = 4\n\
+         [history.gust]\ntimes = [0, 0.1, 0.2]\nvalues = [0, 1, 0]\n{}{}{}{rest}",
+        section("p", 4.0, 30.0, 2.0),
+        section("q", 2.0, 20.0, 1.0),
+        section("r", 1.0, 10.0, 1.0)
+    );
+    folder.write("in/tables.toml", &tables);
+    folder.write("whole.toml", &whole);
+    for deck in ["in/tables.toml", "whole.toml"] {
+        let run = folder.beamsim(&["run", deck]);
+        assert_eq!(status(&run), 0, "{}", last_line(&run));
+    }
+    let history = |deck: &str| fs::read_to_string(folder.0.join("results").join(deck).join("history.csv")).unwrap();
+    assert_eq!(history("tables"), history("whole"));
+    fs::remove_dir_all(folder.0.join("in")).unwrap();
+    assert_eq!(status(&folder.beamsim(&["report", "results/tables"])), 0);
+
+    folder.write("lost.toml", &tables);
+    let lost = folder.beamsim(&["run", "lost.toml"]);
+    let told = String::from_utf8_lossy(&lost.stderr);
+    assert!(status(&lost) == 2 && told.contains("lost.toml:3:") && told.contains("spine.csv"), "{told}");
+}

@@ -20,7 +20,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("toml_edit", &["src/deck/"]),
     ("annotate_snippets", &["src/deck/"]),
     ("strsim", &["src/deck/"]),
-    ("csv", &["src/output/", "src/study/"]),
+    ("csv", &["src/output/", "src/study/", "src/deck/import.rs"]),
     ("kuva", &["src/output/plot.rs", "src/output/curves.rs"]),
     ("cpu_time", &["src/study/cost/trial.rs"]),
     ("clap", &["src/cli/"]),

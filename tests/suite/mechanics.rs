@@ -290,3 +290,32 @@ steps = 2
         other => panic!("{other:?}"),
     }
 }
+
+/// A beam whose section changes from station to station is the chain of tapers between them.
+#[test]
+fn stations_are_tapers_one_after_the_other() {
+    let section =
+        |name: &str, x: f64| format!("[section.{name}]\nEA = {0}\nGA = {0}\nGJ = {1}\nEI = {1}\n", 1e4 * x, 10.0 * x);
+    let rest = "[[support]]\nat = \"o\"\nfix = \"all\"\n[[load]]\nat = \"p\"\nforce = [1, 2, 3]\n[[stage]]\nkind = \"static\"\nsteps = 2\n[output]\nnodes = [\"p\"]\n";
+    let sections = section("a", 3.0) + &section("b", 1.0) + &section("c", 2.0);
+    let one = format!(
+        "[point]\no = [0, 0, 0]\np = [4, 0, 0]\n{sections}[[beam]]\nname = \"s\"\nsection = [\"a\", \"b\", \"c\"]\nstations = [0, 0.25, 1]\n\
+         through = [\"o\", \"p\"]\nelements = 8\norder = 2\n{rest}"
+    );
+    let beam = |name: &str, ends: &str, through: &str, elements: usize| {
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = {ends}\nthrough = {through}\nelements = {elements}\norder = 2\n"
+        )
+    };
+    let two = format!(
+        "[point]\no = [0, 0, 0]\nm = [1, 0, 0]\np = [4, 0, 0]\n{sections}{}{}{rest}",
+        beam("s", "[\"a\", \"b\"]", "[\"o\", \"m\"]", 2),
+        beam("t", "[\"b\", \"c\"]", "[\"m\", \"p\"]", 6)
+    );
+    let [one, two] = [one, two].map(|deck| simulate(&deck));
+    for axis in ["ux", "uy", "uz", "rx", "ry", "rz"] {
+        let column = format!("p.{axis}");
+        let (a, b) = (one.end(&column), two.end(&column));
+        assert!((a - b).abs() <= 1e-12 * (1.0 + b.abs()), "{column}: {a} against {b}");
+    }
+}

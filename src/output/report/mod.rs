@@ -5,7 +5,7 @@ mod film;
 
 pub use film::Film;
 
-use super::{HistoryReader, PartFile};
+use super::{HistoryReader, PartFile, Record};
 use encode::base64;
 use serde_json::{Value, json};
 use std::io;
@@ -21,10 +21,8 @@ const MOST_NUMBERS: usize = 2_000_000;
 pub struct Report<'a> {
     /// What it is about
     pub title: &'a str,
-    /// The deck
-    pub text: &'a str,
     /// The content of run.json
-    pub record: &'a Value,
+    pub record: &'a Record,
 }
 
 impl Report<'_> {
@@ -45,15 +43,11 @@ impl Report<'_> {
         let row = |of: usize| shown.partition_point(|&k| k <= of).saturating_sub(1);
         let (bars, columns): (Vec<usize>, Vec<usize>) =
             (0..history.names.len()).partition(|&k| is_bar(&history.names, k));
-        let mut run = self.record.clone();
-        if let Some(run) = run.as_object_mut() {
-            run.remove("text");
-        }
         let data = json!({
             "title": self.title,
             "version": env!("CARGO_PKG_VERSION"),
-            "deck": self.text,
-            "run": run,
+            "deck": self.record.text(),
+            "run": self.record.bare(),
             "history": table(&history, &shown, &columns, ""),
             "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, ".err") },
             "scene": film.to_json(&row),
