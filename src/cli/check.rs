@@ -1,7 +1,7 @@
 //! `beamsim check`
 
 use super::load::Loaded;
-use super::{Status, Verdict, load, say};
+use super::{Status, Verdict, json, load, say};
 use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
@@ -23,7 +23,7 @@ pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
                 let reading = begun.elapsed();
                 say::line(&format!("{}: {}", path.display(), loaded.scene.title.as_deref().unwrap_or("(no title)")));
                 match tell(&loaded.scene) {
-                    Ok(()) => tell_time(&loaded, reading),
+                    Ok(()) => json::check(path, &loaded.scene, Some(tell_time(&loaded, reading))),
                     Err(message) => verdict.fail(Status::Wrong, "deck", message),
                 }
             }
@@ -54,7 +54,7 @@ fn tell(scene: &Scene) -> Result<(), String> {
 }
 
 /// How long a run will take. One that an accuracy is wanted of begins with a search among other meshes and steps.
-fn tell_time(loaded: &Loaded, reading: Duration) {
+fn tell_time(loaded: &Loaded, reading: Duration) -> f64 {
     let Forecast { seconds, watched, ended, at } = forecast(&loaded.scene, PATIENCE);
     let whole = duration(seconds + reading.as_secs_f64());
     let Moment { stage, time, load } = at;
@@ -65,6 +65,7 @@ fn tell_time(loaded: &Loaded, reading: Duration) {
     };
     let own = if loaded.deck.accuracy.is_some() { ", with its own elements and steps" } else { "" };
     say::line(&format!("run: about {whole} on this machine{own} ({how})"));
+    seconds + reading.as_secs_f64()
 }
 
 /// In few digits: more are not known.

@@ -1,6 +1,6 @@
 //! `beamsim compare`
 
-use super::{Status, say};
+use super::{Status, json, say};
 use crate::output::HistoryReader;
 use crate::study;
 use std::path::Path;
@@ -26,6 +26,7 @@ pub fn compare(a: &Path, b: &Path, rtol: f64, atol: f64) -> Status {
             return Status::Unexpected;
         }
     };
+    json::compare(a, b, &table);
     let width = table.iter().map(|c| c.column.chars().count()).max().unwrap_or(0);
     say::line(&format!("  {:<width$}  {:>6}  {:>24}  {:>24}  {:>10}", "column", "row", "came", "stored", "difference"));
     for cell in &table {

@@ -4,7 +4,7 @@ use super::accuracy::{describe, lines, refused};
 use super::load::{Loaded, Refusal};
 use super::progress::Progress;
 use super::run::{folder, refuse_twins};
-use super::{Status, Verdict, load, say, signals};
+use super::{Status, Verdict, json, load, say, signals};
 use crate::deck::Accuracy;
 use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
 use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
@@ -123,6 +123,7 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
         let written = PartFile::written(folder, file, &content).and_then(|(part, open)| part.finish(&open, file));
         written.map_err(io)?;
         say::line(&format!("  {}", folder.join(file).display()));
+        json::wrote("cost", &folder.join(file));
     }
     if let Some(error) = journal.trouble() {
         say::note(&format!("warning: runs were not kept for another time: {error}"));

@@ -1,7 +1,7 @@
 //! `beamsim effects`
 
 use super::run::{folder, refuse_twins, status_of};
-use super::{Status, Verdict, load, say, signals};
+use super::{Status, Verdict, json, load, say, signals};
 use crate::deck::EffectWord;
 use crate::output::PartFile;
 use crate::study::ablation::{Ablation, Variant, ablate};
@@ -55,6 +55,7 @@ fn study(
     let written = written.and_then(|(part, file)| part.finish(&file, "effects.csv"));
     written.map_err(|error| (Status::Io, "io", error.to_string()))?;
     say::line(&format!("  {}", folder.join("effects.csv").display()));
+    json::wrote("effects", &folder.join("effects.csv"));
     Ok(())
 }
 

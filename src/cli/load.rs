@@ -62,6 +62,17 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
     let (deck, found) = deck::read(&text).map_err(|found| refuse(&text, &found, Vec::new()))?;
     let built = scene::from_deck(&deck, found);
     let (scene, warnings) = built.map_err(|found| refuse(&text, &found, expected_failures(&deck)))?;
+    if !warnings.is_empty() && say::denies_warnings() {
+        let count = warnings.len();
+        return Err(Refusal {
+            details: render(&label, &text, &warnings),
+            ..Refusal::of(
+                Status::Wrong,
+                "deck",
+                format!("{count} warning(s) in {}, which --deny-warnings takes for errors", path.display()),
+            )
+        });
+    }
     if !warnings.is_empty() {
         say::note(&render(&label, &text, &warnings));
     }

@@ -5,6 +5,7 @@ mod check;
 mod compare;
 mod cost;
 mod effects;
+mod json;
 mod load;
 mod plot;
 mod progress;
@@ -29,6 +30,8 @@ const AFTER_HELP: &str = "Exit status: 0 fine; 1 an expectation or comparison fa
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    manner: say::Manner,
 }
 
 /// A deck and changes to it.
@@ -45,6 +48,9 @@ struct DeckArguments {
 #[derive(Subcommand)]
 enum Command {
     /// Simulate decks and write histories
+    #[command(
+        after_help = "Examples:\n  beamsim run arm.toml --set section.rod.EI=50 --report\n  beamsim run arm.toml --accuracy 1e-3\n  beamsim --json run arm.toml | jq .counters.iterations"
+    )]
     Run {
         #[command(flatten)]
         input: DeckArguments,
@@ -58,11 +64,13 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Read a deck and tell what would be simulated
+    #[command(after_help = "Example:\n  beamsim check arm.toml")]
     Check {
         #[command(flatten)]
         input: DeckArguments,
     },
     /// Run decks and hold the results against their [[expect]] tables
+    #[command(after_help = "Examples:\n  beamsim verify decks\n  beamsim verify arm.toml --out results")]
     Verify {
         #[command(flatten)]
         input: DeckArguments,
@@ -71,6 +79,7 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Compare a history with a stored one
+    #[command(after_help = "Example:\n  beamsim compare results/arm/history.csv stored.csv --rtol 1e-6")]
     Compare {
         /// The history
         a: PathBuf,
@@ -84,6 +93,9 @@ enum Command {
         atol: f64,
     },
     /// Tell what accuracy costs in time: many runs of a deck with other elements, orders and steps
+    #[command(
+        after_help = "Examples:\n  beamsim cost arm.toml --budget 60s\n  beamsim cost arm.toml --vary elements=1,2,4 --vary order=1,2,3"
+    )]
     Cost {
         #[command(flatten)]
         input: DeckArguments,
@@ -94,11 +106,15 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Draw histories as a picture (SVG)
+    #[command(
+        after_help = "Examples:\n  beamsim plot results/arm --column tip.uz\n  beamsim plot results/soft results/stiff --column tip.uz --reference measured.csv"
+    )]
     Plot {
         #[command(flatten)]
         wanted: plot::Wanted,
     },
     /// Write a page that plays a run back, with its histories, energies, effects and deck
+    #[command(after_help = "Example:\n  beamsim report results/arm")]
     Report {
         /// Folders of results
         #[arg(required = true, value_name = "RESULTS")]
@@ -108,6 +124,7 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Take each effect out in turn and tell what it changes and costs
+    #[command(after_help = "Example:\n  beamsim effects arm.toml --tolerance 1e-2")]
     Effects {
         #[command(flatten)]
         input: DeckArguments,
@@ -119,11 +136,15 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Run many variants of one deck and write one table of what came of them
+    #[command(
+        after_help = "Examples:\n  beamsim sweep arm.toml --vary section.rod.EI=50:200:4 --vary param.L=1,2\n  beamsim sweep arm.toml --vary param.L=1:3 --sample 200 --seed 7 --output tip.uz:absmax\n  beamsim sweep arm.toml --vary param.L=1:3:1000 --engine slurm --sbatch=--partition=short"
+    )]
     Sweep {
         #[command(flatten)]
         wanted: sweep::Wanted,
     },
     /// Write a commented deck to begin with
+    #[command(after_help = "Example:\n  beamsim new rotating-blade --out blade.toml")]
     New {
         /// Of what
         #[arg(value_enum, default_value_t)]
@@ -133,19 +154,23 @@ enum Command {
         out: Option<PathBuf>,
     },
     /// Tell what a key or a table of the deck means
+    #[command(after_help = "Examples:\n  beamsim explain stage.scheme\n  beamsim explain deck")]
     Explain {
         /// `elements`, `beam.elements`, `[[beam]]`; `deck` for all tables
         key: String,
     },
     /// Print the JSON Schema of the deck, for editors
+    #[command(after_help = "Example:\n  beamsim schema > beamsim.schema.json")]
     Schema,
     /// Print completions for a shell
+    #[command(after_help = "Example:\n  beamsim completions bash > ~/.local/share/bash-completion/completions/beamsim")]
     Completions {
         /// The shell
         #[arg(value_enum)]
         shell: clap_complete::Shell,
     },
     /// Print the manual page, or write one for each command
+    #[command(after_help = "Example:\n  beamsim manual --out ~/.local/share/man/man1")]
     Manual {
         /// The folder they are written to
         #[arg(long, value_name = "DIR")]
@@ -213,6 +238,7 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return ExitCode::from(explain(&error) as u8),
     };
+    say::in_manner(arguments.manner);
     let status = match arguments.command {
         Command::Run { input, target, report, out } => {
             run::run(&input.decks, &input.set, &target, report, out.as_deref())
@@ -233,14 +259,24 @@ pub fn main() -> ExitCode {
         Command::Completions { shell } => words::completions(shell, Arguments::command()),
         Command::Manual { out } => words::manual(Arguments::command(), out.as_deref()),
     };
-    ExitCode::from(status as u8)
+    ExitCode::from(denied(status) as u8)
+}
+
+/// Warnings of a run that ended well may count as a failure.
+fn denied(status: Status) -> Status {
+    let count = say::warnings();
+    if status != Status::Fine || !say::denies_warnings() || count == 0 {
+        return status;
+    }
+    say::error("warnings", &format!("{count} warning(s), which --deny-warnings takes for a failure"));
+    Status::Unexpected
 }
 
 /// Help and version are answers; anything else is a wrong command line.
 fn explain(error: &clap::Error) -> Status {
     let text = error.render();
     if error.exit_code() == 0 {
-        say::line(text.to_string().trim_end());
+        say::answer(text.to_string().trim_end());
         return Status::Fine;
     }
     let text = text.to_string();

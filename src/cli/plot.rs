@@ -1,7 +1,7 @@
 //! `beamsim plot`
 
 use super::load::Refusal;
-use super::{Status, Verdict, load, say};
+use super::{Status, Verdict, json, load, say};
 use crate::deck::nearest;
 use crate::output::{Curve, Curves, HistoryReader, PartFile};
 use std::path::{Path, PathBuf};
@@ -70,6 +70,7 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
     write(&path, &Curves { title, x, curves }.to_svg())?;
     say::line(&format!("{}", path.display()));
+    json::wrote("plot", &path);
     Ok(())
 }
 

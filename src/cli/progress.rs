@@ -20,7 +20,7 @@ pub struct Progress {
 impl Progress {
     /// For a run of this name.
     pub fn new(name: &str) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = (std::io::stderr().is_terminal() && !say::is_quiet()).then(|| {
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} % {elapsed} (left {eta}) {msg}");
             let bar = ProgressBar::new(10_000).with_prefix(name.to_string());
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
@@ -40,7 +40,7 @@ impl Progress {
                 bar.set_message(place());
                 bar.set_position((done * 10_000.0) as u64);
             }
-            None => say::note(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),
+            None => say::remark(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),
         }
     }
 

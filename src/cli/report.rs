@@ -2,7 +2,7 @@
 
 use super::load::Refusal;
 use super::run::{Beyond, simulate};
-use super::{Status, Verdict, load, say, signals};
+use super::{Status, Verdict, json, load, say, signals};
 use crate::output::{Film, Record, Report, Rows};
 use crate::scene::{self, Scene};
 use std::fs;
@@ -71,5 +71,6 @@ pub fn write(
     let written = Report { title, record }.write(results, film, path);
     written.map_err(|error| Refusal::of(Status::Io, "io", format!("{}: {error}", path.display())))?;
     say::line(&format!("  {}", path.display()));
+    json::wrote("report", path);
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
-use super::{Status, Verdict, load, report, say, signals};
+use super::{Status, Verdict, json, load, report, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Rows, remove_fields,
@@ -29,6 +29,7 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, pictured: bo
                 let beyond = Beyond { reached, bars, text, film };
                 let mut finished = simulate(&scene, &name, Some(&folder), None, beyond);
                 summarise(&name, &scene, &finished, &folder);
+                finished.record.iter().for_each(|record| json::run(path, &folder, record));
                 if let (Some(film), Some(record)) = (finished.film.take(), finished.record.take()) {
                     let page = folder.join("report.html");
                     let written = report::write(&scene, &name, &record, film, &folder, &page);
@@ -143,6 +144,7 @@ impl Observer for Watcher<'_> {
     }
 
     fn warn(&mut self, message: &str) {
+        say::count_warnings(1);
         self.progress.note(&format!("warning: {message}"));
     }
 

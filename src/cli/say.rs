@@ -1,11 +1,80 @@
 //! Words to the user. A closed pipe is a quiet end.
 
 use std::io::{self, IsTerminal, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// A line on standard output.
+/// How the user wants to be spoken to.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct Manner {
+    /// Say nothing but warnings and errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Print a line of JSON for each result instead of words
+    #[arg(long, global = true)]
+    json: bool,
+    /// End with a failure where there are warnings: those about a deck before it runs, those of a run after it (exit status 1)
+    #[arg(long, global = true)]
+    deny_warnings: bool,
+}
+
+static MANNER: OnceLock<Manner> = OnceLock::new();
+static WARNINGS: AtomicUsize = AtomicUsize::new(0);
+
+/// From here on.
+pub fn in_manner(manner: Manner) {
+    let _ = MANNER.set(manner);
+}
+
+fn manner() -> Manner {
+    MANNER.get().copied().unwrap_or_default()
+}
+
+/// Whether only warnings and errors are wanted.
+pub fn is_quiet() -> bool {
+    manner().quiet
+}
+
+/// Whether warnings are failures.
+pub fn denies_warnings() -> bool {
+    manner().deny_warnings
+}
+
+/// Takes note of warnings that were said.
+pub fn count_warnings(count: usize) {
+    WARNINGS.fetch_add(count, Ordering::Relaxed);
+}
+
+/// How many there were.
+pub fn warnings() -> usize {
+    WARNINGS.load(Ordering::Relaxed)
+}
+
+/// A line on standard output, for people.
 pub fn line(text: &str) {
+    if !manner().quiet && !manner().json {
+        answer(text);
+    }
+}
+
+/// A line on standard output, for scripts.
+pub fn data(text: &str) {
+    if manner().json {
+        answer(text);
+    }
+}
+
+/// What was asked for, whatever the manner.
+pub fn answer(text: &str) {
     write_to(&mut io::stdout().lock(), text);
+}
+
+/// A remark on standard error that is no warning.
+pub fn remark(text: &str) {
+    if !manner().quiet {
+        note(text);
+    }
 }
 
 /// A line on standard error.

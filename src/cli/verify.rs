@@ -1,7 +1,7 @@
 //! `beamsim verify`
 
 use super::run::{Beyond, folder, simulate};
-use super::{Status, Verdict, load, say, signals};
+use super::{Status, Verdict, json, load, say, signals};
 use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
@@ -80,6 +80,7 @@ fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
 }
 
 fn report(path: &Path, judgements: &[Judgement], seconds: f64) {
+    json::verify(path, seconds, judgements);
     let verdict = if judgements.iter().all(|j| j.holds) { "ok" } else { "FAILED" };
     let nothing = if judgements.is_empty() { ", expects nothing" } else { "" };
     say::line(&format!("{verdict:<6} {} ({seconds:.3} s{nothing})", path.display()));

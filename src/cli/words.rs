@@ -11,7 +11,7 @@ const WIDTH: usize = 96;
 
 /// `beamsim schema`
 pub fn schema() -> Status {
-    say::line(SCHEMA.trim_end());
+    say::answer(SCHEMA.trim_end());
     Status::Fine
 }
 
@@ -20,7 +20,7 @@ pub fn explain(word: &str) -> Status {
     match explained(word) {
         Ok(entries) => {
             let told: Vec<String> = entries.iter().map(describe).collect();
-            say::line(&told.join("\n\n"));
+            say::answer(&told.join("\n\n"));
             Status::Fine
         }
         Err(meant) => {
@@ -133,7 +133,7 @@ fn schema_beside(path: &Path) -> std::io::Result<()> {
 pub fn completions(shell: clap_complete::Shell, mut command: clap::Command) -> Status {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut command, "beamsim", &mut text);
-    say::line(String::from_utf8_lossy(&text).trim_end());
+    say::answer(String::from_utf8_lossy(&text).trim_end());
     Status::Fine
 }
 
@@ -144,7 +144,7 @@ pub fn manual(command: clap::Command, folder: Option<&Path>) -> Status {
         clap_mangen::Man::new(command.clone()).render(&mut text).map(|()| text)
     };
     let done = match folder {
-        None => page(&command).map(|text| say::line(String::from_utf8_lossy(&text).trim_end())),
+        None => page(&command).map(|text| say::answer(String::from_utf8_lossy(&text).trim_end())),
         Some(folder) => std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(command, folder)),
     };
     match done {

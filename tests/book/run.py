@@ -3,15 +3,15 @@
 
     python3 tests/book/run.py --beamsim target/release/beamsim [PAGE…] [--site target/book] [--keep DIR]
 
-Each page of docs/SUMMARY.md that belongs to the guide, and README.md, has a folder of its own, with `decks` and `docs` of the repository in it. In it,
+Each page of docs/SUMMARY.md, and README.md, has a folder of its own, with `decks` and `docs` of the repository in it. In it,
 from top to bottom:
 
 - A fenced block whose first line is `# file: NAME` is written to that file; so is an HTML comment that begins with `file: NAME`, which
   readers do not see. Other `toml` blocks are fragments, which must only be TOML.
 - Each line of a `sh` block that begins with `beamsim`, with `python3` and a file of the page, or with a command that only looks (`cat`, `head`, …), is
   run. Its exit status must be 0, or that of a comment at its end: `# exit 3`. Other lines, and those with an ellipsis, are counted as skipped; so are
-  scripts that import a module that is not installed.
-- A `text` block shows what the block of commands before it prints: each of its lines must be there, in order; an ellipsis stands for anything, a
+  scripts that import a module that is not installed. /tmp/ means a folder of the page.
+- A `text` block shows what the last block of commands under the same heading prints: each of its lines must be there, in order; an ellipsis stands for anything, a
   line of nothing else, like an empty one, for any lines. After `cat FILE` the block that follows is held against the file, whatever its language.
 
 In all pages below docs/, in README.md and CHANGELOG.md relative links must lead to files, and anchors to headings. In the guide they must stay in
@@ -41,11 +41,16 @@ except ImportError:  # Python before 3.11
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 
-# Pages whose commands are for others to run: they need minutes, or programs and files that are not here.
-UNRUN = ("accuracy.md", "effects.md", "performance.md", "hard-cases.md", "theory.md", "architecture.md", "deck.md", "verification/", "decisions/")
 TIMEOUT = 120
 # Commands that only look at files.
 LOOKS = ("cat", "cut", "diff", "grep", "head", "ls", "sort", "tail", "test")
+# A stand-in for GNU parallel where it is not installed: one job after the other.
+PARALLEL = """#!/usr/bin/env python3
+import subprocess, sys
+words = sys.argv[1:]
+job, places = words[: words.index(":::")], words[words.index(":::") + 1 :]
+sys.exit(sum(subprocess.call([word.replace("{}", place) for word in job]) != 0 for place in places))
+"""
 # Words in the options of a command that needs another program or machine.
 ELSEWHERE = ("--engine slurm", "--sbatch")
 
@@ -64,6 +69,8 @@ def blocks(text):
     lines = text.split("\n")
     at = 0
     while at < len(lines):
+        if re.match(r"#+ ", lines[at]):
+            yield Block("heading", at + 1, "")
         fence = re.match(r"( *)(```+)\s*([\w-]*)", lines[at])
         hidden = re.match(r"<!-- file: (\S+)\s*$", lines[at])
         begin = at
@@ -125,7 +132,7 @@ class Page:
         self.files = self.fragments = self.commands = self.texts = 0
         self.skipped = []
         self.failures = []
-        self.printed = ""
+        self.printed = None
         self.cat = False
 
     def fail(self, line, what):
@@ -136,12 +143,17 @@ class Page:
         tools = self.folder / ".bin"
         tools.mkdir()
         (tools / "beamsim").symlink_to(self.beamsim)
+        if shutil.which("parallel") is None:
+            (tools / "parallel").write_text(PARALLEL)
+            (tools / "parallel").chmod(0o755)
         for name in ("decks", "docs"):
             (self.folder / name).symlink_to(ROOT / name)
         self.environment = {**os.environ, "NO_COLOR": "1", "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}"}
         for block in blocks(self.path.read_text()):
             name = block.file()
-            if self.cat and block.language not in ("sh", "hidden"):
+            if block.language == "heading":
+                self.printed = None
+            elif self.cat and block.language not in ("sh", "hidden"):
                 self.compare(block)
             elif name:
                 self.write(block, name)
@@ -149,7 +161,7 @@ class Page:
                 self.fragment(block)
             elif block.language == "sh":
                 self.shell(block)
-            elif block.language == "text":
+            elif block.language == "text" and self.printed is not None:
                 self.compare(block)
             if block.language != "sh":
                 self.cat = False
@@ -198,21 +210,21 @@ class Page:
         if "…" in line or any(word in line for word in ELSEWHERE):
             self.skipped.append(line)
             return
-        if script is not None and script.is_file():
+        if script is not None and script.is_file() and self.folder in script.resolve().parents:
             lacks = missing_module(script)
             if lacks:
                 self.skipped.append(f"{line} ({lacks} is not installed)")
                 return
-        elif words[0] != "beamsim" and words[0] not in LOOKS:
+        elif words[0] != "beamsim" and words[:2] != ["parallel", "beamsim"] and words[0] not in LOOKS:
             self.skipped.append(line)
             return
         self.commands += 1
         self.cat = words[0] == "cat"
-        match = re.search(r"#\s*exit (\d+)\s*$", line)
+        match = re.search(r"#\s*exit (\d+)\b[^#]*$", line)
         wanted = int(match.group(1)) if match else 0
         try:
             ran = subprocess.run(
-                ["sh", "-c", line],
+                ["sh", "-c", line.replace("/tmp/", "tmp/")],
                 cwd=self.folder,
                 env=self.environment,
                 stdin=subprocess.DEVNULL,
@@ -364,7 +376,7 @@ def main():
     for page in everything:
         if DOCS in page.parents and page not in guide and page.name != "SUMMARY.md":
             failures.append(f"{page.relative_to(ROOT)}: not in SUMMARY.md")
-    run = [page for page in guide if page.is_file() and not str(page.relative_to(DOCS)).startswith(UNRUN)] + [ROOT / "README.md"]
+    run = [page for page in guide if page.is_file()] + [ROOT / "README.md"]
     if options.pages:
         run = [page.resolve() for page in options.pages]
 

@@ -28,7 +28,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("ctrlc", &["src/cli/"]),
     ("signal_hook", &["src/cli/"]),
     // The scene hands the resolved deck through to run.json.
-    ("serde_json", &["src/deck/", "src/scene/mod.rs", "src/output/", "src/study/sweep/store.rs"]),
+    ("serde_json", &["src/deck/", "src/scene/mod.rs", "src/output/", "src/study/sweep/store.rs", "src/cli/json.rs"]),
 ];
 
 /// Whether a module may import another one; `Err` for a module that nobody has given a place.

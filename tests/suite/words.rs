@@ -68,3 +68,62 @@ fn shells_editors_and_manuals_are_served() {
     let page = fs::read_to_string(folder.0.join("man/beamsim-sweep.1")).unwrap();
     assert!(page.contains("Latin hypercube"));
 }
+
+#[test]
+fn every_command_has_an_example() {
+    let folder = Folder::new("help");
+    let help = folder.beamsim(&["help"]);
+    let text = String::from_utf8_lossy(&help.stdout).into_owned();
+    let (_, commands) = text.split_once("Commands:").unwrap();
+    let names = commands.lines().skip(1).take_while(|line| line.starts_with("  "));
+    let names: Vec<&str> =
+        names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help").collect();
+    assert!(names.len() >= 14, "{names:?}");
+    for name in names {
+        let help = folder.beamsim(&[name, "--help"]);
+        let text = String::from_utf8_lossy(&help.stdout);
+        assert!(status(&help) == 0 && text.contains(&format!("  beamsim {name}")), "{name}: {text}");
+    }
+}
+
+const SPINNING: &str = "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\nspare = [0, 0, 0]\n[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 1\nEI = 1\n\
+     [[beam]]\nname = \"r\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 1\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+     [[load]]\nat = \"b\"\nmoment = [0, 0, 2]\n[[stage]]\nkind = \"static\"\nsteps = 4\n[output]\nnodes = [\"b\"]\n";
+
+/// Quiet, for scripts, and strict.
+#[test]
+fn the_manner_of_speaking_is_the_users() {
+    let folder = Folder::new("manner");
+    let calm = SPINNING.replace("moment = [0, 0, 2]", "moment = [0, 0, 0.1]");
+    folder.write("calm.toml", &calm);
+    folder.write("turned.toml", SPINNING);
+    let quiet = folder.beamsim(&["--quiet", "run", "calm.toml"]);
+    assert!(status(&quiet) == 0 && quiet.stdout.is_empty() && quiet.stderr.is_empty());
+
+    let told = folder.beamsim(&["run", "calm.toml", "--json"]);
+    let line: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+    assert_eq!(
+        (&line["command"], &line["status"], &line["results"]),
+        (&"run".into(), &"finished".into(), &"results/calm".into())
+    );
+    assert!(line["counters"]["steps"] == 4 && line["text"].is_null());
+    let checked = folder.beamsim(&["check", "calm.toml", "--json"]);
+    let line: serde_json::Value = serde_json::from_slice(&checked.stdout).unwrap();
+    assert!(line["elements"] == 1 && line["seconds"].as_f64().unwrap() > 0.0);
+    let swept = folder.beamsim(&["sweep", "calm.toml", "--vary", "section.s.EI=1,0", "--json"]);
+    let line: serde_json::Value = serde_json::from_slice(&swept.stdout).unwrap();
+    assert!(status(&swept) == 3 && line["finished"] == 1 && line["failed"]["deck"][0] == 2, "{line}");
+
+    // One element that turns by 2 rad: a warning of the run.
+    let warned = folder.beamsim(&["run", "turned.toml"]);
+    assert!(status(&warned) == 0 && String::from_utf8_lossy(&warned.stderr).contains("warning: "));
+    let denied = folder.beamsim(&["run", "turned.toml", "--deny-warnings"]);
+    assert_eq!((status(&denied), last_line(&denied).starts_with("error[warnings]: 1 warning")), (1, true));
+    assert!(folder.0.join("results/turned/history.csv").exists());
+    // A point that lies on another: a warning about the deck.
+    folder.write("twice.toml", &calm.replace("[\"a\", \"b\"]", "[\"a\", \"b\"]\naxis3 = [0, 0, 1]").replace("[[support]]", "[[beam]]\nname = \"q\"\nsection = \"s\"\nthrough = [\"spare\", [0, 1, 0]]\nelements = 1\n[[support]]\nat = \"spare\"\nfix = \"all\"\n[[support]]"));
+    assert_eq!(status(&folder.beamsim(&["run", "twice.toml"])), 0);
+    let refused = folder.beamsim(&["run", "twice.toml", "--deny-warnings", "--out", "none"]);
+    assert_eq!((status(&refused), folder.0.join("none").exists()), (2, false));
+    assert!(folder.beamsim(&["--quiet", "explain", "elements"]).stdout.len() > 50);
+}

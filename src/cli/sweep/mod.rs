@@ -5,7 +5,7 @@ mod plan;
 mod slurm;
 
 use super::load::Refusal;
-use super::{Status, Verdict, say, signals};
+use super::{Status, Verdict, json, say, signals};
 use crate::output::PartFile;
 use crate::study::sweep::Outcome;
 use plan::Plan;
@@ -136,12 +136,12 @@ fn stopped() -> Option<Status> {
 }
 
 fn list(plan: &Plan) {
-    say::line(&format!("point,{}", plan.sweep.keys.join(",")));
+    say::answer(&format!("point,{}", plan.sweep.keys.join(",")));
     let cell = |text: &String| {
         if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.clone() }
     };
     for (k, values) in plan.sweep.points.iter().enumerate() {
-        say::line(&format!("{},{}", k + 1, values.iter().map(cell).collect::<Vec<_>>().join(",")));
+        say::answer(&format!("{},{}", k + 1, values.iter().map(cell).collect::<Vec<_>>().join(",")));
     }
 }
 
@@ -188,6 +188,7 @@ fn tell(plan: &Plan, outcomes: &[Option<Outcome>], verdict: &mut Verdict) {
             outcome => failed.entry(outcome.as_ref().map_or("missing", |o| &o.status)).or_default().push(k + 1),
         }
     }
+    json::sweep(&plan.folder.join("sweep.csv"), outcomes.len(), finished, &failed);
     if failed.is_empty() {
         return;
     }
