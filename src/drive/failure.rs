@@ -251,7 +251,8 @@ impl fmt::Display for Place {
         match (axis, what) {
             (Some((name, _)), "displacement") => write!(f, "node \"{}\", displacement along {name}", self.node),
             (Some((name, _)), _) => write!(f, "node \"{}\", rotation about {name}", self.node),
-            (None, what) => write!(f, "node \"{}\", {what} [{x:.3}, {y:.3}, {z:.3}]", self.node),
+            (None, "displacement") => write!(f, "node \"{}\", displacement along [{x:.3}, {y:.3}, {z:.3}]", self.node),
+            (None, _) => write!(f, "node \"{}\", rotation about [{x:.3}, {y:.3}, {z:.3}]", self.node),
         }
     }
 }

@@ -21,6 +21,8 @@ use crate::tensor::Vec3;
 
 /// Iterations after which the next step stays as long.
 const EASY: f64 = 5.0;
+/// Limit and branch points that are told one by one.
+const MOST_TOLD: usize = 10;
 /// Steps grow at most to this multiple of the first.
 const LONGEST: f64 = 2.0;
 /// And shrink to this part of it.
@@ -214,7 +216,12 @@ impl Run<'_> {
         let kind = kind.or_else(|| changed.then_some(EventKind::Branch));
         let Some(kind) = kind else { return Ok(()) };
         let event = Event { at: self.moment(), kind, negative_pivots: after };
-        self.observer.warn(&event.to_string());
+        match self.told.points {
+            0..MOST_TOLD => self.observer.warn(&event.to_string()),
+            MOST_TOLD => self.observer.warn("more limit and branch points follow: all stand as `events` in run.json"),
+            _ => {}
+        }
+        self.told.points += 1;
         self.counters.events.push(event);
         self.look_out_of_plane(after)
     }

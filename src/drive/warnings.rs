@@ -14,6 +14,8 @@ const FRAME_ERROR: f64 = 0.0533;
 pub(super) struct Told {
     /// That an element turns far from node to node
     pub coarse: bool,
+    /// How many limit and branch points
+    pub points: usize,
     /// How uncertain round-off leaves displacements; below the first value nothing is worth a warning.
     uncertainty: f64,
     /// By how much strains depend on the orientation; below the first value nothing is worth a warning.
@@ -29,6 +31,7 @@ impl Default for Told {
     fn default() -> Self {
         Self {
             coarse: false,
+            points: 0,
             uncertainty: 1e-7,
             frame: 1e-2,
             soft: false,

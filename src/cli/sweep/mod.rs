@@ -173,7 +173,8 @@ fn gather(plan: &Plan, verdict: &mut Verdict) -> Result<(), Refusal> {
 fn tell(plan: &Plan, outcomes: &[Option<Outcome>], verdict: &mut Verdict) {
     let known: Vec<&Outcome> = outcomes.iter().flatten().collect();
     let finished = known.iter().filter(|outcome| outcome.finished()).count();
-    let seconds: f64 = known.iter().map(|outcome| outcome.seconds).sum();
+    // An empty sum is -0.0.
+    let seconds = known.iter().map(|outcome| outcome.seconds).fold(0.0, |sum, seconds| sum + seconds);
     say::line(&format!(
         "{}: {finished} of {} points finished, {} of runs",
         plan.name,

@@ -50,6 +50,7 @@ impl Composer<'_> {
         }
         match (rotary.elements.is_empty(), wanted) {
             (_, false) => self.reason(names[1], false, "switched off in [effects]"),
+            (true, _) if !bodies.is_empty() => self.reason(names[1], false, "what sections have is at the nodes"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
             _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
         }
