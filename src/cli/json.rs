@@ -18,6 +18,9 @@ fn tell(command: &str, rest: Value) {
 
 /// A run: what run.json says, but for the deck.
 pub fn run(deck: &Path, results: &Path, record: &Record) {
+    if !say::speaks_json() {
+        return;
+    }
     let mut rest = record.bare();
     rest["deck"] = json!(deck);
     rest["results"] = json!(results);

@@ -119,16 +119,13 @@ impl Observer for Watcher<'_> {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
         let dynamic = self.dynamic[snapshot.stage - 1];
-        self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, dynamic)).map_err(io_failure)?;
-        self.film.iter_mut().for_each(|film| film.row(snapshot, dynamic));
-        let Some(history) = &mut self.history else { return Ok(()) };
-        match history.row(snapshot, dynamic).map_err(io_failure)? {
-            None => Ok(()),
-            Some(column) => {
-                let at = Moment { stage: snapshot.stage, time: snapshot.state.time, load: snapshot.state.load };
-                Err(Failure::NonFinite { at, effect: Some("a column of the history"), node: column })
-            }
+        let column = self.history.as_mut().map_or(Ok(None), |history| history.row(snapshot, dynamic));
+        if let Some(column) = column.map_err(io_failure)? {
+            let at = Moment { stage: snapshot.stage, time: snapshot.state.time, load: snapshot.state.load };
+            return Err(Failure::NonFinite { at, effect: Some("a column of the history"), node: column });
         }
+        self.film.iter_mut().for_each(|film| film.row(snapshot, dynamic));
+        self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, dynamic)).map_err(io_failure)
     }
 
     fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {

@@ -31,6 +31,11 @@ fn manner() -> Manner {
     MANNER.get().copied().unwrap_or_default()
 }
 
+/// Whether scripts are spoken to.
+pub fn speaks_json() -> bool {
+    manner().json
+}
+
 /// Whether only warnings and errors are wanted.
 pub fn is_quiet() -> bool {
     manner().quiet
@@ -121,5 +126,10 @@ pub fn duration(text: &str) -> Result<Duration, String> {
         _ => return Err(wrong().into()),
     };
     let seconds = number.trim().parse::<f64>().map_err(|_| wrong())? * unit;
+    // Later than that nobody waits, and clocks can add it.
+    const LONGEST: f64 = 100.0 * 365.0 * 86_400.0;
+    if !(0.0..=LONGEST).contains(&seconds) {
+        return Err("a time is between 0 and a hundred years".into());
+    }
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }

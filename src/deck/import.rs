@@ -11,11 +11,11 @@ pub type Open<'o> = &'o dyn Fn(&str) -> Result<String, String>;
 
 /// The text of a deck with everything that it imports. Lines stay where they are; sections of a table follow at the end.
 pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
-    // Most decks import nothing; one that is no TOML is reported when it is read.
-    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.into()) };
     if !text.contains("csv") {
         return Ok(text.into());
     }
+    // A deck that is no TOML is reported when it is read.
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.into()) };
     let mut importer = Importer { text, open, found: Vec::new(), sections: Vec::new(), imported: false };
     importer.beams(&mut document);
     importer.histories(&mut document);
@@ -29,7 +29,13 @@ pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
     if !sections.is_empty() {
         let all = document.entry("section").or_insert(toml_edit::table());
         if let Some(all) = all.as_table_like_mut() {
-            sections.into_iter().for_each(|(name, section)| drop(all.insert(&name, section)));
+            for (name, section) in sections {
+                if all.insert(&name, section).is_some() {
+                    let message =
+                        format!("the deck has a section `{name}`, which is what a station of a table is called");
+                    return Err(vec![Diagnostic::whole(message)]);
+                }
+            }
         }
     }
     Ok(document.to_string())
@@ -118,7 +124,9 @@ impl Csv {
                 record.iter().map(|cell| cell.parse().ok().filter(|x: &f64| x.is_finite())).collect();
             match numbers.iter().position(Option::is_none) {
                 None => rows.push(numbers.into_iter().flatten().collect()),
-                Some(_) if number == 0 => names = record.iter().map(str::to_string).collect(),
+                Some(_) if number == 0 && numbers.iter().all(Option::is_none) => {
+                    names = record.iter().map(str::to_string).collect()
+                }
                 Some(column) => return Err(format!("line {line}: `{}` is no number", &record[column])),
             }
             if rows.len() > MOST_ROWS {
@@ -144,7 +152,7 @@ impl Csv {
     fn points(&self) -> Result<Array, String> {
         let places = match ["x", "y", "z"].map(|name| self.place(name)) {
             [Some(x), Some(y), Some(z)] => [x, y, z],
-            _ if self.width() == 3 => [0, 1, 2],
+            _ if self.names.is_empty() && self.width() == 3 => [0, 1, 2],
             _ => return Err("a line of points has the columns `x`, `y`, `z`".into()),
         };
         let point = |row: &Vec<f64>| Value::from(places.iter().map(|&k| row[k]).collect::<Array>());
@@ -153,16 +161,15 @@ impl Csv {
 
     /// The first column over time, and the one that is named or the second.
     fn history(&self, column: Option<&str>) -> Result<(Array, Array), String> {
+        let time = self.place("time").unwrap_or(0);
         let value = match column {
             Some(name) => self
                 .place(name)
                 .ok_or_else(|| format!("there is no column `{name}`, only {}", self.names.join(", ")))?,
-            None if self.width() == 2 => 1,
-            None => {
-                return Err("it has more than two columns: name one (`column = \"…\"`); the first is the time".into());
-            }
+            // Of two the one that is not the time.
+            None if self.width() == 2 => 1 - time,
+            None => return Err("it has not two columns: name one (`column = \"…\"`); the first is the time".into()),
         };
-        let time = self.place("time").unwrap_or(0);
         Ok((self.column(time).collect(), self.column(value).collect()))
     }
 
@@ -183,6 +190,16 @@ impl Csv {
                 "a section has no `{unknown}`: columns are {}, or C11 to C66 and M11 to M66",
                 RESULTANTS.join(", ")
             ));
+        }
+        let matrices = self.names.iter().any(|name| entry(name).is_some());
+        if let Some(other) = self.names.iter().find(|name| matrices && RESULTANTS.contains(&name.as_str())) {
+            return Err(format!(
+                "a section is given by `C11` to `C66` and `M11` to `M66`, or by `{other}` and the like, not by both"
+            ));
+        }
+        let rotary = ["rhoJ1", "rhoJ2", "rhoJ3"].map(|name| self.place(name).is_some());
+        if rotary.contains(&true) && rotary.contains(&false) {
+            return Err("rotary inertia has the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
         }
         let sections = self.rows.iter().map(|row| self.section(row)).collect::<Result<_, _>>()?;
         Ok((self.column(place).map(|s| s / length).collect(), sections))
@@ -255,7 +272,12 @@ mod tests {
         );
         let history = with("[history.h]\ncsv = \"f.csv\"\ncolumn = \"F\"\n", "time,F,G\n0,1,2\n1,3,4\n").unwrap();
         assert!(history.contains("times = [0.0, 1.0]\nvalues = [1.0, 3.0]") && !history.contains("csv"), "{history}");
+        let turned = with("[history.h]\ncsv = \"f.csv\"\n", "F,time\n5,0\n6,1\n").unwrap();
+        assert!(turned.contains("times = [0.0, 1.0]\nvalues = [5.0, 6.0]"), "{turned}");
         let section = "[[beam]]\nname = \"b\"\nsection = { csv = \"s.csv\" }\n";
+        for wrong in ["s,C11,rhoA\n0,1,1\n1,1,1\n", "s,EA,rhoJ2\n0,1,1\n1,1,1\n", "s,EA\n0,1\n", "s,EB\n0,1\n1,1\n"] {
+            assert!(with(section, wrong).is_err(), "{wrong}");
+        }
         let whole = with(section, "s,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,9,8,7,6,5,4,3\n2,1,1,1,1,1,1,1\n").unwrap();
         assert!(whole.contains("section = [\"b 1\", \"b 2\"]") && whole.contains("stations = [0.0, 1.0]"), "{whole}");
         assert!(whole.contains("[section.\"b 1\"]\nEA = 9.0\nGA = [8.0, 7.0]"), "{whole}");
@@ -269,6 +291,8 @@ mod tests {
         for (file, told) in [
             ("x,y,z\n0,0,zero\n", "a.csv: line 2: `zero` is no number"),
             ("x,y\n0,0\n", "columns `x`, `y`, `z`"),
+            ("s,x,y\n0,0,0\n", "columns `x`, `y`, `z`"),
+            ("O,0,0\n1,0,0\n", "line 1: `O` is no number"),
             ("x,y,z\n", "no numbers"),
         ] {
             let found = with(through, file).unwrap_err();

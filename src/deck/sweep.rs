@@ -56,6 +56,8 @@ pub enum VaryBody {
 
 const KEYS: [&str; 8] = ["deck", "vary", "set", "zip", "sample", "seed", "outputs", "error_bars"];
 const MOST_SAMPLES: usize = 10_000_000;
+/// Whole numbers of TOML and floats agree up to here.
+const LARGEST_SEED: usize = 1 << 53;
 
 impl SweepFile {
     /// Whether a text is one: it names a deck.
@@ -84,15 +86,15 @@ impl SweepFile {
         let top = Table::top(context, document, "the sweep", &KEYS);
         let texts = |key: &str| top.get(key).map_or(Some(Vec::new()), |item| context.texts(item));
         let plain = |texts: Vec<Spanned<String>>| texts.into_iter().map(|text| text.value).collect();
-        let whole = |key: &str, least| top.get(key).and_then(|item| context.whole(item, least, MOST_SAMPLES));
+        let whole = |key: &str, least, most| top.get(key).and_then(|item| context.whole(item, least, most));
         let vary = Table::of_names(context, top.required("vary")?, "[vary]")?;
         Some(Self {
             deck: context.text(top.required("deck")?)?.value,
             set: plain(texts("set")?),
             vary: vary.entries().filter_map(|(key, item)| read_vary(context, key, item)).collect(),
             zip: top.flag("zip").unwrap_or(false),
-            sample: whole("sample", 1).map(|count| count.value),
-            seed: whole("seed", 0).map(|seed| seed.value as u64),
+            sample: whole("sample", 1, MOST_SAMPLES).map(|count| count.value),
+            seed: whole("seed", 0, LARGEST_SEED).map(|seed| seed.value as u64),
             outputs: plain(texts("outputs")?),
             error_bars: top.flag("error_bars").unwrap_or(false),
         })

@@ -208,7 +208,8 @@ impl Run<'_> {
             };
             charts::freeze(&mut self.state, &self.model.charted.elements);
             charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
-            if self.judge_mesh().is_err() {
+            if charts::coarsest(&self.state, &self.model.charted.elements, charts::COARSE).is_some() {
+                self.state.copy_from(&self.good);
                 return false;
             }
             self.model.remember(&mut self.state);

@@ -524,7 +524,7 @@ impl<'o> Run<'o> {
         )))
     }
 
-    pub(super) fn judge_mesh(&mut self) -> Result<(), Failure> {
+    fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.told.coarse { charts::COARSE } else { charts::COARSE_WARNING };
         let Some((element, angle)) = charts::coarsest(&self.state, &self.model.charted.elements, limit) else {
             return Ok(());

@@ -3,9 +3,10 @@
 //! Elements are cells of their own order, so that curved ones are curved. Numbers stand raw behind the XML ("appended").
 
 use super::Rows;
-use super::files::PartFile;
-use crate::drive::Snapshot;
+use super::files::{PartFile, about};
+use crate::drive::{Moment, Snapshot};
 use crate::probe::{Figure, Look};
+use crate::system::State;
 use std::fmt::Write;
 use std::fs;
 use std::io;
@@ -30,15 +31,14 @@ pub struct FieldsWriter {
     /// Files so far, with what ParaView takes for their time
     written: Vec<(String, f64)>,
     /// A row that is written only if no other follows
-    pending: Option<(Vec<u8>, f64)>,
+    pending: Option<(Moment, State)>,
 }
 
 impl FieldsWriter {
     /// In the folder of results. `timed`: no row stands still in time.
     pub fn create(folder: &Path, figure: Figure, rows: Rows, timed: bool) -> io::Result<Self> {
         let part = folder.join(format!("fields.{}.part", std::process::id()));
-        let _ = fs::remove_dir_all(&part);
-        fs::create_dir_all(&part)?;
+        fs::create_dir_all(&part).map_err(|error| about(&part, &error))?;
         Ok(Self { folder: folder.into(), part, figure, rows, timed, seen: 0, written: Vec::new(), pending: None })
     }
 
@@ -46,49 +46,58 @@ impl FieldsWriter {
     pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
         let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
         let time = if self.timed { at.state.time } else { self.seen as f64 };
-        let content = grid(&self.figure, at);
         self.seen += 1;
         self.pending = None;
-        if wanted { self.write(&content, time) } else { Ok(self.pending = Some((content, time))) }
+        let moment = Moment { stage: at.stage, time, load: at.state.load };
+        if wanted { self.write(moment, at.state) } else { Ok(self.pending = Some((moment, at.state.clone()))) }
     }
 
-    fn write(&mut self, content: &[u8], time: f64) -> io::Result<()> {
+    /// `at` is what ParaView takes for the time.
+    fn write(&mut self, at: Moment, state: &State) -> io::Result<()> {
+        let content = grid(&self.figure, at.stage, state);
         let name = format!("{:06}.vtu", self.written.len());
-        fs::write(self.part.join(&name), content)?;
-        self.written.push((name, time));
+        let path = self.part.join(&name);
+        fs::write(&path, content).map_err(|error| about(&path, &error))?;
+        self.written.push((name, at.time));
         Ok(())
     }
 
     /// Gives the fields their names: `fields`, or `fields.partial` where the run failed.
     pub fn finish(mut self, finished: bool) -> io::Result<()> {
-        if let Some((content, time)) = self.pending.take() {
-            self.write(&content, time)?;
+        if let Some((moment, state)) = self.pending.take() {
+            self.write(moment, &state)?;
         }
-        for name in ["fields", "fields.partial"] {
-            remove_folder(&self.folder.join(name))?;
-            super::remove_if_there(&self.folder, &format!("{name}.pvd"))?;
-        }
+        remove_fields(&self.folder)?;
         let name = if finished { "fields" } else { "fields.partial" };
-        fs::rename(&self.part, self.folder.join(name))?;
+        let place = self.folder.join(name);
+        // What is not empty there is not ours.
+        fs::rename(&self.part, &place).map_err(|error| about(&place, &error))?;
         let index = index(name, &self.written);
         let name = format!("{name}.pvd");
         PartFile::written(&self.folder, &name, index.as_bytes()).and_then(|(part, file)| part.finish(&file, &name))
     }
 }
 
-/// Of an earlier run: they belong to another history.
+/// Those of an earlier run, which belong to another history: the files that its index lists, and nothing else.
 pub fn remove_fields(folder: &Path) -> io::Result<()> {
     for name in ["fields", "fields.partial"] {
-        super::remove_if_there(folder, &format!("{name}.pvd"))?;
-        remove_folder(&folder.join(name))?;
+        let index = format!("{name}.pvd");
+        let Ok(listed) = fs::read_to_string(folder.join(&index)) else { continue };
+        for file in listed.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next()) {
+            if Path::new(file).parent() == Some(Path::new(name)) {
+                super::remove_if_there(folder, file)?;
+            }
+        }
+        let _ = fs::remove_dir(folder.join(name));
+        super::remove_if_there(folder, &index)?;
     }
     Ok(())
 }
 
-fn remove_folder(path: &Path) -> io::Result<()> {
-    match fs::remove_dir_all(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
+impl Drop for FieldsWriter {
+    fn drop(&mut self) {
+        // Of a run whose results could not be written.
+        let _ = fs::remove_dir_all(&self.part);
     }
 }
 
@@ -131,14 +140,14 @@ impl Grid {
 }
 
 /// A state as an unstructured grid.
-fn grid(figure: &Figure, at: &Snapshot) -> Vec<u8> {
-    let looks = figure.looks(at.state);
+fn grid(figure: &Figure, stage: usize, state: &State) -> Vec<u8> {
+    let looks = figure.looks(state);
     let cells = Cells::of(figure);
     let mut grid = Grid::default();
     grid.tag("<?xml version=\"1.0\"?>");
     grid.tag("<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">");
     grid.tag("<UnstructuredGrid>\n<FieldData>");
-    for (name, value) in [("TimeValue", at.state.time), ("stage", at.stage as f64), ("load", at.state.load)] {
+    for (name, value) in [("TimeValue", state.time), ("stage", stage as f64), ("load", state.load)] {
         grid.tag(&format!(
             "<DataArray type=\"Float64\" Name=\"{name}\" NumberOfTuples=\"1\" format=\"ascii\">{value:?}</DataArray>"
         ));

@@ -50,6 +50,6 @@ pub fn remove_if_there(folder: &Path, name: &str) -> io::Result<()> {
 }
 
 /// The same error with the name of the file.
-fn about(path: &Path, error: &io::Error) -> io::Error {
+pub(super) fn about(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }

@@ -56,6 +56,11 @@ impl Record {
         self.0["text"].as_str()
     }
 
+    /// Whether a signal ended the run.
+    pub fn is_interrupted(&self) -> bool {
+        self.0["status"] == "interrupted"
+    }
+
     /// Without the deck.
     pub fn bare(&self) -> Value {
         let mut bare = self.0.clone();

@@ -16,10 +16,11 @@ pub fn side_by_side<T: Send>(
     broken: &(dyn Fn(usize) -> T + Sync),
     mut take: impl FnMut(usize, T),
 ) {
+    let threads = threads.clamp(1, open.len().max(1));
     let queue = Mutex::new(open);
     let (sender, receiver) = mpsc::channel();
     thread::scope(|scope| {
-        for _ in 0..threads.max(1) {
+        for _ in 0..threads {
             let (queue, sender) = (&queue, sender.clone());
             scope.spawn(move || {
                 let next = || queue.lock().ok()?.pop();

@@ -25,6 +25,8 @@ pub struct Outcome {
     pub(in crate::study) expected: Vec<f64>,
     /// Steps and levels tried
     pub(in crate::study) attempts: u64,
+    /// The first warning
+    pub(in crate::study) warning: Option<String>,
     /// Work done
     pub counters: Counters,
     /// Wall-clock seconds
@@ -40,14 +42,15 @@ impl Outcome {
         interrupted: &dyn Fn() -> Option<i32>,
     ) -> Self {
         let (clocks, rows, modes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut columns = Columns { scene, recorder, clocks, rows, modes, attempts: 0, most_attempts, interrupted };
+        let mut columns =
+            Columns { scene, recorder, clocks, rows, modes, attempts: 0, warning: None, most_attempts, interrupted };
         let start = Instant::now();
         let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
         let seconds = start.elapsed().as_secs_f64();
-        let Columns { recorder, clocks, rows, modes, attempts, .. } = columns;
+        let Columns { recorder, clocks, rows, modes, attempts, warning, .. } = columns;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
         let dynamic = scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect();
-        Self { ended, dynamic, clocks, rows, modes, expected, attempts, counters, seconds }
+        Self { ended, dynamic, clocks, rows, modes, expected, attempts, warning, counters, seconds }
     }
 }
 
@@ -112,6 +115,7 @@ impl Outcome {
             modes: vec![f64::NAN; places.len() - history.len()],
             expected: Vec::new(),
             attempts: 0,
+            warning: None,
             counters: Counters::default(),
             seconds: 0.0,
         }
@@ -159,6 +163,7 @@ struct Columns<'a> {
     rows: Vec<Vec<f64>>,
     modes: Vec<f64>,
     attempts: u64,
+    warning: Option<String>,
     most_attempts: u64,
     interrupted: &'a dyn Fn() -> Option<i32>,
 }
@@ -193,6 +198,10 @@ impl Observer for Columns<'_> {
         self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.take_modes(stage, loads.to_vec());
         Ok(())
+    }
+
+    fn warn(&mut self, message: &str) {
+        self.warning.get_or_insert_with(|| message.to_string());
     }
 
     fn progress(&mut self, at: crate::drive::Moment, _done: f64) -> Result<(), Failure> {

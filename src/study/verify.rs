@@ -89,7 +89,10 @@ impl Recorder {
             probe.read(at, &mut self.scratch);
         }
         let moment = |value| Row { stage: at.stage, time: at.state.time, load: at.state.load, value };
-        for (place, rows) in self.places.iter().zip(&mut self.rows) {
+        for ((place, rows), expectation) in self.places.iter().zip(&mut self.rows).zip(&self.expectations) {
+            if matches!(expectation.kind, ExpectationKind::Column { reduce: Reduce::At(Instant::End), .. }) {
+                rows.clear();
+            }
             rows.extend(place.map(|place| moment(self.scratch[place])));
         }
     }

@@ -33,7 +33,7 @@ pub struct Wanted {
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..))]
     sample: Option<u32>,
     /// What random numbers begin with
-    #[arg(long, requires = "sample")]
+    #[arg(long)]
     seed: Option<u64>,
     /// What is looked at: tip.uz (at the end) tip.uz:absmax (or max, min, mean, drift) tip.uz:0.5 (a time) tip.uz:load=0.5 (default: all
     /// columns at the end, and modes)
@@ -154,8 +154,13 @@ fn chosen(words: &str, count: usize) -> Result<Vec<usize>, Refusal> {
         let number =
             |text: &str| text.trim().parse::<usize>().ok().filter(|k| (1..=count).contains(k)).ok_or_else(wrong);
         let (from, to) = (number(from)?, number(to)?);
+        if from > to {
+            return Err(wrong());
+        }
         points.extend(from - 1..to);
     }
+    points.sort_unstable();
+    points.dedup();
     if points.is_empty() { Err(wrong()) } else { Ok(points) }
 }
 

@@ -67,12 +67,12 @@ impl Plan {
 
     /// What is known of a point (from 0).
     pub fn known(&self, point: usize) -> Option<Outcome> {
-        self.store.find(point, &self.sweep.identity(point))
+        self.store.find(&self.sweep.identity(point))
     }
 
     /// Keeps what came of a point (from 0).
     pub fn keep(&self, point: usize, outcome: &Outcome) -> Result<(), Refusal> {
-        let kept = self.store.keep(point, &self.sweep.identity(point), outcome);
+        let kept = self.store.keep(&self.sweep.identity(point), outcome);
         kept.map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))
     }
 

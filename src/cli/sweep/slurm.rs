@@ -80,6 +80,10 @@ impl Array<'_> {
         command.args(["--parsable", "--no-requeue"]).arg(format!("--array=0-{}", tasks.len() - 1));
         command.arg(format!("--job-name={}", self.name)).arg(format!("--output={log}/%a.txt"));
         command.args(&wanted.sbatch).arg(self.folder.join("array.sh"));
+        // What an earlier run left must not look like an end of this one.
+        for &point in points {
+            self.plan.store.forget(&self.plan.sweep.identity(point)).map_err(|error| io(&self.folder, &error))?;
+        }
         let answer = output(&mut command)?;
         let job = answer.lines().last().unwrap_or("").split(';').next().unwrap_or("").trim().to_string();
         say::note(&format!(
@@ -185,6 +189,9 @@ impl Array<'_> {
 
     /// A task is gone, and has left nothing of a point.
     fn give_up(&self, point: usize, state: &str) -> Result<(), Refusal> {
+        if self.has_ended(point) {
+            return Ok(());
+        }
         let message =
             if state.is_empty() { "Slurm knows nothing of it any more".into() } else { format!("Slurm: {state}") };
         say::note(&format!("point {}: {}: {message}", point + 1, Outcome::KILLED));

@@ -6,9 +6,10 @@ use crate::drive::Snapshot;
 use crate::model::SlotKind;
 use crate::probe::{Figure, Look, Place, Quantity};
 use crate::scene::Scene;
-use crate::system::Node;
+use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use serde_json::{Value, json};
+use std::collections::HashSet;
 
 /// Nodes that are shown, about; more are seen by nobody.
 const MOST_POINTS: usize = 2000;
@@ -16,6 +17,10 @@ const MOST_POINTS: usize = 2000;
 const MOST_LOOKS: usize = 250_000;
 const MOST_FRAMES: usize = 1500;
 const LEAST_FRAMES: usize = 60;
+/// Nodes times frames even of scenes of very many short beams, whose ends all stay.
+const MOST_LOOKS_EVER: usize = 1_000_000;
+/// Events that are marked.
+const MOST_EVENTS: usize = 5000;
 
 /// Fields below this part of the largest of their kind are round-off.
 const NOTHING: f64 = 1e-9;
@@ -44,7 +49,8 @@ pub struct Film {
     frames: Vec<Frame>,
     /// Each n-th row has a frame
     stride: usize,
-    pending: Option<Frame>,
+    /// The last row: its number and its state
+    pending: Option<(usize, State)>,
     events: Vec<Value>,
     before: [u64; 2],
     supports: Vec<usize>,
@@ -71,7 +77,7 @@ impl Film {
         let directions = model.supports.iter().flat_map(|support| &support.directions);
         let held: Vec<u32> = directions.map(|direction| direction.slot).collect();
         let moves = |slot: u32| model.slots[slot as usize].kind == SlotKind::Displacement;
-        let held: Vec<u32> = held.into_iter().filter(|&slot| moves(slot)).collect();
+        let held: HashSet<u32> = held.into_iter().filter(|&slot| moves(slot)).collect();
         let supports = (0..places.len()).filter(|&k| held.contains(&places[k].0.u)).collect();
         // Where beams were parted two nodes are at one place.
         let parted = |k: usize| places.iter().any(|(node, place)| *place == places[k].1 && node.p != places[k].0.p);
@@ -103,14 +109,13 @@ impl Film {
         self.seen += 1;
         self.note_events(at);
         let due = wanted && self.written.is_multiple_of(self.stride);
-        let frame = self.frame(at);
         self.pending = None;
         if due {
-            self.frames.push(frame);
+            self.frames.push(self.frame(self.written, at.state));
             self.thin();
         } else {
             // The last row is always written.
-            self.pending = Some(frame);
+            self.pending = Some((self.written, at.state.clone()));
         }
         self.written += usize::from(wanted);
     }
@@ -119,7 +124,7 @@ impl Film {
         let now = [at.counters.work.chart_switches, at.counters.cutbacks];
         for (k, (kind, one)) in [("chart_switch", "chart switch"), ("cutback", "cut-back")].into_iter().enumerate() {
             let count = now[k] - self.before[k];
-            if count > 0 {
+            if count > 0 && self.events.len() < MOST_EVENTS {
                 let text = if count == 1 { one.to_string() } else { format!("{count} × {one}") };
                 self.events.push(json!({ "row": self.written, "kind": kind, "text": text }));
             }
@@ -127,11 +132,11 @@ impl Film {
         self.before = now;
     }
 
-    fn frame(&self, at: &Snapshot) -> Frame {
-        let looks = self.figure.looks(at.state);
+    fn frame(&self, row: usize, state: &State) -> Frame {
+        let looks = self.figure.looks(state);
         let of = || self.shown.iter().flatten().map(|&k| &looks[k]);
         Frame {
-            row: self.written,
+            row,
             places: of().map(|look| look.place.0.map(|x| x as f32)).collect(),
             turns: of().map(|look| quaternion(look.axes)).collect(),
             fields: of().map(fields).collect(),
@@ -141,7 +146,8 @@ impl Film {
     /// Drops every other frame where there are too many.
     fn thin(&mut self) {
         let points: usize = self.shown.iter().map(Vec::len).sum();
-        let most = (MOST_LOOKS / points.max(1)).clamp(LEAST_FRAMES, MOST_FRAMES);
+        let most =
+            (MOST_LOOKS / points.max(1)).clamp(LEAST_FRAMES, MOST_FRAMES).min(MOST_LOOKS_EVER.div_ceil(points.max(1)));
         if self.frames.len() > 2 * most {
             self.stride *= 2;
             let stride = self.stride;
@@ -151,7 +157,8 @@ impl Film {
 
     /// Rows of the history that have a frame, after the run; the history has so many rows.
     pub fn end(&mut self, rows: usize) -> Vec<usize> {
-        self.frames.extend(self.pending.take());
+        let last = self.pending.take().map(|(row, state)| self.frame(row, &state));
+        self.frames.extend(last);
         // A run that was stopped has written less than the one that was filmed for it.
         self.frames.retain(|frame| frame.row < rows);
         self.events.retain(|event| event["row"].as_u64().is_some_and(|row| (row as usize) < rows));

@@ -38,7 +38,9 @@ impl Report<'_> {
         let names = ["history.csv", "history.partial.csv"].map(|name| results.join(name));
         let history = names.iter().find(|path| path.exists()).map(|path| HistoryReader::read(path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
-        let shown = rows(&history, &film.end(history.rows.len()));
+        // The last row of a run that was stopped is the one of that moment, which the film passes over.
+        let filmed = history.rows.len() - usize::from(self.record.is_interrupted() && !history.rows.is_empty());
+        let shown = rows(&history, &film.end(filmed));
         // The last row that is shown up to there.
         let row = |of: usize| shown.partition_point(|&k| k <= of).saturating_sub(1);
         let (bars, columns): (Vec<usize>, Vec<usize>) =
@@ -53,9 +55,9 @@ impl Report<'_> {
             "scene": film.to_json(&row),
         });
         let escaped = self.title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
-        let page = PAGE.replace("{{TITLE}}", &escaped);
-        let (before, after) = page.split_once("{{DATA}}").unwrap_or((&page, ""));
-        Ok([before, &data.to_string().replace("</", "<\\/"), after].concat())
+        let (before, after) = PAGE.split_once("{{DATA}}").unwrap_or((PAGE, ""));
+        // A page of text must not take what a deck says for its own; `<` stands in texts alone.
+        Ok([&before.replace("{{TITLE}}", &escaped), &data.to_string().replace('<', "\\u003c"), after].concat())
     }
 }
 

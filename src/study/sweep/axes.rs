@@ -137,6 +137,10 @@ pub fn points(axes: &[Axis], how: Combination) -> Result<Vec<Vec<String>>, Strin
     if axes.is_empty() {
         return Err("nothing is varied: give --vary KEY=V1,V2,…".into());
     }
+    let is_empty = |axis: &&Axis| matches!(&axis.values, Values::List(list) if list.is_empty());
+    if let Some(axis) = axes.iter().find(is_empty) {
+        return Err(format!("`{}` has no values", axis.key));
+    }
     if let Some(axis) = axes.iter().enumerate().find(|(k, axis)| axes[..*k].iter().any(|other| other.key == axis.key)) {
         return Err(format!("`{}` is varied twice", axis.1.key));
     }
@@ -241,6 +245,10 @@ mod tests {
         assert!(points(&axes, Combination::Zip).unwrap_err().contains("`a` has 2, `b` has 3"));
         assert_eq!(points(&[axis("a=1,2"), axis("b=x,y")], Combination::Zip).unwrap()[1], ["2", "y"]);
         assert!(points(&[axis("a=1:2")], Combination::Grid).is_err());
+        let empty = Axis { key: "a".into(), values: Values::List(Vec::new()) };
+        for how in [Combination::Grid, Combination::Zip, Combination::Sample { count: 2, seed: 1 }] {
+            assert!(points(std::slice::from_ref(&empty), how).is_err());
+        }
         assert!(points(&[axis("a=1"), axis("a=2")], Combination::Grid).is_err());
         let drawn = points(&[axis("a=10:20"), axis("b=x,y")], Combination::Sample { count: 10, seed: 7 }).unwrap();
         let mut tenths: Vec<usize> = drawn.iter().map(|p| p[0].parse::<f64>().unwrap() as usize).collect();

@@ -19,6 +19,8 @@ use std::io;
 pub struct Sweep {
     /// The deck, which expects what is looked at
     text: String,
+    /// The fingerprint of what all points share
+    common: u64,
     /// What is looked at
     pub outputs: Vec<Looked>,
     /// Whether errors of these are estimated
@@ -50,12 +52,23 @@ impl Sweep {
     ) -> Result<Self, String> {
         let points = axes::points(axes, how)?;
         let keys = axes.iter().map(|axis| axis.key.clone()).collect();
-        Ok(Self { text: looking_at(text, &outputs), outputs, error_bars, keys, points })
+        let text = looking_at(text, &outputs);
+        let common = fnv(fnv(FNV, &format!("{}\n{error_bars}\n", env!("CARGO_PKG_VERSION"))), &text);
+        Ok(Self { text, common, outputs, error_bars, keys, points })
     }
 
     /// Whether keys, parameters and outputs are ones that the deck has; what a point makes of it is seen when that is run.
     pub fn check(&self, deck: &Deck) -> Result<(), String> {
         deck::apply(&self.text, &self.settings(0))?;
+        if let Some(counter) = self.outputs.iter().find(|output| output.column.starts_with("run.")) {
+            return Err(format!(
+                "`{}` is no output of a point: steps, iterations and factorisations have columns anyway",
+                counter.column
+            ));
+        }
+        if let Some(key) = self.keys.iter().find(|key| key.ends_with(".csv")) {
+            return Err(format!("`{key}` cannot be varied: tables beside the deck are read once, for all points"));
+        }
         let parameters = self.keys.iter().filter_map(|key| key.strip_prefix("param."));
         if let Some(name) = parameters.into_iter().find(|name| deck.parameters.get(name).is_none()) {
             let meant =
@@ -80,15 +93,14 @@ impl Sweep {
 
     /// What its results belong to, and no other's.
     pub fn identity(&self, point: usize) -> String {
-        let settings = self.settings(point).join(" ");
-        let whole = format!("{}\n{}\n{}\n{settings}", env!("CARGO_PKG_VERSION"), self.error_bars, self.text);
-        format!("{settings} {:016x}", fingerprint(&whole))
+        let settings = format!("{:?}", self.settings(point));
+        format!("{settings} {:016x}", fnv(self.common, &settings))
     }
 
     /// What no other sweep has, beside a word of the caller's.
     pub fn fingerprint(&self, word: &str) -> String {
         let points = self.points.iter().map(|point| point.join(" ")).collect::<Vec<_>>().join("\n");
-        format!("{:016x}", fingerprint(&format!("{word}\n{}\n{}\n{points}", self.keys.join(" "), self.identity(0))))
+        format!("{:016x}", fnv(fnv(self.common, &format!("{word}\n{:?}\n", self.keys)), &points))
     }
 
     /// Runs points (from 0) side by side and keeps what comes of each as it ends.
@@ -105,7 +117,7 @@ impl Sweep {
         let trouble = std::sync::atomic::AtomicBool::new(false);
         let stopped = || interrupted().is_some() || trouble.load(std::sync::atomic::Ordering::Relaxed);
         side_by_side(threads, open, &stopped, &work, &broken, |k, done| {
-            if let Err(error) = store.keep(k, &self.identity(k), &done) {
+            if let Err(error) = store.keep(&self.identity(k), &done) {
                 trouble.store(true, std::sync::atomic::Ordering::Relaxed);
                 kept = Err(error);
             }
@@ -116,13 +128,15 @@ impl Sweep {
 
     /// What is known of each point.
     pub fn gathered(&self, store: &Store) -> Vec<Option<Outcome>> {
-        (0..self.points.len()).map(|k| store.find(k, &self.identity(k))).collect()
+        (0..self.points.len()).map(|k| store.find(&self.identity(k))).collect()
     }
 }
 
-/// FNV-1a: the same on every machine.
-fn fingerprint(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+/// FNV-1a, which is the same on every machine: what it begins with, and what a text makes of that.
+const FNV: u64 = 0xcbf2_9ce4_8422_2325;
+
+fn fnv(begun: u64, text: &str) -> u64 {
+    text.bytes().fold(begun, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// What a scene shows by itself: the columns of its history at the end, then modes and critical loads.

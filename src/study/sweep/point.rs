@@ -79,7 +79,10 @@ pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn 
         false => Ok(Vec::new()),
     };
     match errors {
-        Ok(errors) => Outcome { status: "finished".into(), values: run.expected, errors, ..outcome },
+        Ok(errors) => {
+            let message = run.warning.map_or(String::new(), |warning| format!("warning: {warning}"));
+            Outcome { status: "finished".into(), message, values: run.expected, errors, ..outcome }
+        }
         // What was run is worth having without.
         Err(failure @ Failure::Interrupted { .. }) => failed(failure, outcome),
         Err(failure) => Outcome {

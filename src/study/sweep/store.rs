@@ -8,9 +8,6 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Points in one folder.
-const SHELF: usize = 1000;
-
 /// The folder of a sweep's points.
 pub struct Store {
     folder: PathBuf,
@@ -22,27 +19,28 @@ impl Store {
         Self { folder: folder.join("points") }
     }
 
-    /// Where a point stands, its folder and its name.
-    fn place(&self, point: usize) -> (PathBuf, String) {
-        (self.folder.join(format!("{:04}", point / SHELF)), format!("{}.json", point + 1))
+    /// Where a point stands, its folder and its name: by what it is, not by its number, so that a sweep that grows finds what was run of it.
+    fn place(&self, identity: &str) -> (PathBuf, String) {
+        let mark = identity.rsplit(' ').next().unwrap_or(identity);
+        (self.folder.join(&mark[..mark.len().min(2)]), format!("{mark}.json"))
     }
 
-    /// Keeps what came of a point (from 0).
-    pub fn keep(&self, point: usize, identity: &str, outcome: &Outcome) -> io::Result<()> {
-        let (folder, name) = self.place(point);
+    /// Keeps what came of a point.
+    pub fn keep(&self, identity: &str, outcome: &Outcome) -> io::Result<()> {
+        let (folder, name) = self.place(identity);
         let (part, _) = PartFile::written(&folder, &name, record(identity, outcome).to_string().as_bytes())?;
         part.rename(&name)
     }
 
-    /// What came of a point; `None` where nothing is there, or it belongs to another sweep.
-    pub fn find(&self, point: usize, identity: &str) -> Option<Outcome> {
-        let (folder, name) = self.place(point);
+    /// What came of a point; `None` where nothing is there.
+    pub fn find(&self, identity: &str) -> Option<Outcome> {
+        let (folder, name) = self.place(identity);
         read(&serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()?, identity)
     }
 
     /// Forgets what came of a point.
-    pub fn forget(&self, point: usize) -> io::Result<()> {
-        let (folder, name) = self.place(point);
+    pub fn forget(&self, identity: &str) -> io::Result<()> {
+        let (folder, name) = self.place(identity);
         crate::output::remove_if_there(&folder, &name)
     }
 }
