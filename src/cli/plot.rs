@@ -123,12 +123,20 @@ fn clock(runs: &[Named]) -> &'static str {
         let time = run.history.names.iter().position(|name| name == "time");
         time.is_none_or(|k| run.history.rows.last().zip(run.history.rows.first()).is_some_and(|(a, b)| a[k] > b[k]))
     };
-    if runs.iter().any(passes) { "time" } else { "load" }
+    let has = |name: &str| runs.iter().all(|run| run.history.names.iter().any(|known| known == name));
+    if (has("time") && runs.iter().any(passes)) || !has("load") { "time" } else { "load" }
 }
 
 fn curve(run: &Named, x: &str, column: &str, empty: Curve) -> Result<Curve, Refusal> {
-    let (x, y) = (find(&run.history, x)?, find(&run.history, column)?);
-    let points = run.history.rows.iter().map(|row| (row[x], row[y])).collect();
+    let place = |column: &str| {
+        find(&run.history, column).map_err(|why| Refusal { message: format!("{}: {}", run.name, why.message), ..why })
+    };
+    let (x, y) = (place(x)?, place(column)?);
+    let points: Vec<(f64, f64)> = run.history.rows.iter().map(|row| (row[x], row[y])).collect();
+    if let Some(row) = points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
+        let message = format!("{}: row {} of `{column}` is not finite", run.name, row + 1);
+        return Err(Refusal::of(Status::Wrong, "usage", message));
+    }
     let bars = run.history.names.iter().position(|name| *name == format!("{column}.err"));
     let bars = bars.map(|k| run.history.rows.iter().map(|row| row[k]).collect::<Vec<f64>>());
     Ok(Curve { points, bars: bars.filter(|bars| bars.iter().all(|bar| bar.is_finite())), ..empty })

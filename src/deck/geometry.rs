@@ -135,8 +135,8 @@ pub struct Beam {
     pub name: Spanned<String>,
     /// One section, two for a taper, or more
     pub sections: Vec<Spanned<String>>,
-    /// Where they are, as fractions of the length; none: at start and end
-    pub stations: Vec<f64>,
+    /// Where they are, from 0 to 1 as fractions of the length, or to the length; none: at start and end
+    pub stations: Option<Spanned<Vec<f64>>>,
     /// Its centre line
     pub path: Path,
     /// Elements of each piece; one number for all
@@ -435,7 +435,7 @@ fn read_sections(context: &Context, item: &Item) -> Option<Vec<Spanned<String>>>
 }
 
 /// Fractions of the length, one for each of the sections; none for a taper from start to end.
-fn read_stations(table: &Table, sections: usize) -> Option<Vec<f64>> {
+fn read_stations(table: &Table, sections: usize) -> Option<Option<Spanned<Vec<f64>>>> {
     let context = table.context;
     let Some(item) = table.get("stations") else {
         if sections > 2 {
@@ -444,7 +444,7 @@ fn read_stations(table: &Table, sections: usize) -> Option<Vec<f64>> {
                 format!("{sections} sections need `stations`: the fraction of the length of each"),
             );
         }
-        return Some(Vec::new());
+        return Some(None);
     };
     let stations = context.numbers(item, None)?;
     let values = &stations.value;
@@ -453,10 +453,11 @@ fn read_stations(table: &Table, sections: usize) -> Option<Vec<f64>> {
             format!("`stations` are as many as sections, two or more: there are {} and {sections}", values.len());
         return context.wrong(stations.span, message);
     }
-    if values[0] != 0.0 || values[values.len() - 1] != 1.0 || !values.is_sorted_by(|a, b| a < b) {
-        return context.wrong(stations.span, "`stations` rise from 0, the start of the beam, to 1, its end");
+    if values[0] != 0.0 || !values.is_sorted_by(|a, b| a < b) {
+        return context
+            .wrong(stations.span, "`stations` rise from 0, the start of the beam, to 1, or its length, at its end");
     }
-    Some(stations.value)
+    Some(Some(stations))
 }
 
 fn read_path(table: &Table) -> Option<Path> {

@@ -175,11 +175,8 @@ impl Csv {
 
     /// Stations along a beam (`fraction` of its length, or `s` along it), and the section at each.
     fn sections(&self) -> Result<(Vec<f64>, Vec<Table>), String> {
-        let (place, length) = match (self.place("fraction"), self.place("s")) {
-            (Some(place), _) => (place, 1.0),
-            (None, Some(place)) => (place, self.rows[self.rows.len() - 1][place]),
-            (None, None) => return Err("stations have a column `fraction` (of the length), or `s` (along it)".into()),
-        };
+        let place = self.place("fraction").or(self.place("s"));
+        let place = place.ok_or("stations have a column `fraction` (of the length), or `s` (along it)")?;
         if self.rows.len() < 2 {
             return Err("a beam has two stations or more".into());
         }
@@ -202,7 +199,7 @@ impl Csv {
             return Err("rotary inertia has the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
         }
         let sections = self.rows.iter().map(|row| self.section(row)).collect::<Result<_, _>>()?;
-        Ok((self.column(place).map(|s| s / length).collect(), sections))
+        Ok((self.column(place).collect(), sections))
     }
 
     fn section(&self, row: &[f64]) -> Result<Table, String> {
@@ -279,7 +276,7 @@ mod tests {
             assert!(with(section, wrong).is_err(), "{wrong}");
         }
         let whole = with(section, "s,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,9,8,7,6,5,4,3\n2,1,1,1,1,1,1,1\n").unwrap();
-        assert!(whole.contains("section = [\"b 1\", \"b 2\"]") && whole.contains("stations = [0.0, 1.0]"), "{whole}");
+        assert!(whole.contains("section = [\"b 1\", \"b 2\"]") && whole.contains("stations = [0.0, 2.0]"), "{whole}");
         assert!(whole.contains("[section.\"b 1\"]\nEA = 9.0\nGA = [8.0, 7.0]"), "{whole}");
         let full = with(section, "fraction,C11,C12,C22\n0,9,1,8\n1,9,2,8\n").unwrap();
         assert!(full.contains("[[9.0, 2.0, 0.0, 0.0, 0.0, 0.0], [2.0, 8.0"), "{full}");

@@ -307,6 +307,8 @@ impl Path {
 
     /// One step that is neither too hard nor too bent; its length.
     fn step(&mut self, run: &mut Run, workshop: &mut Workshop) -> Result<(Point, f64), Failure> {
+        // Where forces are near the limits of floating point, lengths need not be numbers: nothing is left to halve then.
+        let is_least = |length: f64, first: f64| !length.is_finite() || !(length > SHORTEST * first);
         loop {
             let length = self.length;
             let failure = match self.advance(run, workshop, length) {
@@ -320,7 +322,7 @@ impl Path {
                     };
                     let cosine =
                         dot(run, &next.tangent, &self.here.tangent) * self.scale + next.load_rate * self.here.load_rate;
-                    if cosine >= BENT || length <= SHORTEST * self.first {
+                    if cosine >= BENT || is_least(length, self.first) {
                         let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
                         self.length = (length * factor).min(LONGEST * self.first);
                         return Ok((next, length));
@@ -331,7 +333,7 @@ impl Path {
             };
             run.counters.cutbacks += 1;
             self.length = 0.5 * length;
-            if let (Some(failure), true) = (failure, self.length < SHORTEST * self.first) {
+            if let (Some(failure), true) = (failure, is_least(self.length, self.first)) {
                 let named = run.name_failure(failure, &workshop.assembly.system);
                 run.state.copy_from(&self.here.state);
                 return Err(named);

@@ -276,15 +276,24 @@ impl Mesh {
         let section = match &beam.sections[..] {
             [] => return Err(Diagnostic::error("a beam needs a section", beam.span.clone())),
             [one] => SectionCourse::Uniform(section::matrices(find(one)?, &deck.materials)?),
-            [start, end] => section::taper([find(start)?, find(end)?], &deck.materials)?,
+            [start, end] if beam.stations.is_none() => section::taper([find(start)?, find(end)?], &deck.materials)?,
             several => {
                 let pair =
                     |pair: &[Spanned<String>]| section::taper([find(&pair[0])?, find(&pair[1])?], &deck.materials);
                 let courses = several.windows(2).map(pair).collect::<Result<_, _>>()?;
-                SectionCourse::Stations { fractions: beam.stations.clone(), courses }
+                let fractions = beam.stations.as_ref().map_or(Vec::new(), |stations| stations.value.clone());
+                SectionCourse::Stations { fractions, courses }
             }
         };
         let line = path::centre_line(beam, &|point| names::place(deck, point))?;
+        let section = section.along(line.length).map_err(|last| {
+            let span = beam.stations.as_ref().map_or(beam.span.clone(), |stations| stations.span.clone());
+            let message = format!(
+                "the last of the `stations` is {last}: the beam ends at 1 as a fraction, or at its length {}",
+                line.length
+            );
+            Diagnostic::error(message, span)
+        })?;
         let pieces = line.pieces.len();
         for (key, list) in [("elements", Some(&beam.elements)), ("numbering", beam.numbering.as_ref())] {
             let Some(Spanned { value, span }) = list.filter(|l| l.value.len() != 1 && l.value.len() != pieces) else {

@@ -58,6 +58,9 @@ pub enum SectionCourse {
 /// would not resolve it.
 const RIGID: f64 = 1e2;
 
+/// Lengths of tables and of beams agree to this part: both are measured, and rounded.
+const SAME_LENGTH: f64 = 1e-3;
+
 impl SectionCourse {
     /// The section at the fraction `s` of the arc length.
     pub fn at(&self, s: f64) -> SectionMatrices {
@@ -86,6 +89,16 @@ impl SectionCourse {
                 SectionMatrices { stiffness, ..section }
             }
         }
+    }
+
+    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the length.
+    pub fn along(self, length: f64) -> Result<Self, f64> {
+        let Self::Stations { fractions, courses } = self else { return Ok(self) };
+        let last = fractions.last().copied().unwrap_or(1.0);
+        if last != 1.0 && (last - length).abs() > SAME_LENGTH * length {
+            return Err(last);
+        }
+        Ok(Self::Stations { fractions: fractions.iter().map(|s| s / last).collect(), courses })
     }
 
     /// The course as `[effects]` wants it.

@@ -595,7 +595,7 @@ fn tables_beside_a_deck_are_read_from_its_folder() {
     let folder = Folder::new("import");
     fs::create_dir(folder.0.join("in")).unwrap();
     folder.write("in/spine.csv", "x,y,z\n0,0,0\n1,0,0\n2,0.5,0\n");
-    folder.write("in/blade.csv", "# from another program\ns,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,4e3,4e3,4e3,40,40,30,2\n1,2e3,2e3,2e3,20,20,20,1\n4,1e3,1e3,1e3,10,10,10,1\n");
+    folder.write("in/blade.csv", "# from another program\nfraction,EA,GA2,GA3,GJ,EI2,EI3,rhoA\n0,4e3,4e3,4e3,40,40,30,2\n0.25,2e3,2e3,2e3,20,20,20,1\n1,1e3,1e3,1e3,10,10,10,1\n");
     folder.write("in/gust.csv", "time,drag,lift\n0,0,0\n0.1,5,1\n0.2,5,0\n");
     let rest = "[[support]]\nat = \"b@start\"\nfix = \"all\"\n[[load]]\nat = \"b@end\"\nforce = [0, 0, 3]\nhistory = \"gust\"\n\
                 [[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.02\n[output]\nnodes = [\"b@end\", \"b@0.6\"]\ncolumns = [\"u\", \"resultant\"]\n";
@@ -625,6 +625,12 @@ fn tables_beside_a_deck_are_read_from_its_folder() {
     }
     let history = |deck: &str| fs::read_to_string(folder.0.join("results").join(deck).join("history.csv")).unwrap();
     assert_eq!(history("tables"), history("whole"));
+    // Stations in another unit than the beam.
+    let blade = fs::read_to_string(folder.0.join("in/blade.csv")).unwrap();
+    folder.write("in/blade.csv", &blade.replace("fraction", "s").replace("\n1,", "\n2118,"));
+    let stretched = folder.beamsim(&["check", "in/tables.toml"]);
+    let told = String::from_utf8_lossy(&stretched.stderr);
+    assert!(status(&stretched) == 2 && told.contains("the last of the `stations` is 2118"), "{told}");
     fs::remove_dir_all(folder.0.join("in")).unwrap();
     assert_eq!(status(&folder.beamsim(&["report", "results/tables"])), 0);
 

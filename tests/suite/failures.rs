@@ -113,3 +113,16 @@ fn rows_before_a_failure_are_kept() {
     assert!(simulation.result.is_err());
     assert!(simulation.rows.len() > 5, "{} rows", simulation.rows.len());
 }
+
+/// Near the limits of floating point lengths along a path are no numbers any more: a search for a shorter one must end all the same.
+#[test]
+fn forces_near_the_limits_of_floating_point_end_in_a_name() {
+    for force in ["1e20", "1e200", "1e300"] {
+        let deck = format!(
+            "{}[[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, {force}]\n[[stage]]\nkind = \"static\"\nsteps = 2\n",
+            ARM.replace("elements = 2", "elements = 8\norder = 2")
+        );
+        let failure = attempt(&deck).result.expect_err("the run must fail");
+        assert!(["not_converged", "non_finite", "mesh_too_coarse"].contains(&failure.name()), "{force}: {failure}");
+    }
+}

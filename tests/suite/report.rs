@@ -132,6 +132,21 @@ fn a_run_that_fails_has_a_page_and_wrong_folders_are_told() {
 }
 
 #[test]
+fn modes_and_critical_loads_stand_in_the_page() {
+    let folder = Folder::new("report_modes");
+    let stages = "[[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"modal\"\nmodes = 3\n";
+    let held = DECK.replace("kind = \"spherical\"", "kind = \"rigid\"");
+    folder.write("deck.toml", &held.replace("[[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.01\n", stages));
+    let run = folder.beamsim(&["run", "deck.toml", "--report", "--out", "r"]);
+    assert_eq!(status(&run), 0, "{}", last_line(&run));
+    let modes = &data(&fs::read_to_string(folder.0.join("r/report.html")).unwrap())["modes"];
+    assert_eq!(modes["columns"], serde_json::json!(["stage", "mode", "omega", "growth"]));
+    let told = fs::read_to_string(folder.0.join("r/modes.csv")).unwrap();
+    let omega: f64 = told.lines().nth(1).unwrap().split(',').nth(2).unwrap().parse().unwrap();
+    assert!(modes["rows"].as_array().unwrap().len() == 3 && modes["rows"][0][2] == omega);
+}
+
+#[test]
 fn a_browser_plays_scrubs_and_shows_the_numbers_of_the_history() {
     let folder = Folder::new("report_browser");
     folder.write("deck.toml", DECK);

@@ -53,12 +53,23 @@ impl Report<'_> {
             "history": table(&history, &shown, &columns, ""),
             "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, ".err") },
             "scene": film.to_json(&row),
+            "modes": numbers(&results.join("modes.csv"))?,
+            "buckling": numbers(&results.join("buckling.csv"))?,
         });
         let escaped = self.title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
         let (before, after) = PAGE.split_once("{{DATA}}").unwrap_or((PAGE, ""));
         // A page of text must not take what a deck says for its own; `<` stands in texts alone.
         Ok([&before.replace("{{TITLE}}", &escaped), &data.to_string().replace('<', "\\u003c"), after].concat())
     }
+}
+
+/// A small table of the results, where they have it.
+fn numbers(path: &Path) -> io::Result<Value> {
+    if !path.exists() {
+        return Ok(Value::Null);
+    }
+    let HistoryReader { names, rows } = HistoryReader::read(path)?;
+    Ok(json!({ "columns": names, "rows": rows }))
 }
 
 /// Whether a column is the error bar of another.

@@ -3,9 +3,9 @@
 use crate::deck::{self, Diagnostic};
 use crate::drive::Failure;
 use crate::scene;
-use crate::study::Recorder;
 use crate::study::error_bars::of_expected;
 use crate::study::outcome::Outcome as Run;
+use crate::study::{Recorder, expected_values};
 
 /// What came of a point.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -80,7 +80,10 @@ pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn 
     };
     match errors {
         Ok(errors) => {
-            let message = run.warning.map_or(String::new(), |warning| format!("warning: {warning}"));
+            let expected = expected_values(&scene.expectations);
+            let missed = expected.iter().zip(&run.expected).find(|(_, value)| value.is_nan());
+            let missed = missed.map(|((name, _), _)| format!("`{name}` was not reached"));
+            let message = missed.or(run.warning.map(|warning| format!("warning: {warning}"))).unwrap_or_default();
             Outcome { status: "finished".into(), message, values: run.expected, errors, ..outcome }
         }
         // What was run is worth having without.
