@@ -308,7 +308,8 @@ impl Path {
     /// One step that is neither too hard nor too bent; its length.
     fn step(&mut self, run: &mut Run, workshop: &mut Workshop) -> Result<(Point, f64), Failure> {
         // Where forces are near the limits of floating point, lengths need not be numbers: nothing is left to halve then.
-        let is_least = |length: f64, first: f64| !length.is_finite() || !(length > SHORTEST * first);
+        let is_least =
+            |length: f64, first: f64| !(length.is_finite() && first.is_finite()) || length <= SHORTEST * first;
         loop {
             let length = self.length;
             let failure = match self.advance(run, workshop, length) {

@@ -16,9 +16,6 @@ use std::path::{Path, PathBuf};
 const LINES: [u8; 3] = [3, 21, 35];
 const VERTEX: u8 = 1;
 
-/// Names of six numbers along and about the section axes.
-type Six = (&'static str, &'static str);
-
 /// Writes the fields of a run.
 pub struct FieldsWriter {
     folder: PathBuf,
@@ -49,7 +46,11 @@ impl FieldsWriter {
         self.seen += 1;
         self.pending = None;
         let moment = Moment { stage: at.stage, time, load: at.state.load };
-        if wanted { self.write(moment, at.state) } else { Ok(self.pending = Some((moment, at.state.clone()))) }
+        if wanted {
+            return self.write(moment, at.state);
+        }
+        self.pending = Some((moment, at.state.clone()));
+        Ok(())
     }
 
     /// `at` is what ParaView takes for the time.
@@ -175,13 +176,16 @@ fn point_data(grid: &mut Grid, looks: &[Look]) {
         grid.floats(name, 3, looks.iter().flat_map(|look| look.axes.column(k).0));
     }
     grid.floats("velocity", 3, looks.iter().flat_map(|look| look.velocity.0));
-    let pairs: [(Six, fn(&Look) -> &[f64; 6]); 2] =
-        [(("N", "M"), |look| &look.resultant), (("Gamma", "K"), |look| &look.strain)];
-    for ((along, about), of) in pairs {
-        grid.floats(along, 3, looks.iter().flat_map(|look| of(look)[..3].to_vec()));
-        grid.floats(about, 3, looks.iter().flat_map(|look| of(look)[3..].to_vec()));
-    }
+    six(grid, ["N", "M"], looks, |look| &look.resultant);
+    six(grid, ["Gamma", "K"], looks, |look| &look.strain);
     grid.floats("strain_energy_per_length", 1, looks.iter().map(|look| look.energy));
+}
+
+/// Three numbers along the section axes, and three about them.
+fn six(grid: &mut Grid, names: [&str; 2], looks: &[Look], of: fn(&Look) -> &[f64; 6]) {
+    for (half, name) in names.into_iter().enumerate() {
+        grid.floats(name, 3, looks.iter().flat_map(|look| of(look)[3 * half..][..3].iter().copied()));
+    }
 }
 
 /// Elements as cells.
