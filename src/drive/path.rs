@@ -245,9 +245,8 @@ impl Path {
         let Some(Direction { rate: direction, .. }) = run.path_direction(workshop)? else { return Ok(None) };
         let mut path = Self::with_measure(run, workshop, direction);
         path.here = path.look(run, workshop, &path.here.clone())?;
-        path.first = 1.0 / (steps as f64 * path.here.load_rate.abs());
-        path.length = path.first;
-        Ok(Some(path))
+        let first = 1.0 / (steps as f64 * path.here.load_rate.abs());
+        path.begin_with(run, first).map(Some)
     }
 
     /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`: near a limit point the
@@ -260,9 +259,20 @@ impl Path {
         let secant = run.state.q.iter().zip(&from.q).map(|(q, before)| (*q - *before) * (1.0 / risen)).collect();
         let mut path = Self::with_measure(run, workshop, secant);
         path.here = path.look(run, workshop, &path.here.clone())?;
-        path.first = std::f64::consts::SQRT_2 * increment;
-        path.length = path.first;
-        Ok(Some(path))
+        path.begin_with(run, std::f64::consts::SQRT_2 * increment).map(Some)
+    }
+
+    /// With its first length. Forces near the limits of floating point have no measure of displacements: then lengths are no numbers,
+    /// and no search for a shorter one would end.
+    fn begin_with(mut self, run: &Run, first: f64) -> Result<Self, Failure> {
+        (self.first, self.length) = (first, first);
+        if first.is_finite() && self.here.load_rate.is_finite() {
+            return Ok(self);
+        }
+        let sizes = self.here.tangent.iter().map(|t| t.norm());
+        let largest = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(slot, _)| slot);
+        let node = run.model.slots.get(largest).map_or(String::new(), |info| info.node.clone());
+        Err(Failure::NonFinite { at: run.moment(), effect: Some("what a unit of load moves"), node })
     }
 
     /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to go on in.
@@ -307,9 +317,6 @@ impl Path {
 
     /// One step that is neither too hard nor too bent; its length.
     fn step(&mut self, run: &mut Run, workshop: &mut Workshop) -> Result<(Point, f64), Failure> {
-        // Where forces are near the limits of floating point, lengths need not be numbers: nothing is left to halve then.
-        let is_least =
-            |length: f64, first: f64| !(length.is_finite() && first.is_finite()) || length <= SHORTEST * first;
         loop {
             let length = self.length;
             let failure = match self.advance(run, workshop, length) {
@@ -323,7 +330,7 @@ impl Path {
                     };
                     let cosine =
                         dot(run, &next.tangent, &self.here.tangent) * self.scale + next.load_rate * self.here.load_rate;
-                    if cosine >= BENT || is_least(length, self.first) {
+                    if cosine >= BENT || length <= SHORTEST * self.first {
                         let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
                         self.length = (length * factor).min(LONGEST * self.first);
                         return Ok((next, length));
@@ -334,7 +341,7 @@ impl Path {
             };
             run.counters.cutbacks += 1;
             self.length = 0.5 * length;
-            if let (Some(failure), true) = (failure, is_least(self.length, self.first)) {
+            if let (Some(failure), true) = (failure, self.length < SHORTEST * self.first) {
                 let named = run.name_failure(failure, &workshop.assembly.system);
                 run.state.copy_from(&self.here.state);
                 return Err(named);
