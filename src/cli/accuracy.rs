@@ -2,14 +2,13 @@
 
 use super::load::{Loaded, Refusal};
 use super::progress::Progress;
-use super::{Status, load, run, say, signals};
+use super::{Status, cores, load, run, say, signals};
 use crate::deck::{Accuracy, Deck};
 use crate::output::Reached;
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Journal, Options, Pace, Point};
 use crate::study::error_bars::{ErrorBars, error_bars, refuse_paths};
-use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -83,7 +82,7 @@ impl Target {
             progress.tell(done as f64 / all as f64, || format!("looking for the accuracy: {done} of {all} runs"));
         };
         let options = Options {
-            threads: std::thread::available_parallelism().map_or(1, NonZero::get),
+            threads: cores(None),
             budget: self.budget,
             interrupted: &signals::caught,
             tell: &mut tell,

@@ -4,7 +4,7 @@ use super::accuracy::{describe, lines, refused};
 use super::load::{Loaded, Refusal};
 use super::progress::Progress;
 use super::run::{folder, refuse_twins};
-use super::{Status, Verdict, json, load, say, signals};
+use super::{Status, Verdict, cores, json, load, say, signals};
 use crate::deck::Accuracy;
 use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
 use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
@@ -89,7 +89,7 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
         None => (Against::Finest, String::new()),
         Some(word) if word.as_os_str() == "expect" => (Against::Expectations, "expect".into()),
         Some(path) => {
-            let table = HistoryReader::read(path).map_err(|e| Refusal::of(Status::Io, "io", e.to_string()))?;
+            let table = HistoryReader::read(path).map_err(Refusal::io)?;
             let identity = format!("{table:?}");
             (Against::Table(table), identity)
         }
@@ -103,7 +103,7 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
     let mut tell =
         |done: usize, all: usize| progress.tell(done as f64 / all as f64, || format!("{done} of {all} runs"));
     let options = Options {
-        threads: wanted.threads.or(std::thread::available_parallelism().ok()).map_or(1, NonZero::get),
+        threads: cores(wanted.threads),
         budget: wanted.budget,
         interrupted: &signals::caught,
         tell: &mut tell,
@@ -116,12 +116,11 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
     }
     let found = found.map_err(|refusal| refused(refusal, path, loaded))?;
     tell_study(name, loaded, &found, wanted.accuracy);
-    let table = found.to_csv().map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))?;
+    let table = found.to_csv().map_err(|error| Refusal::io(error.into()))?;
     let title = loaded.scene.title.as_deref().unwrap_or(name);
     let drawn = frontier(&found).first().map(|_| ("cost.svg", plot(title, &found).into_bytes()));
     for (file, content) in std::iter::once(("cost.csv", table)).chain(drawn) {
-        let written = PartFile::written(folder, file, &content).and_then(|(part, open)| part.finish(&open, file));
-        written.map_err(io)?;
+        PartFile::write(folder, file, &content).map_err(Refusal::io)?;
         say::line(&format!("  {}", folder.join(file).display()));
         json::wrote("cost", &folder.join(file));
     }

@@ -51,9 +51,7 @@ fn study(
     tell(&name, scene.title.as_deref(), &found, tolerance);
     let folder = folder(out, &name, several);
     let table = found.to_csv().map_err(|error| (Status::Io, "io", error.to_string()))?;
-    let written = PartFile::written(&folder, "effects.csv", &table);
-    let written = written.and_then(|(part, file)| part.finish(&file, "effects.csv"));
-    written.map_err(|error| (Status::Io, "io", error.to_string()))?;
+    PartFile::write(&folder, "effects.csv", &table).map_err(|error| (Status::Io, "io", error.to_string()))?;
     say::line(&format!("  {}", folder.join("effects.csv").display()));
     json::wrote("effects", &folder.join("effects.csv"));
     Ok(())

@@ -25,6 +25,11 @@ pub struct Refusal {
 }
 
 impl Refusal {
+    /// A file that could not be read or written.
+    pub fn io(error: std::io::Error) -> Self {
+        Self::of(Status::Io, "io", error.to_string())
+    }
+
     /// With its last line.
     pub fn of(status: Status, name: &'static str, message: String) -> Self {
         Self { status, name, message, details: String::new(), expected: Vec::new() }

@@ -18,6 +18,7 @@ mod verify;
 mod words;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -196,6 +197,18 @@ pub enum Status {
     Interrupted = 130,
     /// SIGTERM
     Terminated = 143,
+}
+
+impl Status {
+    /// That of a process that a signal ended.
+    pub fn after(signal: i32) -> Self {
+        if signal == 15 { Self::Terminated } else { Self::Interrupted }
+    }
+}
+
+/// How many runs at a time: as many as are wanted, or one a core.
+fn cores(wanted: Option<NonZero<usize>>) -> usize {
+    wanted.or(std::thread::available_parallelism().ok()).map_or(1, NonZero::get)
 }
 
 /// The outcome of a command over several decks: its status is the worst, and its last line names it.

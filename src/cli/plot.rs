@@ -68,7 +68,8 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
     }
     let title = runs.iter().filter(|run| !run.stored).map(|run| run.name.as_str()).collect::<Vec<_>>().join(", ");
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
-    write(&path, &Curves { title, x, curves }.to_svg())?;
+    let written = PartFile::write_to(&path, Curves { title, x, curves }.to_svg().as_bytes());
+    written.map_err(Refusal::io)?;
     say::line(&format!("{}", path.display()));
     json::wrote("plot", &path);
     Ok(())
@@ -76,10 +77,8 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
 
 /// The history in a folder, or the file itself.
 fn read(path: &Path, stored: bool) -> Result<Named, Refusal> {
-    let io = |error: std::io::Error| Refusal::of(Status::Io, "io", error.to_string());
-    let inside = ["history.csv", "history.partial.csv"].map(|name| path.join(name));
-    let file = inside.into_iter().find(|file| file.exists()).unwrap_or_else(|| path.to_path_buf());
-    let history = HistoryReader::read(&file).map_err(io)?;
+    let file = HistoryReader::of_results(path).unwrap_or_else(|| path.to_path_buf());
+    let history = HistoryReader::read(&file).map_err(Refusal::io)?;
     // `results/arm/history.csv` is `arm`.
     let place = if file.file_stem().is_some_and(|stem| stem.to_string_lossy().starts_with("history")) {
         file.parent()
@@ -145,12 +144,4 @@ fn curve(run: &Named, x: &str, column: &str, empty: Curve) -> Result<Curve, Refu
 /// plot.svg in the folder of the results.
 fn beside(results: &Path) -> PathBuf {
     if results.is_dir() { results.join("plot.svg") } else { results.with_file_name("plot.svg") }
-}
-
-fn write(path: &Path, content: &str) -> Result<(), Refusal> {
-    let name = path.file_name().map_or("plot.svg".into(), |name| name.to_string_lossy().into_owned());
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let written =
-        PartFile::written(folder, &name, content.as_bytes()).and_then(|(part, file)| part.finish(&file, &name));
-    written.map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))
 }

@@ -1,9 +1,9 @@
 //! `beamsim report`: the page of results that are there.
 
 use super::load::Refusal;
-use super::run::{Beyond, simulate};
+use super::run::{Beyond, rows_of, simulate};
 use super::{Status, Verdict, json, load, say, signals};
-use crate::output::{Film, Record, Report, Rows};
+use crate::output::{Film, Record, Report};
 use crate::scene::{self, Scene};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub fn report(folders: &[PathBuf], out: Option<&Path>) -> Status {
 }
 
 fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
-    let record = Record::read(folder).map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))?;
+    let record = Record::read(folder).map_err(Refusal::io)?;
     let Some(text) = record.text() else {
         let message = format!("{}: run.json holds no deck: run it again", folder.display());
         return Err(Refusal::of(Status::Io, "io", message));
@@ -55,7 +55,7 @@ fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
 
 /// For a run of a scene.
 pub fn film(scene: &Scene) -> Film {
-    Film::of(scene, Rows { every: scene.every, interval: scene.plan.interval })
+    Film::of(scene, rows_of(scene))
 }
 
 /// Writes the page, and says where.
@@ -69,7 +69,7 @@ pub fn write(
 ) -> Result<(), Refusal> {
     let title = scene.title.as_deref().unwrap_or(name);
     let written = Report { title, record }.write(results, film, path);
-    written.map_err(|error| Refusal::of(Status::Io, "io", format!("{}: {error}", path.display())))?;
+    written.map_err(Refusal::io)?;
     say::line(&format!("  {}", path.display()));
     json::wrote("report", path);
     Ok(())

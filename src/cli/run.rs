@@ -97,8 +97,7 @@ pub fn status_of(failure: &Failure) -> Status {
     match failure {
         Failure::Deck(_) | Failure::Limit(_) => Status::Wrong,
         Failure::Io(_) => Status::Io,
-        Failure::Interrupted { signal: 15, .. } => Status::Terminated,
-        Failure::Interrupted { .. } => Status::Interrupted,
+        Failure::Interrupted { signal, .. } => Status::after(*signal),
         _ => Status::GaveUp,
     }
 }
@@ -171,6 +170,11 @@ pub struct Beyond {
     pub film: Option<Film>,
 }
 
+/// Which rows are written, in the history and in whatever stands beside it.
+pub fn rows_of(scene: &Scene) -> Rows {
+    Rows { every: scene.every, interval: scene.plan.interval }
+}
+
 /// Runs a scene; with a folder it leaves its results there, and a recorder follows what is expected.
 pub fn simulate(
     scene: &Scene,
@@ -182,7 +186,7 @@ pub fn simulate(
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
-    let rows = Rows { every: scene.every, interval: scene.plan.interval };
+    let rows = rows_of(scene);
     let Beyond { reached, bars, text, film } = beyond;
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
     let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows, beside)).transpose();
@@ -224,7 +228,7 @@ pub fn simulate(
     Finished { result, counters, seconds, film: watcher.film, record }
 }
 
-/// Both files are whole before either gets its name.
+/// The record is whole before anything gets its name, and gets its own when all else has.
 fn write_results(
     history: HistoryWriter,
     fields: Option<FieldsWriter>,

@@ -35,7 +35,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
                 );
                 if let Some(signal) = signals::caught() {
                     say::error("interrupted", &format!("stopped by signal {signal}"));
-                    return if signal == 15 { Status::Terminated } else { Status::Interrupted };
+                    return Status::after(signal);
                 }
                 let judgements = judge(&recorder, &finished.result, &finished.counters);
                 report(path, &judgements, finished.seconds);

@@ -74,8 +74,7 @@ impl FieldsWriter {
         // What is not empty there is not ours.
         fs::rename(&self.part, &place).map_err(|error| about(&place, &error))?;
         let index = index(name, &self.written);
-        let name = format!("{name}.pvd");
-        PartFile::written(&self.folder, &name, index.as_bytes()).and_then(|(part, file)| part.finish(&file, &name))
+        PartFile::write(&self.folder, &format!("{name}.pvd"), index.as_bytes())
     }
 }
 

@@ -28,6 +28,19 @@ impl PartFile {
         Ok((part, file))
     }
 
+    /// A whole file at once.
+    pub fn write(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
+        let (part, file) = Self::written(folder, name, content)?;
+        part.finish(&file, name)
+    }
+
+    /// A whole file at a path that a user names.
+    pub fn write_to(path: &Path, content: &[u8]) -> io::Result<()> {
+        let name = path.file_name().ok_or_else(|| about(path, &io::Error::other("this names no file")))?;
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Self::write(folder, &name.to_string_lossy(), content)
+    }
+
     /// Gives the part, which must be flushed, its final name, when it is safe on the disk.
     pub fn finish(self, file: &File, name: &str) -> io::Result<()> {
         file.sync_all().map_err(|e| about(&self.part, &e)).and_then(|()| self.rename(name))

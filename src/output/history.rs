@@ -163,6 +163,12 @@ pub struct HistoryReader {
 }
 
 impl HistoryReader {
+    /// Where the history in a folder of results is, whole or of a run that failed.
+    pub fn of_results(folder: &Path) -> Option<PathBuf> {
+        let names = ["history.csv", "history.partial.csv"];
+        names.map(|name| folder.join(name)).into_iter().find(|path| path.exists())
+    }
+
     /// Reads a table of numbers with a line of names above.
     pub fn read(path: &Path) -> io::Result<Self> {
         let wrong = |message: String| io::Error::other(format!("{}: {message}", path.display()));

@@ -40,6 +40,5 @@ fn write(folder: &Path, name: &str, head: &str, rows: &[String]) -> io::Result<(
         return remove_if_there(folder, name);
     }
     let text = format!("{head}\n{}\n", rows.join("\n"));
-    let (part, file) = PartFile::written(folder, name, text.as_bytes())?;
-    part.finish(&file, name)
+    PartFile::write(folder, name, text.as_bytes())
 }

@@ -10,6 +10,7 @@ pub mod forecast;
 mod outcome;
 mod scale;
 pub mod sweep;
+mod variant;
 mod verify;
 
 pub use compare::{Comparison, compare};

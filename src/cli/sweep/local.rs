@@ -3,7 +3,7 @@
 use super::plan::Plan;
 use crate::cli::load::Refusal;
 use crate::cli::progress::Progress;
-use crate::cli::{Status, signals};
+use crate::cli::{cores, signals};
 use crate::study::sweep::{Options, Outcome};
 use std::num::NonZero;
 use std::time::Instant;
@@ -24,13 +24,9 @@ pub fn run(plan: &Plan, points: &[usize], threads: Option<NonZero<usize>>) -> Re
             format!("{done} of {count} points, {failed} failed, {rate:.1} a second")
         });
     };
-    let options = Options {
-        threads: threads.or(std::thread::available_parallelism().ok()).map_or(1, NonZero::get),
-        interrupted: &signals::caught,
-        tell: &mut tell,
-    };
+    let options = Options { threads: cores(threads), interrupted: &signals::caught, tell: &mut tell };
     let kept = plan.sweep.run(points, &plan.store, options);
     progress.done();
-    kept.map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))?;
+    kept.map_err(Refusal::io)?;
     Ok(failed)
 }

@@ -11,7 +11,7 @@ use crate::study::sweep::Outcome;
 use plan::Plan;
 use std::collections::BTreeMap;
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// What the user asks of a sweep.
@@ -132,7 +132,7 @@ fn tell_failures(failed: usize, of: usize, verdict: &mut Verdict) {
 
 /// The exit status after a signal.
 fn stopped() -> Option<Status> {
-    signals::caught().map(|signal| if signal == 15 { Status::Terminated } else { Status::Interrupted })
+    signals::caught().map(Status::after)
 }
 
 fn list(plan: &Plan) {
@@ -166,11 +166,9 @@ fn chosen(words: &str, count: usize) -> Result<Vec<usize>, Refusal> {
 
 /// Writes the table, and says what failed.
 fn gather(plan: &Plan, verdict: &mut Verdict) -> Result<(), Refusal> {
-    let io = |error: String| Refusal::of(Status::Io, "io", error);
     let outcomes = plan.sweep.gathered(&plan.store);
-    let table = plan.sweep.to_csv(&outcomes).map_err(|error| io(error.to_string()))?;
-    let written = PartFile::written(&plan.folder, "sweep.csv", &table);
-    written.and_then(|(part, file)| part.finish(&file, "sweep.csv")).map_err(|error| io(error.to_string()))?;
+    let table = plan.sweep.to_csv(&outcomes).map_err(|error| Refusal::io(error.into()))?;
+    PartFile::write(&plan.folder, "sweep.csv", &table).map_err(Refusal::io)?;
     tell(plan, &outcomes, verdict);
     Ok(())
 }
@@ -210,9 +208,4 @@ fn tell(plan: &Plan, outcomes: &[Option<Outcome>], verdict: &mut Verdict) {
         }
         None => verdict.fail(Status::GaveUp, "sweep", message),
     }
-}
-
-/// Where the results of a sweep go.
-fn folder(out: Option<&Path>, name: &str) -> PathBuf {
-    out.map_or_else(|| Path::new("results").join(name), Path::to_path_buf)
 }

@@ -1,9 +1,10 @@
 //! What a command line, or a sweep.toml, makes of a sweep.
 
+use super::Wanted;
 use super::slurm::absolute;
-use super::{Wanted, folder};
 use crate::cli::Status;
 use crate::cli::load::{self, Refusal};
+use crate::cli::run::folder;
 use crate::cli::say;
 use crate::deck::{Diagnostic, Looked, SweepFile, VaryBody, VaryTable};
 use crate::study::sweep::{Axis, Combination, Outcome, Range, Store, Sweep, Values, usual_outputs};
@@ -61,7 +62,7 @@ impl Plan {
             Sweep::new(&loaded.text, &axes, how, outputs, wanted.error_bars || file.error_bars).map_err(usage)?;
         sweep.check(&loaded.deck).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
         let name = load::name(&wanted.file);
-        let folder = folder(wanted.out.as_deref(), &name);
+        let folder = folder(wanted.out.as_deref(), &name, false);
         Ok(Self { sweep, store: Store::of(&folder), folder, name })
     }
 
@@ -73,7 +74,7 @@ impl Plan {
     /// Keeps what came of a point (from 0).
     pub fn keep(&self, point: usize, outcome: &Outcome) -> Result<(), Refusal> {
         let kept = self.store.keep(&self.sweep.identity(point), outcome);
-        kept.map_err(|error| Refusal::of(Status::Io, "io", error.to_string()))
+        kept.map_err(Refusal::io)
     }
 
     /// What no other sweep and no other folder has.

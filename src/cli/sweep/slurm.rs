@@ -97,8 +97,7 @@ impl Array<'_> {
     }
 
     fn write(&self, name: &str, content: &str) -> Result<(), Refusal> {
-        let written = PartFile::written(&self.folder, name, content.as_bytes());
-        written.and_then(|(part, file)| part.finish(&file, name)).map_err(|error| io(&self.folder, &error))
+        PartFile::write(&self.folder, name, content.as_bytes()).map_err(Refusal::io)
     }
 
     /// A task runs the points that stand in its line.

@@ -73,19 +73,6 @@ impl Film {
         let shown = shown(&figure, &named);
         let places = initial(&figure, &shown);
         let names = named.iter().filter_map(|(name, place)| Some((name.clone(), nearest(&places, place)?))).collect();
-        let model = &scene.plan.model;
-        let directions = model.supports.iter().flat_map(|support| &support.directions);
-        let held: Vec<u32> = directions.map(|direction| direction.slot).collect();
-        let moves = |slot: u32| model.slots[slot as usize].kind == SlotKind::Displacement;
-        let held: HashSet<u32> = held.into_iter().filter(|&slot| moves(slot)).collect();
-        let supports = (0..places.len()).filter(|&k| held.contains(&places[k].0.u)).collect();
-        // Where beams were parted two nodes are at one place.
-        let parted = |k: usize| places.iter().any(|(node, place)| *place == places[k].1 && node.p != places[k].0.p);
-        let joints = if places.len() > MOST_POINTS * 2 {
-            Vec::new()
-        } else {
-            (0..places.len()).filter(|&k| parted(k)).collect()
-        };
         Self {
             figure,
             shown,
@@ -98,8 +85,8 @@ impl Film {
             pending: None,
             events: Vec::new(),
             before: [0; 2],
-            supports,
-            joints,
+            supports: supported(scene, &places),
+            joints: parted(&places),
         }
     }
 
@@ -209,6 +196,23 @@ impl Film {
         })
         .collect()
     }
+}
+
+/// The nodes whose place is held.
+fn supported(scene: &Scene, places: &[(Node, Vec3)]) -> Vec<usize> {
+    let model = &scene.plan.model;
+    let slots = model.supports.iter().flat_map(|support| &support.directions).map(|direction| direction.slot);
+    let held: HashSet<u32> = slots.filter(|&slot| model.slots[slot as usize].kind == SlotKind::Displacement).collect();
+    (0..places.len()).filter(|&k| held.contains(&places[k].0.u)).collect()
+}
+
+/// Where beams were parted: two nodes at one place. Of very many nodes nobody looks for marks.
+fn parted(places: &[(Node, Vec3)]) -> Vec<usize> {
+    if places.len() > 2 * MOST_POINTS {
+        return Vec::new();
+    }
+    let is_parted = |k: &usize| places.iter().any(|(node, place)| *place == places[*k].1 && node.p != places[*k].0.p);
+    (0..places.len()).filter(is_parted).collect()
 }
 
 /// An event at the row where it is shown.

@@ -28,15 +28,11 @@ pub struct Report<'a> {
 impl Report<'_> {
     /// Writes the page of results in a folder.
     pub fn write(&self, results: &Path, film: Film, path: &Path) -> io::Result<()> {
-        let page = self.page(results, film)?;
-        let name = path.file_name().map_or("report.html".into(), |name| name.to_string_lossy().into_owned());
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        PartFile::written(folder, &name, page.as_bytes()).and_then(|(part, file)| part.finish(&file, &name))
+        PartFile::write_to(path, self.page(results, film)?.as_bytes())
     }
 
     fn page(&self, results: &Path, mut film: Film) -> io::Result<String> {
-        let names = ["history.csv", "history.partial.csv"].map(|name| results.join(name));
-        let history = names.iter().find(|path| path.exists()).map(|path| HistoryReader::read(path)).transpose()?;
+        let history = HistoryReader::of_results(results).map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
         // The last row of a run that was stopped is the one of that moment, which the film passes over.
         let filmed = history.rows.len() - usize::from(self.record.is_interrupted() && !history.rows.is_empty());

@@ -31,8 +31,7 @@ impl Journal {
         // Written anew, as a whole: the last line of a stopped study may be half a line.
         let mut content = line(&[identity.to_string()]);
         known.iter().for_each(|(key, trial)| content.extend(line(&record(key, trial))));
-        let (part, file) = PartFile::written(folder, NAME, &content)?;
-        part.finish(&file, NAME)?;
+        PartFile::write(folder, NAME, &content)?;
         let file = OpenOptions::new().append(true).open(&path)?;
         Ok(Self { known, file: Some((path, file)), trouble: None })
     }

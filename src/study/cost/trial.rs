@@ -1,10 +1,11 @@
 //! One run of a variant.
 
 use super::sample::{Sampler, Samples};
-use crate::deck::{self, Deck, Diagnostic, StageBody};
+use crate::deck::{Deck, StageBody};
 use crate::drive::Failure;
-use crate::scene::{self, Scene};
+use crate::scene::Scene;
 use crate::study::outcome::Outcome;
+use crate::study::variant::Variant;
 use cpu_time::ThreadTime;
 use std::time::Instant;
 
@@ -94,12 +95,7 @@ pub fn simulate(
 }
 
 fn read(text: &str, settings: &[String], sampler: &Sampler) -> Result<(Deck, Scene), String> {
-    let text = deck::apply(text, settings)?;
-    let first = |found: Vec<Diagnostic>| {
-        found.into_iter().find(|d| !d.is_warning()).map_or("there is no such scene".into(), |d| d.message)
-    };
-    let (deck, found) = deck::read(&text).map_err(first)?;
-    let (scene, _) = scene::from_deck(&deck, found).map_err(first)?;
+    let Variant { deck, scene, .. } = Variant::read(text, settings)?;
     // A point of an arc may be a node of some meshes only.
     if !sampler.suits(&scene) {
         return Err("it has other outputs".into());

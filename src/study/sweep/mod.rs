@@ -11,8 +11,9 @@ pub use point::Outcome;
 pub use store::Store;
 
 use super::crowd::side_by_side;
-use crate::deck::{self, Deck, Diagnostic, Looked, looking_at, nearest};
-use crate::scene::{self, Scene};
+use super::variant::Variant;
+use crate::deck::{self, Deck, Looked, looking_at, nearest};
+use crate::scene::Scene;
 use std::io;
 
 /// What is run.
@@ -75,15 +76,7 @@ impl Sweep {
                 nearest(name, deck.parameters.names()).map_or(String::new(), |m| format!(": did you mean `{m}`?"));
             return Err(format!("the deck has no parameter `{name}`{meant}"));
         }
-        let wrong = |found: Vec<Diagnostic>| {
-            let error = found.into_iter().find(|diagnostic| !diagnostic.is_warning());
-            error.map_or("there is no such scene".into(), |error| match error.help {
-                Some(help) => format!("{}: {help}", error.message),
-                None => error.message,
-            })
-        };
-        let (read, found) = deck::read(&self.text).map_err(wrong)?;
-        scene::from_deck(&read, found).map(|_| ()).map_err(wrong)
+        Variant::read(&self.text, &[]).map(|_| ())
     }
 
     /// What makes a point (from 0) of the deck.

@@ -1,10 +1,9 @@
 //! One point of a sweep.
 
-use crate::deck::{self, Diagnostic};
 use crate::drive::Failure;
-use crate::scene;
 use crate::study::error_bars::of_expected;
 use crate::study::outcome::Outcome as Run;
+use crate::study::variant::Variant;
 use crate::study::{Recorder, expected_values};
 
 /// What came of a point.
@@ -41,22 +40,14 @@ impl Outcome {
 
 /// Runs the deck `text`, which expects what is looked at, with settings.
 pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> Outcome {
-    let text = match deck::apply(text, settings) {
-        Ok(text) => text,
-        Err(why) => return Outcome::failed("deck", why),
-    };
-    let first = |found: Vec<Diagnostic>| {
-        let error = found.into_iter().find(|diagnostic| !diagnostic.is_warning());
-        Outcome::failed("deck", error.map_or("there is no such scene".into(), |error| error.message))
-    };
-    let (deck, found) = match deck::read(&text) {
-        Ok(read) => read,
-        Err(found) => return first(found),
-    };
-    let mut scene = match scene::from_deck(&deck, found) {
-        Ok((scene, _)) => scene,
-        Err(found) => return first(found),
-    };
+    match Variant::read(text, settings) {
+        Ok(variant) => simulate(variant, error_bars, interrupted),
+        Err(why) => Outcome::failed("deck", why),
+    }
+}
+
+fn simulate(variant: Variant, error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> Outcome {
+    let Variant { text, deck, mut scene } = variant;
     // Rows of a history that nobody reads need not be kept.
     let probes = std::mem::take(&mut scene.probes);
     let run = Run::of(&scene, Some(Recorder::new(&scene)), u64::MAX, interrupted);
