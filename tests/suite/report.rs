@@ -79,11 +79,12 @@ fn a_page_holds_the_run_and_its_shape() {
     let turns = numbers(&scene["turns"], i16::from_le_bytes);
     for (frame, name) in (0..14).flat_map(|frame| ["a@end", "tip"].map(|name| (frame, name))) {
         let at = frame * 10 + node(name);
+        // Places are single floats: 1e-7 of lengths of 2.
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
             let exact = column(history, &format!("{name}.{axis}"))[frame];
             assert!((f64::from(places[3 * at + k]) - exact).abs() < 1e-6, "{name} {frame}");
         }
-        // The first section axis from the quaternion.
+        // The first section axis from the quaternion, of four numbers in steps of 3e-5.
         let [w, x, y, z] = [0, 1, 2, 3].map(|k| f64::from(turns[4 * at + k]) / 32767.0);
         let first = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)];
         for (came, axis) in first.iter().zip(["d1x", "d1y", "d1z"]) {
