@@ -4,7 +4,7 @@ use super::load::{Loaded, Refusal};
 use super::progress::Progress;
 use super::{Status, cores, load, run, say, signals};
 use crate::deck::{Accuracy, Deck};
-use crate::output::Reached;
+use crate::output::{Film, Reached};
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Journal, Options, Pace, Point};
@@ -24,6 +24,9 @@ pub struct Target {
     /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two coarser runs
     #[arg(long)]
     error_bars: bool,
+    /// Also write report.html, a page that plays the run back
+    #[arg(long)]
+    report: bool,
 }
 
 /// A scene that is ready to run.
@@ -36,6 +39,8 @@ pub struct Aimed {
     pub reached: Option<Reached>,
     /// Error bars, where they are wanted
     pub bars: Option<ErrorBars>,
+    /// What films it for a report, where one is wanted
+    pub film: Option<Film>,
 }
 
 impl Target {
@@ -72,7 +77,8 @@ impl Target {
     fn with_bars(&self, path: &Path, loaded: Loaded, reached: Option<Reached>) -> Result<Aimed, Refusal> {
         let made = || error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
         let bars = self.error_bars.then(made).transpose().map_err(|refusal| refused(refusal, path, &loaded))?;
-        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, bars })
+        let film = self.report.then(|| Film::of(&loaded.scene));
+        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, bars, film })
     }
 
     fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {

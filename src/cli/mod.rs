@@ -57,9 +57,6 @@ enum Command {
         input: DeckArguments,
         #[command(flatten)]
         target: accuracy::Target,
-        /// Also write report.html, a page that plays the run back
-        #[arg(long)]
-        report: bool,
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -253,9 +250,7 @@ pub fn main() -> ExitCode {
     };
     say::in_manner(arguments.manner);
     let status = match arguments.command {
-        Command::Run { input, target, report, out } => {
-            run::run(&input.decks, &input.set, &target, report, out.as_deref())
-        }
+        Command::Run { input, target, out } => run::run(&input.decks, &input.set, &target, out.as_deref()),
         Command::Check { input } => check::check(&input.decks, &input.set),
         Command::Verify { input, out } => verify::verify(&input.decks, &input.set, out.as_deref()),
         Command::Compare { a, b, rtol, atol } => compare::compare(&a, &b, rtol, atol),

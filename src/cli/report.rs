@@ -1,7 +1,7 @@
 //! `beamsim report`: the page of results that are there.
 
 use super::load::Refusal;
-use super::run::{Beyond, rows_of, simulate};
+use super::run::{Beyond, simulate};
 use super::{Status, Verdict, json, load, say, signals};
 use crate::output::{Film, Record, Report};
 use crate::scene::{self, Scene};
@@ -44,18 +44,13 @@ fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
 }
 
 fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
-    let beyond = Beyond { film: Some(film(scene)), ..Beyond::default() };
+    let beyond = Beyond { film: Some(Film::of(scene)), ..Beyond::default() };
     let finished = simulate(scene, name, None, None, beyond);
     if signals::caught().is_some() {
         let status = finished.status();
         return Err(Refusal::of(status, "interrupted", "stopped before the report was written".into()));
     }
     finished.film.ok_or_else(|| Refusal::of(Status::Io, "io", "nothing was filmed".into()))
-}
-
-/// For a run of a scene.
-pub fn film(scene: &Scene) -> Film {
-    Film::of(scene, rows_of(scene))
 }
 
 /// Writes the page, and says where.

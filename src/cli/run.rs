@@ -5,8 +5,8 @@ use super::progress::Progress;
 use super::{Status, Verdict, json, load, report, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
-    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Rows, remove_fields,
-    remove_if_there,
+    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, RowCounter, Rows,
+    remove_fields, remove_if_there,
 };
 use crate::scene::Scene;
 use crate::study::Recorder;
@@ -14,8 +14,8 @@ use crate::study::error_bars::ErrorBars;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Runs decks one after the other; where an accuracy is wanted, after a search for elements and steps. `pictured`: with a report.
-pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, pictured: bool, out: Option<&Path>) -> Status {
+/// Runs decks one after the other; where an accuracy is wanted, after a search for elements and steps.
+pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
     if refuse_twins(decks, &mut verdict) {
         return verdict.finish(1);
@@ -23,9 +23,8 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, pictured: bo
     for path in decks {
         let name = load::name(path);
         match target.aim(&name, path, settings) {
-            Ok(Aimed { text, scene, reached, bars }) => {
+            Ok(Aimed { text, scene, reached, bars, film }) => {
                 let folder = folder(out, &name, decks.len() > 1);
-                let film = pictured.then(|| report::film(&scene));
                 let beyond = Beyond { reached, bars, text, film };
                 let mut finished = simulate(&scene, &name, Some(&folder), None, beyond);
                 summarise(&name, &scene, &finished, &folder);
@@ -109,6 +108,7 @@ struct Watcher<'r> {
     recorder: Option<&'r mut Recorder>,
     progress: Progress,
     dynamic: Vec<bool>,
+    rows: RowCounter,
     modes: ModesWriter,
     fields: Option<FieldsWriter>,
     film: Option<Film>,
@@ -117,14 +117,14 @@ struct Watcher<'r> {
 impl Observer for Watcher<'_> {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
-        let dynamic = self.dynamic[snapshot.stage - 1];
-        let column = self.history.as_mut().map_or(Ok(None), |history| history.row(snapshot, dynamic));
+        let row = self.rows.next(self.dynamic[snapshot.stage - 1], snapshot.state.time);
+        let column = self.history.as_mut().map_or(Ok(None), |history| history.row(snapshot, row));
         if let Some(column) = column.map_err(io_failure)? {
             let at = Moment { stage: snapshot.stage, time: snapshot.state.time, load: snapshot.state.load };
             return Err(Failure::NonFinite { at, effect: Some("a column of the history"), node: column });
         }
-        self.film.iter_mut().for_each(|film| film.row(snapshot, dynamic));
-        self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, dynamic)).map_err(io_failure)
+        self.film.iter_mut().for_each(|film| film.row(snapshot, row));
+        self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
     }
 
     fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
@@ -170,11 +170,6 @@ pub struct Beyond {
     pub film: Option<Film>,
 }
 
-/// Which rows are written, in the history and in whatever stands beside it.
-pub fn rows_of(scene: &Scene) -> Rows {
-    Rows { every: scene.every, interval: scene.plan.interval }
-}
-
 /// Runs a scene; with a folder it leaves its results there, and a recorder follows what is expected.
 pub fn simulate(
     scene: &Scene,
@@ -186,14 +181,13 @@ pub fn simulate(
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
-    let rows = rows_of(scene);
     let Beyond { reached, bars, text, film } = beyond;
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
-    let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), rows, beside)).transpose();
+    let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), beside)).transpose();
     let dynamic: Vec<bool> =
         scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect();
     let timed = dynamic.iter().all(|dynamic| *dynamic);
-    let fields = folder.filter(|_| scene.vtk).map(|folder| FieldsWriter::create(folder, scene.figure(), rows, timed));
+    let fields = folder.filter(|_| scene.vtk).map(|folder| FieldsWriter::create(folder, scene.figure(), timed));
     let (history, fields, opened) = match (history, fields.transpose()) {
         (Ok(history), Ok(fields)) => (history, fields, Ok(())),
         (Err(error), _) | (_, Err(error)) => (None, None, Err(io_failure(error))),
@@ -206,6 +200,7 @@ pub fn simulate(
         fields,
         film,
         dynamic,
+        rows: RowCounter::new(Rows { every: scene.every, interval: scene.plan.interval }),
     };
     let (mut result, counters) = match opened {
         Ok(()) => Run::new(scene.plan.clone(), &mut watcher).finish(),

@@ -2,7 +2,7 @@
 //!
 //! Elements are cells of their own order, so that curved ones are curved. Numbers stand raw behind the XML ("appended").
 
-use super::Rows;
+use super::Row;
 use super::files::{PartFile, about};
 use crate::drive::{Moment, Snapshot};
 use crate::probe::{Figure, Look};
@@ -21,10 +21,8 @@ pub struct FieldsWriter {
     folder: PathBuf,
     part: PathBuf,
     figure: Figure,
-    rows: Rows,
     /// Whether time alone tells rows apart
     timed: bool,
-    seen: u64,
     /// Files so far, with what ParaView takes for their time
     written: Vec<(String, f64)>,
     /// A row that is written only if no other follows
@@ -33,20 +31,18 @@ pub struct FieldsWriter {
 
 impl FieldsWriter {
     /// In the folder of results. `timed`: no row stands still in time.
-    pub fn create(folder: &Path, figure: Figure, rows: Rows, timed: bool) -> io::Result<Self> {
+    pub fn create(folder: &Path, figure: Figure, timed: bool) -> io::Result<Self> {
         let part = folder.join(format!("fields.{}.part", std::process::id()));
         fs::create_dir_all(&part).map_err(|error| about(&part, &error))?;
-        Ok(Self { folder: folder.into(), part, figure, rows, timed, seen: 0, written: Vec::new(), pending: None })
+        Ok(Self { folder: folder.into(), part, figure, timed, written: Vec::new(), pending: None })
     }
 
     /// Takes a converged state; writes it if its row is wanted.
-    pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
-        let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
-        let time = if self.timed { at.state.time } else { self.seen as f64 };
-        self.seen += 1;
+    pub fn row(&mut self, at: &Snapshot, row: Row) -> io::Result<()> {
+        let time = if self.timed { at.state.time } else { row.number as f64 };
         self.pending = None;
         let moment = Moment { stage: at.stage, time, load: at.state.load };
-        if wanted {
+        if row.wanted {
             return self.write(moment, at.state);
         }
         self.pending = Some((moment, at.state.clone()));

@@ -18,8 +18,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Whether a row is written, but for the last.
-    pub fn contains(&self, number: u64, dynamic: bool, time: f64) -> bool {
+    fn contains(&self, number: u64, dynamic: bool, time: f64) -> bool {
         match self.interval {
             Some(interval) if dynamic => {
                 let turns = time / interval;
@@ -28,6 +27,37 @@ impl Rows {
             Some(_) => true,
             None => number.is_multiple_of(self.every as u64),
         }
+    }
+}
+
+/// Counts converged states, for all that is written of them.
+pub struct RowCounter {
+    rows: Rows,
+    seen: u64,
+}
+
+/// A converged state among others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Its number, from 0
+    pub number: u64,
+    /// Whether it is written whatever follows; the last always is
+    pub wanted: bool,
+    /// Whether time passes in its stage
+    pub dynamic: bool,
+}
+
+impl RowCounter {
+    /// Of these rows.
+    pub fn new(rows: Rows) -> Self {
+        Self { rows, seen: 0 }
+    }
+
+    /// The next.
+    pub fn next(&mut self, dynamic: bool, time: f64) -> Row {
+        let number = self.seen;
+        self.seen += 1;
+        Row { number, wanted: self.rows.contains(number, dynamic, time), dynamic }
     }
 }
 
@@ -47,12 +77,10 @@ pub struct HistoryWriter {
     folder: PathBuf,
     part: PartFile,
     writer: csv::Writer<File>,
-    rows: Rows,
     probes: Vec<Probe>,
     beside: Option<Box<dyn Beside>>,
     values: Vec<f64>,
     text: String,
-    seen: u64,
     record: csv::ByteRecord,
     /// Whether the last row was not wanted, and so is not written yet
     pending: bool,
@@ -62,7 +90,7 @@ pub struct HistoryWriter {
 
 impl HistoryWriter {
     /// Begins a history in `folder`.
-    pub fn create(folder: &Path, probes: Vec<Probe>, rows: Rows, beside: Option<Box<dyn Beside>>) -> io::Result<Self> {
+    pub fn create(folder: &Path, probes: Vec<Probe>, beside: Option<Box<dyn Beside>>) -> io::Result<Self> {
         let (part, file) = PartFile::create(folder, "history.csv")?;
         let mut writer = csv::Writer::from_writer(file);
         let mut names: Vec<String> = probes.iter().flat_map(|probe| probe.names.clone()).collect();
@@ -73,12 +101,10 @@ impl HistoryWriter {
             folder: folder.into(),
             part,
             writer,
-            rows,
             probes,
             beside,
             values: Vec::new(),
             text: String::new(),
-            seen: 0,
             record: csv::ByteRecord::new(),
             pending: false,
             waiting: Vec::new(),
@@ -86,7 +112,7 @@ impl HistoryWriter {
     }
 
     /// Takes a converged state; writes it if its row is wanted. Gives the name of a column that is not finite, if one is.
-    pub fn row(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<Option<String>> {
+    pub fn row(&mut self, at: &Snapshot, row: Row) -> io::Result<Option<String>> {
         self.values.clear();
         self.values.extend([at.state.time, at.state.load]);
         for probe in &self.probes {
@@ -100,10 +126,9 @@ impl HistoryWriter {
         self.record.clear();
         self.record.push_field(at.stage.to_string().as_bytes());
         push(&mut self.record, &mut self.text, &self.values);
-        self.pending = !self.rows.contains(self.seen, dynamic, at.state.time);
-        self.seen += 1;
+        self.pending = !row.wanted;
         if self.beside.is_some() {
-            self.wait_for_what_stands_beside(at, dynamic)?;
+            self.wait_for_what_stands_beside(at, row.dynamic)?;
         } else if !self.pending {
             self.writer.write_byte_record(&self.record)?;
         }

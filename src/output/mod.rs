@@ -12,7 +12,7 @@ mod report;
 pub use curves::{Curve, Curves};
 pub use fields::{FieldsWriter, remove_fields};
 pub use files::{PartFile, remove_if_there};
-pub use history::{Beside, HistoryReader, HistoryWriter, Rows};
+pub use history::{Beside, HistoryReader, HistoryWriter, Row, RowCounter, Rows};
 pub use modes::ModesWriter;
 pub use plot::{LinePlots, NamedLine};
 pub use record::{Outcome, Reached, Record};

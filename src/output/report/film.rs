@@ -1,6 +1,6 @@
 //! The whole shape of a scene at the rows of its history, few enough to be carried about.
 
-use super::super::Rows;
+use super::super::Row;
 use super::encode::{base64, quantised};
 use crate::drive::Snapshot;
 use crate::model::SlotKind;
@@ -42,8 +42,6 @@ pub struct Film {
     /// Numbers of the nodes that are shown, beam by beam, then the bodies
     shown: Vec<Vec<usize>>,
     names: Vec<(String, usize)>,
-    rows: Rows,
-    seen: u64,
     /// Rows of the history so far
     written: usize,
     frames: Vec<Frame>,
@@ -67,7 +65,7 @@ struct Frame {
 
 impl Film {
     /// Of a scene.
-    pub fn of(scene: &Scene, rows: Rows) -> Self {
+    pub fn of(scene: &Scene) -> Self {
         let figure = scene.figure();
         let named = named(scene);
         let shown = shown(&figure, &named);
@@ -77,8 +75,6 @@ impl Film {
             figure,
             shown,
             names,
-            rows,
-            seen: 0,
             written: 0,
             frames: Vec::new(),
             stride: 1,
@@ -91,11 +87,9 @@ impl Film {
     }
 
     /// Takes a converged state, if its row is written.
-    pub fn row(&mut self, at: &Snapshot, dynamic: bool) {
-        let wanted = self.rows.contains(self.seen, dynamic, at.state.time);
-        self.seen += 1;
+    pub fn row(&mut self, at: &Snapshot, row: Row) {
         self.note_events(at);
-        let due = wanted && self.written.is_multiple_of(self.stride);
+        let due = row.wanted && self.written.is_multiple_of(self.stride);
         self.pending = None;
         if due {
             self.frames.push(self.frame(self.written, at.state));
@@ -104,7 +98,7 @@ impl Film {
             // The last row is always written.
             self.pending = Some((self.written, at.state.clone()));
         }
-        self.written += usize::from(wanted);
+        self.written += usize::from(row.wanted);
     }
 
     fn note_events(&mut self, at: &Snapshot) {
