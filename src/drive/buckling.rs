@@ -10,7 +10,7 @@ use super::levels::{NO_MOTION, distance};
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{LinearSolver, Operator, Pivots, is_symmetric, largest_eigenvalues, mechanism};
+use crate::solve::{LinearSolver, Operator, is_symmetric, largest_eigenvalues, mechanism};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -185,8 +185,7 @@ impl Run<'_> {
         let Workshop { assembly, newton, .. } = workshop;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        let system = &assembly.system;
-        Pivots::new(system, &self.model.multipliers, Some(&newton.solver))?.negative(system)
+        newton.solver.negative_pivots(&assembly.system)
     }
 
     /// Goes along the path to a load factor in steps that shrink where they must; `false` where it does not get there, or the
@@ -243,8 +242,7 @@ impl Run<'_> {
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
         // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.
-        let pivots = Pivots::new(system, &self.model.multipliers, Some(&newton.solver));
-        let stable = pivots.and_then(|mut pivots| pivots.negative(system)) == Some(0);
+        let stable = newton.solver.negative_pivots(system) == Some(0);
         let symmetric = stable && self.model.multipliers.is_empty() && is_symmetric(&system.pattern, &varied);
         let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
         let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default();

@@ -5,7 +5,6 @@ use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, relative_angle};
-use crate::solve::Pivots;
 use crate::system::State;
 
 /// A level is not approached in smaller parts than this.
@@ -36,31 +35,30 @@ pub enum Approach {
 
 /// Follows the number of negative pivots from step to step.
 pub(super) struct Stability {
-    pivots: Option<Pivots>,
+    /// Whether there is something to follow
+    counts: bool,
     pub negative: Option<usize>,
 }
 
 impl Stability {
     /// At the start of a stage.
-    pub fn new(run: &Run, workshop: &Workshop) -> Self {
-        let system = &workshop.assembly.system;
-        let mut pivots = Pivots::new(system, &run.model.multipliers, Some(&workshop.newton.solver));
+    pub fn new(run: &Run, workshop: &mut Workshop) -> Self {
         // The start was assembled with its stiffness.
-        let negative = pivots.as_mut().and_then(|pivots| pivots.negative(system));
+        let negative = workshop.newton.solver.negative_pivots(&workshop.assembly.system);
         // What is linear keeps its tangent.
-        Self { pivots: pivots.filter(|_| !run.is_linear()), negative }
+        Self { counts: !run.is_linear(), negative }
     }
 
     /// The number at the run's state; `None` where it is not known.
     pub fn count(&mut self, run: &Run, workshop: &mut Workshop) -> Option<usize> {
-        let pivots = self.pivots.as_mut()?;
+        if !self.counts {
+            return None;
+        }
         workshop.assembly.forget();
         workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
-        let negative = pivots.negative(&workshop.assembly.system);
-        if negative.is_none() {
-            // Not symmetric: neither will the next be.
-            self.pivots = None;
-        }
+        let negative = workshop.newton.solver.negative_pivots(&workshop.assembly.system);
+        // What is not symmetric will not be so next.
+        self.counts = negative.is_some();
         negative
     }
 
@@ -88,7 +86,7 @@ pub(super) struct Levels {
 
 impl Levels {
     /// From the run's state on.
-    pub fn new(run: &Run, workshop: &Workshop, steps: usize, approach: Approach) -> Self {
+    pub fn new(run: &Run, workshop: &mut Workshop, steps: usize, approach: Approach) -> Self {
         let (start, level) = (run.state.clone(), 1.0 / steps as f64);
         Self { start, level, approach, stability: Stability::new(run, workshop), increment: level }
     }

@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
-use crate::solve::{NewtonFailure, Pivots, Verdict, mechanism, timed};
+use crate::solve::{NewtonFailure, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -236,14 +236,13 @@ struct Path {
     first: f64,
     /// 1/U^2
     scale: f64,
-    pivots: Option<Pivots>,
 }
 
 impl Path {
     /// `None` where nothing grows with the load factor.
     fn new(run: &mut Run, workshop: &mut Workshop, steps: usize) -> Result<Option<Self>, Failure> {
         let Some(Direction { rate: direction, .. }) = run.path_direction(workshop)? else { return Ok(None) };
-        let mut path = Self::with_measure(run, workshop, direction);
+        let mut path = Self::with_measure(run, direction);
         path.here = path.look(run, workshop, &path.here.clone())?;
         let first = 1.0 / (steps as f64 * path.here.load_rate.abs());
         path.begin_with(run, first).map(Some)
@@ -257,7 +256,7 @@ impl Path {
             return Self::new(run, workshop, (1.0 / increment).ceil() as usize);
         }
         let secant = run.state.q.iter().zip(&from.q).map(|(q, before)| (*q - *before) * (1.0 / risen)).collect();
-        let mut path = Self::with_measure(run, workshop, secant);
+        let mut path = Self::with_measure(run, secant);
         path.here = path.look(run, workshop, &path.here.clone())?;
         path.begin_with(run, std::f64::consts::SQRT_2 * increment).map(Some)
     }
@@ -276,7 +275,7 @@ impl Path {
     }
 
     /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to go on in.
-    fn with_measure(run: &Run, workshop: &Workshop, rate: Vec<Vec3>) -> Self {
+    fn with_measure(run: &Run, rate: Vec<Vec3>) -> Self {
         let moved = squared(run, &rate);
         let rotated = run.model.slots.iter().zip(&rate).filter(|(info, _)| info.kind == SlotKind::Rotation);
         let turned = rotated.map(|(_, d)| d.norm() * run.model.length).fold(0.0, f64::max);
@@ -289,7 +288,6 @@ impl Path {
             length: 0.0,
             first: 0.0,
             scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
-            pivots: Pivots::new(&workshop.assembly.system, &run.model.multipliers, Some(&workshop.newton.solver)),
         }
     }
 
@@ -305,7 +303,7 @@ impl Path {
         let slots = run.state.q.len();
         let Direction { rate, pull } = run.path_direction(workshop)?.unwrap_or_else(|| Direction::none(slots));
         // The tangent of the last evaluation tells the pivots.
-        let negative = self.pivots.as_mut().and_then(|pivots| pivots.negative(&workshop.assembly.system));
+        let negative = workshop.newton.solver.negative_pivots(&workshop.assembly.system);
         let along = dot(run, &rate, &before.tangent) * self.scale + before.load_rate;
         let size = (squared(run, &rate) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };

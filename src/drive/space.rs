@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::Run;
 use crate::kernel::Weights;
 use crate::model::Assembly;
-use crate::solve::{LinearSolver, Pivots, mechanism};
+use crate::solve::{LinearSolver, mechanism};
 
 impl Run<'_> {
     /// The present stage in space, where it is treated in a plane.
@@ -25,9 +25,9 @@ impl Run<'_> {
         }
         let Some(mut assembly) = self.in_space()? else { return Ok(()) };
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        let pivots = Pivots::new(&assembly.system, &self.model.multipliers, None);
+        let solver = LinearSolver::new(&assembly.system, &self.model.multipliers);
         self.counters.work.factorisations += 1;
-        let in_space = pivots.and_then(|mut pivots| pivots.negative(&assembly.system));
+        let in_space = solver.and_then(|mut solver| solver.negative_pivots(&assembly.system));
         if let Some(more) = in_space.and_then(|in_space| in_space.checked_sub(in_plane)).filter(|&more| more > 0) {
             self.warn_out_of_plane(more);
         }

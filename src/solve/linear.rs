@@ -2,6 +2,7 @@
 
 use super::block::BlockSolver;
 use super::general::GeneralSolver;
+use super::pivots::Pivots;
 use super::softest::NullVector;
 use crate::system::{Slot, System};
 
@@ -15,6 +16,9 @@ pub struct LinearSolver {
     factored: bool,
     /// That of the tangent that Newton has factorised last
     revision: Option<u64>,
+    pub(super) multipliers: Vec<Slot>,
+    /// Where it cannot count them itself
+    pub(super) pivots: Option<Pivots>,
 }
 
 enum Way {
@@ -42,7 +46,7 @@ impl LinearSolver {
             Some(blocks) => Way::Blocks(Box::new(blocks)),
             None => Way::General(Box::new(GeneralSolver::new(system)?)),
         };
-        Some(Self { way, factored: false, revision: None })
+        Some(Self { way, factored: false, revision: None, multipliers: multipliers.to_vec(), pivots: None })
     }
 
     /// Its factorisation in blocks, where it has one.
@@ -51,6 +55,19 @@ impl LinearSolver {
             Way::Blocks(blocks) => Some(blocks),
             Way::General(_) => None,
         }
+    }
+
+    /// Whether its factorisation is one of symmetric tangents, without pivoting.
+    pub(super) fn is_symmetric(&self) -> bool {
+        self.blocks().is_some_and(BlockSolver::is_symmetric)
+    }
+
+    /// Factorises, as far as it can by blocks, and counts negative pivots.
+    pub(super) fn negative_of_own(&mut self, system: &System) -> Option<usize> {
+        let Way::Blocks(blocks) = &mut self.way else { return None };
+        self.revision = None;
+        self.factored = blocks.factorise(system);
+        self.factored.then(|| blocks.negative()).flatten()
     }
 
     /// How it solves, in a few words.

@@ -18,5 +18,5 @@ pub use krylov::{Operator, largest_eigenvalues};
 pub use linear::LinearSolver;
 pub use mechanism::{Limp, mechanism};
 pub use newton::{Newton, NewtonFailure, Work, timed};
-pub use pivots::{Pivots, is_symmetric};
+pub use pivots::is_symmetric;
 pub use softest::NullVector;

@@ -12,7 +12,7 @@ use faer::sparse::linalg::cholesky::{
 };
 
 /// LDL^T without pivoting, whose D tells the inertia (Sylvester).
-pub enum Pivots {
+pub(super) enum Pivots {
     /// By blocks
     Blocks(Box<BlockSolver>),
     /// In general
@@ -20,7 +20,7 @@ pub enum Pivots {
 }
 
 /// Of numbers, by faer.
-pub struct Entries {
+pub(super) struct Entries {
     symbolic: SymbolicCholesky<u32>,
     columns: Columns,
     memory: MemBuffer,
@@ -36,26 +36,38 @@ const SYMMETRY: f64 = 1e-9;
 /// What multipliers get on their diagonal, relative to the largest stiffness, so that pivots exist.
 const COMPLIANCE: f64 = 1e-9;
 
-impl Pivots {
-    /// For tangents of this pattern; a `solver` for it lends its order of elimination. `None` where memory cannot be had.
-    pub fn new(system: &System, multipliers: &[Slot], solver: Option<&LinearSolver>) -> Option<Self> {
-        let pattern = &system.pattern;
-        let blocks = match solver.and_then(LinearSolver::blocks) {
-            Some(blocks) => blocks.symmetric_beside(pattern),
-            None => multipliers.is_empty().then(|| BlockSolver::new(pattern, true)).flatten(),
-        };
-        match blocks {
-            Some(blocks) => Some(Self::Blocks(Box::new(blocks))),
-            None => Some(Self::Entries(Box::new(Entries::new(system, multipliers)?))),
-        }
-    }
-
+impl LinearSolver {
     /// How many pivots of the tangent are negative, those of multipliers left out; `None` where it is not symmetric, or a
-    /// pivot is lost.
-    pub fn negative(&mut self, system: &System) -> Option<usize> {
+    /// pivot is lost. Where this solver's own factorisation tells, the tangent is what it has factorised last.
+    pub fn negative_pivots(&mut self, system: &System) -> Option<usize> {
         if !system.symmetric && !is_symmetric(&system.pattern, &system.values) {
             return None;
         }
+        if self.is_symmetric() {
+            return self.negative_of_own(system);
+        }
+        if self.pivots.is_none() {
+            self.pivots = Pivots::beside(self, system);
+        }
+        self.pivots.as_mut()?.negative(system)
+    }
+}
+
+impl Pivots {
+    /// Of a solver whose own factorisation does not tell; its order of elimination serves for both. `None` where memory cannot be
+    /// had.
+    fn beside(solver: &LinearSolver, system: &System) -> Option<Self> {
+        let blocks = match solver.blocks() {
+            Some(blocks) => blocks.symmetric_beside(&system.pattern),
+            None => solver.multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, true)).flatten(),
+        };
+        match blocks {
+            Some(blocks) => Some(Self::Blocks(Box::new(blocks))),
+            None => Some(Self::Entries(Box::new(Entries::new(system, &solver.multipliers)?))),
+        }
+    }
+
+    fn negative(&mut self, system: &System) -> Option<usize> {
         match self {
             Self::Blocks(blocks) => blocks.factorise(system).then(|| blocks.negative()).flatten(),
             Self::Entries(entries) => entries.negative(system),
@@ -109,17 +121,28 @@ impl Entries {
 
 /// Whether each entry is what its mirror image is.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
+    let width = pattern.width();
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    let root = |k: u32| match pattern.find(k, k).map_or(0.0, |place| values[place].abs().sqrt()) {
+    let root = |k: usize| match pattern
+        .tile(k / width, k / width)
+        .map_or(0.0, |tile| values[tile + (width + 1) * (k % width)])
+    {
         0.0 => largest.sqrt(),
-        root => root,
+        diagonal => diagonal.abs().sqrt(),
     };
-    let count = pattern.equations.count() as u32;
-    let roots: Vec<f64> = (0..count).map(root).collect();
-    (0..count).all(|column| {
-        pattern.entries(column).all(|entry| {
-            let mirror = pattern.find(column, entry.row).map_or(0.0, |place| values[place]);
-            (values[entry.place] - mirror).abs() <= SYMMETRY * roots[column as usize] * roots[entry.row as usize]
+    let roots: Vec<f64> = (0..width * pattern.groups.count()).map(root).collect();
+    let roots: Vec<&[f64]> = roots.chunks_exact(width).collect();
+    (0..pattern.groups.count()).all(|column| {
+        let rows = pattern.rows_of(column).iter().map(|&row| row as usize).filter(|&row| row >= column);
+        let mut pairs = rows.map(|row| (row, pattern.tile(row, column), pattern.tile(column, row)));
+        pairs.all(|(row, tile, mirror)| match (tile, mirror) {
+            (Some(tile), Some(mirror)) => (0..width * width).all(|k| {
+                let (c, r) = (k / width, k % width);
+                let difference = values[tile + k] - values[mirror + width * r + c];
+                difference.abs() <= SYMMETRY * roots[column][c] * roots[row][r]
+            }),
+            // Whom a node meets meets it.
+            _ => false,
         })
     })
 }

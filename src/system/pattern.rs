@@ -187,8 +187,8 @@ impl Pattern {
         (group, first + k as usize)
     }
 
-    /// The index of the first value of a tile.
-    fn tile(&self, row: usize, column: usize) -> Option<usize> {
+    /// The index of the first value of a tile; `None` where the groups do not meet.
+    pub fn tile(&self, row: usize, column: usize) -> Option<usize> {
         let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
         Some(self.width() * self.width() * (self.column_starts[column] as usize + found))
     }

@@ -66,6 +66,11 @@ impl BlockSolver {
         self.factor.name()
     }
 
+    /// Whether it takes the tangent for symmetric.
+    pub fn is_symmetric(&self) -> bool {
+        self.factor.negative().is_some()
+    }
+
     /// Factorises; `false` where a pivot is zero or no number.
     pub fn factorise(&mut self, system: &System) -> bool {
         self.factor.factorise(&self.elimination, system)
