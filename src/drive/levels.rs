@@ -6,6 +6,7 @@ use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, relative_angle};
 use crate::system::State;
+use crate::tensor::Vec3;
 
 /// A level is not approached in smaller parts than this.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
@@ -18,6 +19,9 @@ const CLOSE: f64 = 1.0 / 256.0;
 
 /// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
 const JUMP: f64 = 8.0;
+
+/// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.
+const BACK: f64 = -0.5;
 
 /// What moves less is round-off: relative to the length of the scene, and in radians.
 pub(super) const NO_MOTION: f64 = 1e-9;
@@ -120,17 +124,36 @@ impl Levels {
         self.increment = self.level;
     }
 
-    /// Whether a step that changed the number of negative pivots may have gone to another branch: it is not small, or the
-    /// state has moved further than on a path that goes on.
-    pub fn may_have_jumped(&self, model: &Model, from: &State, to: &State, negative: Option<usize>) -> bool {
-        if self.approach == Approach::Straight || !self.stability.changes_to(negative) {
+    /// Whether a step may have gone to another branch: it went back against the `first` correction, or it changed the number of
+    /// negative pivots and is not small, or the state has moved further than on a path that goes on.
+    pub fn may_have_jumped(&self, model: &Model, states: [&State; 2], first: &[Vec3], negative: Option<usize>) -> bool {
+        let [from, to] = states;
+        if self.approach == Approach::Straight {
             return false;
+        }
+        if !self.stability.changes_to(negative) {
+            return has_turned_back(model, from, to, first);
         }
         let (step, risen) = (to.load - from.load, from.load - self.start.load);
         let moved = distance(model, from, to);
         let usual = if risen > 0.0 { distance(model, &self.start, from) / risen * step } else { f64::INFINITY };
         step > CLOSE * self.level || moved > (JUMP * usual).max(NO_MOTION)
     }
+}
+
+/// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
+/// displacements tell.
+pub(super) fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> bool {
+    let [mut along, mut moved, mut expected] = [0.0; 3];
+    let nodes = model.slots.iter().zip(first).enumerate();
+    for (slot, (_, first)) in nodes.filter(|(_, (info, _))| info.kind == SlotKind::Displacement) {
+        let step = to.q[slot] - from.q[slot];
+        along += step.dot(*first);
+        moved += step.squared();
+        expected += first.squared();
+    }
+    let sizes = [moved.sqrt(), expected.sqrt()];
+    sizes.iter().all(|&size| size > NO_MOTION * model.length) && along < BACK * sizes[0] * sizes[1]
 }
 
 /// The largest difference of two states: displacements over the length of the scene, rotations in radians, whatever their charts.

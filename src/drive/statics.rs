@@ -117,7 +117,8 @@ impl Run<'_> {
             return Tried::Failed(failure);
         }
         let negative = levels.stability.count(self, workshop);
-        let jumped = !self.soft && levels.may_have_jumped(&self.model, &self.good, &self.state, negative);
+        let states = [&self.good, &self.state];
+        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &workshop.newton.first, negative);
         if jumped { Tried::Jumped(negative) } else { Tried::Good(negative) }
     }
 

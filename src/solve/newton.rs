@@ -100,6 +100,8 @@ pub struct Newton {
     pub solver: LinearSolver,
     right_hand_side: Vec<f64>,
     dq: Vec<Vec3>,
+    /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
+    pub first: Vec<Vec3>,
     /// The largest residual of each iterate, over what is allowed
     history: Vec<f64>,
 }
@@ -160,7 +162,7 @@ impl Newton {
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
         let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
         let (right_hand_side, dq) = (vec![0.0; equations], vec![Vec3::ZERO; slots]);
-        Self { convergence, max_iterations, solver, right_hand_side, dq, history: Vec::new() }
+        Self { convergence, max_iterations, solver, right_hand_side, dq, first: Vec::new(), history: Vec::new() }
     }
 
     /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
@@ -179,6 +181,7 @@ impl Newton {
         let noise = assembly.noise(state);
         let mut iterations = 0;
         self.history.clear();
+        self.first.clear();
         let mut refinement = Refinement::default();
         let mut noisy = false;
         loop {
@@ -221,6 +224,9 @@ impl Newton {
             }
             assembly.extrapolate(state, &self.dq);
             let changes_charts = method.changes_charts();
+            if changes_charts && iterations == 1 {
+                self.first.clone_from(&self.dq);
+            }
             if changes_charts {
                 charts::carry(state, &self.dq, &model.charted.rotations);
             }

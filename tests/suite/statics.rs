@@ -157,6 +157,24 @@ fn round_off_is_no_jump() {
     assert_eq!((along.steps, along.cutbacks, along.events.len()), (skew.steps, skew.cutbacks, skew.events.len()));
 }
 
+/// The branch of the other side is as stable, and no pivot tells.
+#[test]
+fn an_imperfect_column_bends_to_the_side_of_its_imperfection() {
+    for steps in [3, 10, 30, 50] {
+        let column = simulate(&format!(
+            "[param]\nP = \"1.5*10*pi^2\"\n[point]\nfoot = [0, 0, 0]\nmiddle = [0, 0, 0.5]\ntop = [0, 0, 1]\n\
+             [section.s]\nEA = 1e5\nGA = 5e4\nGJ = 100\nEI = [1000, 10]\n\
+             [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"foot\", \"middle\", \"top\"]\nelements = 4\norder = 3\n\
+             [[support]]\nat = \"foot\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+             [[support]]\nat = \"top\"\nfix = [\"ux\", \"uy\", \"rx\", \"rz\"]\n\
+             [[load]]\nat = \"top\"\nforce = [0, 0, \"-P\"]\n[[load]]\nat = \"middle\"\nforce = [\"0.001*P\", 0, 0]\n\
+             [[stage]]\nkind = \"static\"\nsteps = {steps}\n"
+        ));
+        let aside = column.end("middle.ux");
+        assert!((aside - 0.39448).abs() < 1e-4, "{steps} levels: {aside}");
+    }
+}
+
 /// Turned back within one level, no element turns further than it did: smaller steps tell.
 #[test]
 fn a_reversal_is_no_leap_over_pi() {
