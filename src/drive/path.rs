@@ -131,6 +131,8 @@ impl Run<'_> {
             let mut targets = Vec::new();
             if (next.load_rate > 0.0) != rising {
                 targets.push(Target::Limit);
+                // On the limit point itself the sign of one pivot is that of round-off.
+                self.look_out_of_plane(next.negative)?;
             }
             if (next.work_rate > 0.0) != working {
                 targets.push(Target::Turning);
@@ -223,7 +225,7 @@ impl Run<'_> {
         }
         self.told.points += 1;
         self.counters.events.push(event);
-        self.look_out_of_plane(after)
+        if kind == EventKind::Limit { Ok(()) } else { self.look_out_of_plane(after) }
     }
 }
 

@@ -447,6 +447,28 @@ fn lateral_buckling_is_told_where_the_plane_hides_it() {
     assert!(!warned(0.99 * critical) && warned(1.01 * critical));
 }
 
+/// On a limit point itself round-off gives one pivot its sign, in the plane another one than in space.
+#[test]
+fn a_limit_point_is_not_taken_for_an_instability_out_of_plane() {
+    let warned = |aside: f64, steps: usize| {
+        let (seen, ended, _) = run(&format!(
+            "[point]\nleft = [-1, 0, 0]\ncrown = [0, 0, 0.1]\nright = [1, 0, 0]\n\
+             [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 100\nEI = [{aside}, 1]\n\
+             [[beam]]\nname = \"arch\"\nsection = \"s\"\nthrough = [\"left\", \"crown\", \"right\"]\nelements = 8\norder = 2\naxis3 = [0, 1, 0]\n\
+             [[support]]\nat = \"left\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+             [[support]]\nat = \"right\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n[[load]]\nat = \"crown\"\nforce = [0, 0, -20]\n\
+             [[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\n"
+        ));
+        ended.unwrap();
+        assert!(seen.planar && seen.warnings.iter().any(|warning| warning.starts_with("limit point")));
+        seen.warnings.iter().any(|warning| warning.contains("unstable out of plane"))
+    };
+    for steps in [10, 40, 80] {
+        assert!(!warned(100.0, steps), "stiff aside, {steps} steps");
+    }
+    assert!(warned(0.5, 40), "soft aside");
+}
+
 /// Vectors in a tilted plane are rounded aside of it; nothing pulls that back, so it must not pile up.
 #[test]
 fn long_runs_stay_in_a_tilted_plane() {
