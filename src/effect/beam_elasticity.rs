@@ -170,8 +170,15 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
 
     fn energy(&self, at: &State) -> Energy {
         let mut strain = 0.0;
-        for_each_batch!(self.elements, |_first, batch| for element in batch {
-            strain += element.energy::<I>(at);
+        for_each_batch!(self.elements, |_first, batch| {
+            let mut add = |energy: f64| strain += energy;
+            let done = Instructions::here().run_side_by_side(
+                #[inline(always)]
+                || each_energy::<I, _, _>(batch, at, &mut add),
+            );
+            if done.is_none() {
+                batch.iter().for_each(|element| add(element.energy::<I>(at)));
+            }
         });
         Energy { kinetic: 0.0, strain }
     }
@@ -375,6 +382,41 @@ fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
     }
 }
 
+/// Shows the strain energy of each element, in their order.
+#[inline(always)]
+fn each_energy<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    show: &mut dyn FnMut(f64),
+) {
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let sum = Sum::side_by_side(elements, &[], at);
+        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| &elements[k].connection), at));
+        let energies = strain_energy(&sum.points, view.nodes(), sum.free);
+        for (k, element) in elements.iter().enumerate().take(batch.len() - start) {
+            let mixed = at.mixed[element.connection.element as usize] != 0;
+            show(if mixed { element.energy::<I>(at) } else { energies.0[k] });
+        }
+    }
+}
+
+/// The strain energy of an element, by its points and the nodes that its kernel is shown.
+#[inline(always)]
+fn strain_energy<const N: usize, const G: usize, T: Real>(
+    points: &[StiffnessPoint<N, T>; G],
+    nodes: &[NodeMotion<T>; N],
+    free: T,
+) -> T {
+    let mut sum = T::zero();
+    for point in points {
+        let (strain, stress) = point.strain_and_stress(nodes, free);
+        let elastic = point.elastic_part(&strain, free);
+        sum += (elastic.gamma.dot(stress.n) + elastic.kappa.dot(stress.m)) * point.weight * 0.5;
+    }
+    sum
+}
+
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
     pub(super) fn free_amplitude(&self, at: &State) -> f64 {
         self.free.map_or(0.0, |number| at.amplitude[number])
@@ -386,13 +428,9 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         self.points.map(|point| point.strain_and_stress(view.nodes(), free))
     }
 
+    #[inline(never)]
     fn energy<I: Interpolation>(&self, at: &State) -> f64 {
-        let free = self.free_amplitude(at);
-        let density = |(point, (strain, stress)): (&StiffnessPoint<N>, &(Strain, Stress))| {
-            let elastic = point.elastic_part(strain, free);
-            0.5 * point.weight * (elastic.gamma.dot(stress.n) + elastic.kappa.dot(stress.m))
-        };
-        self.points.iter().zip(&self.strains_and_stresses::<I>(at)).map(density).sum()
+        strain_energy(&self.points, I::see(&self.connection, at).nodes(), self.free_amplitude(at))
     }
 
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.

@@ -47,7 +47,7 @@ impl Effect for BeamMass {
 
     fn energy(&self, at: &State) -> Energy {
         let mut kinetic = 0.0;
-        self.elements.each_point(at, |mass, w, _, motion| kinetic += 0.5 * w * mass * motion.u_rate.squared());
+        self.elements.each_velocity(at, |mass, w, velocity| kinetic += 0.5 * w * mass * velocity.squared());
         Energy { kinetic, strain: 0.0 }
     }
 

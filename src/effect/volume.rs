@@ -63,6 +63,16 @@ impl<Q: Copy> VolumeElements<Q> {
         });
     }
 
+    /// Shows each point's quantity, its weight and the velocity of its centre line.
+    pub fn each_velocity(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3)) {
+        for_each_batch!(self, |_first, batch| for element in batch {
+            for point in &element.points {
+                let velocity = |i: usize| at.v[element.connection.nodes[i].u as usize];
+                show(&point.quantity, point.weight, beam::interpolate(&point.shape, velocity));
+            }
+        });
+    }
+
     /// Shows the quantity of each point.
     pub fn each_quantity(&self, mut show: impl FnMut(&Q)) {
         for_each_batch!(self, |_first, batch| {

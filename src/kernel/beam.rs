@@ -78,6 +78,7 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
     }
 
     /// Strain and stress at this point; `free` is the amplitude of the free strain.
+    #[inline(always)]
     pub fn strain_and_stress(&self, nodes: &[NodeMotion<T>; N], free: T) -> (Strain<T>, Stress<T>) {
         let strain = self.configuration(nodes).strain(self.tangent);
         (strain, self.stress(&strain, free))
