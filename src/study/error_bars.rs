@@ -4,7 +4,7 @@
 //! cross, and one that begins to grow shows in them late. See [`super::accuracy`] for the estimate.
 
 use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
-use super::cost::{Family, Mesher, Pace, Point, Refusal, Sampler, dynamic_stages, trial};
+use super::cost::{Family, Mesher, Pace, Patience, Point, Refusal, Sampler, dynamic_stages, trial};
 use super::outcome::{Outcome, Presence};
 use crate::deck::{Deck, Diagnostic, StageBody};
 use crate::drive::Failure;
@@ -50,7 +50,7 @@ pub fn error_bars(
     refuse_paths(deck).map_err(Refusal::Deck)?;
     let sampler = Sampler::of_rows(deck, scene, Vec::new(), Pace::Timeless);
     let variants = companions(text, deck, &sampler);
-    let run = |point: &Point| trial::simulate(text, &point.settings(deck, text), &sampler, interrupted);
+    let run = |point: &Point| trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted);
     let outcomes: Vec<Result<Outcome, String>> = thread::scope(|scope| {
         let started: Vec<_> = variants.iter().map(|(point, _)| scope.spawn(|| run(point))).collect();
         started.into_iter().map(|thread| thread.join().unwrap_or(Err("it broke off".into()))).collect()
@@ -85,8 +85,8 @@ pub fn of_expected(
     let (sampler, _) = Sampler::of_expectations(deck, scene);
     let mut errors: Vec<f64> = came.iter().map(|value| left_by_newton(deck) * value.abs()).collect();
     for (point, divisors) in companions(text, deck, &sampler) {
-        let outcome =
-            trial::simulate(text, &point.settings(deck, text), &sampler, interrupted).map_err(Failure::Limit)?;
+        let outcome = trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted)
+            .map_err(Failure::Limit)?;
         outcome.ended?;
         for (((error, a), b), divisor) in errors.iter_mut().zip(came).zip(&outcome.expected).zip(&divisors) {
             *error += SAFETY * (a - b).abs() / divisor;

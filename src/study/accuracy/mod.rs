@@ -18,7 +18,7 @@ mod search;
 use estimate::largest_tolerance;
 pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 
-use super::cost::{Crew, Family, Mesher, Options, Pace, Point, Refusal, Sampler};
+use super::cost::{Crew, Family, Mesher, Options, Pace, Patience, Point, Refusal, Sampler};
 use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
 use crate::drive::Failure;
 use crate::scene::Scene;
@@ -82,13 +82,25 @@ pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options:
         ..Family::default()
     };
     let newton = (NEWTON * wanted.least() / largest_tolerance(deck)).min(1.0);
-    Search::new(wanted, mesher, family, pace, newton).run(Crew::new(text, deck, &sampler, options))
+    let crew = Crew::new(text, deck, &sampler, options)
+        .with_patience(|point| if is_offer(point) { Patience::SHORT } else { Patience::LONG });
+    Search::new(wanted, mesher, family, pace, newton).run(crew)
+}
+
+/// Whether its steps are longer than the deck's own: an offer, no more.
+fn is_offer(point: &Point) -> bool {
+    matches!(point.pace, Pace::Steps(factor) if factor > 1.0)
 }
 
 /// With twice the step.
 fn coarser(pace: Pace) -> Pace {
+    scaled(pace, 2.0)
+}
+
+/// With steps longer by this factor.
+fn scaled(pace: Pace, by: f64) -> Pace {
     match pace {
-        Pace::Steps(factor) => Pace::Steps(2.0 * factor),
+        Pace::Steps(factor) => Pace::Steps(by * factor),
         other => other,
     }
 }

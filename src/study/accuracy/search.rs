@@ -1,7 +1,7 @@
 //! The search for a variant of a deck that is accurate enough.
 
 use super::estimate::{Fall, Share, Source, left_by_newton};
-use super::{Found, coarser};
+use super::{Found, coarser, is_offer, scaled};
 use crate::deck::{Accuracy, StageBody};
 use crate::drive::Failure;
 use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Trial};
@@ -146,6 +146,11 @@ impl<'a> Search<'a> {
                     self.mesher.sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
                 }
                 "singular" | "deck" => break,
+                // The longer step is no easier: two halvings leave one to compare with.
+                "limit" if is_offer(&round.own) => {
+                    self.pace = scaled(self.pace, 0.25);
+                    continue;
+                }
                 _ => {}
             }
             let estimate = self.estimate(&round, &trials);

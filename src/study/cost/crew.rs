@@ -3,7 +3,7 @@
 use super::frontier;
 use super::grid::Point;
 use super::sample::Sampler;
-use super::trial::{self, Seconds, Trial};
+use super::trial::{self, Patience, Seconds, Trial};
 use super::{Options, Refusal, Run, Timing};
 use crate::deck::Deck;
 use crate::drive::{Failure, Moment};
@@ -40,6 +40,7 @@ pub(in crate::study) struct Crew<'a, 'o> {
     deck: &'a Deck,
     sampler: &'a Sampler,
     options: Options<'o>,
+    patience: fn(&Point) -> Patience,
     deadline: Deadline,
     done: usize,
     expected: usize,
@@ -48,7 +49,12 @@ pub(in crate::study) struct Crew<'a, 'o> {
 impl<'a, 'o> Crew<'a, 'o> {
     pub fn new(text: &'a str, deck: &'a Deck, sampler: &'a Sampler, options: Options<'o>) -> Self {
         let deadline = Deadline::after(options.budget);
-        Self { text, deck, sampler, options, deadline, done: 0, expected: 0 }
+        Self { text, deck, sampler, options, patience: |_| Patience::LONG, deadline, done: 0, expected: 0 }
+    }
+
+    /// With its patience for each run.
+    pub fn with_patience(self, patience: fn(&Point) -> Patience) -> Self {
+        Self { patience, ..self }
     }
 
     /// Tells how many runs there will be, for those who wait.
@@ -75,11 +81,11 @@ impl<'a, 'o> Crew<'a, 'o> {
             open.reverse();
         }
         self.done += points.len() - open.len();
-        let (text, sampler, deadline) = (self.text, self.sampler, self.deadline);
+        let (text, sampler, patience, deadline) = (self.text, self.sampler, self.patience, self.deadline);
         let signals = self.options.interrupted;
         let stopped = || signals().or_else(|| deadline.is_over().then_some(0));
         let run = |k: usize| {
-            let trial = trial::run(text, &settings[k], sampler, &stopped);
+            let trial = trial::run(text, &settings[k], sampler, patience(&points[k]), &stopped);
             (trial.status != "interrupted").then_some(trial)
         };
         let broken = |_| Trial::ended("broke off");
@@ -98,7 +104,7 @@ impl<'a, 'o> Crew<'a, 'o> {
     /// What the deck itself ends with, where a variant of it ended as `singular`: a mechanism is one on every mesh, and named by
     /// a node of the deck's own.
     pub fn own_failure(&self) -> Option<Failure> {
-        let outcome = trial::simulate(self.text, &[], self.sampler, &self.options.interrupted);
+        let outcome = trial::simulate(self.text, &[], self.sampler, Patience::LONG, &self.options.interrupted);
         outcome.ok()?.ended.err()
     }
 
@@ -124,7 +130,8 @@ impl<'a, 'o> Crew<'a, 'o> {
                 if self.deadline.is_over() || (round >= REPEATS[0] && spent > TIMED) {
                     continue;
                 }
-                let trial = trial::run(self.text, &runs[k].settings, self.sampler, &self.options.interrupted);
+                let trial =
+                    trial::run(self.text, &runs[k].settings, self.sampler, Patience::LONG, &self.options.interrupted);
                 if let Some(signal) = (self.options.interrupted)() {
                     return Err(Refusal::Failure(interrupted(signal)));
                 }

@@ -16,7 +16,7 @@ pub use grid::{Family, Pace, Point};
 pub use journal::Journal;
 pub use order::{Expected, Order};
 pub use reference::Reference;
-pub use trial::{Seconds, Trial};
+pub use trial::{Patience, Seconds, Trial};
 
 pub(in crate::study) use crew::Crew;
 pub(in crate::study) use grid::{Mesher, dynamic_stages};

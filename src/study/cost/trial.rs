@@ -9,9 +9,21 @@ use crate::study::variant::Variant;
 use cpu_time::ThreadTime;
 use std::time::Instant;
 
-/// What takes more attempts than so many times its steps, and some, would not end in any time that a user waits.
-const MOST_ATTEMPTS: f64 = 50.0;
-const FEW_ATTEMPTS: u64 = 1000;
+/// How often a run may try: so many times its steps and levels, and some.
+#[derive(Clone, Copy, Debug)]
+pub struct Patience {
+    per_step: f64,
+    per_level: f64,
+    more: f64,
+}
+
+impl Patience {
+    /// What takes more attempts than that would not end in any time that a user waits.
+    pub const LONG: Self = Self { per_step: 50.0, per_level: 50.0, more: 1000.0 };
+    /// A step that fails costs as much as many that do not: where one in twenty does, all are too long to tell an error.
+    pub const SHORT: Self = Self { per_step: 1.05, per_level: 50.0, more: 10.0 };
+}
+
 /// Steps of a stage whose steps adapt.
 const MOST_ADAPTED: f64 = 1e5;
 
@@ -55,9 +67,15 @@ impl Trial {
 }
 
 /// Runs the deck `text` with settings. `interrupted` tells of signals.
-pub fn run(text: &str, settings: &[String], sampler: &Sampler, interrupted: &dyn Fn() -> Option<i32>) -> Trial {
+pub fn run(
+    text: &str,
+    settings: &[String],
+    sampler: &Sampler,
+    patience: Patience,
+    interrupted: &dyn Fn() -> Option<i32>,
+) -> Trial {
     let (cpu, wall) = (ThreadTime::try_now().ok(), Instant::now());
-    let outcome = simulate(text, settings, sampler, interrupted);
+    let outcome = simulate(text, settings, sampler, patience, interrupted);
     let wall = wall.elapsed().as_secs_f64();
     // A system that does not tell the time of threads has that on the wall.
     let cpu = cpu.and_then(|start| start.try_elapsed().ok()).map_or(wall, |time| time.as_secs_f64());
@@ -88,10 +106,11 @@ pub fn simulate(
     text: &str,
     settings: &[String],
     sampler: &Sampler,
+    patience: Patience,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> Result<Outcome, String> {
     let (deck, scene) = read(text, settings, sampler)?;
-    Ok(Outcome::of(&scene, sampler.recorder(&scene), attempts(&deck), interrupted))
+    Ok(Outcome::of(&scene, sampler.recorder(&scene), attempts(&deck, patience), interrupted))
 }
 
 fn read(text: &str, settings: &[String], sampler: &Sampler) -> Result<(Deck, Scene), String> {
@@ -103,21 +122,21 @@ fn read(text: &str, settings: &[String], sampler: &Sampler) -> Result<(Deck, Sce
     Ok((deck, scene))
 }
 
-/// How often a run may try, steps and levels together.
-fn attempts(deck: &Deck) -> u64 {
+/// How often a run of a deck may try, steps and levels together.
+fn attempts(deck: &Deck, patience: Patience) -> u64 {
     let mut start = 0.0;
-    let mut steps = 0.0;
+    let mut most = patience.more;
     for stage in &deck.stages {
-        steps += match stage.body {
-            StageBody::Static { steps, .. } => steps as f64,
-            StageBody::Path { max_steps, .. } => max_steps as f64,
+        most += match stage.body {
+            StageBody::Static { steps, .. } => patience.per_level * steps as f64,
+            StageBody::Path { max_steps, .. } => patience.per_level * max_steps as f64,
             StageBody::Dynamic { end, step, step_tolerance, .. } => {
                 let count = (end - start) / deck.output.interval.map_or(step, |interval| step.min(interval));
                 start = end;
-                if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
+                patience.per_step * if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
             }
-            StageBody::Modal { .. } | StageBody::Buckling { .. } => 1.0,
+            StageBody::Modal { .. } | StageBody::Buckling { .. } => patience.per_level,
         };
     }
-    (MOST_ATTEMPTS * steps) as u64 + FEW_ATTEMPTS
+    most as u64
 }
