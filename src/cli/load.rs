@@ -1,7 +1,7 @@
 //! From the path of a deck to a scene, with every message on the way.
 
 use super::{Status, say};
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity, SweepFile};
 use crate::scene::{self, Scene};
 use std::fs::File;
 use std::io::Read;
@@ -54,6 +54,9 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());
     let refuse = |text: &str, found: &[Diagnostic], expected: Vec<String>| {
+        if SweepFile::is_one(text) {
+            return a_sweep(path);
+        }
         let errors: Vec<_> = found.iter().filter(|d| !d.is_warning()).collect();
         let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
         let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
@@ -82,6 +85,12 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
         say::note(&render(&label, &text, &warnings));
     }
     Ok(Loaded { text, deck, scene })
+}
+
+/// What a sweep is told where a deck belongs.
+fn a_sweep(path: &Path) -> Refusal {
+    let name = path.display();
+    Refusal::of(Status::Wrong, "deck", format!("{name} is a sweep and no deck: try `beamsim sweep {name}`"))
 }
 
 /// The text of a table that a deck names, seen from the deck's folder.

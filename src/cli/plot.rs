@@ -26,7 +26,7 @@ pub struct Wanted {
     /// A stored history (CSV) to compare with
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// The picture (default: plot.svg in the first folder)
+    /// The picture, .svg or, where that was built in, .png (default: plot.svg in the first folder)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -62,17 +62,48 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
             if run.stored && !run.history.names.contains(column) {
                 continue;
             }
-            let name = if runs.len() == 1 { column.clone() } else { format!("{}: {column}", run.name) };
+            // One column needs no name on each line, and its runs differ by colour.
+            let (name, colour, dash) = match (runs.len(), columns.len()) {
+                (1, _) => (column.clone(), colour, 0),
+                (_, 1) => (run.name.clone(), dash, dash),
+                _ => (format!("{}: {column}", run.name), colour, dash),
+            };
             curves.push(curve(run, &x, column, Curve { name, points: Vec::new(), bars: None, colour, dash })?);
         }
     }
     let title = runs.iter().filter(|run| !run.stored).map(|run| run.name.as_str()).collect::<Vec<_>>().join(", ");
+    let y = if let [column] = &columns[..] { column.clone() } else { String::new() };
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
-    let written = PartFile::write_to(&path, Curves { title, x, curves }.to_svg().as_bytes());
-    written.map_err(Refusal::io)?;
+    let picture = picture(&Curves { title, x, y, curves }, &path)?;
+    PartFile::write_to(&path, &picture).map_err(Refusal::io)?;
     say::line(&format!("{}", path.display()));
     json::wrote("plot", &path);
     Ok(())
+}
+
+/// In the format that the name of the file asks for.
+fn picture(curves: &Curves, path: &Path) -> Result<Vec<u8>, Refusal> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        None | Some("svg") => Ok(curves.to_svg().into_bytes()),
+        Some("png") => png(curves),
+        Some(other) => {
+            let message = format!("`.{other}`: pictures are written as .svg or .png");
+            Err(Refusal::of(Status::Wrong, "usage", message))
+        }
+    }
+}
+
+#[cfg(feature = "png")]
+fn png(curves: &Curves) -> Result<Vec<u8>, Refusal> {
+    curves.to_png().map_err(|why| Refusal::of(Status::Wrong, "usage", format!("the picture cannot be drawn: {why}")))
+}
+
+#[cfg(not(feature = "png"))]
+fn png(_curves: &Curves) -> Result<Vec<u8>, Refusal> {
+    let message =
+        "this build draws .svg only: `cargo install --path . --locked --features png` makes one that draws .png";
+    Err(Refusal::of(Status::Wrong, "usage", message.into()))
 }
 
 /// The history in a folder, or the file itself.

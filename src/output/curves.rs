@@ -12,6 +12,8 @@ pub struct Curves {
     pub title: String,
     /// Below the horizontal axis
     pub x: String,
+    /// Beside the vertical axis
+    pub y: String,
     /// The lines
     pub curves: Vec<Curve>,
 }
@@ -33,14 +35,26 @@ pub struct Curve {
 impl Curves {
     /// The text of an SVG file.
     pub fn to_svg(&self) -> String {
+        let (plots, layout) = self.drawn();
+        render_to_svg(plots, layout)
+    }
+
+    /// The bytes of a PNG file, 1720 x 960; an error is what the drawing library says.
+    #[cfg(feature = "png")]
+    pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        let (plots, layout) = self.drawn();
+        render_to_png(plots, layout, 2.0)
+    }
+
+    fn drawn(&self) -> (Vec<Plot>, Layout) {
         let plots: Vec<Plot> = self.curves.iter().map(Curve::plot).collect();
         let layout = Layout::auto_from_plots(&plots)
             .with_title(self.title.as_str())
             .with_x_label(self.x.as_str())
-            .with_y_label("")
+            .with_y_label(self.y.as_str())
             .with_width(860.0)
             .with_height(480.0);
-        render_to_svg(plots, layout)
+        (plots, layout)
     }
 }
 
@@ -86,6 +100,18 @@ fn thinned(points: &[(f64, f64)]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "png")]
+    #[test]
+    fn png_files_hold_the_picture() {
+        let points = vec![(0.0, 0.0), (1.0, 2.0)];
+        let curve = Curve { name: "tip.ux".into(), points, bars: None, colour: 0, dash: 0 };
+        let curves = Curves { title: "A tip".into(), x: "time".into(), y: "tip.ux".into(), curves: vec![curve] };
+        let png = curves.to_png().unwrap();
+        let number = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+        assert_eq!((&png[..8], &png[12..16]), (&b"\x89PNG\r\n\x1a\n"[..], &b"IHDR"[..]));
+        assert_eq!((number(16), number(20)), (1720, 960));
+    }
 
     #[test]
     fn peaks_of_long_histories_stay() {

@@ -20,7 +20,7 @@ fn histories_of_several_runs_and_a_reference_stand_on_one_axis() {
     let words = ["plot", "fine", "coarse", "--column", "tip.uz", "--reference", "stored.csv", "--out", "p.svg"];
     assert_eq!(status(&folder.beamsim(&words)), 0);
     let picture = fs::read_to_string(folder.0.join("p.svg")).unwrap();
-    for word in ["fine: tip.uz", "coarse: tip.uz", "stored: tip.uz", ">load<", "stroke-dasharray"] {
+    for word in [">fine<", ">coarse<", ">stored<", ">tip.uz<", ">load<", "stroke-dasharray"] {
         assert!(picture.contains(word), "{word}");
     }
     assert!(picture.starts_with("<svg") && !picture.contains("NaN"));
@@ -43,6 +43,9 @@ fn what_cannot_be_drawn_is_told() {
         (&["h.csv", "--x", "lod"], "did you mean `load`?"),
         (&["empty.csv"], "no columns to draw"),
         (&["nothing.csv"], "nothing.csv"),
+        (&["h.csv", "--out", "h.pdf"], "`.pdf`: pictures are written as .svg or .png"),
+        #[cfg(not(feature = "png"))]
+        (&["h.csv", "--out", "h.png"], "--features png"),
     ] {
         let output = folder.beamsim(&[&["plot"], words].concat());
         assert!([2, 4].contains(&status(&output)) && last_line(&output).contains(told), "{}", last_line(&output));

@@ -168,6 +168,8 @@ fn a_file_says_what_a_command_line_says() {
         status(&output) == 2 && text.contains("did you mean `sample`?") && text.contains("did you mean `from`?"),
         "{text}"
     );
+    let output = folder.beamsim(&["run", "wrong.toml"]);
+    assert!(status(&output) == 2 && last_line(&output).contains("try `beamsim sweep wrong.toml`"));
 }
 
 #[test]
