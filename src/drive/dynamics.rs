@@ -54,8 +54,7 @@ impl Run<'_> {
             let grid = self.next_grid(end, step);
             for number in 1..=grid.steps {
                 let (next, length) = grid.step(number);
-                let done = self.dynamic_progress(next, end);
-                let last = self.stride(workshop, Step { scheme, length }, before, (next, done))?;
+                let last = self.stride(workshop, Step { scheme, length }, before, (next, end))?;
                 if self.complete(workshop, &last)? {
                     return Ok(());
                 }
@@ -65,19 +64,19 @@ impl Run<'_> {
     }
 
     /// A step of the grid at once, or where that fails in halves, and halves of halves. Returns the last of them, which is
-    /// not settled yet. `next` is the time it ends at, with the part of the run that is done then.
+    /// not settled yet. `next` is the time it ends at, `end` that of the stage.
     fn stride(
         &mut self,
         workshop: &mut Workshop,
         whole: Step,
         before: &mut f64,
-        (next, done): (f64, f64),
+        (next, end): (f64, f64),
     ) -> Result<Step, Failure> {
         // Parts are counted: the clock is rounded, and late in a run a short step is not much longer than that.
         let (mut step, mut parts) = (whole, 1);
         loop {
             let target = if parts == 1 { next } else { self.state.time + step.length };
-            self.observer.progress(self.moment(), done)?;
+            self.observer.progress(self.moment(), self.dynamic_progress(target, end))?;
             match self.advance(workshop, step, *before, target) {
                 Ok(()) => {
                     *before = step.length;

@@ -131,10 +131,11 @@ impl Levels {
         if self.approach == Approach::Straight {
             return false;
         }
-        if !self.stability.changes_to(negative) {
-            return has_turned_back(model, from, to, first);
-        }
         let (step, risen) = (to.load - from.load, from.load - self.start.load);
+        if !self.stability.changes_to(negative) {
+            // A stage may begin out of balance: its first step need not go along a path.
+            return risen > 0.0 && has_turned_back(model, from, to, first);
+        }
         let moved = distance(model, from, to);
         let usual = if risen > 0.0 { distance(model, &self.start, from) / risen * step } else { f64::INFINITY };
         step > CLOSE * self.level || moved > (JUMP * usual).max(NO_MOTION)
@@ -143,7 +144,7 @@ impl Levels {
 
 /// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
 /// displacements tell.
-pub(super) fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> bool {
+fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> bool {
     let [mut along, mut moved, mut expected] = [0.0; 3];
     let nodes = model.slots.iter().zip(first).enumerate();
     for (slot, (_, first)) in nodes.filter(|(_, (info, _))| info.kind == SlotKind::Displacement) {

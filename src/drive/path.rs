@@ -25,10 +25,17 @@ const EASY: f64 = 5.0;
 const MOST_TOLD: usize = 10;
 /// Steps grow at most to this multiple of the first.
 const LONGEST: f64 = 2.0;
+/// Where the path is straight and brings little load, at most to so many times that.
+const STRETCH: f64 = 8.0;
+/// Straight is what has this cosine between tangents.
+const STRAIGHT: f64 = 0.995;
 /// And shrink to this part of it.
 const SHORTEST: f64 = 1.0 / 16384.0;
-/// Cosine between tangents below which a step was too long: it may have come down on another branch.
+/// Cosine between tangents, or between a tangent and its chord, below which a step was too long: it may have come down on another
+/// branch.
 const BENT: f64 = 0.8;
+/// Part of the first step below which a change of pivots is believed that no limit point explains.
+const BELIEVED: f64 = 1.0 / 1024.0;
 /// Attempts to come nearer to a special point.
 const MOST_LOOKS: usize = 40;
 /// A correction of so many times the step is a flight.
@@ -48,6 +55,8 @@ struct Point {
     /// The rate of the displacement that the loads do work on
     work_rate: f64,
     negative: Option<usize>,
+    /// Whether it is a limit point: one pivot is next to zero, with the sign of round-off
+    on_limit: bool,
 }
 
 /// What is looked for between two points, as a function that changes its sign there.
@@ -94,7 +103,7 @@ impl Run<'_> {
             self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
         }
         self.warn_of_instability(path.here.negative);
-        self.look_out_of_plane(path.here.negative)
+        if path.here.on_limit { Ok(()) } else { self.look_out_of_plane(path.here.negative) }
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
@@ -131,8 +140,6 @@ impl Run<'_> {
             let mut targets = Vec::new();
             if (next.load_rate > 0.0) != rising {
                 targets.push(Target::Limit);
-                // On the limit point itself the sign of one pivot is that of round-off.
-                self.look_out_of_plane(next.negative)?;
             }
             if (next.work_rate > 0.0) != working {
                 targets.push(Target::Turning);
@@ -141,10 +148,16 @@ impl Run<'_> {
                 targets.push(goal);
             }
             let behind = next.negative;
+            let beyond = (self.plane.is_some() && targets.contains(&Target::Limit)).then(|| next.state.clone());
             let (mut arrived, mut target) = path.nearest(self, workshop, next, length, &targets);
             if target == Some(Target::Limit) {
                 // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
                 arrived.negative = behind;
+                arrived.on_limit = true;
+                if let Some(beyond) = &beyond {
+                    self.state.copy_from(beyond);
+                    self.look_out_of_plane(behind)?;
+                }
             }
             if targets.contains(&goal) && (target.is_none() || target == Some(goal)) {
                 if !self.hit(workshop, goal, &mut arrived, path) && path.shorten() {
@@ -236,6 +249,8 @@ struct Path {
     here: Point,
     length: f64,
     first: f64,
+    /// The tangent's part in the load factor at the beginning
+    first_rate: f64,
     /// 1/U^2
     scale: f64,
 }
@@ -266,7 +281,7 @@ impl Path {
     /// With its first length. Forces near the limits of floating point have no measure of displacements: then lengths are no numbers,
     /// and no search for a shorter one would end.
     fn begin_with(mut self, run: &Run, first: f64) -> Result<Self, Failure> {
-        (self.first, self.length) = (first, first);
+        (self.first, self.length, self.first_rate) = (first, first, self.here.load_rate);
         if first.is_finite() && self.here.load_rate.is_finite() {
             return Ok(self);
         }
@@ -283,12 +298,20 @@ impl Path {
         let turned = rotated.map(|(_, d)| d.norm() * run.model.length).fold(0.0, f64::max);
         // Displacements that are only round-off beside the rotations measure nothing.
         let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
-        let here = Point { state: run.state.clone(), tangent: rate, load_rate: 1.0, work_rate: 1.0, negative: None };
+        let here = Point {
+            state: run.state.clone(),
+            tangent: rate,
+            load_rate: 1.0,
+            work_rate: 1.0,
+            negative: None,
+            on_limit: false,
+        };
         Self {
             begun: run.state.load,
             here,
             length: 0.0,
             first: 0.0,
+            first_rate: 1.0,
             scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
         }
     }
@@ -312,7 +335,14 @@ impl Path {
         // Of prescribed motions alone no displacement is known that loads would do work on.
         let work = work_of_loads(run, &pull, &rate).unwrap_or(load_rate.signum());
         let tangent = rate.into_iter().map(|d| d * load_rate).collect();
-        Ok(Point { state: run.state.clone(), tangent, load_rate, work_rate: work * load_rate, negative })
+        Ok(Point {
+            state: run.state.clone(),
+            tangent,
+            load_rate,
+            work_rate: work * load_rate,
+            negative,
+            on_limit: false,
+        })
     }
 
     /// One step that is neither too hard nor too bent; its length.
@@ -330,9 +360,13 @@ impl Path {
                     };
                     let cosine =
                         dot(run, &next.tangent, &self.here.tangent) * self.scale + next.load_rate * self.here.load_rate;
-                    if cosine >= BENT || length <= SHORTEST * self.first {
+                    let straight = cosine.min(length / self.chord(run, &next)) >= BENT;
+                    let fine = straight && !self.may_have_jumped(&next, length);
+                    if fine || length <= SHORTEST * self.first {
                         let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
-                        self.length = (length * factor).min(LONGEST * self.first);
+                        let is_easy = iterations <= 2 && cosine >= STRAIGHT;
+                        let longest = if is_easy { self.longest(next.load_rate) } else { LONGEST * self.first };
+                        self.length = (length * factor).min(longest.max(length));
                         return Ok((next, length));
                     }
                     None
@@ -347,6 +381,27 @@ impl Path {
                 return Err(named);
             }
         }
+    }
+
+    /// The longest step where the path is straight: it brings as much load as the longest one at the beginning.
+    fn longest(&self, load_rate: f64) -> f64 {
+        LONGEST * self.first * (self.first_rate / load_rate).abs().clamp(1.0, STRETCH)
+    }
+
+    /// How far a point is from here; over its length along the tangent, the cosine between both.
+    fn chord(&self, run: &Run, next: &Point) -> f64 {
+        let moved: Vec<Vec3> = next.state.q.iter().zip(&self.here.state.q).map(|(q, here)| *q - *here).collect();
+        let risen = next.state.load - self.here.state.load;
+        (squared(run, &moved) * self.scale + risen * risen).sqrt()
+    }
+
+    /// Whether a step of this length may have gone to another branch: along a path one pivot changes its sign where the load turns,
+    /// and else only where another branch begins, which a short step passes by.
+    fn may_have_jumped(&self, next: &Point, length: f64) -> bool {
+        let (Some(before), Some(after)) = (self.here.negative, next.negative) else { return false };
+        // On a limit point the load has turned already.
+        let turned = !self.here.on_limit && (next.load_rate > 0.0) != (self.here.load_rate > 0.0);
+        before.abs_diff(after) != usize::from(turned) && length > BELIEVED * self.first
     }
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and returns the iterations.

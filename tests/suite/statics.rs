@@ -175,6 +175,80 @@ fn an_imperfect_column_bends_to_the_side_of_its_imperfection() {
     }
 }
 
+/// A buckled column from which the load is taken again: its path leads past where it buckled, next to the mirrored branch.
+#[test]
+fn arc_length_stays_on_its_branch() {
+    for steps in [1, 10, 40] {
+        let column = simulate(&format!(
+            "[point]\nfoot = [0, 0, 0]\nmiddle = [0, 0, 0.5]\ntop = [0, 0, 1]\n\
+             [section.s]\nEA = 1e5\nGA = 5e4\nGJ = 100\nEI = [1000, 10]\n\
+             [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"foot\", \"middle\", \"top\"]\nelements = 4\norder = 2\n\
+             [[support]]\nat = \"foot\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+             [[support]]\nat = \"top\"\nfix = [\"ux\", \"uy\", \"rx\", \"rz\"]\n\
+             [[load]]\nat = \"top\"\nforce = [0, 0, \"-15*pi^2\"]\nstages = [1]\n[[load]]\nat = \"middle\"\nforce = [\"0.01*pi^2\", 0, 0]\n\
+             [[stage]]\nkind = \"static\"\nsteps = 10\n\
+             [[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\nmax_steps = 300\n"
+        ));
+        // F L^3/48 EI, and the shear of F L/4 GA.
+        let force = 0.01 * std::f64::consts::PI.powi(2);
+        let exact = force / 480.0 + force / (4.0 * 5e4);
+        let aside = column.end("middle.ux");
+        assert!(
+            (aside - exact).abs() < 1e-3 * exact && column.end("load") == 1.0,
+            "{steps} steps: {aside} for {exact}"
+        );
+    }
+}
+
+/// A strip with a force of 5 % aside, shortened to a hundred times what it buckles at: no load turns, and no branch begins.
+#[test]
+fn an_imperfect_path_has_no_branches() {
+    for steps in [1, 20, 200] {
+        let strip = simulate(&format!(
+            "[point]\nleft = [0, 0, 0]\nmiddle = [0.5, 0, 0]\nright = [1, 0, 0]\n\
+             [section.s]\nEA = 1e5\nGA = 5e4\nGJ = 10\nEI = [10, 1000]\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"left\", \"middle\", \"right\"]\nelements = 12\norder = 2\n\
+             [[support]]\nat = \"left\"\nfix = \"all\"\n[[support]]\nat = \"right\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n\
+             [[load]]\nat = \"middle\"\nforce = [0, 0, 20]\n[[motion]]\nat = \"right\"\nux = -0.6\n\
+             [[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\nmax_steps = 1000\n"
+        ));
+        let aside = strip.end("middle.uz");
+        assert!((aside - 0.389_643_66).abs() < 1e-7 && strip.counters.events.is_empty(), "{steps} steps: {aside}");
+    }
+}
+
+/// A hinged arch at five times its limit load, with a force of 1 % aside: the detour leads to the branch hanging through.
+#[test]
+fn a_detour_passes_bifurcations_nearby() {
+    for steps in [1, 4, 20] {
+        let arch = simulate(&format!(
+            "[param]\nR = 5\na = \"20*deg\"\n[point]\nleft = [\"-R*sin(a)\", 0, \"R*cos(a)\"]\ncrown = [0, 0, \"R\"]\nright = [\"R*sin(a)\", 0, \"R*cos(a)\"]\n\
+             [section.s]\nEA = 2e4\nGA = 1e4\nGJ = 10\nEI = 10\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\narc = [\"left\", \"crown\", \"right\"]\nelements = 12\norder = 2\n\
+             [[support]]\nat = \"left\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n[[support]]\nat = \"right\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+             [[load]]\nat = \"crown\"\nforce = [0.5, 0, -60]\n[[stage]]\nkind = \"static\"\nsteps = {steps}\n"
+        ));
+        let crown = arch.end("crown.uz");
+        assert!((crown + 0.681_38).abs() < 1e-5 && arch.counters.steps < 100, "{steps} levels: {crown}");
+    }
+}
+
+/// A pendulum stopped in its swing: nothing grows with the load factor, and the first step goes where gravity leads.
+#[test]
+fn a_static_stage_may_begin_out_of_balance() {
+    let hanging = simulate(
+        "gravity = [0, 0, -10]\n[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1\nEI = 1\nrhoA = 1\n\
+         [[beam]]\nname = \"m\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 8\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+         [[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.01\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+    );
+    let statics = simulate(
+        "gravity = [0, 0, -10]\n[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1\nEI = 1\nrhoA = 1\n\
+         [[beam]]\nname = \"m\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 8\n[[support]]\nat = \"a\"\nfix = \"all\"\n\
+         [[stage]]\nkind = \"static\"\nsteps = 4\n",
+    );
+    assert!((hanging.end("b.uz") - statics.end("b.uz")).abs() < 1e-8);
+}
+
 /// Turned back within one level, no element turns further than it did: smaller steps tell.
 #[test]
 fn a_reversal_is_no_leap_over_pi() {
