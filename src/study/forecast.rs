@@ -118,8 +118,17 @@ impl Observer for Watch<'_> {
         self.at = at;
         let come = self.watched.filter(|(watched, ..)| *watched == stage).map_or(0.0, |(.., come)| come);
         let begins = self.seen.last().is_none_or(|last| last.stage != stage);
-        let behind = if begins { 0.0 } else { self.under_way };
-        self.under_way = done * stages - stage as f64;
+        let (tried, next) = (self.under_way, done * stages - stage as f64);
+        let before = self.seen.last().map_or(0.0, |last| last.done);
+        // An attempt that is followed by one that goes less far has failed.
+        let behind = if begins {
+            0.0
+        } else if next > tried {
+            tried
+        } else {
+            before
+        };
+        self.under_way = next;
         // At least one attempt is seen to its end.
         let is_over =
             self.seen.first().is_some_and(|first| elapsed.as_secs_f64() - first.elapsed > self.patience.as_secs_f64());

@@ -209,7 +209,7 @@ impl Observer for Columns<'_> {
         match (self.interrupted)() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),
             None if self.attempts > self.most_attempts => Err(Failure::Limit(format!(
-                "given up at {at} after {} attempts at steps, far more than the whole scene takes",
+                "given up at {at} after {} attempts at steps, more than the whole scene should take",
                 self.most_attempts
             ))),
             None => Ok(()),

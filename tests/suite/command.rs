@@ -242,6 +242,17 @@ fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
     assert!(plot.contains("CPU time / s") && plot.contains("order 2, relative") && !plot.contains("NaN"));
 }
 
+/// The first step on offer fails in one step of three, and takes eight times the iterations of half of it.
+#[test]
+fn a_search_gives_up_steps_that_fail() {
+    let folder = Folder::new("offer");
+    let deck = concat!(env!("CARGO_MANIFEST_DIR"), "/decks/spin_up.toml");
+    assert_eq!(status(&folder.beamsim(&["run", deck, "--accuracy", "1e-2", "--out", "r"])), 0);
+    let record: serde_json::Value = serde_json::from_slice(&fs::read(folder.0.join("r/run.json")).unwrap()).unwrap();
+    // Two rounds; a third where the first told something.
+    assert_eq!(record["accuracy"]["runs"], 6);
+}
+
 #[test]
 fn run_reaches_an_accuracy_and_says_with_what() {
     let folder = Folder::new("accuracy");

@@ -149,9 +149,14 @@ impl<'a> Search<'a> {
                 // The longer step is no easier: two halvings leave one to compare with.
                 "limit" if is_offer(&round.own) => {
                     self.pace = scaled(self.pace, 0.25);
+                    self.longest = self.pace;
                     continue;
                 }
                 _ => {}
+            }
+            if round.with_longer_step.is_some() && trials.last().is_some_and(|longer| longer.status == "limit") {
+                // A pace needs one twice as long to compare with.
+                self.longest = scaled(self.pace, 0.5);
             }
             let estimate = self.estimate(&round, &trials);
             let found = self.cheapest(round, &estimate, runs);

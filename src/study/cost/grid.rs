@@ -57,6 +57,11 @@ pub struct Point {
     pub newton: f64,
 }
 
+/// A fixed step as it is taken: where rows are wanted at multiples of an interval, an equal part of that.
+pub fn equal_part(deck: &Deck, step: f64) -> f64 {
+    deck.output.interval.map_or(step, |interval| interval / (interval / step - 1e-9).ceil().max(1.0))
+}
+
 /// The variants of a study: every family on every mesh with every pace, from coarse to fine.
 pub struct Grid {
     /// The families
@@ -217,8 +222,7 @@ impl Point {
     pub fn step(&self, deck: &Deck) -> Option<f64> {
         let Pace::Steps(factor) = self.pace else { return None };
         let StageBody::Dynamic { step, .. } = dynamic_stages(deck).next()?.1 else { return None };
-        let step = step * factor;
-        Some(deck.output.interval.map_or(step, |interval| interval / (interval / step - 1e-9).ceil().max(1.0)))
+        Some(equal_part(deck, step * factor))
     }
 
     /// About how much work it is, for runs of one deck.

@@ -1,5 +1,6 @@
 //! One run of a variant.
 
+use super::grid::equal_part;
 use super::sample::{Sampler, Samples};
 use crate::deck::{Deck, StageBody};
 use crate::drive::Failure;
@@ -20,7 +21,7 @@ pub struct Patience {
 impl Patience {
     /// What takes more attempts than that would not end in any time that a user waits.
     pub const LONG: Self = Self { per_step: 50.0, per_level: 50.0, more: 1000.0 };
-    /// A step that fails costs as much as many that do not: where one in twenty does, all are too long to tell an error.
+    /// Steps that fail cost as much as many that do not, and tell no error: one in forty, halved once each, uses this up.
     pub const SHORT: Self = Self { per_step: 1.05, per_level: 50.0, more: 10.0 };
 }
 
@@ -131,7 +132,7 @@ fn attempts(deck: &Deck, patience: Patience) -> u64 {
             StageBody::Static { steps, .. } => patience.per_level * steps as f64,
             StageBody::Path { max_steps, .. } => patience.per_level * max_steps as f64,
             StageBody::Dynamic { end, step, step_tolerance, .. } => {
-                let count = (end - start) / deck.output.interval.map_or(step, |interval| step.min(interval));
+                let count = (end - start) / equal_part(deck, step) + 1.0;
                 start = end;
                 patience.per_step * if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
             }
