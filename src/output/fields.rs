@@ -209,6 +209,10 @@ impl Cells {
         for body in 0..figure.bodies.len() {
             cells.push(std::iter::once(first + body), VERTEX, -1);
         }
+        first += figure.bodies.len();
+        for link in 0..figure.links.len() {
+            cells.push((0..2).map(|end| first + 2 * link + end), LINES[0], -1);
+        }
         cells
     }
 

@@ -12,6 +12,8 @@ pub struct Figure {
     pub lines: Vec<Line>,
     /// Its rigid bodies
     pub bodies: Vec<Place>,
+    /// The ends of its springs and cables between nodes
+    pub links: Vec<[Place; 2]>,
 }
 
 /// A beam.
@@ -58,10 +60,11 @@ pub struct Look {
 }
 
 impl Figure {
-    /// All nodes of beams, then the bodies.
+    /// All nodes of beams, then the bodies, then the ends of links.
     pub fn looks(&self, state: &State) -> Vec<Look> {
         let points = self.lines.iter().flat_map(|line| &line.points);
-        points.map(|point| point.look(state)).chain(self.bodies.iter().map(|place| bare(place, state))).collect()
+        let others = self.bodies.iter().chain(self.links.as_flattened());
+        points.map(|point| point.look(state)).chain(others.map(|place| bare(place, state))).collect()
     }
 
     /// How many nodes of beams there are.

@@ -2,22 +2,27 @@
 
 use super::mesh::{Mesh, MeshBeam};
 use crate::effect::beam_elasticity::StressField;
+use crate::effect::link;
 use crate::effect::rigid_body::Body;
 use crate::probe::{BeamPoint, Figure, Line, LinePoint, Place};
 use crate::tensor::Mat3;
 use nalgebra::Matrix6;
 use std::sync::Arc;
 
-/// Every node of every beam, and the rigid bodies.
-pub fn figure(mesh: &Mesh, bodies: &[Body], elasticity: &[Arc<dyn StressField>]) -> Figure {
+/// Every node of every beam, the rigid bodies, and the ends of what joins two nodes.
+pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[link::Instance], elasticity: &[Arc<dyn StressField>]) -> Figure {
     let line = |beam: &MeshBeam| Line {
         name: beam.name.clone(),
         order: beam.order,
         points: (0..beam.nodes.len()).map(|k| point(mesh, beam, k, elasticity)).collect(),
     };
-    let body =
-        |body: &Body| Place { nodes: vec![(body.node, body.place, 1.0)], frame: Mat3::IDENTITY, relative: false };
-    Figure { lines: mesh.beams.iter().map(line).collect(), bodies: bodies.iter().map(body).collect() }
+    let bare = |node, place| Place { nodes: vec![(node, place, 1.0)], frame: Mat3::IDENTITY, relative: false };
+    let ends = |link: &link::Instance| [0, 1].map(|k| bare(link.nodes[k], link.places[k]));
+    Figure {
+        lines: mesh.beams.iter().map(line).collect(),
+        bodies: bodies.iter().map(|body| bare(body.node, body.place)).collect(),
+        links: links.iter().map(ends).collect(),
+    }
 }
 
 fn point(mesh: &Mesh, beam: &MeshBeam, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {

@@ -20,6 +20,7 @@ pub use section::{MassPerLength, SectionMatrices};
 use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::beam_elasticity::StressField;
+use crate::effect::link;
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
 use crate::model::{Charted, ElementInfo, Model, SlotInfo, SlotKind};
@@ -49,6 +50,8 @@ pub struct Scene {
     pub mesh: Mesh,
     /// Rigid bodies
     pub bodies: Vec<Body>,
+    /// Springs and cables between nodes
+    pub links: Vec<link::Instance>,
     /// The deck with expressions replaced by numbers
     pub resolved: serde_json::Value,
     /// What knows of resultants
@@ -58,7 +61,7 @@ pub struct Scene {
 impl Scene {
     /// Its whole shape, for pictures.
     pub fn figure(&self) -> Figure {
-        figure::figure(&self.mesh, &self.bodies, &self.elasticity)
+        figure::figure(&self.mesh, &self.bodies, &self.links, &self.elasticity)
     }
 }
 
@@ -240,6 +243,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         reasons: [vec![planar], composition.reasons].concat(),
         mesh,
         bodies: composition.bodies,
+        links: composition.links,
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
     })

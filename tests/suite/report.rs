@@ -3,20 +3,20 @@
 use super::folder::{Folder, last_line, status};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 
-/// A pendulum of two beams and a body, let go.
+/// A pendulum of two beams and a body, on a soft spring, let go.
 const DECK: &str = "title = \"Pendulum & <body>\"\ngravity = [0, 0, -10]\n\
      [point]\nroot = [0, 0, 0]\nmid = [1, 0, 0]\ntip = [2, 0.5, 0]\n\
      [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 10\nEI = 10\nrhoA = 1\n\
      [[beam]]\nname = \"a\"\nsection = \"s\"\nthrough = [\"root\", \"mid\"]\nelements = 2\norder = 2\n\
      [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"mid\", \"tip\"]\nelements = 3\n\
      [[joint]]\nkind = \"spherical\"\nat = \"mid\"\nbeams = [\"a\", \"b\"]\n\
-     [[body]]\nat = \"tip\"\nmass = 0.5\n[[support]]\nat = \"root\"\nfix = \"all\"\n\
+     [[body]]\nat = \"tip\"\nmass = 0.5\n[[spring]]\nbetween = [\"root\", \"tip\"]\nstiffness = 0.1\n[[support]]\nat = \"root\"\nfix = \"all\"\n\
      [[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.01\n\
      [output]\nnodes = [\"a@end\", \"tip\", \"b@0.1\"]\ncolumns = [\"x\", \"d\", \"energy\"]\nevery = 4\n";
 
@@ -61,8 +61,8 @@ fn a_page_holds_the_run_and_its_shape() {
     let rows: Vec<usize> = scene["rows"].as_array().unwrap().iter().map(|row| row.as_u64().unwrap() as usize).collect();
     assert!(rows.into_iter().eq(0..14));
 
-    // Five nodes of `a`, four of `b`, one of the body.
-    assert_eq!(scene["nodes"], 10);
+    // Five nodes of `a`, four of `b`, one of the body, two of the spring.
+    assert_eq!((&scene["nodes"], &scene["links"]), (&json!(12), &json!([[10, 11]])));
     let orders: Vec<u64> =
         scene["beams"].as_array().unwrap().iter().map(|beam| beam["order"].as_u64().unwrap()).collect();
     assert_eq!(orders, [2, 1]);
@@ -78,7 +78,7 @@ fn a_page_holds_the_run_and_its_shape() {
     let places = numbers(&scene["places"], f32::from_le_bytes);
     let turns = numbers(&scene["turns"], i16::from_le_bytes);
     for (frame, name) in (0..14).flat_map(|frame| ["a@end", "tip"].map(|name| (frame, name))) {
-        let at = frame * 10 + node(name);
+        let at = frame * 12 + node(name);
         // Places are single floats: 1e-7 of lengths of 2.
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
             let exact = column(history, &format!("{name}.{axis}"))[frame];

@@ -39,7 +39,7 @@ const FIELDS: [(&str, &str, char); 7] = [
 /// Watches a run.
 pub struct Film {
     figure: Figure,
-    /// Numbers of the nodes that are shown, beam by beam, then the bodies
+    /// Numbers of the nodes that are shown, beam by beam, then the bodies, then the ends of links
     shown: Vec<Vec<usize>>,
     names: Vec<(String, usize)>,
     /// Rows of the history so far
@@ -158,13 +158,15 @@ impl Film {
             first += shown.len();
         }
         let nodes = |all: &[usize]| all.iter().map(|node| json!({ "node": node })).collect::<Vec<_>>();
-        let bodies: Vec<usize> = (first..places.len()).collect();
+        let bodies: Vec<usize> = (first..first + self.figure.bodies.len()).collect();
+        let ends: Vec<usize> = (first + bodies.len()..places.len()).collect();
         let frames = || self.frames.iter();
         json!({
             "nodes": places.len(),
             "names": self.names.iter().map(|(name, node)| json!({ "name": name, "node": node })).collect::<Vec<_>>(),
             "beams": beams,
             "bodies": nodes(&bodies),
+            "links": ends.as_chunks::<2>().0,
             "supports": nodes(&self.supports),
             "joints": nodes(&self.joints),
             "initial": base64(places.iter().flat_map(|(_, place)| place.0).flat_map(|x| (x as f32).to_le_bytes())),
@@ -221,7 +223,8 @@ fn fields(look: &Look) -> [f32; 7] {
     [n1, n2, n3, m1, m2, m3, look.energy].map(|x| x as f32)
 }
 
-/// The nodes of each beam that are shown: all, or each n-th, the ends and those with names; then the bodies.
+/// The nodes of each beam that are shown: all, or each n-th, the ends and those with names; then the bodies; then the
+/// ends of links.
 fn shown(figure: &Figure, named: &[(String, Place)]) -> Vec<Vec<usize>> {
     let stride = figure.line_points().div_ceil(MOST_POINTS).max(1);
     let mut first = 0;
@@ -238,6 +241,8 @@ fn shown(figure: &Figure, named: &[(String, Place)]) -> Vec<Vec<usize>> {
         first += line.points.len();
     }
     all.push((first..first + figure.bodies.len()).collect());
+    first += figure.bodies.len();
+    all.push((first..first + figure.links.as_flattened().len()).collect());
     all
 }
 
@@ -248,6 +253,7 @@ fn initial(figure: &Figure, shown: &[Vec<usize>]) -> Vec<(Node, Vec3)> {
         .iter()
         .flat_map(|line| line.points.iter().map(|point| &point.place))
         .chain(&figure.bodies)
+        .chain(figure.links.as_flattened())
         .collect();
     shown.iter().flatten().filter_map(|&k| Some((places[k].node()?, places[k].initial()))).collect()
 }

@@ -71,6 +71,7 @@ impl Composer<'_> {
             return self.reason("springs and cables between nodes", false, "no [[spring]] `between` nodes");
         }
         let reason = format!("{} [[spring]] table(s) `between` nodes", links.len());
+        self.out.links.clone_from(&links);
         self.push(Links { links }, reason);
     }
 

@@ -12,9 +12,9 @@ use crate::deck::{self, Deck, Diagnostic, EffectWord, InterpolationWord};
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
 use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
 use crate::effect::rigid_body::Body;
-use crate::effect::spring;
 use crate::effect::strain_rate_damping::StrainRateDamping;
 use crate::effect::{Connection, Effect, VolumeElement, VolumeElements};
+use crate::effect::{link, spring};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Strain;
 use crate::kernel::volume::VolumePoint;
@@ -46,6 +46,8 @@ pub struct Composition {
     pub elasticity: Vec<Arc<dyn StressField>>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
+    /// Springs and cables between nodes
+    pub links: Vec<link::Instance>,
     /// Springs to ground
     pub springs: Vec<spring::Instance>,
     /// Slots of multipliers, behind those of the mesh
@@ -84,6 +86,7 @@ pub fn compose(
         amplitudes: Vec::new(),
         elasticity: Vec::new(),
         bodies: Vec::new(),
+        links: Vec::new(),
         springs: Vec::new(),
         multipliers: Vec::new(),
         idle_multipliers: Vec::new(),
