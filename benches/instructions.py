@@ -32,7 +32,7 @@ FEW, MANY = 2, 8
 TOLERANCE, SAME = 0.05, 1e-3
 # Instructions of a function in callgrind_annotate's list, and the functions of the allocator.
 LISTED = re.compile(r"^\s*([\d,]+) \(\s*[\d.]+%\)\s+\S*?:(.*)$", re.MULTILINE)
-ALLOCATOR = re.compile(r"malloc|calloc|realloc|memalign|free\b|unlink_chunk|alloc_perturb|sysmalloc|systrim|tcache|morecore")
+ALLOCATOR = re.compile(r"malloc|calloc|realloc|memalign|_int_free|free\b|unlink_chunk|alloc_perturb|systrim|tcache|morecore")
 
 BASE = """
 [point]
@@ -199,7 +199,7 @@ def main():
         bench = Bench(arguments.beamsim, Path(folder))
         try:
             fine = [present(bench, arguments.bless), absent(bench)]
-        except RuntimeError as error:
+        except (RuntimeError, OSError, subprocess.CalledProcessError) as error:
             print(error, file=sys.stderr)
             return 2
     return 0 if all(fine) else 1
