@@ -136,7 +136,9 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
     if !wanted.columns.is_empty() {
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
-    let shown = |name: &&String| !CLOCKS.contains(&name.as_str()) && !name.ends_with(".err");
+    let shown = |name: &&String| {
+        !CLOCKS.contains(&name.as_str()) && !name.ends_with(".err") && Some(*name) != wanted.x.as_ref()
+    };
     let moved = |name: &&String| [".ux", ".uy", ".uz"].iter().any(|suffix| name.ends_with(suffix));
     let all: Vec<String> = history.names.iter().filter(shown).cloned().collect();
     let some: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();

@@ -35,6 +35,8 @@ pub struct Tried {
     pub dynamic: bool,
     /// Whether it was an increment of arc length
     pub path: bool,
+    /// Whether it was a load level that is not linear in the load factor, so that arc length could not follow
+    pub nonlinear: bool,
     /// Whether round-off takes the stiffness of the softest motion
     pub soft: bool,
     /// Whether there are beams, whose mesh may be too coarse
@@ -57,6 +59,10 @@ impl Tried {
             Self { path: true, .. } => {
                 "shorter increments were tried: the mesh may be too coarse where it turns most, or a branch cross the path (a small side \
                  force chooses one)"
+            }
+            Self { nonlinear: true, cutbacks: 1.., .. } => {
+                "smaller load levels were tried: a limit load may lie just ahead, around which only arc length leads, and that follows no \
+                 `history` and no `frame` (load and unload in stages of their own, with `stages = [1]` in a load)"
             }
             Self { cutbacks: 1.., .. } => {
                 "smaller load levels and arc length were tried: the mesh may be too coarse where it turns most, or a buckling load \

@@ -574,6 +574,10 @@ impl<'o> Run<'o> {
                 tried: Tried {
                     cutbacks: self.counters.cutbacks - self.cutbacks_before,
                     path: matches!(self.plan.stages[self.stage].work, StageWork::Path { .. }),
+                    nonlinear: matches!(
+                        self.plan.stages[self.stage].work,
+                        StageWork::Static { approach: Approach::Parts, .. }
+                    ),
                     dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
                     soft: self.soft,
                     beams: self.model.elements > 0,

@@ -93,6 +93,21 @@ fn too_few_iterations_are_told_with_the_residual() {
     }
 }
 
+/// A von Mises truss pushed through and pulled back by a history, which no arc length follows.
+#[test]
+fn a_snap_under_a_history_is_told_what_to_try() {
+    let text = "[point]\nleft = [0, 0, 0]\ncrown = [1, 0, 0.1]\nright = [2, 0, 0]\n\
+         [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 100\nEI = 1\n\
+         [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"left\", \"crown\", \"right\"]\nelements = 2\norder = 2\naxis3 = [0, 1, 0]\n\
+         [[support]]\nat = \"left\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+         [[support]]\nat = \"right\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+         [[load]]\nat = \"crown\"\nforce = [0, 0, -20]\nhistory = \"h\"\n[history.h]\ntimes = [0, 0.5, 1]\nvalues = [0, 1, 0]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 20\n";
+    let failure = attempt(text).result.expect_err("it snaps");
+    assert_eq!(failure.name(), "not_converged");
+    assert!(failure.hint().is_some_and(|hint| hint.contains("`history`")), "{failure}");
+}
+
 #[test]
 fn a_motion_that_would_jump_is_an_error_of_the_deck() {
     let failure = failure(
