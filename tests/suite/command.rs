@@ -242,7 +242,7 @@ fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
     assert!(plot.contains("CPU time / s") && plot.contains("order 2, relative") && !plot.contains("NaN"));
 }
 
-/// The first step on offer fails in one step of three, and takes eight times the iterations of half of it.
+/// The first step on offer fails in two steps of five, and takes three times the iterations of half of it.
 #[test]
 fn a_search_gives_up_steps_that_fail() {
     let folder = Folder::new("offer");

@@ -157,19 +157,25 @@ fn round_off_is_no_jump() {
     assert_eq!((along.steps, along.cutbacks, along.events.len()), (skew.steps, skew.cutbacks, skew.events.len()));
 }
 
+/// A pinned column, 10 pi^2 its critical load, pressed in the first stage by `force` and pushed `aside` at its middle; `stage` ends the
+/// table of that static stage.
+fn pinned_column(order: usize, force: &str, aside: &str, stage: &str) -> String {
+    format!(
+        "[point]\nfoot = [0, 0, 0]\nmiddle = [0, 0, 0.5]\ntop = [0, 0, 1]\n\
+         [section.s]\nEA = 1e5\nGA = 5e4\nGJ = 100\nEI = [1000, 10]\n\
+         [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"foot\", \"middle\", \"top\"]\nelements = 4\norder = {order}\n\
+         [[support]]\nat = \"foot\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
+         [[support]]\nat = \"top\"\nfix = [\"ux\", \"uy\", \"rx\", \"rz\"]\n\
+         [[load]]\nat = \"top\"\nforce = [0, 0, \"-{force}\"]\nstages = [1]\n[[load]]\nat = \"middle\"\nforce = [\"{aside}\", 0, 0]\n\
+         [[stage]]\nkind = \"static\"\n{stage}"
+    )
+}
+
 /// The branch of the other side is as stable, and no pivot tells.
 #[test]
 fn an_imperfect_column_bends_to_the_side_of_its_imperfection() {
     for steps in [3, 10, 30, 50] {
-        let column = simulate(&format!(
-            "[param]\nP = \"1.5*10*pi^2\"\n[point]\nfoot = [0, 0, 0]\nmiddle = [0, 0, 0.5]\ntop = [0, 0, 1]\n\
-             [section.s]\nEA = 1e5\nGA = 5e4\nGJ = 100\nEI = [1000, 10]\n\
-             [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"foot\", \"middle\", \"top\"]\nelements = 4\norder = 3\n\
-             [[support]]\nat = \"foot\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
-             [[support]]\nat = \"top\"\nfix = [\"ux\", \"uy\", \"rx\", \"rz\"]\n\
-             [[load]]\nat = \"top\"\nforce = [0, 0, \"-P\"]\n[[load]]\nat = \"middle\"\nforce = [\"0.001*P\", 0, 0]\n\
-             [[stage]]\nkind = \"static\"\nsteps = {steps}\n"
-        ));
+        let column = simulate(&pinned_column(3, "1.5*10*pi^2", "0.015*pi^2", &format!("steps = {steps}\n")));
         let aside = column.end("middle.ux");
         assert!((aside - 0.39448).abs() < 1e-4, "{steps} levels: {aside}");
     }
@@ -179,16 +185,9 @@ fn an_imperfect_column_bends_to_the_side_of_its_imperfection() {
 #[test]
 fn arc_length_stays_on_its_branch() {
     for steps in [1, 10, 40] {
-        let column = simulate(&format!(
-            "[point]\nfoot = [0, 0, 0]\nmiddle = [0, 0, 0.5]\ntop = [0, 0, 1]\n\
-             [section.s]\nEA = 1e5\nGA = 5e4\nGJ = 100\nEI = [1000, 10]\n\
-             [[beam]]\nname = \"c\"\nsection = \"s\"\nthrough = [\"foot\", \"middle\", \"top\"]\nelements = 4\norder = 2\n\
-             [[support]]\nat = \"foot\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
-             [[support]]\nat = \"top\"\nfix = [\"ux\", \"uy\", \"rx\", \"rz\"]\n\
-             [[load]]\nat = \"top\"\nforce = [0, 0, \"-15*pi^2\"]\nstages = [1]\n[[load]]\nat = \"middle\"\nforce = [\"0.01*pi^2\", 0, 0]\n\
-             [[stage]]\nkind = \"static\"\nsteps = 10\n\
-             [[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\nmax_steps = 300\n"
-        ));
+        let path =
+            format!("[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\nmax_steps = 300\n");
+        let column = simulate(&pinned_column(2, "15*pi^2", "0.01*pi^2", &format!("steps = 10\n{path}")));
         // F L^3/48 EI, and the shear of F L/4 GA.
         let force = 0.01 * std::f64::consts::PI.powi(2);
         let exact = force / 480.0 + force / (4.0 * 5e4);
@@ -200,7 +199,7 @@ fn arc_length_stays_on_its_branch() {
     }
 }
 
-/// A strip with a force of 5 % aside, shortened to a hundred times what it buckles at: no load turns, and no branch begins.
+/// A strip with a force of 5 % aside, shortened far beyond what it buckles at: no load turns, and no branch begins.
 #[test]
 fn an_imperfect_path_has_no_branches() {
     for steps in [1, 20, 200] {
