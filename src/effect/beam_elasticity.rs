@@ -260,7 +260,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     out: &mut Sink,
 ) {
     let stiffness = weights.stiffness;
-    let (mut systems, mut scratch) = (ElementSystem::<Lanes>::new(2 * N), Scratch::<Lanes>::new(N));
+    let (mut systems, mut scratch) = (out.lend(2 * N), Scratch::new(N));
     let mut alone = None;
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
@@ -274,6 +274,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
             elements[k].add::<I>(first + start + k, stresses_of(remembered, start + k), at, stiffness, work, out);
         });
     }
+    out.take_back(systems);
 }
 
 /// Element systems to compute with, one element of the batch at a time.

@@ -92,16 +92,21 @@ pub struct HalfWay<'a, const N: usize, T> {
     pub geometric: Option<&'a Stress<T>>,
 }
 
-/// Two element systems to compute with, kept between elements.
+/// Two element systems to compute with where they are needed, kept between elements.
 pub struct Scratch<T = f64> {
-    local: ElementSystem<T>,
-    geometric: ElementSystem<T>,
+    nodes: usize,
+    /// Of the nodes that the kernel is shown, and of its geometric part
+    systems: Option<[ElementSystem<T>; 2]>,
 }
 
 impl<T: Real> Scratch<T> {
     /// For elements of `nodes` nodes.
     pub fn new(nodes: usize) -> Self {
-        Self { local: ElementSystem::new(2 * nodes), geometric: ElementSystem::new(2 * nodes) }
+        Self { nodes, systems: None }
+    }
+
+    fn systems(&mut self) -> &mut [ElementSystem<T>; 2] {
+        self.systems.get_or_insert_with(|| [(); 2].map(|()| ElementSystem::new(2 * self.nodes)))
     }
 }
 
@@ -304,7 +309,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
         if let Some(HalfWay { point, free, geometric }) = sum.half_way() {
             return self.seen.fill_half_way(&self.rotations, point, free, geometric, stiffness, out);
         }
-        let Scratch { local, geometric } = scratch;
+        let [local, geometric] = scratch.systems();
         let weights = Weights { stiffness, ..Weights::NONE };
         out.clear_for(weights);
         local.clear_for(weights);

@@ -112,7 +112,7 @@ impl RigidBody {
 
     #[inline(always)]
     fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Sink) {
-        let mut systems = ElementSystem::new(2);
+        let mut systems = out.lend(2);
         for first in (0..self.bodies.len()).step_by(LANES) {
             let bodies = side_by_side(&self.bodies, first);
             let inertia = pack!(bodies.inertia);
@@ -122,6 +122,7 @@ impl RigidBody {
             let count = LANES.min(self.bodies.len() - first);
             out.add_lanes(first, count, &systems, |_| false, |_, _| ());
         }
+        out.take_back(systems);
     }
 
     /// Puts force and tangent in the place of what stands in `system`.
@@ -141,7 +142,7 @@ impl RigidBody {
         } else {
             inertia::body(inertia, acceleration, &spin, weights)
         };
-        system.clear();
+        system.clear_for(weights);
         force.write(system);
     }
 }

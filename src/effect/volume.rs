@@ -103,7 +103,7 @@ fn add_batch<K, const N: usize>(
     K: VolumeKernel,
     K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
 {
-    let mut systems = ElementSystem::new(K::BLOCKS.count(N));
+    let mut systems = out.lend(K::BLOCKS.count(N));
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let nodes = motions(each_lane!(|k| &elements[k].connection), at);
@@ -119,6 +119,7 @@ fn add_batch<K, const N: usize>(
             add_alone(kernel, elements[k], first + start + k, at, weights, out);
         });
     }
+    out.take_back(systems);
 }
 
 /// The same for one element, whose nodes may sit in different charts.

@@ -7,6 +7,7 @@ use super::state::Slot;
 use crate::kernel::{ElementSystem, MAX_NODES, PlanarSystem};
 use crate::real::{Instructions, LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
+use std::ops::Range;
 
 /// What a force is; the stop test of Newton and the energy account look at them apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +41,8 @@ pub struct System {
     lift: Vec<Vec3>,
     lifts: bool,
     lifted: Vec<f64>,
+    /// Systems of elements that stand side by side, kept between evaluations
+    room: Vec<ElementSystem<Lanes>>,
 }
 
 impl System {
@@ -56,6 +59,7 @@ impl System {
             lift: zero,
             lifts: false,
             lifted: vec![0.0; equations],
+            room: Vec::new(),
         }
     }
 
@@ -200,6 +204,7 @@ impl System {
             values: &mut self.values,
             lift: self.lifts.then_some(&self.lift[..]),
             lifted: &mut self.lifted,
+            room: &mut self.room,
             with_tangent,
         }
     }
@@ -227,10 +232,26 @@ pub struct Sink<'a> {
     values: &'a mut [f64],
     lift: Option<&'a [Vec3]>,
     lifted: &'a mut [f64],
+    room: &'a mut Vec<ElementSystem<Lanes>>,
     with_tangent: bool,
 }
 
 impl Sink<'_> {
+    /// A system of zeros to compute with, of so many blocks.
+    pub fn lend(&mut self, blocks: usize) -> ElementSystem<Lanes> {
+        let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
+            return ElementSystem::new(blocks);
+        };
+        let mut system = self.room.swap_remove(fits);
+        system.clear();
+        system
+    }
+
+    /// Takes it back for the next evaluation.
+    pub fn take_back(&mut self, system: ElementSystem<Lanes>) {
+        self.room.push(system);
+    }
+
     /// Adds instance `k`; the blocks of `element` are in the order of the slots of its clique.
     #[inline]
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
@@ -271,22 +292,24 @@ impl Sink<'_> {
             sink.with_tangent && special
         };
         if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
-            return self.add_plain(first, count, elements);
+            return self.add_plain(first, 0..count, elements);
         }
         for lane in 0..count {
             if is_apart(lane) {
                 alone(lane, self);
-            } else {
+            } else if special(self, lane) {
                 self.add(first + lane, &elements.lane(lane));
+            } else {
+                self.add_plain(first, lane..lane + 1, elements);
             }
         }
     }
 
     /// The same where none touches a held direction or turned axes.
     #[inline(always)]
-    fn add_plain(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>) {
+    fn add_plain(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
         let forces = &mut self.force[self.category as usize];
-        for lane in 0..count {
+        for lane in lanes.clone() {
             for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(first + lane)) {
                 forces[slot as usize] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
             }
@@ -295,23 +318,23 @@ impl Sink<'_> {
             return;
         }
         if self.equations.plane().is_some() {
-            for lane in 0..count {
+            for lane in lanes.clone() {
                 self.add_in_plane(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
             }
             return;
         }
         if self.places.whole {
-            return self.add_whole(first, count, elements);
+            return self.add_whole(first, lanes, elements);
         }
-        for lane in 0..count {
+        for lane in lanes {
             self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
         }
     }
 
     /// Adds the tangents of elements of whole nodes, one element after the other.
     #[inline(always)]
-    fn add_whole(&mut self, first: usize, count: usize, elements: &ElementSystem<Lanes>) {
-        for lane in 0..count {
+    fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
+        for lane in lanes {
             for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
                 add_lane(&mut self.values[place as usize..place as usize + TILE], tile, lane);
             }
