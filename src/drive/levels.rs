@@ -46,21 +46,26 @@ pub(super) struct Stability {
 
 impl Stability {
     /// At the start of a stage.
-    pub fn new(run: &Run, workshop: &mut Workshop) -> Self {
+    pub fn new(run: &mut Run, workshop: &mut Workshop) -> Self {
         // The start was assembled with its stiffness.
-        let negative = workshop.newton.solver.negative_pivots(&workshop.assembly.system);
+        let negative = Self::look(run, workshop);
         // What is linear keeps its tangent.
         Self { counts: !run.is_linear(), negative }
     }
 
+    /// At a stiffness that has just been assembled: the next level begins with it.
+    fn look(run: &mut Run, workshop: &mut Workshop) -> Option<usize> {
+        workshop.newton.begin_with(&workshop.assembly.system, &mut run.counters.work)
+    }
+
     /// The number at the run's state; `None` where it is not known.
-    pub fn count(&mut self, run: &Run, workshop: &mut Workshop) -> Option<usize> {
+    pub fn count(&mut self, run: &mut Run, workshop: &mut Workshop) -> Option<usize> {
         if !self.counts {
             return None;
         }
         workshop.assembly.forget();
         workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
-        let negative = workshop.newton.solver.negative_pivots(&workshop.assembly.system);
+        let negative = Self::look(run, workshop);
         // What is not symmetric will not be so next.
         self.counts = negative.is_some();
         negative
@@ -90,7 +95,7 @@ pub(super) struct Levels {
 
 impl Levels {
     /// From the run's state on.
-    pub fn new(run: &Run, workshop: &mut Workshop, steps: usize, approach: Approach) -> Self {
+    pub fn new(run: &mut Run, workshop: &mut Workshop, steps: usize, approach: Approach) -> Self {
         let (start, level) = (run.state.clone(), 1.0 / steps as f64);
         Self { start, level, approach, stability: Stability::new(run, workshop), increment: level }
     }

@@ -70,7 +70,7 @@ impl Run<'_> {
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
-        if newton.solver.factorise(&assembly.system)
+        if newton.solver.factorise_new(&assembly.system).0
             && let Some(limp) = Limp::find(&mut newton.solver, assembly, &self.model, &self.state, self.stage > 0)
         {
             if limp.is_loose() {

@@ -141,6 +141,13 @@ impl Model {
         State::rest(self.slots.len(), self.elements, self.amplitudes.len(), self.angles)
     }
 
+    /// The inner product of two motions, displacements over the length of the scene.
+    pub fn inner_product(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
+        let weight = |info: &SlotInfo| (info.arm(self.length) / self.length).powi(2);
+        let slots = self.slots.iter().zip(a.iter().zip(b)).filter(|(info, _)| !info.is_multiplier());
+        slots.map(|(info, (a, b))| a.dot(*b) * weight(info)).sum()
+    }
+
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
     pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<Equations, StageError> {
         let fresh = self.has_fresh_loads(stage);

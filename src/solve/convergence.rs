@@ -175,10 +175,3 @@ pub(super) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
     let size = |(info, dq): (&SlotInfo, &Vec3)| dq.norm() * info.arm(model.length) / model.length;
     model.slots.iter().zip(dq).filter(|(info, _)| !info.is_multiplier()).map(size).fold(0.0, f64::max)
 }
-
-/// The inner product of two corrections, displacements over the length of the scene.
-pub(super) fn weighted(model: &Model, a: &[Vec3], b: &[Vec3]) -> f64 {
-    let weight = |info: &SlotInfo| (info.arm(model.length) / model.length).powi(2);
-    let slots = model.slots.iter().zip(a.iter().zip(b)).filter(|(info, _)| !info.is_multiplier());
-    slots.map(|(info, (a, b))| a.dot(*b) * weight(info)).sum()
-}

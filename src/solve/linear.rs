@@ -14,7 +14,7 @@ pub struct LinearSolver {
     way: Way,
     /// Whether the last factorisation has come to its end
     factored: bool,
-    /// That of the tangent that Newton has factorised last
+    /// That of the tangent that was factorised last, where it stays
     revision: Option<u64>,
     pub(super) multipliers: Vec<Slot>,
     /// Where it cannot count them itself
@@ -64,9 +64,10 @@ impl LinearSolver {
 
     /// Factorises, as far as it can by blocks, and counts negative pivots.
     pub(super) fn negative_of_own(&mut self, system: &System) -> Option<usize> {
+        let known = self.has_factorised(system);
         let Way::Blocks(blocks) = &mut self.way else { return None };
-        self.revision = None;
-        self.factored = blocks.factorise(system);
+        self.factored = known || blocks.factorise(system);
+        self.revision = self.factored.then_some(system.revision);
         self.factored.then(|| blocks.negative()).flatten()
     }
 
@@ -78,9 +79,14 @@ impl LinearSolver {
         }
     }
 
+    /// Whether its last factorisation is that of this tangent.
+    pub fn has_factorised(&self, system: &System) -> bool {
+        self.factored && self.revision == Some(system.revision)
+    }
+
     /// Factorises the tangent where it is another one than the last; whether there is a factorisation, and whether it is new.
     pub fn factorise_new(&mut self, system: &System) -> (bool, bool) {
-        if self.factored && self.revision == Some(system.revision) {
+        if self.has_factorised(system) {
             return (true, false);
         }
         let done = self.factorise(system);

@@ -9,6 +9,8 @@ mod linear;
 mod mechanism;
 mod newton;
 mod pivots;
+mod refinement;
+mod reuse;
 mod softest;
 
 pub use block::BlockSolver;

@@ -1,8 +1,10 @@
 //! Newton's iteration on one step or load level.
 
-use super::convergence::{Convergence, Residual, Verdict, correction, weighted};
+use super::convergence::{Convergence, Residual, Verdict, correction};
 use super::linear::LinearSolver;
 use super::mechanism::mechanism;
+use super::refinement::Refinement;
+use super::reuse::Reuse;
 use super::softest::NullVector;
 use crate::integrate::Method;
 use crate::kernel::Weights;
@@ -14,7 +16,7 @@ use std::time::Instant;
 /// Work done, added up over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
-    /// Linear solves
+    /// Corrections of Newton's method whose forces were looked at
     pub iterations: u64,
     /// Factorisations
     pub factorisations: u64,
@@ -102,15 +104,12 @@ pub struct Newton {
     dq: Vec<Vec3>,
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
     pub first: Vec<Vec3>,
-    /// The largest residual of each iterate, over what is allowed
-    history: Vec<f64>,
+    reuse: Reuse,
+    /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
+    given: Option<u64>,
+    /// The last tangent that was formed here, and its weights
+    formed: Option<(u64, Weights)>,
 }
-
-/// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
-const FINE: f64 = 1e-8;
-
-/// The ratio of a residual to what is allowed that is expected to become one in balance.
-const EXPECTED: f64 = 0.1;
 
 /// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
 const RUNAWAY: f64 = 1e6;
@@ -120,49 +119,31 @@ fn size(model: &Model, state: &State) -> f64 {
     correction(model, &state.q)
 }
 
-/// Follows corrections that refine a solution whose residual is round-off.
-#[derive(Default)]
-struct Refinement {
-    before: Vec<Vec3>,
-    /// The last correction over the unknowns; after a change of chart there is none.
-    last: f64,
-    /// The last correction over the one before
-    ratio: f64,
-    /// Whether both go the same way
-    aligned: bool,
-}
-
-impl Refinement {
-    fn look(&mut self, model: &Model, dq: &[Vec3], size: f64) -> &Self {
-        let last = correction(model, dq) / size;
-        self.ratio = if self.before.is_empty() { 0.0 } else { correction(model, dq) / correction(model, &self.before) };
-        let dot = |a: &[Vec3], b: &[Vec3]| weighted(model, a, b);
-        let cosine = dot(dq, &self.before) / (dot(dq, dq) * dot(&self.before, &self.before)).sqrt();
-        self.aligned = cosine > 0.5;
-        self.last = last;
-        self.before = if last.is_finite() { dq.to_vec() } else { Vec::new() };
-        self
-    }
-
-    /// Small enough, or not becoming smaller any more.
-    fn is_done(&self) -> bool {
-        let stalls = self.ratio > if self.aligned { 0.9 } else { 0.5 };
-        self.last <= FINE || (self.last.is_finite() && stalls)
-    }
-
-    /// What is still to come: of corrections that go one way, each `ratio` times the one before, the sum of the series.
-    fn uncertainty(&self) -> f64 {
-        let series = if self.aligned { 1.0 / (1.0 - self.ratio.min(0.99)) } else { 1.0 };
-        if self.last.is_finite() { (self.last * series).min(1.0) } else { 0.0 }
-    }
-}
-
 impl Newton {
     /// For a stage with these unknowns.
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
         let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
         let (right_hand_side, dq) = (vec![0.0; equations], vec![Vec3::ZERO; slots]);
-        Self { convergence, max_iterations, solver, right_hand_side, dq, first: Vec::new(), history: Vec::new() }
+        Self {
+            convergence,
+            max_iterations,
+            solver,
+            right_hand_side,
+            dq,
+            first: Vec::new(),
+            reuse: Reuse::new(),
+            given: None,
+            formed: None,
+        }
+    }
+
+    /// Counts the negative pivots of a stiffness, see [`LinearSolver::negative_pivots`]. It is that of the state that the next solution
+    /// begins with, but for the loads.
+    pub fn begin_with(&mut self, system: &System, work: &mut Work) -> Option<usize> {
+        (self.given, self.formed) = (Some(system.revision), Some((system.revision, Weights::STIFFNESS)));
+        let negative = self.solver.negative_pivots(system);
+        work.factorisations += u64::from(self.solver.has_factorised(system));
+        negative
     }
 
     /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
@@ -180,27 +161,31 @@ impl Newton {
         assembly.forget();
         let noise = assembly.noise(state);
         let mut iterations = 0;
-        self.history.clear();
         self.first.clear();
+        self.reuse.begin(self.given.take() == Some(assembly.system.revision));
         let mut refinement = Refinement::default();
         let mut noisy = false;
         loop {
-            // Where balance is expected the tangent is left for when it is needed after all.
-            let expected = lift.is_none() && !noisy && iterations < self.max_iterations && self.expects_balance();
-            let weights = if expected { Weights::NONE } else { method.weights() };
-            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
+            let forms = lift.is_some() || noisy || iterations >= self.max_iterations || self.reuse.expects_tangent();
+            let weights = if forms { method.weights() } else { Weights::NONE };
+            self.evaluate(assembly, state, weights, lift, work);
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
-            self.history.push(residual.ratio);
+            self.reuse.history.push(residual.ratio);
             noisy = verdict == Verdict::Noisy;
             match verdict {
-                Verdict::Converged if lift.is_none() => return Ok(()),
+                Verdict::Converged if lift.is_none() => {
+                    if residual.ratio > 0.0 {
+                        self.polish(model, &assembly.system, state, method, work);
+                    }
+                    return Ok(self.reuse.end());
+                }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
                 Verdict::Noisy if lift.is_none() && iterations > 0 => {
                     let refined = refinement.look(model, &self.dq, size(model, state));
                     if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
-                        return Ok(());
+                        return Ok(self.reuse.end());
                     }
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
@@ -208,8 +193,13 @@ impl Newton {
                 _ if iterations >= self.max_iterations => return Err(self.not_converged(&assembly.system, residual)),
                 _ => {}
             }
-            if expected {
-                timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), None));
+            if forms || noisy || !self.reuse.keeps_tangent() {
+                if !forms {
+                    self.evaluate(assembly, state, method.weights(), None, work);
+                }
+                self.reuse.form();
+            } else {
+                self.reuse.keep();
             }
             if !self.find_correction(&assembly.system, lift.take(), work) {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, assembly, model, state)));
@@ -222,44 +212,80 @@ impl Newton {
                     None => self.not_converged(&assembly.system, residual),
                 });
             }
-            assembly.extrapolate(state, &self.dq);
+            if noisy || self.reuse.expects_tangent() {
+                assembly.extrapolate(state, &self.dq);
+            } else {
+                assembly.forget();
+            }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {
                 self.first.clone_from(&self.dq);
             }
-            if changes_charts {
-                charts::carry(state, &self.dq, &model.charted.rotations);
-            }
-            method.correct(state, &self.dq);
+            Self::add(model, state, method, &self.dq);
             if changes_charts {
                 self.change_charts(model, state, work);
             }
         }
     }
 
+    /// Forces, and where there are weights the tangent.
+    fn evaluate(
+        &mut self,
+        assembly: &mut Assembly,
+        state: &State,
+        weights: Weights,
+        lift: Option<&[Vec3]>,
+        work: &mut Work,
+    ) {
+        timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
+        if weights != Weights::NONE {
+            self.formed = Some((assembly.system.revision, weights));
+        }
+    }
+
+    /// Another correction with the tangent that is there takes most of a residual away for the price of a substitution: what is
+    /// left of it may grow from time step to time step. Forces stay those of the iterate before, from which they differ by less
+    /// than the stop test allows.
+    fn polish(&mut self, model: &Model, system: &System, state: &mut State, method: &dyn Method, work: &mut Work) {
+        let wanted = method.weights();
+        let fits = self.formed.is_some_and(|(last, with)| last == system.revision && with.serves_for(&wanted));
+        if fits && self.substitute(system, None, false, work) {
+            Self::add(model, state, method, &self.dq);
+        }
+    }
+
+    /// Corrects a state.
+    fn add(model: &Model, state: &mut State, method: &dyn Method, dq: &[Vec3]) {
+        if method.changes_charts() {
+            charts::carry(state, dq, &model.charted.rotations);
+        }
+        method.correct(state, dq);
+    }
+
     /// The next attempt is better off with pivots where round-off has taken most of the softest stiffness.
     fn not_converged(&mut self, system: &System, residual: Residual) -> NewtonFailure {
         self.solver.doubt(system);
-        NewtonFailure::NotConverged { residual, history: self.history.clone() }
-    }
-
-    /// Whether residuals have fallen so fast that the next one will do: by the last factor once more, and a little.
-    fn expects_balance(&self) -> bool {
-        match self.history[..] {
-            [.., before, last] => last * last < EXPECTED * before,
-            _ => false,
-        }
+        NewtonFailure::NotConverged { residual, history: self.reuse.history.clone() }
     }
 
     /// Solves J dq = -g; held directions take their part of `lift`. `false` where there is no solution.
     fn find_correction(&mut self, system: &System, lift: Option<&[Vec3]>, work: &mut Work) -> bool {
+        work.iterations += 1;
+        // What an older tangent leaves is more than what the solver does.
+        self.substitute(system, lift, self.reuse.is_own(), work)
+    }
+
+    /// The same, with a look at what the solver leaves or without.
+    fn substitute(&mut self, system: &System, lift: Option<&[Vec3]>, looks: bool, work: &mut Work) -> bool {
         let Self { solver, right_hand_side, .. } = self;
         system.right_hand_side(right_hand_side);
-        work.iterations += 1;
         let solved = timed(&mut work.solve_seconds, || {
             let (done, new) = solver.factorise_new(system);
             work.factorisations += u64::from(new);
-            done && solver.solve(system, right_hand_side)
+            match looks || new {
+                true => done && solver.solve(system, right_hand_side),
+                false => done && solver.solve_once(system, right_hand_side),
+            }
         });
         if solved {
             system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
@@ -273,6 +299,8 @@ impl Newton {
         if switched > 0 {
             work.chart_switches += switched as u64;
             charts::freeze(state, &model.charted.elements);
+            self.reuse.forget();
+            self.formed = None;
             // What was a correction before is none in the new chart: it may not end the iteration.
             self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }

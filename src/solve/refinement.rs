@@ -1,0 +1,45 @@
+//! Corrections of a solution whose residual is round-off.
+
+use super::convergence::correction;
+use crate::model::Model;
+use crate::tensor::Vec3;
+
+/// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
+const FINE: f64 = 1e-8;
+
+/// Follows corrections that refine a solution whose residual is round-off.
+#[derive(Default)]
+pub(super) struct Refinement {
+    before: Vec<Vec3>,
+    /// The last correction over the unknowns; after a change of chart there is none.
+    last: f64,
+    /// The last correction over the one before
+    ratio: f64,
+    /// Whether both go the same way
+    aligned: bool,
+}
+
+impl Refinement {
+    pub fn look(&mut self, model: &Model, dq: &[Vec3], size: f64) -> &Self {
+        let last = correction(model, dq) / size;
+        self.ratio = if self.before.is_empty() { 0.0 } else { correction(model, dq) / correction(model, &self.before) };
+        let dot = |a: &[Vec3], b: &[Vec3]| model.inner_product(a, b);
+        let cosine = dot(dq, &self.before) / (dot(dq, dq) * dot(&self.before, &self.before)).sqrt();
+        self.aligned = cosine > 0.5;
+        self.last = last;
+        self.before = if last.is_finite() { dq.to_vec() } else { Vec::new() };
+        self
+    }
+
+    /// Small enough, or not becoming smaller any more.
+    pub fn is_done(&self) -> bool {
+        let stalls = self.ratio > if self.aligned { 0.9 } else { 0.5 };
+        self.last <= FINE || (self.last.is_finite() && stalls)
+    }
+
+    /// What is still to come: of corrections that go one way, each `ratio` times the one before, the sum of the series.
+    pub fn uncertainty(&self) -> f64 {
+        let series = if self.aligned { 1.0 / (1.0 - self.ratio.min(0.99)) } else { 1.0 };
+        if self.last.is_finite() { (self.last * series).min(1.0) } else { 0.0 }
+    }
+}

@@ -1,0 +1,146 @@
+//! When Newton's iteration goes on with the tangent it has (modified Newton), and when it forms another.
+//!
+//! A correction with an old tangent costs an evaluation of forces and a substitution; one with a new tangent costs an
+//! evaluation of both and a factorisation, about three times that. Where a new tangent has made a residual smaller by theta, the
+//! same tangent makes the next one smaller by about 2 theta (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is
+//! kept where so much brings balance soon enough. Only residuals and counts decide, never a clock.
+
+/// The ratio of a residual to what is allowed that is expected to become one in balance.
+const EXPECTED: f64 = 0.1;
+
+/// The factor of the next residual with the same tangent, over that of the first one: twice what theory has.
+const SAME: f64 = 4.0;
+
+/// So many corrections with an old tangent cost less than one with a new one.
+const CHEAP: i32 = 2;
+
+/// Follows one solution after the other.
+#[derive(Debug)]
+pub(super) struct Reuse {
+    /// The largest residual of each iterate of the present solution, over what is allowed
+    pub history: Vec<f64>,
+    /// Whether there is a tangent near the present iterate
+    kept: bool,
+    /// Whether the last correction was found with the tangent of its iterate
+    own: bool,
+    /// The tangents that this solution could not do without so far
+    needed: usize,
+    /// And the last solution, once there is one
+    before: usize,
+}
+
+impl Reuse {
+    pub fn new() -> Self {
+        Self { history: Vec::new(), kept: false, own: false, needed: 0, before: usize::MAX }
+    }
+
+    /// A solution begins; `kept` where the tangent is already that of its first iterate, but for the loads.
+    pub fn begin(&mut self, kept: bool) {
+        self.history.clear();
+        (self.kept, self.own, self.needed) = (kept, kept, 0);
+    }
+
+    /// A solution has come to balance.
+    pub fn end(&mut self) {
+        self.before = self.needed;
+    }
+
+    /// Whether the next evaluation had better form the tangent, too: neither is balance expected, nor did the last solution
+    /// need another one from here on.
+    pub fn expects_tangent(&self) -> bool {
+        let begins = self.history.is_empty();
+        let expected = if begins { self.kept } else { self.will_do(1) };
+        !(expected || ((begins || self.kept) && self.needed == self.before))
+    }
+
+    /// Whether the tangent that is there shall serve for the present iterate.
+    pub fn keeps_tangent(&self) -> bool {
+        self.kept && (self.history.len() == 1 || self.will_do(CHEAP))
+    }
+
+    /// The iterate has its own tangent, which is used unless it is in balance.
+    pub fn form(&mut self) {
+        self.needed += usize::from(!self.keeps_tangent());
+        (self.kept, self.own) = (true, true);
+    }
+
+    /// The iterate was corrected with an older tangent.
+    pub fn keep(&mut self) {
+        self.own = false;
+    }
+
+    /// Whether the present correction is found with the tangent of its iterate.
+    pub fn is_own(&self) -> bool {
+        self.own
+    }
+
+    /// Unknowns have changed their meaning.
+    pub fn forget(&mut self) {
+        self.kept = false;
+    }
+
+    /// Whether residuals have fallen so fast that after so many corrections more the next one will do.
+    fn will_do(&self, corrections: i32) -> bool {
+        let [.., before, last] = self.history[..] else { return false };
+        let factor = if self.own && corrections > 1 { SAME * last / before } else { last / before };
+        last * factor.powi(corrections) < EXPECTED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How many tangents a solution with these residuals forms, and how many evaluations it makes for nothing.
+    fn solve(reuse: &mut Reuse, residuals: &[f64]) -> (usize, usize) {
+        let (mut formed, mut twice) = (0, 0);
+        reuse.begin(false);
+        for &residual in residuals {
+            let forms = reuse.expects_tangent();
+            reuse.history.push(residual);
+            if residual <= 1.0 {
+                break;
+            }
+            if forms || !reuse.keeps_tangent() {
+                formed += 1;
+                twice += usize::from(!forms);
+                reuse.form();
+            } else {
+                reuse.keep();
+            }
+        }
+        reuse.end();
+        (formed, twice)
+    }
+
+    #[test]
+    fn a_tangent_is_kept_where_it_will_do() {
+        let mut reuse = Reuse::new();
+        let fast = [1e9, 1e2, 1e-3];
+        // Nothing is known at first; from then on the second evaluation forms no tangent.
+        assert_eq!(solve(&mut reuse, &fast), (2, 0));
+        assert_eq!(solve(&mut reuse, &fast), (1, 0));
+    }
+
+    #[test]
+    fn a_tangent_is_formed_where_the_old_one_is_slow() {
+        let mut reuse = Reuse::new();
+        let slow = [1e9, 5e8, 1e8, 1e7, 1e-1];
+        assert_eq!(solve(&mut reuse, &slow), (4, 0));
+        // What was enough in the last solution is tried again, and given up where it is not.
+        solve(&mut reuse, &[1e9, 1e2, 1e-3]);
+        assert_eq!(solve(&mut reuse, &slow), (4, 1));
+        assert_eq!(solve(&mut reuse, &slow), (4, 0));
+    }
+
+    #[test]
+    fn a_tangent_in_other_charts_is_never_kept() {
+        let mut reuse = Reuse::new();
+        reuse.begin(true);
+        assert!(!reuse.expects_tangent());
+        reuse.history.push(10.0);
+        assert!(reuse.keeps_tangent());
+        reuse.forget();
+        assert!(!reuse.keeps_tangent());
+    }
+}
