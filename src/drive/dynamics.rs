@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::grid::Grid;
 use super::guard::Growth;
 use super::run::{Run, Workshop};
-use crate::integrate::{Increments, Rotations, Scheme, Step};
+use crate::integrate::{Increments, Rotations, Scheme, Step, Trend};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::NewtonFailure;
@@ -28,6 +28,7 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         workshop.increments = (scheme.rotations == Rotations::Increments)
             .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.equations));
+        workshop.trend = Trend::new(&self.model, &workshop.assembly.system.pattern.equations);
         self.start_dynamic(workshop, &Step { scheme, length: step })?;
         self.find_rates(workshop);
         let mut before = step;
@@ -108,9 +109,12 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn settle_charts(&mut self, workshop: &Workshop, step: &Step) {
-        let lag = workshop.increments.is_none().then_some(step.scheme.lag() * step.length);
-        self.change_charts(lag);
+    fn settle_charts(&mut self, workshop: &mut Workshop, step: &Step) {
+        let totals = workshop.increments.is_none();
+        let switched = self.change_charts(totals.then_some(step.scheme.lag() * step.length));
+        if totals && switched > 0 {
+            workshop.trend.forget();
+        }
     }
 
     /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller one.
@@ -157,10 +161,27 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// One attempt at a step: predict, prescribe, iterate.
+    /// One attempt at a step; what was foreseen of it may not be what it fails for.
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
-        let Workshop { assembly, newton, increments, massive, rateless, .. } = workshop;
+        match self.attempt_step(workshop, step, before, next) {
+            Err(_) if workshop.trend.forget() => {
+                self.state.copy_from(&self.good);
+                self.attempt_step(workshop, step, before, next)
+            }
+            result => result,
+        }
+    }
+
+    /// Predict, prescribe, iterate.
+    fn attempt_step(
+        &mut self,
+        workshop: &mut Workshop,
+        step: Step,
+        before: f64,
+        next: f64,
+    ) -> Result<(), NewtonFailure> {
+        let Workshop { assembly, newton, increments, trend, massive, rateless, .. } = workshop;
         if !rateless.is_empty() {
             self.model.steady(&mut self.state);
         }
@@ -171,7 +192,9 @@ impl Run<'_> {
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
+        trend.begin(&assembly.system.pattern.equations, &mut self.state, &step);
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
+        trend.end(&self.state, &assembly.system, &step);
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);
             self.counters.work.chart_switches += switched as u64;
@@ -228,11 +251,12 @@ impl Run<'_> {
         named
     }
 
-    /// Between steps, nodes beyond pi change their chart, and elements settle theirs. `lag`: see [`charts::switch`].
-    pub(super) fn change_charts(&mut self, lag: Option<f64>) {
+    /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how many did. `lag`: see [`charts::switch`].
+    pub(super) fn change_charts(&mut self, lag: Option<f64>) -> usize {
         let switched = charts::switch(&mut self.state, &self.model.charted.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
         charts::freeze(&mut self.state, &self.model.charted.elements);
+        switched
     }
 
     /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the next of those.

@@ -5,7 +5,7 @@ use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use super::levels::Approach;
 use super::warnings::Told;
-use crate::integrate::{Increments, Scheme};
+use crate::integrate::{Increments, Scheme, Trend};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, Plane, State, System};
@@ -289,6 +289,8 @@ pub(super) struct Workshop {
     pub until: Option<Until>,
     /// Where the unknowns of time steps are increments of rotation
     pub increments: Option<Increments>,
+    /// How time steps go on
+    pub trend: Trend,
     /// For each slot whether its accelerations mean something; known in dynamic stages
     pub massive: Vec<bool>,
     /// The slots whose velocities enter no force: they have neither inertia nor damping; known in dynamic stages
@@ -390,6 +392,7 @@ impl<'o> Run<'o> {
             lift,
             until,
             increments: None,
+            trend: Trend::default(),
             massive: Vec::new(),
             rateless: Vec::new(),
             guard: None,

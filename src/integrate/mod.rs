@@ -3,9 +3,11 @@
 
 mod alpha;
 mod increments;
+mod trend;
 
 pub use alpha::{Rotations, Scheme, Step};
 pub use increments::Increments;
+pub use trend::Trend;
 
 use crate::kernel::Weights;
 use crate::system::State;

@@ -1,0 +1,182 @@
+//! What the corrections of the last steps tell about the next one.
+//!
+//! A scheme predicts the end of a step with the acceleration of its start. What Newton's method then adds, c = q1 - q1(predicted), grows with
+//! the third power of the step and goes on as the motion does: it is foreseen as nothing, as the last one, or along the line or
+//! the parabola through the last ones. That way is taken whose residual J (c - c(foreseen)) would have been the smallest in the last
+//! steps: where motion is not smooth, or stiff directions swing from step to step, that is the scheme's own.
+
+use super::{Method, Step};
+use crate::model::Model;
+use crate::system::{Equations, State, System};
+use crate::tensor::Vec3;
+use std::array::from_fn;
+use std::collections::VecDeque;
+
+/// The factors of the last corrections for each way to foresee the next one, the latest first.
+const WAYS: [&[f64]; 4] = [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0]];
+
+/// The weight of the last step in what is thought of a way.
+const NEWS: f64 = 0.5;
+
+/// A step that is longer or shorter than another one by more than this has nothing to say of it.
+const ALIKE: f64 = 4.0;
+
+/// Factors of the last corrections, the latest first
+type Factors = [f64; WAYS.len() - 1];
+
+/// The corrections of the last steps of a stage.
+#[derive(Default)]
+pub struct Trend {
+    /// What forces are compared by, by equation
+    weights: Vec<f64>,
+    /// The latest first
+    past: VecDeque<Past>,
+    /// By way, how much residual it would have left (squares, in the mean of the last steps); `None` where that is not known
+    missed: [Option<f64>; WAYS.len()],
+    /// Where the scheme's own prediction went in the present step
+    predicted: Vec<Vec3>,
+    /// The way that was taken there
+    taken: usize,
+}
+
+/// A step that has come to its end, by equation: what is held is not corrected.
+struct Past {
+    length: f64,
+    /// c
+    correction: Vec<f64>,
+    /// J c
+    force: Vec<f64>,
+}
+
+impl Trend {
+    /// For a stage with these equations.
+    pub fn new(model: &Model, equations: &Equations) -> Self {
+        let weight = |equation: usize| {
+            let info = &model.slots[equations.origin(equation).0 as usize];
+            if info.is_multiplier() { 0.0 } else { 1.0 / info.arm(model.length) }
+        };
+        Self { weights: (0..equations.count()).map(weight).collect(), ..Self::default() }
+    }
+
+    /// Adds what is foreseen to the prediction of a step.
+    pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step) {
+        self.predicted.clone_from(&state.q);
+        let best = self.best();
+        let Some(factors) = self.factors(best, step.length).filter(|_| best > 0) else {
+            self.taken = 0;
+            return;
+        };
+        self.taken = best;
+        let mut foreseen = vec![0.0; equations.count()];
+        for (past, factor) in self.past.iter().zip(factors) {
+            foreseen.iter_mut().zip(&past.correction).for_each(|(sum, part)| *sum += part * factor);
+        }
+        let mut dq = vec![Vec3::ZERO; state.q.len()];
+        equations.scatter(&foreseen, None, &mut dq);
+        step.correct(state, &dq);
+    }
+
+    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in, and its tangent.
+    pub fn end(&mut self, state: &State, system: &System, step: &Step) {
+        let equations = &system.pattern.equations;
+        let corrected: Vec<_> = state.q.iter().zip(&self.predicted).map(|(q, predicted)| *q - *predicted).collect();
+        let mut correction = vec![0.0; equations.count()];
+        equations.gather(&corrected, &mut correction);
+        let force = system.multiply(&system.values, &correction);
+        self.learn(Past { length: step.length, correction, force });
+    }
+
+    fn learn(&mut self, last: Past) {
+        let factors = [0, 1, 2, 3].map(|way| self.factors(way, last.length));
+        let missed = self.rests(&last.force, &factors);
+        for (mean, (rest, known)) in self.missed.iter_mut().zip(missed.into_iter().zip(factors)) {
+            *mean = known.map(|_| mean.map_or(rest, |mean| mean + NEWS * (rest - mean)));
+        }
+        self.past.push_front(last);
+        self.past.truncate(WAYS.len() - 1);
+    }
+
+    /// Forgets all steps: unknowns have changed their meaning, or the motion does not go on. Whether anything had been foreseen
+    /// of the present one.
+    pub fn forget(&mut self) -> bool {
+        self.past.clear();
+        std::mem::take(&mut self.taken) > 0
+    }
+
+    /// The first of the ways that miss least.
+    fn best(&self) -> usize {
+        let known = self.missed.iter().enumerate().filter_map(|(way, missed)| Some((way, (*missed)?)));
+        known.reduce(|best, next| if next.1 < best.1 { next } else { best }).map_or(0, |(way, _)| way)
+    }
+
+    /// The factors of the last steps by which a way foresees a step of this length; `None` where too little is known.
+    fn factors(&self, way: usize, length: f64) -> Option<Factors> {
+        let mut factors = [0.0; WAYS.len() - 1];
+        for (number, factor) in WAYS[way].iter().enumerate() {
+            let stretch = length / self.past.get(number)?.length;
+            if !(1.0 / ALIKE..=ALIKE).contains(&stretch) {
+                return None;
+            }
+            factors[number] = factor * stretch.powi(3);
+        }
+        Some(factors)
+    }
+
+    /// By way, the sum of squares of what it leaves of a force; moments are taken over the length of the scene, gaps do not count.
+    fn rests(&self, force: &[f64], factors: &[Option<Factors>; WAYS.len()]) -> [f64; WAYS.len()] {
+        let factors = factors.map(|factors| factors.unwrap_or_default());
+        let mut sums = [0.0; WAYS.len()];
+        for (equation, (force, weight)) in force.iter().zip(&self.weights).enumerate() {
+            let past: Factors = from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force[equation]));
+            for (sum, factors) in sums.iter_mut().zip(&factors) {
+                let foreseen = past[0] * factors[0] + past[1] * factors[1] + past[2] * factors[2];
+                *sum += ((force - foreseen) * weight).powi(2);
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(corrections: &[f64]) -> Trend {
+        let mut trend = Trend { weights: vec![1.0], ..Trend::default() };
+        for (length, correction) in corrections.iter().map(|c| (1.0, *c)) {
+            trend.learn(Past { length, correction: vec![correction], force: vec![correction] });
+        }
+        trend
+    }
+
+    fn foreseen(trend: &Trend, way: usize, length: f64) -> f64 {
+        let factors = trend.factors(way, length).unwrap();
+        trend.past.iter().zip(factors).map(|(past, factor)| past.correction[0] * factor).sum()
+    }
+
+    #[test]
+    fn lines_and_parabolas_go_on() {
+        let line = with(&[1.0, 3.0, 5.0, 7.0, 9.0]);
+        assert_eq!((line.best(), foreseen(&line, 2, 1.0)), (2, 11.0));
+        let parabola = with(&[1.0, 4.0, 9.0, 16.0, 25.0, 36.0]);
+        assert_eq!((parabola.best(), foreseen(&parabola, 3, 1.0)), (3, 49.0));
+        // With half the step an eighth.
+        assert_eq!(foreseen(&line, 2, 0.5), 11.0 / 8.0);
+        assert!(line.factors(2, 0.1).is_none());
+    }
+
+    #[test]
+    fn what_swings_from_step_to_step_is_not_foreseen() {
+        let swing = with(&[1.0, -1.0, 1.0, -1.0, 1.0]);
+        assert_eq!(swing.best(), 0);
+        assert_eq!(with(&[0.0; 5]).best(), 0);
+    }
+
+    #[test]
+    fn forgotten_steps_are_not_gone_on_with() {
+        let mut trend = with(&[1.0, 1.0, 1.0]);
+        assert_eq!(trend.best(), 1);
+        trend.forget();
+        assert!(trend.factors(1, 1.0).is_none());
+    }
+}
