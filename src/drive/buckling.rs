@@ -86,10 +86,13 @@ impl Run<'_> {
             way,
             seen: estimate,
             ended: false,
+            coarse: false,
         };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
                 if search.is_a_limit(found) {
+                    self.state.copy_from(&search.here);
+                    self.judge_mesh()?;
                     return Ok(found);
                 }
                 break;
@@ -98,9 +101,10 @@ impl Run<'_> {
             self.state.copy_from(&search.here);
             self.good.copy_from(&search.here);
             self.observer.progress(self.moment(), self.static_progress(done))?;
-            if !self.continue_path(workshop, target) || self.has_leapt(workshop, &search.here)? {
+            let walked = self.continue_path(workshop, target);
+            if walked != Walked::There || self.has_leapt(workshop, &search.here)? {
                 // Load control ends at limit points, or comes down on another branch.
-                search.end_at(target);
+                search.end_at(target, walked == Walked::TooCoarse);
                 continue;
             }
             let count = self.negative_pivots(workshop);
@@ -122,7 +126,7 @@ impl Run<'_> {
                 );
             }
         }
-        self.warn_of_estimate(search.estimate, search.here.load);
+        self.warn_of_estimate(search.estimate, search.here.load, search.coarse);
         Ok(search.estimate)
     }
 
@@ -139,7 +143,9 @@ impl Run<'_> {
         });
         let far = distance(&self.model, from, &to) > (LEAP * ahead).max(NO_MOTION);
         self.state.copy_from(&to);
-        let leapt = far || !self.continue_path(workshop, from.load) || distance(&self.model, from, &self.state) > SAME;
+        let leapt = far
+            || self.continue_path(workshop, from.load) != Walked::There
+            || distance(&self.model, from, &self.state) > SAME;
         self.state.copy_from(&to);
         self.good.copy_from(&to);
         Ok(leapt)
@@ -153,6 +159,7 @@ impl Run<'_> {
         before: usize,
         done: f64,
     ) -> Result<f64, Failure> {
+        let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
             self.observer.progress(self.moment(), self.static_progress(done))?;
             let from = self.state.load;
@@ -165,17 +172,19 @@ impl Run<'_> {
                 return Ok(critical);
             }
             let target = critical - 0.5 * NEAR * (critical - self.state.load).signum() * critical.abs();
-            if !self.continue_path(workshop, target) {
+            walked = self.continue_path(workshop, target);
+            if walked != Walked::There {
                 break;
             }
         }
-        self.warn_of_estimate(critical, self.state.load);
+        self.warn_of_estimate(critical, self.state.load, walked == Walked::TooCoarse);
         Ok(critical)
     }
 
-    fn warn_of_estimate(&mut self, critical: f64, from: f64) {
+    fn warn_of_estimate(&mut self, critical: f64, from: f64, coarse: bool) {
+        let why = if coarse { ", since the mesh does not tell the shape there: use more `elements`" } else { "" };
         let message = format!(
-            "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it"
+            "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it{why}"
         );
         self.observer.warn(&message);
     }
@@ -188,9 +197,8 @@ impl Run<'_> {
         newton.solver.negative_pivots(&assembly.system)
     }
 
-    /// Goes along the path to a load factor in steps that shrink where they must; `false` where it does not get there, or the
-    /// mesh does not tell the shape.
-    fn continue_path(&mut self, workshop: &mut Workshop, target: f64) -> bool {
+    /// Goes along the path to a load factor in steps that shrink where they must.
+    fn continue_path(&mut self, workshop: &mut Workshop, target: f64) -> Walked {
         let start = self.state.load;
         let (mut done, mut part) = (0.0, 1.0_f64);
         self.good.copy_from(&self.state);
@@ -201,7 +209,7 @@ impl Run<'_> {
                 self.state.copy_from(&self.good);
                 part *= 0.25;
                 if part < SMALLEST_PART {
-                    return false;
+                    return Walked::Short;
                 }
                 continue;
             };
@@ -209,14 +217,14 @@ impl Run<'_> {
             charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
             if charts::coarsest(&self.state, &self.model.charted.elements, charts::COARSE).is_some() {
                 self.state.copy_from(&self.good);
-                return false;
+                return Walked::TooCoarse;
             }
             self.model.remember(&mut self.state);
             self.good.copy_from(&self.state);
             done = next;
             part *= if moved < 0.5 * STRIDE { 2.0 } else { 1.0 };
         }
-        true
+        Walked::There
     }
 
     /// One step along the path: how far it moved, where it came down near by.
@@ -284,6 +292,19 @@ struct Search {
     seen: f64,
     /// Whether what lies beyond is known only from load control, which did not get there
     ended: bool,
+    /// And that for a mesh that does not tell the shape
+    coarse: bool,
+}
+
+/// How far load control came on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Walked {
+    /// To the load factor that was wanted
+    There,
+    /// Not there, in steps however small
+    Short,
+    /// To where the mesh does not tell the shape
+    TooCoarse,
 }
 
 impl Search {
@@ -296,16 +317,16 @@ impl Search {
     }
 
     /// The path by load control ends before this load.
-    fn end_at(&mut self, load: f64) {
+    fn end_at(&mut self, load: f64, coarse: bool) {
         self.beyond = Some(load);
-        self.ended = true;
+        (self.ended, self.coarse) = (true, coarse);
         self.stretch = 1.0;
         self.estimate = 0.5 * (self.here.load + load);
     }
 
     /// Whether load control ends there for want of stiffness: a limit point looks twice as far away as it is.
     fn is_a_limit(&self, found: f64) -> bool {
-        !self.ended || (self.seen - found).abs() <= SEEN * found.abs()
+        !self.ended || (!self.coarse && (self.seen - found).abs() <= SEEN * found.abs())
     }
 
     /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the

@@ -527,7 +527,7 @@ impl<'o> Run<'o> {
         )))
     }
 
-    fn judge_mesh(&mut self) -> Result<(), Failure> {
+    pub(super) fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.told.coarse { charts::COARSE } else { charts::COARSE_WARNING };
         let Some((element, angle)) = charts::coarsest(&self.state, &self.model.charted.elements, limit) else {
             return Ok(());
