@@ -116,7 +116,7 @@ impl Run<'_> {
             };
             if passed > before {
                 search.beyond = Some(target);
-                search.ended = false;
+                (search.ended, search.coarse) = (false, false);
                 search.stretch = 1.0;
             } else {
                 let ahead = self.critical_loads(workshop, before + 4)?;

@@ -154,6 +154,7 @@ impl Run<'_> {
                 // bring them back, more and more the shorter it is.
                 self.close_joints(workshop)?;
             } else {
+                workshop.trend.withdraw();
                 self.state.copy_from(&self.good);
                 self.counters.cutbacks += 1;
             }
@@ -164,13 +165,17 @@ impl Run<'_> {
     /// One attempt at a step; what was foreseen of it may not be what it fails for.
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
-        match self.attempt_step(workshop, step, before, next) {
-            Err(_) if workshop.trend.forget() => {
-                self.state.copy_from(&self.good);
-                self.attempt_step(workshop, step, before, next)
-            }
-            result => result,
+        workshop.trend.reset();
+        let result = self.attempt_step(workshop, step, before, next);
+        if result.is_ok() {
+            return result;
         }
+        workshop.trend.forget();
+        if !workshop.trend.has_foreseen() {
+            return result;
+        }
+        self.state.copy_from(&self.good);
+        self.attempt_step(workshop, step, before, next)
     }
 
     /// Predict, prescribe, iterate.

@@ -48,14 +48,11 @@ impl Stability {
     /// At the start of a stage.
     pub fn new(run: &mut Run, workshop: &mut Workshop) -> Self {
         // The start was assembled with its stiffness.
-        let negative = Self::look(run, workshop);
+        let Workshop { assembly, newton, .. } = workshop;
+        newton.begin_with(&assembly.system);
+        let negative = newton.count_pivots(&assembly.system, &mut run.counters.work);
         // What is linear keeps its tangent.
         Self { counts: !run.is_linear(), negative }
-    }
-
-    /// At a stiffness that has just been assembled: the next level begins with it.
-    fn look(run: &mut Run, workshop: &mut Workshop) -> Option<usize> {
-        workshop.newton.begin_with(&workshop.assembly.system, &mut run.counters.work)
     }
 
     /// The number at the run's state; `None` where it is not known.
@@ -65,7 +62,8 @@ impl Stability {
         }
         workshop.assembly.forget();
         workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
-        let negative = Self::look(run, workshop);
+        let Workshop { assembly, newton, .. } = workshop;
+        let negative = newton.count_pivots(&assembly.system, &mut run.counters.work);
         // What is not symmetric will not be so next.
         self.counts = negative.is_some();
         negative

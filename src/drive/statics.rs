@@ -70,7 +70,9 @@ impl Run<'_> {
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
-        if newton.solver.factorise_new(&assembly.system).0
+        let (factorised, new) = newton.solver.factorise_new(&assembly.system);
+        self.counters.work.factorisations += u64::from(new);
+        if factorised
             && let Some(limp) = Limp::find(&mut newton.solver, assembly, &self.model, &self.state, self.stage > 0)
         {
             if limp.is_loose() {
@@ -131,6 +133,10 @@ impl Run<'_> {
         self.accept(workshop)?;
         levels.stability.pass(self, negative)?;
         self.good.copy_from(&self.state);
+        // Where pivots were counted the stiffness is that of this state.
+        if negative.is_some() {
+            workshop.newton.begin_with(&workshop.assembly.system);
+        }
         levels.double();
         Ok(())
     }

@@ -21,6 +21,12 @@ const NEWS: f64 = 0.5;
 /// A step that is longer or shorter than another one by more than this has nothing to say of it.
 const ALIKE: f64 = 4.0;
 
+/// The power of the length of a step with which corrections grow
+const CORRECTION: i32 = 3;
+
+/// And forces J c, since J has the mass over the square of the length
+const FORCE: i32 = 1;
+
 /// Factors of the last corrections, the latest first
 type Factors = [f64; WAYS.len() - 1];
 
@@ -58,14 +64,21 @@ impl Trend {
         Self { weights: (0..equations.count()).map(weight).collect(), ..Self::default() }
     }
 
+    /// Another attempt at a step begins: nothing has been foreseen of it yet.
+    pub fn reset(&mut self) {
+        self.taken = 0;
+    }
+
+    /// Whether something was foreseen of the present step.
+    pub fn has_foreseen(&self) -> bool {
+        self.taken > 0
+    }
+
     /// Adds what is foreseen to the prediction of a step.
     pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step) {
         self.predicted.clone_from(&state.q);
         let best = self.best();
-        let Some(factors) = self.factors(best, step.length).filter(|_| best > 0) else {
-            self.taken = 0;
-            return;
-        };
+        let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) else { return };
         self.taken = best;
         let mut foreseen = vec![0.0; equations.count()];
         for (past, factor) in self.past.iter().zip(factors) {
@@ -87,7 +100,7 @@ impl Trend {
     }
 
     fn learn(&mut self, last: Past) {
-        let factors = [0, 1, 2, 3].map(|way| self.factors(way, last.length));
+        let factors = from_fn(|way| self.factors(way, last.length, FORCE));
         let missed = self.rests(&last.force, &factors);
         for (mean, (rest, known)) in self.missed.iter_mut().zip(missed.into_iter().zip(factors)) {
             *mean = known.map(|_| mean.map_or(rest, |mean| mean + NEWS * (rest - mean)));
@@ -96,11 +109,14 @@ impl Trend {
         self.past.truncate(WAYS.len() - 1);
     }
 
-    /// Forgets all steps: unknowns have changed their meaning, or the motion does not go on. Whether anything had been foreseen
-    /// of the present one.
-    pub fn forget(&mut self) -> bool {
+    /// The last step is not taken after all.
+    pub fn withdraw(&mut self) {
+        self.past.pop_front();
+    }
+
+    /// Forgets all steps: unknowns have changed their meaning, or the motion does not go on.
+    pub fn forget(&mut self) {
         self.past.clear();
-        std::mem::take(&mut self.taken) > 0
     }
 
     /// The first of the ways that miss least.
@@ -109,15 +125,16 @@ impl Trend {
         known.reduce(|best, next| if next.1 < best.1 { next } else { best }).map_or(0, |(way, _)| way)
     }
 
-    /// The factors of the last steps by which a way foresees a step of this length; `None` where too little is known.
-    fn factors(&self, way: usize, length: f64) -> Option<Factors> {
+    /// The factors of the last steps by which a way foresees what grows with this power of the length of a step; `None` where too
+    /// little is known.
+    fn factors(&self, way: usize, length: f64, power: i32) -> Option<Factors> {
         let mut factors = [0.0; WAYS.len() - 1];
         for (number, factor) in WAYS[way].iter().enumerate() {
             let stretch = length / self.past.get(number)?.length;
             if !(1.0 / ALIKE..=ALIKE).contains(&stretch) {
                 return None;
             }
-            factors[number] = factor * stretch.powi(3);
+            factors[number] = factor * stretch.powi(power);
         }
         Some(factors)
     }
@@ -150,7 +167,7 @@ mod tests {
     }
 
     fn foreseen(trend: &Trend, way: usize, length: f64) -> f64 {
-        let factors = trend.factors(way, length).unwrap();
+        let factors = trend.factors(way, length, CORRECTION).unwrap();
         trend.past.iter().zip(factors).map(|(past, factor)| past.correction[0] * factor).sum()
     }
 
@@ -162,7 +179,21 @@ mod tests {
         assert_eq!((parabola.best(), foreseen(&parabola, 3, 1.0)), (3, 49.0));
         // With half the step an eighth.
         assert_eq!(foreseen(&line, 2, 0.5), 11.0 / 8.0);
-        assert!(line.factors(2, 0.1).is_none());
+        assert!(line.factors(2, 0.1, CORRECTION).is_none());
+    }
+
+    #[test]
+    fn steps_that_grow_are_foreseen() {
+        let mut trend = Trend { weights: vec![1.0], ..Trend::default() };
+        for length in [1.0_f64, 1.8, 3.2, 5.8] {
+            trend.learn(Past { length, correction: vec![length.powi(3)], force: vec![length] });
+        }
+        assert_eq!(trend.best(), 1);
+        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-9);
+        // A step that is not taken has nothing to say.
+        trend.learn(Past { length: 5.8, correction: vec![7.0], force: vec![1.0] });
+        trend.withdraw();
+        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-9);
     }
 
     #[test]
@@ -177,6 +208,6 @@ mod tests {
         let mut trend = with(&[1.0, 1.0, 1.0]);
         assert_eq!(trend.best(), 1);
         trend.forget();
-        assert!(trend.factors(1, 1.0).is_none());
+        assert!(trend.factors(1, 1.0, CORRECTION).is_none());
     }
 }

@@ -17,16 +17,7 @@ pub struct Weights {
     pub mass: f64,
 }
 
-/// Weights that differ by no more than this, relative to each, give tangents that correct alike.
-const ALIKE: f64 = 1e-6;
-
 impl Weights {
-    /// Whether a tangent with these weights serves in the place of one with others.
-    pub fn serves_for(&self, other: &Self) -> bool {
-        let alike = |a: f64, b: f64| (a - b).abs() <= ALIKE * b.abs();
-        alike(self.stiffness, other.stiffness) && alike(self.damping, other.damping) && alike(self.mass, other.mass)
-    }
-
     /// The stiffness alone.
     pub const STIFFNESS: Self = Self { stiffness: 1.0, damping: 0.0, mass: 0.0 };
     /// The gyroscopic and damping matrix alone.

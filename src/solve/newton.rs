@@ -107,8 +107,6 @@ pub struct Newton {
     reuse: Reuse,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
     given: Option<u64>,
-    /// The last tangent that was formed here, and its weights
-    formed: Option<(u64, Weights)>,
 }
 
 /// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
@@ -133,17 +131,20 @@ impl Newton {
             first: Vec::new(),
             reuse: Reuse::new(),
             given: None,
-            formed: None,
         }
     }
 
-    /// Counts the negative pivots of a stiffness, see [`LinearSolver::negative_pivots`]. It is that of the state that the next solution
-    /// begins with, but for the loads.
-    pub fn begin_with(&mut self, system: &System, work: &mut Work) -> Option<usize> {
-        (self.given, self.formed) = (Some(system.revision), Some((system.revision, Weights::STIFFNESS)));
+    /// Counts the negative pivots of a tangent, see [`LinearSolver::negative_pivots`].
+    pub fn count_pivots(&mut self, system: &System, work: &mut Work) -> Option<usize> {
+        let known = self.solver.has_factorised(system);
         let negative = self.solver.negative_pivots(system);
-        work.factorisations += u64::from(self.solver.has_factorised(system));
+        work.factorisations += u64::from(!known && self.solver.has_factorised(system));
         negative
+    }
+
+    /// The tangent of the system is that of the state that the next solution begins with, but for the loads.
+    pub fn begin_with(&mut self, system: &System) {
+        self.given = Some(system.revision);
     }
 
     /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
@@ -168,7 +169,7 @@ impl Newton {
         loop {
             let forms = lift.is_some() || noisy || iterations >= self.max_iterations || self.reuse.expects_tangent();
             let weights = if forms { method.weights() } else { Weights::NONE };
-            self.evaluate(assembly, state, weights, lift, work);
+            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
             self.reuse.history.push(residual.ratio);
@@ -176,16 +177,18 @@ impl Newton {
             match verdict {
                 Verdict::Converged if lift.is_none() => {
                     if residual.ratio > 0.0 {
-                        self.polish(model, &assembly.system, state, method, work);
+                        self.polish(model, assembly, state, method, forms, work);
                     }
-                    return Ok(self.reuse.end());
+                    self.reuse.end();
+                    return Ok(());
                 }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
                 Verdict::Noisy if lift.is_none() && iterations > 0 => {
                     let refined = refinement.look(model, &self.dq, size(model, state));
                     if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
-                        return Ok(self.reuse.end());
+                        self.reuse.end();
+                        return Ok(());
                     }
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
@@ -195,7 +198,7 @@ impl Newton {
             }
             if forms || noisy || !self.reuse.keeps_tangent() {
                 if !forms {
-                    self.evaluate(assembly, state, method.weights(), None, work);
+                    self.form(assembly, state, method, work);
                 }
                 self.reuse.form();
             } else {
@@ -212,10 +215,11 @@ impl Newton {
                     None => self.not_converged(&assembly.system, residual),
                 });
             }
-            if noisy || self.reuse.expects_tangent() {
-                assembly.extrapolate(state, &self.dq);
-            } else {
+            // Where balance is expected the next tangent, if any, is that of the state itself.
+            if !noisy && self.reuse.expects_balance() {
                 assembly.forget();
+            } else {
+                assembly.extrapolate(state, &self.dq);
             }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {
@@ -228,28 +232,29 @@ impl Newton {
         }
     }
 
-    /// Forces, and where there are weights the tangent.
-    fn evaluate(
-        &mut self,
-        assembly: &mut Assembly,
-        state: &State,
-        weights: Weights,
-        lift: Option<&[Vec3]>,
-        work: &mut Work,
-    ) {
-        timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
-        if weights != Weights::NONE {
-            self.formed = Some((assembly.system.revision, weights));
-        }
+    /// Forces and the tangent.
+    fn form(&self, assembly: &mut Assembly, state: &State, method: &dyn Method, work: &mut Work) {
+        timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), None));
     }
 
-    /// Another correction with the tangent that is there takes most of a residual away for the price of a substitution: what is
+    /// Another correction with a tangent of this solution takes most of a residual away for the price of a substitution: what is
     /// left of it may grow from time step to time step. Forces stay those of the iterate before, from which they differ by less
-    /// than the stop test allows.
-    fn polish(&mut self, model: &Model, system: &System, state: &mut State, method: &dyn Method, work: &mut Work) {
-        let wanted = method.weights();
-        let fits = self.formed.is_some_and(|(last, with)| last == system.revision && with.serves_for(&wanted));
-        if fits && self.substitute(system, None, false, work) {
+    /// than the stop test allows. A state that is in balance at once has no tangent but its own; `formed` where it is there.
+    fn polish(
+        &mut self,
+        model: &Model,
+        assembly: &mut Assembly,
+        state: &mut State,
+        method: &dyn Method,
+        formed: bool,
+        work: &mut Work,
+    ) {
+        let last = if self.reuse.history.len() > 1 { correction(model, &self.dq) } else { f64::INFINITY };
+        if !formed && !self.reuse.has_tangent() {
+            self.form(assembly, state, method, work);
+        }
+        // A correction that grows is none.
+        if self.substitute(&assembly.system, None, formed, work) && correction(model, &self.dq) <= last {
             Self::add(model, state, method, &self.dq);
         }
     }
@@ -300,7 +305,6 @@ impl Newton {
             work.chart_switches += switched as u64;
             charts::freeze(state, &model.charted.elements);
             self.reuse.forget();
-            self.formed = None;
             // What was a correction before is none in the new chart: it may not end the iteration.
             self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }

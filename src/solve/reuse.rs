@@ -37,7 +37,7 @@ impl Reuse {
     /// A solution begins; `kept` where the tangent is already that of its first iterate, but for the loads.
     pub fn begin(&mut self, kept: bool) {
         self.history.clear();
-        (self.kept, self.own, self.needed) = (kept, kept, 0);
+        (self.kept, self.own, self.needed) = (kept, false, 0);
     }
 
     /// A solution has come to balance.
@@ -48,14 +48,30 @@ impl Reuse {
     /// Whether the next evaluation had better form the tangent, too: neither is balance expected, nor did the last solution
     /// need another one from here on.
     pub fn expects_tangent(&self) -> bool {
-        let begins = self.history.is_empty();
-        let expected = if begins { self.kept } else { self.will_do(1) };
-        !(expected || ((begins || self.kept) && self.needed == self.before))
+        match self.history.is_empty() {
+            true => !self.kept,
+            false => !(self.expects_balance() || (self.kept && self.needed == self.before)),
+        }
+    }
+
+    /// Whether residuals have fallen so fast that the next one will do.
+    pub fn expects_balance(&self) -> bool {
+        self.will_do(1)
+    }
+
+    /// Whether there is a tangent near the present iterate.
+    pub fn has_tangent(&self) -> bool {
+        self.kept
     }
 
     /// Whether the tangent that is there shall serve for the present iterate.
     pub fn keeps_tangent(&self) -> bool {
-        self.kept && (self.history.len() == 1 || self.will_do(CHEAP))
+        self.kept && (self.begins() || self.will_do(CHEAP))
+    }
+
+    /// Whether this is the first iterate, whose tangent may have been given.
+    fn begins(&self) -> bool {
+        self.history.len() == 1
     }
 
     /// The iterate has its own tangent, which is used unless it is in balance.
@@ -64,9 +80,9 @@ impl Reuse {
         (self.kept, self.own) = (true, true);
     }
 
-    /// The iterate was corrected with an older tangent.
+    /// The iterate is corrected with the tangent that is there.
     pub fn keep(&mut self) {
-        self.own = false;
+        self.own = self.begins();
     }
 
     /// Whether the present correction is found with the tangent of its iterate.
@@ -134,12 +150,18 @@ mod tests {
     }
 
     #[test]
-    fn a_tangent_in_other_charts_is_never_kept() {
+    fn a_given_tangent_serves_until_charts_change() {
         let mut reuse = Reuse::new();
         reuse.begin(true);
         assert!(!reuse.expects_tangent());
         reuse.history.push(10.0);
         assert!(reuse.keeps_tangent());
+        // It is that of the iterate, and what it gives is looked at like that of a new one.
+        reuse.keep();
+        assert!(reuse.is_own());
+        reuse.history.push(1.5);
+        reuse.keep();
+        assert!(!reuse.is_own());
         reuse.forget();
         assert!(!reuse.keeps_tangent());
     }
