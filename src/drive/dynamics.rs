@@ -126,7 +126,7 @@ impl Run<'_> {
         before: &mut f64,
     ) -> Result<(), Failure> {
         while self.state.time < end {
-            let (next, length) = control.propose(self.state.time, self.next_stop(end));
+            let (next, length) = control.propose(self.state.time, self.next_corner(end));
             self.observer.progress(self.moment(), self.dynamic_progress(next, end))?;
             let step = Step { scheme: control.scheme, length };
             let tried = self.advance(workshop, step, *before, next);
@@ -200,6 +200,7 @@ impl Run<'_> {
         trend.begin(&assembly.system.pattern.equations, &mut self.state, &step);
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
         trend.end(&self.state, &assembly.system, &step);
+        self.refuse_massless_turns(massive)?;
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);
             self.counters.work.chart_switches += switched as u64;
@@ -214,15 +215,18 @@ impl Run<'_> {
         }
         let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
-        self.refuse_massless_turns(massive)?;
         self.refuse_leaps()
     }
 
-    /// Rotations without inertia have no spin to speak of: they go where balance is.
+    /// Rotations without inertia have no spin to speak of: they go where balance is. While a step is iterated the unknown is the
+    /// increment, or a total vector in the chart it began in.
     fn refuse_massless_turns(&self, massive: &[bool]) -> Result<(), NewtonFailure> {
-        let massless = self.model.charted.rotations.iter().map(|&slot| slot as usize).filter(|&slot| !massive[slot]);
-        let mut turned = massless.map(|slot| (slot, (self.state.q[slot] - self.good.q[slot]).norm()));
-        match turned.find(|&(_, angle)| angle > PI && self.state.turns.is_empty()) {
+        let massless = self.model.charted.rotations.iter().copied().filter(|&slot| !massive[slot as usize]);
+        let mut turned = massless.map(|slot| {
+            let (k, q) = (slot as usize, self.state.q[slot as usize]);
+            (k, if self.state.turn(slot).is_some() { q.norm() } else { (q - self.good.q[k]).norm() })
+        });
+        match turned.find(|&(_, angle)| angle > PI) {
             Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot, angle }),
             None => Ok(()),
         }
@@ -276,6 +280,13 @@ impl Run<'_> {
         let Some(interval) = self.plan.interval else { return end };
         let next = ((self.state.time / interval + 1e-9).floor() + 1.0) * interval;
         if next >= end - 1e-9 * interval { end } else { next }
+    }
+
+    /// The same, or the next instant at which a load or a motion takes another course: what begins and ends within a step
+    /// would leave no trace in the accelerations at its ends.
+    fn next_corner(&self, end: f64) -> f64 {
+        let stop = self.next_stop(end);
+        self.model.next_corner(self.state.time).map_or(stop, |corner| corner.min(stop))
     }
 
     fn dynamic_progress(&self, time: f64, end: f64) -> f64 {

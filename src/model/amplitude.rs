@@ -87,6 +87,14 @@ impl Amplitude {
         self.reached = self.at(time, load)[0];
     }
 
+    /// The first time behind `time` at which it takes another course.
+    pub fn next_corner(&self, time: f64) -> Option<f64> {
+        match self.course {
+            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_corner(time),
+            _ => None,
+        }
+    }
+
     /// The factor at `time` and `load`, and its first and second derivative over time.
     pub fn at(&self, time: f64, load: f64) -> [f64; 3] {
         match self.course {

@@ -168,6 +168,14 @@ impl Motion {
         }
     }
 
+    /// The first time behind `time` at which it takes another course.
+    pub fn next_corner(&self, time: f64) -> Option<f64> {
+        match self.course {
+            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_corner(time),
+            _ => None,
+        }
+    }
+
     /// Value and two derivatives over time.
     fn at(&self, time: f64, load: f64) -> [f64; 3] {
         match self.course {

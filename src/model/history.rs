@@ -4,6 +4,11 @@
 pub trait History: Send + Sync {
     /// Value, first and second derivative at `x`.
     fn at(&self, x: f64) -> [f64; 3];
+
+    /// The first place behind `x` where it takes another course, if it knows of one.
+    fn next_corner(&self, _x: f64) -> Option<f64> {
+        None
+    }
 }
 
 /// A table: linear between its points and constant outside; or smooth, each interval by s^3 (10 - 15 s + 6 s^2), whose
@@ -37,6 +42,10 @@ impl History for Table {
         let slope = 30.0 * s * s * (1.0 - s) * (1.0 - s);
         let bend = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s);
         [self.values[k] + rise * value, rise * slope / width, rise * bend / (width * width)]
+    }
+
+    fn next_corner(&self, x: f64) -> Option<f64> {
+        self.times.get(self.times.partition_point(|&t| t <= x)).copied()
     }
 }
 

@@ -249,6 +249,12 @@ impl Model {
         Ok(())
     }
 
+    /// The first time behind `time` at which a load or a motion takes another course.
+    pub fn next_corner(&self, time: f64) -> Option<f64> {
+        let loads = self.amplitudes.iter().filter_map(|amplitude| amplitude.next_corner(time));
+        loads.chain(self.motions.iter().filter_map(|motion| motion.next_corner(time))).min_by(f64::total_cmp)
+    }
+
     /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions. Where a motion turns
     /// its node too far at once, its slot and the angle are returned.
     pub fn set_clock(&self, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {

@@ -284,7 +284,7 @@ fn critical_loads_of_a_folded_frame_do_not_depend_on_the_unit_of_the_load() {
         close(unit * critical_loads(&folded_frame(4, unit)).loads[0], 81_080.0, 1e-3);
         let finer = critical_loads(&folded_frame(16, unit));
         close(unit * finer.loads[0], 23_604.5, 1e-5);
-        assert_eq!(finer.warnings, [String::new(); 0]);
+        assert!(finer.warnings.is_empty(), "{:?}", finer.warnings);
     }
 }
 

@@ -217,6 +217,45 @@ fn adaptive_steps_know_what_increments_are_good_at() {
     }
 }
 
+/// A pulse that begins and ends between two steps leaves no trace in the accelerations at their ends: steps stop where it begins.
+#[test]
+fn adaptive_steps_see_what_comes_late() {
+    let text = |adaptive: &str| {
+        format!(
+            "[point]\nblock = [0, 0, 0]\n[[body]]\nat = \"block\"\nmass = 2\n\
+             [[load]]\nat = \"block\"\nforce = [100, 0, 0]\nhistory = \"pulse\"\n\
+             [history.pulse]\ntimes = [0.5, 0.51, 0.52]\nvalues = [0, 1, 0]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 2\nstep = 0.1\n{adaptive}\n[output]\ncolumns = [\"u\", \"v\"]\n"
+        )
+    };
+    let adaptive = simulate(&text("adaptive = true\nstep_tolerance = 1e-6"));
+    assert!((adaptive.vector("block.v")[0] - 0.5).abs() < 1e-9);
+    assert!((adaptive.vector("block.u")[0] - 0.5 * 1.49).abs() < 1e-5);
+    // Fixed steps are where the deck puts them, and know nothing of it.
+    assert_eq!(simulate(&text("")).vector("block.v"), [0.0; 3]);
+}
+
+/// What has no inertia turns with its rod past pi, where its vector is continued in the other chart.
+#[test]
+fn rotations_without_inertia_turn_on_over_increments() {
+    let spin = |scheme: &str| {
+        let rod = format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\n[section.s]\nEA = 5e4\nGA = 2e4\nGJ = 80\nEI = 100\nrhoA = 1\n\
+             [[beam]]\nname = \"rod\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 4\n\
+             [[initial]]\nspin = [0, 0, 10]\nabout = \"a\"\n\
+             [[support]]\nat = \"a\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"ry\"]\n\
+             [[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.002\nscheme = \"{scheme}\"\n[output]\ncolumns = [\"u\"]\n"
+        );
+        let run = simulate(&rod);
+        assert_eq!(run.counters.cutbacks, 0);
+        run.vector("b.u")
+    };
+    let (increments, totals) = (spin("lie_generalized_alpha"), spin("generalized_alpha"));
+    let rigid = [f64::cos(10.0) - 1.0, f64::sin(10.0), 0.0];
+    assert!(distance(increments, totals) < 1e-3, "{increments:?} and {totals:?}");
+    assert!(distance(increments, rigid) < 0.05, "{increments:?} and {rigid:?}");
+}
+
 /// A rod that is hit hard: Newton cannot take the first step as long as it is asked for.
 #[test]
 fn a_step_whose_newton_fails_is_taken_smaller() {
