@@ -239,7 +239,7 @@ impl Newton {
 
     /// Another correction with a tangent of this solution takes most of a residual away for the price of a substitution: what is
     /// left of it may grow from time step to time step. Forces stay those of the iterate before, from which they differ by less
-    /// than the stop test allows. A state that is in balance at once has no tangent but its own; `formed` where it is there.
+    /// than the stop test allows. A time step that is in balance at once has no tangent but its own; `formed` where it is there.
     fn polish(
         &mut self,
         model: &Model,
@@ -249,12 +249,16 @@ impl Newton {
         formed: bool,
         work: &mut Work,
     ) {
-        let last = if self.reuse.history.len() > 1 { correction(model, &self.dq) } else { f64::INFINITY };
+        // A correction that grows is none; without one before, one that is large for its residual is of something loose.
+        let first = self.reuse.history.len() == 1;
+        let most = if first { self.convergence.tolerance.sqrt() } else { correction(model, &self.dq) };
+        if first && method.changes_charts() {
+            return;
+        }
         if !formed && !self.reuse.has_tangent() {
             self.form(assembly, state, method, work);
         }
-        // A correction that grows is none.
-        if self.substitute(&assembly.system, None, formed, work) && correction(model, &self.dq) <= last {
+        if self.substitute(&assembly.system, None, formed, work) && correction(model, &self.dq) <= most {
             Self::add(model, state, method, &self.dq);
         }
     }
