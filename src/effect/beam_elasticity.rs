@@ -363,11 +363,8 @@ fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
         let connections = each_lane!(|k| &elements[k].connection);
         let sum = Sum::side_by_side(elements, &[], at);
         let view = I::View::new(&Posture::side_by_side(connections, at));
-        let (mut du, mut dp) = ([Vec3::zero(); N], [Vec3::zero(); N]);
-        for i in 0..N {
-            du[i] = at_slots(dq, each_lane!(|k| connections[k].nodes[i].u));
-            dp[i] = at_slots(dq, each_lane!(|k| connections[k].nodes[i].p));
-        }
+        let du: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| connections[k].nodes[i].u)));
+        let dp: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| connections[k].nodes[i].p)));
         let stresses = view.extrapolated(&sum.points, sum.free, &du, &dp);
         for g in 0..G {
             let stress = packed(&stresses[g]);
