@@ -78,16 +78,8 @@ impl Run<'_> {
     fn follow(&mut self, workshop: &mut Workshop, estimate: f64, before: usize, done: f64) -> Result<f64, Failure> {
         let way = (estimate - self.state.load).signum();
         let none = self.negative_pivots(workshop);
-        let mut search = Search {
-            here: self.state.clone(),
-            beyond: None,
-            estimate,
-            stretch: 1.0,
-            way,
-            seen: estimate,
-            ended: false,
-            coarse: false,
-        };
+        let mut search =
+            Search { here: self.state.clone(), beyond: None, estimate, stretch: 1.0, way, seen: estimate, ended: None };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
                 if search.is_a_limit(found) {
@@ -104,7 +96,7 @@ impl Run<'_> {
             let walked = self.continue_path(workshop, target);
             if walked != Walked::There || self.has_leapt(workshop, &search.here)? {
                 // Load control ends at limit points, or comes down on another branch.
-                search.end_at(target, walked == Walked::TooCoarse);
+                search.end_at(target, walked);
                 continue;
             }
             let count = self.negative_pivots(workshop);
@@ -116,7 +108,7 @@ impl Run<'_> {
             };
             if passed > before {
                 search.beyond = Some(target);
-                (search.ended, search.coarse) = (false, false);
+                search.ended = None;
                 search.stretch = 1.0;
             } else {
                 let ahead = self.critical_loads(workshop, before + 4)?;
@@ -126,7 +118,7 @@ impl Run<'_> {
                 );
             }
         }
-        self.warn_of_estimate(search.estimate, search.here.load, search.coarse);
+        self.warn_of_estimate(search.estimate, search.here.load, search.ended);
         Ok(search.estimate)
     }
 
@@ -177,11 +169,12 @@ impl Run<'_> {
                 break;
             }
         }
-        self.warn_of_estimate(critical, self.state.load, walked == Walked::TooCoarse);
+        self.warn_of_estimate(critical, self.state.load, Some(walked));
         Ok(critical)
     }
 
-    fn warn_of_estimate(&mut self, critical: f64, from: f64, coarse: bool) {
+    fn warn_of_estimate(&mut self, critical: f64, from: f64, ended: Option<Walked>) {
+        let coarse = ended == Some(Walked::TooCoarse);
         let why = if coarse { ", since the mesh does not tell the shape there: use more `elements`" } else { "" };
         let message = format!(
             "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it{why}"
@@ -290,10 +283,8 @@ struct Search {
     way: f64,
     /// What the tangent of the last point before it said
     seen: f64,
-    /// Whether what lies beyond is known only from load control, which did not get there
-    ended: bool,
-    /// And that for a mesh that does not tell the shape
-    coarse: bool,
+    /// How load control went where what lies beyond is known only from that it did not get there, or not on this branch
+    ended: Option<Walked>,
 }
 
 /// How far load control came on its way.
@@ -317,16 +308,20 @@ impl Search {
     }
 
     /// The path by load control ends before this load.
-    fn end_at(&mut self, load: f64, coarse: bool) {
+    fn end_at(&mut self, load: f64, walked: Walked) {
         self.beyond = Some(load);
-        (self.ended, self.coarse) = (true, coarse);
+        self.ended = Some(walked);
         self.stretch = 1.0;
         self.estimate = 0.5 * (self.here.load + load);
     }
 
     /// Whether load control ends there for want of stiffness: a limit point looks twice as far away as it is.
     fn is_a_limit(&self, found: f64) -> bool {
-        !self.ended || (!self.coarse && (self.seen - found).abs() <= SEEN * found.abs())
+        match self.ended {
+            None => true,
+            Some(Walked::TooCoarse) => false,
+            Some(_) => (self.seen - found).abs() <= SEEN * found.abs(),
+        }
     }
 
     /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the
