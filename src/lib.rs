@@ -16,3 +16,4 @@ pub mod solve;
 pub mod study;
 pub mod system;
 pub mod tensor;
+pub mod threads;

@@ -9,6 +9,7 @@ use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Journal, Options, Pace, Point};
 use crate::study::error_bars::{ErrorBars, error_bars, refuse_paths};
+use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -24,6 +25,9 @@ pub struct Target {
     /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two coarser runs
     #[arg(long)]
     error_bars: bool,
+    /// Threads (default: one a core); they serve a search, and a large scene, whose results are the same on any number of them
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZero<usize>>,
     /// Also write report.html, a page that plays the run back
     #[arg(long)]
     report: bool,
@@ -88,7 +92,7 @@ impl Target {
             progress.tell(done as f64 / all as f64, || format!("looking for the accuracy: {done} of {all} runs"));
         };
         let options = Options {
-            threads: cores(None),
+            threads: cores(self.threads),
             budget: self.budget,
             interrupted: &signals::caught,
             tell: &mut tell,

@@ -2,7 +2,7 @@
 
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
-use super::{Status, Verdict, json, load, report, say, signals};
+use super::{Status, Verdict, cores, json, load, report, say, signals};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, RowCounter, Rows,
@@ -11,6 +11,7 @@ use crate::output::{
 use crate::scene::Scene;
 use crate::study::Recorder;
 use crate::study::error_bars::ErrorBars;
+use crate::threads;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -26,7 +27,8 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
             Ok(Aimed { text, scene, reached, bars, film }) => {
                 let folder = folder(out, &name, decks.len() > 1);
                 let beyond = Beyond { reached, bars, text, film };
-                let mut finished = simulate(&scene, &name, Some(&folder), None, beyond);
+                let threads = cores(target.threads);
+                let mut finished = simulate(&scene, &name, Some(&folder), None, beyond, threads);
                 summarise(&name, &scene, &finished, &folder);
                 finished.record.iter().for_each(|record| json::run(path, &folder, record));
                 if let (Some(film), Some(record)) = (finished.film.take(), finished.record.take()) {
@@ -170,18 +172,21 @@ pub struct Beyond {
     pub film: Option<Film>,
 }
 
-/// Runs a scene; with a folder it leaves its results there, and a recorder follows what is expected.
+/// Runs a scene on so many threads where it is large; with a folder it leaves its results there, and a recorder follows what is
+/// expected.
 pub fn simulate(
     scene: &Scene,
     name: &str,
     folder: Option<&Path>,
     recorder: Option<&mut Recorder>,
     beyond: Beyond,
+    threads: usize,
 ) -> Finished {
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
     let Beyond { reached, bars, text, film } = beyond;
+    let threads = threads.min(scene.plan.model.regions());
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
     let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), beside)).transpose();
     let dynamic: Vec<bool> =
@@ -203,14 +208,15 @@ pub fn simulate(
         rows: RowCounter::new(Rows { every: scene.every, interval: scene.plan.interval }),
     };
     let (mut result, counters) = match opened {
-        Ok(()) => Run::new(scene.plan.clone(), &mut watcher).finish(),
+        Ok(()) => threads::on(threads, || Run::new(scene.plan.clone(), &mut watcher).finish()),
         Err(failure) => (Err(failure), Counters::default()),
     };
     watcher.progress.done();
     let seconds = start.elapsed().as_secs_f64();
     let mut record = None;
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
-        let outcome = Outcome { result: &result, counters: &counters, seconds, reached: reached.as_ref(), text: &text };
+        let reached = reached.as_ref();
+        let outcome = Outcome { result: &result, counters: &counters, seconds, threads, reached, text: &text };
         let told = Record::of(scene, &outcome);
         let text = told.to_string();
         record = Some(told);

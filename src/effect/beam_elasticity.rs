@@ -2,13 +2,14 @@
 
 use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
 use super::planar_elasticity::PlanarElasticity;
-use super::{ByOrder, Connection, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
+use super::{AT_ONCE, ByOrder, Connection, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane, pack};
 use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -54,6 +55,12 @@ impl<I: Interpolation> BeamElasticity<I> {
         self
     }
 
+    /// The integration points of the elements before this one.
+    pub(super) fn points_before(&self, element: usize) -> usize {
+        let (two, three) = (self.elements.two.len(), self.elements.three.len());
+        element + element.saturating_sub(two) + element.saturating_sub(two + three)
+    }
+
     /// The stresses of geometric parts; empty where they are the present ones.
     pub(super) fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
         match &self.unstressed {
@@ -93,7 +100,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
+        let mut cliques = Cliques::divisible();
         for_each_batch!(self.elements, |_first, batch| for element in batch {
             cliques.push(element.connection.slots());
         });
@@ -127,16 +134,14 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn memory_points(&self) -> usize {
-        self.elements.two.len() + 2 * self.elements.three.len() + 3 * self.elements.four.len()
+        let ByOrder { two, three, four } = &self.elements;
+        self.points_before(two.len() + three.len() + four.len())
     }
 
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
         let remembered = self.remembered(memory);
-        let mut start = 0;
-        for_each_batch!(self.elements, |first, batch| {
-            let points: usize = batch.iter().map(|element| element.points.len()).sum();
-            let end = start + points;
-            let part = remembered.get(std::mem::replace(&mut start, end)..).unwrap_or_default();
+        for_each_batch!(self.elements, out.instances(), |first, batch| {
+            let part = remembered.get(self.points_before(first)..).unwrap_or_default();
             let done = Instructions::here().run_side_by_side(
                 #[inline(always)]
                 || add_batch::<I, _, _>(batch, first, part, at, weights, out),
@@ -152,18 +157,9 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
-        let mut start = 0;
-        for_each_batch!(self.elements, |_first, batch| {
-            let end = start + batch.iter().map(|element| element.points.len()).sum::<usize>();
-            let own = &mut memory.points[std::mem::replace(&mut start, end)..end];
-            let done = Instructions::here().run_side_by_side(
-                #[inline(always)]
-                || extrapolate_batch::<I, _, _>(batch, at, dq, own),
-            );
-            if done.is_none() {
-                let each = batch.iter().zip(own.chunks_mut(batch.first().map_or(1, |element| element.points.len())));
-                each.for_each(|(element, stresses)| element.extrapolate::<I>(at, dq, stresses));
-            }
+        for_each_batch!(self.elements, |first, batch| {
+            let own = &mut memory.points[self.points_before(first)..self.points_before(first + batch.len())];
+            extrapolate_batch::<I, _, _>(batch, at, dq, own);
         });
         memory.valid = true;
     }
@@ -171,14 +167,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     fn energy(&self, at: &State) -> Energy {
         let mut strain = 0.0;
         for_each_batch!(self.elements, |_first, batch| {
-            let mut add = |energy: f64| strain += energy;
-            let done = Instructions::here().run_side_by_side(
-                #[inline(always)]
-                || each_energy::<I, _, _>(batch, at, &mut add),
-            );
-            if done.is_none() {
-                batch.iter().for_each(|element| add(element.energy::<I>(at)));
-            }
+            threads::in_order(batch.chunks(AT_ONCE), |batch| energy_of::<I, _, _>(batch, at), |own| strain += own);
         });
         Energy { kinetic: 0.0, strain }
     }
@@ -207,18 +196,32 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn noise(&self, at: &State) -> Noise {
-        let (mut largest, mut points) = (Noise::default(), self.rounding.iter());
-        for_each_batch!(self.elements, |_first, batch| for element in batch {
-            let nodes = element.connection.nodes.iter();
-            let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
-            for point in points.by_ref().take(element.points.len()) {
-                let force = point.at_rest + point.over_displacement * u;
-                largest.force = largest.force.max(force);
-                largest.moment = largest.moment.max(point.bending + force * point.weight);
-            }
+        let mut largest = Noise::default();
+        for_each_batch!(self.elements, |first, batch| {
+            let points = &self.rounding[self.points_before(first)..];
+            let parts = batch.chunks(AT_ONCE).zip(points.chunks(AT_ONCE * batch[0].points.len()));
+            threads::in_order(
+                parts,
+                |(batch, points)| noise_of(batch, points, at),
+                |noise| largest = largest.or(noise),
+            );
         });
         largest
     }
+}
+
+/// The largest round-off of the forces of some elements.
+fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], points: &[Rounding], at: &State) -> Noise {
+    let mut largest = Noise::default();
+    for (element, points) in batch.iter().zip(points.as_chunks::<G>().0) {
+        let nodes = element.connection.nodes.iter();
+        let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
+        for point in points {
+            let force = point.at_rest + point.over_displacement * u;
+            largest = largest.or(Noise { force, moment: point.bending + force * point.weight });
+        }
+    }
+    largest
 }
 
 /// What round-off may leave of the force of a point: displacements u and rotations P carry a relative error of one unit in the last
@@ -351,8 +354,26 @@ pub(super) fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
 }
 
 /// The stresses that the points of a batch are expected to have after the correction `dq`.
-#[inline(always)]
 fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    threads::each(batch.chunks(AT_ONCE).zip(out.chunks_mut(AT_ONCE * G)), |(batch, out)| {
+        let done = Instructions::here().run_side_by_side(
+            #[inline(always)]
+            || extrapolate_side_by_side::<I, _, _>(batch, at, dq, out),
+        );
+        if done.is_none() {
+            let each = batch.iter().zip(out.as_chunks_mut::<G>().0);
+            each.for_each(|(element, stresses)| element.extrapolate::<I>(at, dq, stresses));
+        }
+    });
+}
+
+#[inline(always)]
+fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
     at: &State,
     dq: &[Vec3],
@@ -378,6 +399,20 @@ fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
             }
         }
     }
+}
+
+/// The strain energy of some elements.
+fn energy_of<I: Interpolation, const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> f64 {
+    let mut sum = 0.0;
+    let mut add = |energy: f64| sum += energy;
+    let done = Instructions::here().run_side_by_side(
+        #[inline(always)]
+        || each_energy::<I, _, _>(batch, at, &mut add),
+    );
+    if done.is_none() {
+        batch.iter().for_each(|element| add(element.energy::<I>(at)));
+    }
+    sum
 }
 
 /// Shows the strain energy of each element, in their order.

@@ -74,7 +74,7 @@ impl Effect for BodyGravity {
     }
 
     fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
+        let mut cliques = Cliques::divisible();
         self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
         cliques
     }
@@ -94,7 +94,8 @@ impl Effect for BodyGravity {
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
-        for (k, body) in self.bodies.iter().enumerate() {
+        for k in out.instances() {
+            let body = &self.bodies[k];
             let weight = self.acceleration * (at.amplitude[self.amplitude] * body.inertia.mass);
             system.clear();
             system.add_force(0, -weight);

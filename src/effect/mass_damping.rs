@@ -57,7 +57,7 @@ impl Effect for BodyMassDamping {
     }
 
     fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
+        let mut cliques = Cliques::divisible();
         self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
         cliques
     }
@@ -68,7 +68,8 @@ impl Effect for BodyMassDamping {
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let mut system = ElementSystem::new(2);
-        for (k, body) in self.bodies.iter().enumerate() {
+        for k in out.instances() {
+            let body = &self.bodies[k];
             let velocity = at.v[body.node.u as usize];
             let force = drag(&body.inertia, velocity, &at.spin(body.node.p), self.factor, weights);
             system.clear();

@@ -30,6 +30,7 @@ use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{LANES, Lanes, Pack, each_lane};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, Slot, StageContext, StageKind, State};
 use crate::tensor::{Mat3, Vec3};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Stored energy of one state.
@@ -76,6 +77,13 @@ pub struct Noise {
     pub moment: f64,
 }
 
+impl Noise {
+    /// The larger of both.
+    pub fn or(self, other: Self) -> Self {
+        Self { force: self.force.max(other.force), moment: self.moment.max(other.moment) }
+    }
+}
+
 /// One kind of physical effect with all its instances.
 pub trait Effect: Send + Sync {
     /// Its name in `check` and run.json.
@@ -84,7 +92,7 @@ pub trait Effect: Send + Sync {
     /// What its forces are.
     fn category(&self) -> Category;
 
-    /// The slots that meet in each instance.
+    /// The slots that meet in each instance; [divisible](Cliques::divisible) where many instances make it worth while.
     fn cliques(&self) -> Cliques;
 
     /// Whether its forces depend on the state at all; forces that do not have no tangent.
@@ -264,6 +272,16 @@ impl<const N: usize> Connection<N> {
     }
 }
 
+/// Which rows of elements side by side of a batch of this length, before which there are so many instances, a sink takes: it never
+/// takes parts of rows.
+fn own_blocks(before: usize, length: usize, out: &Sink) -> Range<usize> {
+    let own = own_part(before, length, &out.instances());
+    own.start.div_ceil(LANES)..own.end.div_ceil(LANES)
+}
+
+/// As many elements of a batch as one thread takes at a time, where elements know nothing of each other: whole rows.
+const AT_ONCE: usize = 256 * LANES;
+
 /// The elements from `start` on that stand side by side; the last one of a batch fills up its row.
 #[inline(always)]
 fn side_by_side<E>(batch: &[E], start: usize) -> [&E; LANES] {
@@ -325,26 +343,38 @@ impl<A, B, C> ByOrder<A, B, C> {
     }
 }
 
-/// Where each instance of a batch begins counting: batches follow each other in the order two, three, four.
+/// Where each instance of a batch begins counting: batches follow each other in the order two, three, four. Of each batch those of
+/// some instances, where these are given.
 macro_rules! for_each_batch {
-    ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {{
-        let batches = &$batches;
-        let mut $first = 0;
-        crate::effect::for_each_batch!(@one batches.two, $first, $batch, $body);
-        crate::effect::for_each_batch!(@one batches.three, $first, $batch, $body);
-        crate::effect::for_each_batch!(@one batches.four, $first, $batch, $body);
-        let _ = $first;
+    ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {
+        crate::effect::for_each_batch!($batches, 0..usize::MAX, |$first, $batch| $body)
+    };
+    ($batches:expr, $instances:expr, |$first:ident, $batch:ident| $body:expr) => {{
+        let (batches, instances) = (&$batches, $instances);
+        let mut before = 0;
+        crate::effect::for_each_batch!(@one batches.two, instances, before, $first, $batch, $body);
+        crate::effect::for_each_batch!(@one batches.three, instances, before, $first, $batch, $body);
+        crate::effect::for_each_batch!(@one batches.four, instances, before, $first, $batch, $body);
+        let _ = before;
     }};
     // Room to work in is not made for nothing.
-    (@one $own:expr, $first:ident, $batch:ident, $body:expr) => {
-        let $batch = &$own;
+    (@one $own:expr, $instances:ident, $before:ident, $first:ident, $batch:ident, $body:expr) => {
+        let own = crate::effect::own_part($before, $own.len(), &$instances);
+        let ($first, $batch) = ($before + own.start, &$own[own]);
         if !$batch.is_empty() {
             $body;
-            $first += $batch.len();
         }
+        $before += $own.len();
     };
 }
 pub(crate) use for_each_batch;
+
+/// Which elements of a batch of this length, before which there are so many instances, are among some instances.
+#[inline]
+fn own_part(before: usize, length: usize, instances: &Range<usize>) -> Range<usize> {
+    let place = |instance: usize| instance.clamp(before, before + length) - before;
+    place(instances.start)..place(instances.end)
+}
 
 /// What of mass properties decides whether they lie in a plane.
 fn inertia_aspects(inertia: &Inertia, show: &mut dyn FnMut(Aspect)) {

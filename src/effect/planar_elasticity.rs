@@ -2,12 +2,13 @@
 
 use super::beam_elasticity::{BeamElasticity, ElasticElement, stresses_of, workspace};
 use super::interpolation::Interpolation;
-use super::{ByOrder, PlanarForm, at_slots};
+use super::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Memory, Plane, Sink, Slot, State};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::sync::Arc;
 
 /// The elements of an effect in space, side by side in their order. Where something is held, or nodes sit in different charts, the
@@ -96,8 +97,8 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     out: &mut Sink,
 ) {
     let (stiffness, mut alone) = (weights.stiffness, None);
-    for (number, block) in blocks.iter().enumerate() {
-        let start = number * LANES;
+    for number in own_blocks(first, batch.len(), out) {
+        let (block, start) = (&blocks[number], number * LANES);
         let elements = &batch[start..batch.len().min(start + LANES)];
         let mut nodes = block.nodes(&at.q, plane);
         in_one_turn(&mut nodes);
@@ -115,8 +116,25 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     }
 }
 
-#[inline(always)]
 fn extrapolate_batch<const N: usize, const G: usize>(
+    plane: &Plane,
+    blocks: &[Block<N, G>],
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    let parts = blocks.chunks(AT_ONCE / LANES).zip(batch.chunks(AT_ONCE)).zip(out.chunks_mut(AT_ONCE * G));
+    threads::each(parts, |((blocks, batch), out)| {
+        Instructions::here().run(
+            #[inline(always)]
+            || extrapolate_blocks(plane, blocks, batch, at, dq, out),
+        );
+    });
+}
+
+#[inline(always)]
+fn extrapolate_blocks<const N: usize, const G: usize>(
     plane: &Plane,
     blocks: &[Block<N, G>],
     batch: &[ElasticElement<N, G>],
@@ -142,16 +160,18 @@ fn extrapolate_batch<const N: usize, const G: usize>(
 impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
         let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
-        let known = self.spatial.remembered(memory);
         let (two, three) = (elements.two.len(), elements.three.len());
-        let part = |start: usize| known.get(start..).unwrap_or_default();
+        let known = |first: usize| {
+            let points = self.spatial.points_before(first);
+            self.spatial.remembered(memory).get(points..).unwrap_or_default()
+        };
         Instructions::here().run(
             #[inline(always)]
             || {
-                add_batch::<I, 2, 1>(plane, &blocks.two, &elements.two, 0, known, at, weights, out);
-                add_batch::<I, 3, 2>(plane, &blocks.three, &elements.three, two, part(two), at, weights, out);
-                let (first, own) = (two + three, part(two + 2 * three));
-                add_batch::<I, 4, 3>(plane, &blocks.four, &elements.four, first, own, at, weights, out);
+                add_batch::<I, 2, 1>(plane, &blocks.two, &elements.two, 0, known(0), at, weights, out);
+                add_batch::<I, 3, 2>(plane, &blocks.three, &elements.three, two, known(two), at, weights, out);
+                let first = two + three;
+                add_batch::<I, 4, 3>(plane, &blocks.four, &elements.four, first, known(first), at, weights, out);
             },
         );
     }
@@ -160,14 +180,9 @@ impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
         let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
         let (two, rest) = memory.points.split_at_mut(elements.two.len());
         let (three, four) = rest.split_at_mut(2 * elements.three.len());
-        Instructions::here().run(
-            #[inline(always)]
-            || {
-                extrapolate_batch(plane, &blocks.two, &elements.two, at, dq, two);
-                extrapolate_batch(plane, &blocks.three, &elements.three, at, dq, three);
-                extrapolate_batch(plane, &blocks.four, &elements.four, at, dq, four);
-            },
-        );
+        extrapolate_batch(plane, &blocks.two, &elements.two, at, dq, two);
+        extrapolate_batch(plane, &blocks.three, &elements.three, at, dq, three);
+        extrapolate_batch(plane, &blocks.four, &elements.four, at, dq, four);
         memory.valid = true;
     }
 }

@@ -1,9 +1,9 @@
 //! Inertia in a scene that lies in a plane: the mass of beams on their centre lines, and bodies at nodes.
 
 use super::beam_mass::BeamMass;
-use super::rigid_body::RigidBody;
+use super::rigid_body::{RigidBody, are_centred};
 use super::volume::VolumeElement;
-use super::{ByOrder, Effect, PlanarForm, at_slots};
+use super::{ByOrder, Effect, PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::PlanarBody;
 use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
@@ -64,7 +64,9 @@ fn add_masses<const N: usize>(
     weights: Weights,
     out: &mut Sink,
 ) {
-    for (number, block) in blocks.iter().enumerate() {
+    let length = blocks.last().map_or(0, |last| LANES * (blocks.len() - 1) + last.count);
+    for number in own_blocks(first, length, out) {
+        let block = &blocks[number];
         let mut force = [Vec3::zero(); N];
         for j in 0..N {
             let acceleration = at_slots(&at.a, block.u[j]);
@@ -131,9 +133,9 @@ impl PlanarBodies {
         let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
         let in_plane = |v: Vec3<Lanes>| [along(v, plane.axes().column(0)), along(v, plane.axes().column(1))];
         let gyroscopic = if self.spatial.gyroscopic { 1.0 } else { 0.0 };
-        let (mut alone, centred) = (None, self.spatial.is_centred());
-        for (number, block) in self.blocks.iter().enumerate() {
-            let first = number * LANES;
+        let (mut alone, centred) = (None, are_centred(&bodies[out.instances()]));
+        for number in own_blocks(0, bodies.len(), out) {
+            let (block, first) = (&self.blocks[number], number * LANES);
             let angle = along(at_slots(&at.q, block.p), normal);
             let spin = along(at_slots(&at.v, block.p), normal) * gyroscopic;
             let spin_rate = along(at_slots(&at.a, block.p), normal);
@@ -158,7 +160,7 @@ impl PlanarBodies {
 impl PlanarForm for PlanarBodies {
     /// A spin about one axis has no gyroscopic moments; only masses beside their node pull.
     fn is_symmetric(&self) -> bool {
-        self.spatial.is_centred()
+        are_centred(&self.spatial.bodies)
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {

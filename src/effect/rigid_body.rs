@@ -41,7 +41,7 @@ impl Effect for RigidBody {
     }
 
     fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
+        let mut cliques = Cliques::divisible();
         self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
         cliques
     }
@@ -58,7 +58,7 @@ impl Effect for RigidBody {
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        let centred = self.is_centred();
+        let centred = are_centred(&self.bodies[out.instances()]);
         // Increments of rotation have spins of their own.
         let vectors = at.turns.is_empty().then(Instructions::here);
         let done = vectors.and_then(|instructions| {
@@ -69,7 +69,7 @@ impl Effect for RigidBody {
         });
         if done.is_none() {
             let mut system = ElementSystem::new(2);
-            (0..self.bodies.len()).for_each(|k| self.add_one(k, centred, at, weights, &mut system, out));
+            out.instances().for_each(|k| self.add_one(k, centred, at, weights, &mut system, out));
         }
     }
 
@@ -89,12 +89,7 @@ impl Effect for RigidBody {
 }
 
 impl RigidBody {
-    /// Whether every mass centre is at its node.
-    pub(super) fn is_centred(&self) -> bool {
-        self.bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
-    }
-
-    /// Adds body `k`; `system` is scratch, `centred` see [`Self::is_centred`].
+    /// Adds body `k`; `system` is scratch, `centred` see [`are_centred`].
     pub(super) fn add_one(
         &self,
         k: usize,
@@ -113,14 +108,15 @@ impl RigidBody {
     #[inline(always)]
     fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Sink) {
         let mut systems = out.lend(2);
-        for first in (0..self.bodies.len()).step_by(LANES) {
-            let bodies = side_by_side(&self.bodies, first);
+        let (own, before) = (&self.bodies[out.instances()], out.instances().start);
+        for first in (0..own.len()).step_by(LANES) {
+            let bodies = side_by_side(own, first);
             let inertia = pack!(bodies.inertia);
             let [u, p] = [each_lane!(|k| bodies[k].node.u), each_lane!(|k| bodies[k].node.p)];
             let spin = Spin::new(at_slots(&at.q, p), at_slots(&at.v, p), at_slots(&at.a, p));
             self.put(&inertia, centred, at_slots(&at.a, u), spin, weights, &mut systems);
-            let count = LANES.min(self.bodies.len() - first);
-            out.add_lanes(first, count, &systems, |_| false, |_, _| ());
+            let count = LANES.min(own.len() - first);
+            out.add_lanes(before + first, count, &systems, |_| false, |_, _| ());
         }
         out.take_back(systems);
     }
@@ -145,6 +141,11 @@ impl RigidBody {
         system.clear_for(weights);
         force.write(system);
     }
+}
+
+/// Whether every mass centre is at its node.
+pub(super) fn are_centred(bodies: &[Body]) -> bool {
+    bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
 }
 
 /// m v.v/2 + m v.R(Omega x d) + Omega.J0 Omega/2

@@ -49,7 +49,7 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        for_each_batch!(self.elasticity.elements, |first, batch| {
+        for_each_batch!(self.elasticity.elements, out.instances(), |first, batch| {
             add_batch::<I, _, _>(batch, first, self.factor, at, weights, out);
         });
     }

@@ -22,7 +22,7 @@ pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, V
 impl<Q: Copy> VolumeElements<Q> {
     /// The slots that meet in each element.
     pub fn cliques(&self, blocks: Blocks) -> Cliques {
-        let mut cliques = Cliques::default();
+        let mut cliques = Cliques::divisible();
         for_each_batch!(self, |_first, batch| for element in batch {
             let nodes = element.connection.nodes.iter();
             match blocks {
@@ -40,7 +40,7 @@ impl<Q: Copy> VolumeElements<Q> {
         K: VolumeKernel<Quantity = Q>,
         K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
     {
-        for_each_batch!(self, |first, batch| {
+        for_each_batch!(*self, out.instances(), |first, batch| {
             let done = Instructions::here().run_side_by_side(
                 #[inline(always)]
                 || add_batch(kernel, batch, first, at, weights, out),

@@ -18,6 +18,7 @@ use crate::kernel::Weights;
 use crate::kernel::turn::StepCoefficients;
 use crate::system::{Slot, State};
 use crate::tensor::Vec3;
+use crate::threads::{self, PART};
 
 /// The coefficients of a method.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,15 +134,20 @@ impl Method for Step {
         let Weights { damping, mass, .. } = self.weights();
         let algorithmic = 1.0 / (self.scheme.beta * self.length * self.length);
         // Where a motion is prescribed nothing is corrected, and rates stay as they are prescribed.
-        for (slot, &dq) in dq.iter().enumerate().filter(|(_, dq)| **dq != Vec3::ZERO) {
-            state.q[slot] += dq;
-            if let Some(turn) = state.turn(slot as Slot) {
-                (state.v[slot], state.a[slot]) = turn.rates(state.q[slot]);
-                continue;
+        let State { q, v, a, algorithmic: filtered, turns, .. } = state;
+        let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(filtered.chunks_mut(PART));
+        let parts = q.chunks_mut(PART).zip(rates).zip(dq.chunks(PART)).enumerate();
+        threads::each(parts, |(number, ((q, ((v, a), filtered)), dq))| {
+            for (k, &dq) in dq.iter().enumerate().filter(|(_, dq)| **dq != Vec3::ZERO) {
+                q[k] += dq;
+                if let Some(Some(turn)) = turns.get(PART * number + k) {
+                    (v[k], a[k]) = turn.rates(q[k]);
+                    continue;
+                }
+                v[k] += dq * damping;
+                a[k] += dq * mass;
+                filtered[k] += dq * algorithmic;
             }
-            state.v[slot] += dq * damping;
-            state.a[slot] += dq * mass;
-            state.algorithmic[slot] += dq * algorithmic;
-        }
+        });
     }
 }

@@ -12,6 +12,7 @@ pub use trend::Trend;
 use crate::kernel::Weights;
 use crate::system::State;
 use crate::tensor::Vec3;
+use crate::threads;
 
 /// What Newton needs to know of a step.
 pub trait Method {
@@ -37,7 +38,7 @@ impl Method for Equilibrium {
     }
 
     fn correct(&self, state: &mut State, dq: &[Vec3]) {
-        state.q.iter_mut().zip(dq).for_each(|(q, &dq)| *q += dq);
+        threads::each_part(&mut state.q, |start, q| q.iter_mut().zip(&dq[start..]).for_each(|(q, &dq)| *q += dq));
     }
 
     fn changes_charts(&self) -> bool {

@@ -4,8 +4,9 @@ use super::linear::Linear;
 use super::{Model, StageContext};
 use crate::effect::{Effect, Noise, PlanarForm};
 use crate::kernel::Weights;
-use crate::system::{Cliques, Equations, FrameConflict, Memory, Pattern, Plane, Sink, State, System};
+use crate::system::{Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, System};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::sync::Arc;
 
 /// The effects of one stage with their scratch, and the system they add to.
@@ -26,13 +27,14 @@ struct Acting {
     planar: Option<Box<dyn PlanarForm>>,
     memory: Memory,
     instances: u64,
+    has_tangent: bool,
 }
 
 impl Acting {
     fn new(effect: Arc<dyn Effect>, plane: Option<&Plane>, instances: usize) -> Self {
         let memory = Memory { points: vec![[0.0; 6]; effect.memory_points()], valid: false };
         let planar = plane.and_then(|plane| effect.clone().in_plane(plane));
-        Self { effect, planar, memory, instances: instances as u64 }
+        Self { has_tangent: effect.has_tangent(), effect, planar, memory, instances: instances as u64 }
     }
 
     fn is_symmetric(&self) -> bool {
@@ -50,6 +52,18 @@ impl Acting {
         match &self.planar {
             None => self.effect.extrapolate(at, dq, &mut self.memory),
             Some(planar) => planar.extrapolate(at, dq, &mut self.memory),
+        }
+    }
+}
+
+/// Adds the instances that belong to a part of the system.
+fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part) {
+    for (number, acting) in effects.iter().enumerate() {
+        let with_tangent = weights != Weights::NONE && acting.has_tangent;
+        let weights = if with_tangent { weights } else { Weights::NONE };
+        for instances in part.instances(number) {
+            let category = acting.effect.category();
+            acting.add(state, weights, &mut part.sink(number, category, with_tangent, instances.clone()));
         }
     }
 }
@@ -102,29 +116,30 @@ impl Assembly {
             self.system.forget_forces();
             linear.formed = Some((weights, self.system.revision));
         }
-        self.add_effects(&linear.about, Weights::NONE);
+        self.add_effects(&linear.about, Weights::NONE, |_| ());
         linear.add_forces(state, &mut self.system.force);
     }
 
     fn evaluate_effects(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
-        match weights {
-            Weights::NONE => {
-                debug_assert!(lift.is_none(), "prescribed increments act through the tangent");
-                self.system.clear_forces();
-            }
-            _ => self.system.clear(lift),
-        }
-        self.add_effects(state, weights);
+        let with_tangent = weights != Weights::NONE;
+        debug_assert!(with_tangent || lift.is_none(), "prescribed increments act through the tangent");
+        self.system.begin(with_tangent, lift);
+        // What has just been cleared is still near.
+        self.add_effects(state, weights, |part| part.clear(with_tangent));
     }
 
-    fn add_effects(&mut self, state: &State, weights: Weights) {
-        for (number, acting) in self.effects.iter().enumerate() {
-            let with_tangent = weights != Weights::NONE && acting.effect.has_tangent();
-            let mut sink = self.system.sink(number, acting.effect.category(), with_tangent);
-            let weights = if with_tangent { weights } else { Weights::NONE };
-            acting.add(state, weights, &mut sink);
-            self.evaluations[number].1 += acting.instances;
+    /// Regions of a large scene at once, each after it was made ready, then what lies in none.
+    fn add_effects(&mut self, state: &State, weights: Weights, make_ready: impl Fn(&mut Part) + Send + Sync) {
+        let Self { effects, system, evaluations, .. } = self;
+        match system.is_cut() {
+            true => threads::each(system.parts().into_iter(), |mut part| {
+                make_ready(&mut part);
+                add_part(effects, state, weights, &mut part);
+            }),
+            false => make_ready(&mut system.whole()),
         }
+        add_part(effects, state, weights, &mut system.whole());
+        evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 
     /// Lets effects remember what the next tangent is formed with, before the state is corrected by `dq`.
@@ -152,12 +167,7 @@ impl Assembly {
 
     /// The largest round-off among the effects.
     pub fn noise(&self, state: &State) -> Noise {
-        let mut largest = Noise::default();
-        for noise in self.effects.iter().map(|acting| acting.effect.noise(state)) {
-            largest.force = largest.force.max(noise.force);
-            largest.moment = largest.moment.max(noise.moment);
-        }
-        largest
+        self.effects.iter().map(|acting| acting.effect.noise(state)).fold(Noise::default(), Noise::or)
     }
 
     /// The largest strain that a field makes, see [`Effect::strain_of`].

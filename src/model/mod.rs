@@ -16,7 +16,9 @@ pub use history::{History, Table};
 pub use share::Share;
 
 use crate::effect::{Effect, Energy, Momentum};
-use crate::system::{Aspect, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State};
+use crate::system::{
+    Aspect, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, most_regions,
+};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -293,6 +295,11 @@ impl Model {
         Groups::new(self.slots.len(), layout, |slot| {
             kind(slot) == SlotKind::Rotation && kind(slot - 1) == SlotKind::Displacement
         })
+    }
+
+    /// How many regions of it can be evaluated at once: one where it is not large.
+    pub fn regions(&self) -> usize {
+        most_regions(self.slots.len() / 2)
     }
 
     /// The effects that act in a stage.

@@ -62,7 +62,7 @@ impl RowCounter {
 }
 
 /// What stands beside the columns of a history: numbers about them, row by row.
-pub trait Beside {
+pub trait Beside: Send {
     /// The names of its columns, beside these
     fn names(&self, columns: &[String]) -> Vec<String>;
     /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor. Whether all is known that stands beside the

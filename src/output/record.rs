@@ -15,6 +15,8 @@ pub struct Outcome<'a> {
     pub counters: &'a Counters,
     /// Wall-clock seconds of the run
     pub seconds: f64,
+    /// The threads that it ran on
+    pub threads: usize,
     /// The accuracy that was reached, where one was wanted
     pub reached: Option<&'a Reached>,
     /// The deck as it was read
@@ -89,6 +91,7 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         "effects": effects,
         "counters": counters(outcome.counters),
         "events": events(outcome.counters),
+        "threads": outcome.threads,
         "seconds": {
             "total": outcome.seconds,
             "evaluation": outcome.counters.work.evaluation_seconds,

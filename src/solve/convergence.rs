@@ -4,6 +4,8 @@ use crate::effect::Noise;
 use crate::model::{Model, SlotInfo, SlotKind};
 use crate::system::{Equations, Plane, Slot, System};
 use crate::tensor::Vec3;
+use crate::threads;
+use std::ops::Range;
 
 /// The bounds of the test.
 ///
@@ -126,17 +128,26 @@ struct Peaks {
 
 impl Peaks {
     /// In this measure of vectors.
-    fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64) -> Self {
+    fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy + Send + Sync) -> Self {
+        let mut all: Option<Self> = None;
+        let regions = system.pattern.regions.iter().map(|region| region.slots.clone());
+        let of_region = |slots| Self::among(slots, model, system, measure);
+        threads::in_order(regions, of_region, |own| all = Some(all.map_or(own, |all| all.or(own))));
+        all.unwrap_or_else(|| Self::among(0..0, model, system, measure))
+    }
+
+    /// Those of some slots.
+    fn among(slots: Range<usize>, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
         let equations = &system.pattern.equations;
         // Vectors in a tilted plane are rounded aside.
         let tilted = equations.plane().is_some_and(Plane::is_tilted);
         let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
-        for (slot, info) in model.slots.iter().enumerate() {
+        for (slot, info) in slots.clone().zip(&model.slots[slots]) {
             let parts = system.force.each_ref().map(|force| force[slot]);
             let total = parts.into_iter().fold(Vec3::ZERO, |total, part| total + part);
             let whole = !tilted && equations.is_plain(slot as Slot);
             let free = if whole { total } else { free_part(equations, slot as Slot, total) };
-            let [a, b, c, d] = parts.map(&measure);
+            let [a, b, c, d] = parts.map(measure);
             let [held, free] = [measure(total - free), measure(free)];
             poison += ((a + b) + (c + d)) * 0.0;
             let kind = info.kind as usize;
@@ -147,6 +158,22 @@ impl Peaks {
         }
         let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize]);
         Self { force, moment, residuals, poison }
+    }
+
+    /// The larger ones of two, of equal ones the first.
+    fn or(self, other: Self) -> Self {
+        let mut residuals = self.residuals;
+        for (own, other) in residuals.iter_mut().zip(other.residuals) {
+            if other.size > own.size {
+                *own = other;
+            }
+        }
+        Self {
+            force: larger(other.force, self.force),
+            moment: larger(other.moment, self.moment),
+            residuals,
+            poison: self.poison + other.poison,
+        }
     }
 
     /// The largest of all.
@@ -173,5 +200,8 @@ fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
 /// The largest correction, displacements over the length of the scene.
 pub(super) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
     let size = |(info, dq): (&SlotInfo, &Vec3)| dq.norm() * info.arm(model.length) / model.length;
-    model.slots.iter().zip(dq).filter(|(info, _)| !info.is_multiplier()).map(size).fold(0.0, f64::max)
+    threads::largest(dq.len(), |slots| {
+        let slots = model.slots[slots.clone()].iter().zip(&dq[slots]);
+        slots.filter(|(info, _)| !info.is_multiplier()).map(size).fold(0.0, f64::max)
+    })
 }

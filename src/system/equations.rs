@@ -4,6 +4,7 @@ use super::groups::Layout;
 use super::plane::Plane;
 use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
+use crate::threads;
 
 /// Unit vectors whose inner product is nearer to 1 are one axis, nearer to 0 orthogonal: the fewest digits that a deck may give axes with.
 const SAME_AXIS: f64 = 1e-9;
@@ -127,6 +128,11 @@ impl Equations {
         self.origin.len()
     }
 
+    /// The number of equations of the slots before this one.
+    pub fn before(&self, slot: usize) -> usize {
+        self.origin.partition_point(|(other, _)| (*other as usize) < slot)
+    }
+
     /// The equations of a slot, by local direction.
     #[inline]
     pub fn of(&self, slot: Slot) -> [u32; 3] {
@@ -153,27 +159,26 @@ impl Equations {
 
     /// Picks the free entries of a field of slots.
     pub fn gather(&self, field: &[Vec3], out: &mut [f64]) {
-        for (slot, value) in field.iter().enumerate() {
-            let local = self.to_local(slot as Slot, *value);
-            for k in 0..3 {
-                if self.number[slot][k] != Self::HELD {
-                    out[self.number[slot][k] as usize] = local.0[k];
-                }
+        threads::each_part(out, |start, out| {
+            for (out, &(slot, k)) in out.iter_mut().zip(&self.origin[start..]) {
+                *out = self.to_local(slot, field[slot as usize]).0[k as usize];
             }
-        }
+        });
     }
 
     /// Writes the solution into a field of slots; held directions take their part of `held`.
     pub fn scatter(&self, solution: &[f64], held: Option<&[Vec3]>, out: &mut [Vec3]) {
-        for slot in 0..self.number.len() {
-            let mut local = self.to_local(slot as Slot, held.map_or(Vec3::ZERO, |held| held[slot]));
-            for k in 0..3 {
-                if self.number[slot][k] != Self::HELD {
-                    local.0[k] = solution[self.number[slot][k] as usize];
+        threads::each_part(out, |start, out| {
+            for (slot, out) in (start..).zip(out) {
+                let mut local = self.to_local(slot as Slot, held.map_or(Vec3::ZERO, |held| held[slot]));
+                for k in 0..3 {
+                    if self.number[slot][k] != Self::HELD {
+                        local.0[k] = solution[self.number[slot][k] as usize];
+                    }
                 }
+                *out = self.frame(slot as Slot).map_or(local, |frame| frame * local);
             }
-            out[slot] = self.frame(slot as Slot).map_or(local, |frame| frame * local);
-        }
+        });
     }
 
     /// Whether no direction of a slot is held but those that leave the plane.

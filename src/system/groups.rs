@@ -48,6 +48,16 @@ impl Groups {
         self.members.len()
     }
 
+    /// The number of slots.
+    pub fn slots(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The first slot of a group; those of its others and of later groups follow.
+    pub fn first_slot(&self, group: usize) -> usize {
+        self.members[group].into_iter().flatten().next().map_or(0, |slot| slot as usize)
+    }
+
     /// The rows of a tile.
     pub fn width(&self) -> usize {
         match self.layout {

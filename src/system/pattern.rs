@@ -2,8 +2,10 @@
 
 use super::equations::Equations;
 use super::groups::{Groups, SLOTS};
+use super::regions::{self, Region, Shares};
 use super::state::Slot;
 pub use crate::kernel::{TILE, WIDTH};
+use crate::threads;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
@@ -16,9 +18,16 @@ pub type Tile<const W: usize> = [[f64; W]; W];
 pub struct Cliques {
     slots: Vec<Slot>,
     ends: Vec<u32>,
+    pub(super) divisible: bool,
 }
 
 impl Cliques {
+    /// Of an effect that adds no others than the [instances that a sink takes](super::Sink::instances), so that regions of a large scene
+    /// can be evaluated at once.
+    pub fn divisible() -> Self {
+        Self { divisible: true, ..Self::default() }
+    }
+
     /// Adds an instance that couples these slots, in the order of its blocks.
     pub fn push(&mut self, slots: impl IntoIterator<Item = Slot>) {
         self.slots.extend(slots);
@@ -60,6 +69,7 @@ pub(super) struct Places {
     starts: Vec<u32>,
     /// Instances that touch a held direction or turned axes.
     pub special: Vec<bool>,
+    pub shares: Shares,
 }
 
 impl Places {
@@ -86,6 +96,10 @@ pub struct Pattern {
     numbers: Vec<u32>,
     /// Rows without an equation: group, and row of its tile
     pub idle: Vec<(u32, u8)>,
+    /// What is evaluated at once
+    pub regions: Vec<Region>,
+    /// Tiles whose rows lie in another region than their columns: column and number
+    pub between: Vec<(usize, usize)>,
     pub(super) places: Vec<Places>,
 }
 
@@ -105,7 +119,10 @@ impl Pattern {
         let (numbers, width) = (numbers(&equations, &groups), groups.width());
         let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
         let idle = idle.map(|k| ((k / width) as u32, (k % width) as u8)).collect();
-        let mut pattern = Self { equations, groups, column_starts, rows, numbers, idle, places: Vec::new() };
+        let regions = regions::cut(&groups, &equations, &column_starts);
+        let (between, places) = (Vec::new(), Vec::new());
+        let mut pattern = Self { equations, groups, column_starts, rows, numbers, idle, regions, between, places };
+        pattern.between = pattern.between();
         pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
         pattern
     }
@@ -126,10 +143,16 @@ impl Pattern {
         self.width() * self.width() * self.tiles()
     }
 
+    /// The tiles in a column.
+    #[inline]
+    pub fn tiles_of(&self, column: usize) -> std::ops::Range<usize> {
+        self.column_starts[column] as usize..self.column_starts[column + 1] as usize
+    }
+
     /// The groups of the rows of the tiles in a column.
     #[inline]
     pub fn rows_of(&self, column: usize) -> &[u32] {
-        &self.rows[self.column_starts[column] as usize..self.column_starts[column + 1] as usize]
+        &self.rows[self.tiles_of(column)]
     }
 
     /// The equations of a group's rows.
@@ -140,24 +163,37 @@ impl Pattern {
 
     /// One number an equation as one part a group; zero where a row has no equation.
     pub fn apart<const W: usize>(&self, x: &[f64]) -> Vec<[f64; W]> {
-        let part = |numbers: &[u32; W]| numbers.map(|number| x.get(number as usize).copied().unwrap_or(0.0));
-        self.numbers.as_chunks().0.iter().map(part).collect()
+        let mut parts = vec![[0.0; W]; self.groups.count()];
+        threads::each_part(&mut parts, |start, parts| {
+            for (part, numbers) in parts.iter_mut().zip(&self.numbers.as_chunks::<W>().0[start..]) {
+                *part = numbers.map(|number| x.get(number as usize).copied().unwrap_or(0.0));
+            }
+        });
+        parts
     }
 
-    /// The reverse of [`Pattern::apart`].
-    pub fn join<const W: usize>(&self, parts: &[[f64; W]], out: &mut [f64]) {
-        for (&number, &value) in self.numbers.iter().zip(parts.as_flattened()) {
-            if let Some(out) = out.get_mut(number as usize) {
-                *out = value;
+    /// The reverse of [`Pattern::apart`], for parts that are found by their groups.
+    pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
+        self.each_region(out, |region, out| {
+            for group in region.groups.clone() {
+                for (&number, &value) in self.numbers(group).iter().zip(part(group)) {
+                    if let Some(out) = out.get_mut((number as usize).wrapping_sub(region.equations.start)) {
+                        *out = value;
+                    }
+                }
             }
-        }
+        });
+    }
+
+    /// Does something for each region with what belongs to its equations, one number each.
+    pub fn each_region(&self, out: &mut [f64], work: impl Fn(&Region, &mut [f64]) + Send + Sync) {
+        regions::each(&self.regions, out, |region| region.equations.end, work);
     }
 
     /// The entries of an equation's column, by rows.
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
         let ((group, c), width) = (self.row_of(column), self.width());
-        let tiles = self.column_starts[group] as usize..self.column_starts[group + 1] as usize;
-        tiles.flat_map(move |tile| {
+        self.tiles_of(group).flat_map(move |tile| {
             let numbers = self.numbers(self.rows[tile] as usize).iter().enumerate();
             let held = move |&(_, &row): &(usize, &u32)| row != Equations::HELD;
             numbers.filter(held).map(move |(r, &row)| Entry { row, place: width * (width * tile + c) + r })
@@ -193,6 +229,17 @@ impl Pattern {
         Some(self.width() * self.width() * (self.column_starts[column] as usize + found))
     }
 
+    fn between(&self) -> Vec<(usize, usize)> {
+        let mut between = Vec::new();
+        for region in &self.regions {
+            for column in region.groups.clone() {
+                let elsewhere = |tile: &usize| !region.groups.contains(&(self.rows[*tile] as usize));
+                between.extend(self.tiles_of(column).filter(elsewhere).map(|tile| (column, tile)));
+            }
+        }
+        between
+    }
+
     fn places_of(&self, cliques: Cliques) -> Places {
         let whole = cliques.iter().all(|slots| self.is_whole(slots));
         let mut places = Places {
@@ -200,6 +247,7 @@ impl Pattern {
             values: Vec::new(),
             starts: Vec::with_capacity(cliques.len() + 1),
             special: Vec::with_capacity(cliques.len()),
+            shares: Shares::new(&cliques, &self.groups, &self.regions),
             cliques: Cliques::default(),
         };
         for slots in cliques.iter() {

@@ -5,17 +5,15 @@ use std::path::{Path, PathBuf};
 
 /// From the bottom to the top; each imports only what stands before it, and `deck`, the words, none of it.
 #[rustfmt::skip]
-const ORDER: [&str; 16] = [
-    "real", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "drive", "probe",
+const ORDER: [&str; 17] = [
+    "threads", "real", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "drive", "probe",
     "deck", "scene", "output", "study", "cli",
 ];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 13] = [
-    (
-        "faer",
-        &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/pivots.rs", "src/solve/block/elimination.rs"],
-    ),
+const CRATES: [(&str, &[&str]); 14] = [
+    ("rayon", &["src/threads.rs"]),
+    ("faer", &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/pivots.rs", "src/solve/block/order.rs"]),
     ("toml", &["src/deck/"]),
     ("toml_edit", &["src/deck/"]),
     ("annotate_snippets", &["src/deck/"]),

@@ -30,5 +30,6 @@ mod solvers;
 mod statics;
 mod sweep;
 mod tangents;
+mod threads;
 mod turned;
 mod words;

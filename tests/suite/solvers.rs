@@ -81,10 +81,23 @@ fn patterns(random: &mut Random) -> Vec<(&'static str, Vec<[usize; 2]>)> {
     ]
 }
 
+/// Large enough to be eliminated in branches.
+fn large_patterns(random: &mut Random) -> Vec<(&'static str, Vec<[usize; 2]>)> {
+    let chains = (0..40).flat_map(|k| chain(50).into_iter().map(move |[a, b]| [50 * k + a, 50 * k + b]));
+    let ladder = chain(800).into_iter().flat_map(|[a, b]| [[2 * a, 2 * b], [2 * a + 1, 2 * b + 1], [2 * a, 2 * a + 1]]);
+    vec![
+        ("long chain", chain(3000)),
+        ("large tree", tree(2000, random)),
+        ("large ring", ring(1500)),
+        ("chains", chains.collect()),
+        ("ladder", ladder.collect()),
+    ]
+}
+
 #[test]
 fn blocks_solve_what_faer_solves() {
     let mut random = Random::new(3);
-    for (name, edges) in patterns(&mut random) {
+    for (name, edges) in [patterns(&mut random), large_patterns(&mut random)].concat() {
         for symmetric in [true, false] {
             for shift in [0.0, 30.0] {
                 let system = system(&edges, symmetric, shift, &mut random);
@@ -120,6 +133,25 @@ fn negative_pivots_are_negative_eigenvalues() {
         assert!(blocks.factorise(&system));
         assert!(negative > 0);
         assert_eq!(blocks.negative(), Some(negative), "{name}");
+    }
+}
+
+/// Branches leave to the trunk what one row after the other leaves, and no order fills more than that of least degree.
+#[test]
+fn large_patterns_are_eliminated_in_branches() {
+    let mut random = Random::new(9);
+    for (name, edges) in large_patterns(&mut random) {
+        let system = system(&edges, true, 30.0, &mut random);
+        let blocks = BlockSolver::new(&system.pattern, true).unwrap();
+        let sizes = blocks.branches();
+        let nodes = system.pattern.groups.count();
+        let trunk = nodes - sizes.iter().sum::<usize>();
+        println!("{name}: {sizes:?} and {trunk}, {} blocks", blocks.blocks());
+        assert!(sizes.len() > 1 && trunk < 64, "{name}: {sizes:?}");
+        assert!(sizes.iter().all(|size| 4 * size <= 3 * nodes), "{name}: {sizes:?}");
+        if !name.contains("ring") && name != "ladder" {
+            assert_eq!(blocks.blocks(), (system.pattern.tiles() - nodes) / 2, "{name}");
+        }
     }
 }
 

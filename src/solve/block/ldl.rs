@@ -1,102 +1,107 @@
 //! L D L^T in blocks, of symmetric tangents.
 
 use super::elimination::Elimination;
+use super::pieces::Piece;
+use super::stretch::Stretch;
 use super::tile::{self, Part, Rows, Tile, Width};
-use super::{Factor, load, tiles};
-use crate::real::Instructions;
 use crate::system::System;
+use std::ops::Range;
 
 /// With Y = L_kk^-1 A_kj right of the diagonal, L_jk = Y^T D_k^-1.
 pub struct Ldl<const W: usize> {
-    diagonal: Vec<Tile<W>>,
-    upper: Vec<Tile<W>>,
-    /// Pivots below zero in the last factorisation
-    negative: usize,
+    diagonal: Stretch<Tile<W>>,
+    upper: Stretch<Tile<W>>,
 }
 
-impl<const W: usize> Ldl<W>
+impl<const W: usize> Piece<W> for Ldl<W>
 where
     Width<W>: Rows<W>,
 {
-    /// Of so many rows, and blocks right of the diagonal.
-    pub fn new(rows: usize, blocks: usize) -> Option<Self> {
-        Some(Self { diagonal: tiles(rows)?, upper: tiles(blocks)?, negative: 0 })
+    const NAME: &'static str = "block LDL^T";
+    const SYMMETRIC: bool = true;
+
+    fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self> {
+        Some(Self { diagonal: Stretch::new(rows, tile::zero())?, upper: Stretch::new(blocks, tile::zero())? })
     }
 
     #[inline(always)]
-    fn eliminate(&mut self, elimination: &Elimination, system: &System) -> bool {
-        load(elimination, system, &mut self.diagonal, &mut self.upper, None);
-        self.negative = 0;
-        let mut target = 0;
-        for row in 0..self.diagonal.len() {
-            let Some(negative) = tile::factorise_symmetric(&mut self.diagonal[row]) else { return false };
-            self.negative += negative;
-            let factor = self.diagonal[row];
+    fn load(&mut self, elimination: &Elimination, system: &System) {
+        let tiles = system.tiles::<W>();
+        for row in self.diagonal.range() {
+            self.diagonal[row] = tile::of(tiles, elimination.diagonal[row]);
+            for k in elimination.neighbours(row) {
+                // The one half of a symmetric tangent is the other one's transpose.
+                self.upper[k] = tile::of(tiles, elimination.sources[k][1]);
+            }
+        }
+        for &(row, direction) in elimination.idle(&self.diagonal.range()) {
+            self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.diagonal.add(&other.diagonal);
+        self.upper.add(&other.upper);
+    }
+
+    fn clear(&mut self) {
+        self.diagonal.fill(|_| tile::zero());
+        self.upper.fill(|_| tile::zero());
+    }
+
+    #[inline(always)]
+    fn eliminate(&mut self, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
+        let Self { diagonal, upper } = self;
+        let mut negative = 0;
+        for row in diagonal.range() {
+            negative += tile::factorise_symmetric(&mut diagonal[row])?;
+            let factor = diagonal[row];
             let neighbours = elimination.neighbours(row);
             for k in neighbours.clone() {
-                tile::forward_symmetric(&factor, &mut self.upper[k]);
+                tile::forward_symmetric(&factor, &mut upper[k]);
             }
+            let mut target = elimination.target_starts[row] as usize;
             for k in neighbours.clone() {
-                let w = tile::over_pivots(&factor, &self.upper[k]);
-                let a = elimination.later[k] as usize;
-                tile::subtract_product(&mut self.diagonal[a], &w, &self.upper[k]);
+                let w = tile::over_pivots(&factor, &upper[k]);
+                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
+                tile::subtract_product(changed, &w, &upper[k]);
                 for b in k + 1..neighbours.end {
-                    let y = self.upper[b];
-                    tile::subtract_product(&mut self.upper[elimination.targets[target] as usize], &w, &y);
+                    let y = upper[b];
+                    tile::subtract_product(upper.or(&mut beyond.upper, elimination.targets[target] as usize), &w, &y);
                     target += 1;
                 }
             }
         }
-        true
+        Some(negative)
     }
 
     #[inline(always)]
-    fn substitute(&self, elimination: &Elimination, x: &mut [Part<W>]) {
-        for (row, factor) in self.diagonal.iter().enumerate() {
-            let mut part = x[row];
+    fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+        let rows = self.diagonal.range();
+        for row in rows.clone() {
+            let (factor, mut part) = (&self.diagonal[row], x[row - rows.start]);
             tile::solve_forward_symmetric(factor, &mut part);
             part.iter_mut().enumerate().for_each(|(r, x)| *x *= factor[r][r]);
             for k in elimination.neighbours(row) {
-                tile::subtract_transposed(&mut x[elimination.later[k] as usize], &self.upper[k], &part);
+                let later = elimination.place(&rows, k);
+                tile::subtract_transposed(later.of_mut(x, beyond), &self.upper[k], &part);
             }
-            x[row] = part;
+            x[row - rows.start] = part;
         }
-        for (row, factor) in self.diagonal.iter().enumerate().rev() {
+    }
+
+    #[inline(always)]
+    fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
+        let rows = self.diagonal.range();
+        for row in rows.clone().rev() {
             let mut sum = [0.0; W];
             for k in elimination.neighbours(row) {
-                tile::subtract_times(&mut sum, &self.upper[k], &x[elimination.later[k] as usize]);
+                tile::subtract_times(&mut sum, &self.upper[k], elimination.place(&rows, k).of(x, beyond));
             }
-            let mut part = x[row];
+            let (factor, mut part) = (&self.diagonal[row], x[row - rows.start]);
             part.iter_mut().enumerate().for_each(|(r, x)| *x += factor[r][r] * sum[r]);
             tile::solve_backward_symmetric(factor, &mut part);
-            x[row] = part;
+            x[row - rows.start] = part;
         }
-    }
-}
-
-impl<const W: usize> Factor for Ldl<W>
-where
-    Width<W>: Rows<W>,
-{
-    fn name(&self) -> &'static str {
-        "block LDL^T"
-    }
-
-    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
-        Instructions::here().run(
-            #[inline(always)]
-            || self.eliminate(elimination, system),
-        )
-    }
-
-    fn negative(&self) -> Option<usize> {
-        Some(self.negative)
-    }
-
-    fn solve(&self, elimination: &Elimination, x: &mut [f64]) {
-        Instructions::here().run(
-            #[inline(always)]
-            || self.substitute(elimination, x.as_chunks_mut().0),
-        )
     }
 }

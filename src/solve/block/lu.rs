@@ -1,104 +1,121 @@
 //! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal.
 
 use super::elimination::Elimination;
+use super::pieces::Piece;
+use super::stretch::Stretch;
 use super::tile::{self, Part, RowOrder, Rows, Tile, Width};
-use super::{Factor, load, tiles};
-use crate::real::Instructions;
 use crate::system::System;
+use std::ops::Range;
 
 /// With P A_kk = L U: Y = L^-1 P A_kj right of the diagonal, W = U^-T A_jk^T below it; L_jk = W^T.
 pub struct Lu<const W: usize> {
-    diagonal: Vec<Tile<W>>,
-    orders: Vec<RowOrder<W>>,
-    upper: Vec<Tile<W>>,
+    diagonal: Stretch<Tile<W>>,
+    orders: Stretch<RowOrder<W>>,
+    upper: Stretch<Tile<W>>,
     /// Transposed, each beside its mirror image in `upper`
-    lower: Vec<Tile<W>>,
+    lower: Stretch<Tile<W>>,
 }
 
-impl<const W: usize> Lu<W>
+impl<const W: usize> Piece<W> for Lu<W>
 where
     Width<W>: Rows<W>,
 {
-    /// Of so many rows, and blocks right of the diagonal.
-    pub fn new(rows: usize, blocks: usize) -> Option<Self> {
-        let orders = vec![[0; W]; rows];
-        Some(Self { diagonal: tiles(rows)?, orders, upper: tiles(blocks)?, lower: tiles(blocks)? })
+    const NAME: &'static str = "block LU";
+    const SYMMETRIC: bool = false;
+
+    fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self> {
+        Some(Self {
+            diagonal: Stretch::new(rows.clone(), tile::zero())?,
+            orders: Stretch::new(rows, [0; W])?,
+            upper: Stretch::new(blocks.clone(), tile::zero())?,
+            lower: Stretch::new(blocks, tile::zero())?,
+        })
     }
 
     #[inline(always)]
-    fn eliminate(&mut self, elimination: &Elimination, system: &System) -> bool {
-        load(elimination, system, &mut self.diagonal, &mut self.upper, Some(&mut self.lower));
-        let mut target = 0;
-        for row in 0..self.diagonal.len() {
-            let Some(order) = tile::factorise(&mut self.diagonal[row]) else { return false };
-            self.orders[row] = order;
-            let factor = self.diagonal[row];
+    fn load(&mut self, elimination: &Elimination, system: &System) {
+        let tiles = system.tiles::<W>();
+        for row in self.diagonal.range() {
+            self.diagonal[row] = tile::transposed(&tile::of(tiles, elimination.diagonal[row]));
+            for k in elimination.neighbours(row) {
+                let [upper, lower] = elimination.sources[k];
+                self.upper[k] = tile::transposed(&tile::of(tiles, upper));
+                self.lower[k] = tile::of(tiles, lower);
+            }
+        }
+        for &(row, direction) in elimination.idle(&self.diagonal.range()) {
+            self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.diagonal.add(&other.diagonal);
+        self.upper.add(&other.upper);
+        self.lower.add(&other.lower);
+    }
+
+    fn clear(&mut self) {
+        for stretch in [&mut self.diagonal, &mut self.upper, &mut self.lower] {
+            stretch.fill(|_| tile::zero());
+        }
+    }
+
+    #[inline(always)]
+    fn eliminate(&mut self, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
+        let Self { diagonal, orders, upper, lower } = self;
+        for row in diagonal.range() {
+            let order = tile::factorise(&mut diagonal[row])?;
+            orders[row] = order;
+            let factor = diagonal[row];
             let neighbours = elimination.neighbours(row);
             for k in neighbours.clone() {
-                let mut y = tile::permuted(&order, &self.upper[k]);
+                let mut y = tile::permuted(&order, &upper[k]);
                 tile::forward(&factor, &mut y);
-                self.upper[k] = y;
-                tile::forward_upper(&factor, &mut self.lower[k]);
+                upper[k] = y;
+                tile::forward_upper(&factor, &mut lower[k]);
             }
+            let mut target = elimination.target_starts[row] as usize;
             for k in neighbours.clone() {
-                let (w, y) = (self.lower[k], self.upper[k]);
-                tile::subtract_product(&mut self.diagonal[elimination.later[k] as usize], &w, &y);
+                let (w, y) = (lower[k], upper[k]);
+                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
+                tile::subtract_product(changed, &w, &y);
                 for b in k + 1..neighbours.end {
-                    let (other_w, other_y) = (self.lower[b], self.upper[b]);
+                    let (other_w, other_y) = (lower[b], upper[b]);
                     let shared = elimination.targets[target] as usize;
-                    tile::subtract_product(&mut self.upper[shared], &w, &other_y);
-                    tile::subtract_product(&mut self.lower[shared], &y, &other_w);
+                    tile::subtract_product(upper.or(&mut beyond.upper, shared), &w, &other_y);
+                    tile::subtract_product(lower.or(&mut beyond.lower, shared), &y, &other_w);
                     target += 1;
                 }
             }
         }
-        true
+        // Signs of pivots tell nothing.
+        Some(0)
     }
 
     #[inline(always)]
-    fn substitute(&self, elimination: &Elimination, x: &mut [Part<W>]) {
-        for (row, factor) in self.diagonal.iter().enumerate() {
-            let mut part = x[row];
-            tile::solve_forward(factor, &self.orders[row], &mut part);
+    fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+        let rows = self.diagonal.range();
+        for row in rows.clone() {
+            let mut part = x[row - rows.start];
+            tile::solve_forward(&self.diagonal[row], &self.orders[row], &mut part);
             for k in elimination.neighbours(row) {
-                tile::subtract_transposed(&mut x[elimination.later[k] as usize], &self.lower[k], &part);
+                let later = elimination.place(&rows, k);
+                tile::subtract_transposed(later.of_mut(x, beyond), &self.lower[k], &part);
             }
-            x[row] = part;
-        }
-        for (row, factor) in self.diagonal.iter().enumerate().rev() {
-            let mut part = x[row];
-            for k in elimination.neighbours(row) {
-                tile::subtract_times(&mut part, &self.upper[k], &x[elimination.later[k] as usize]);
-            }
-            tile::solve_backward(factor, &mut part);
-            x[row] = part;
+            x[row - rows.start] = part;
         }
     }
-}
 
-impl<const W: usize> Factor for Lu<W>
-where
-    Width<W>: Rows<W>,
-{
-    fn name(&self) -> &'static str {
-        "block LU"
-    }
-
-    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
-        Instructions::here().run(
-            #[inline(always)]
-            || self.eliminate(elimination, system),
-        )
-    }
-
-    fn negative(&self) -> Option<usize> {
-        None
-    }
-
-    fn solve(&self, elimination: &Elimination, x: &mut [f64]) {
-        Instructions::here().run(
-            #[inline(always)]
-            || self.substitute(elimination, x.as_chunks_mut().0),
-        )
+    #[inline(always)]
+    fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
+        let rows = self.diagonal.range();
+        for row in rows.clone().rev() {
+            let mut part = x[row - rows.start];
+            for k in elimination.neighbours(row) {
+                tile::subtract_times(&mut part, &self.upper[k], elimination.place(&rows, k).of(x, beyond));
+            }
+            tile::solve_backward(&self.diagonal[row], &mut part);
+            x[row - rows.start] = part;
+        }
     }
 }

@@ -7,14 +7,18 @@
 mod elimination;
 mod ldl;
 mod lu;
+mod order;
+mod pieces;
+mod stretch;
 mod tile;
 
-use crate::system::{Pattern, System};
-use elimination::{Elimination, Place};
+use crate::system::{Pattern, System, WIDTH};
+use crate::threads;
+use elimination::Elimination;
 use ldl::Ldl;
 use lu::Lu;
+use pieces::Pieces;
 use std::sync::Arc;
-use tile::{Tile, zero};
 
 /// A factorisation in blocks.
 pub struct BlockSolver {
@@ -51,19 +55,29 @@ impl BlockSolver {
     }
 
     fn by(elimination: Arc<Elimination>, pattern: &Pattern, symmetric: bool) -> Option<Self> {
-        let (rows, blocks) = (elimination.order.len(), elimination.later.len());
         let factor: Box<dyn Factor> = match (pattern.width(), symmetric) {
-            (3, true) => Box::new(Ldl::<3>::new(rows, blocks)?),
-            (3, false) => Box::new(Lu::<3>::new(rows, blocks)?),
-            (_, true) => Box::new(Ldl::<6>::new(rows, blocks)?),
-            (_, false) => Box::new(Lu::<6>::new(rows, blocks)?),
+            (3, true) => Box::new(Pieces::<Ldl<3>, 3>::new(&elimination)?),
+            (3, false) => Box::new(Pieces::<Lu<3>, 3>::new(&elimination)?),
+            (_, true) => Box::new(Pieces::<Ldl<6>, 6>::new(&elimination)?),
+            (_, false) => Box::new(Pieces::<Lu<6>, 6>::new(&elimination)?),
         };
-        Some(Self { elimination, factor, parts: vec![0.0; pattern.width() * rows] })
+        let parts = vec![0.0; pattern.width() * elimination.order.len()];
+        Some(Self { elimination, factor, parts })
     }
 
     /// What it does, in a word.
     pub fn name(&self) -> &'static str {
         self.factor.name()
+    }
+
+    /// The rows in each part that is eliminated at once with others; what is left comes last.
+    pub fn branches(&self) -> Vec<usize> {
+        self.elimination.branches.iter().map(|rows| rows.len()).collect()
+    }
+
+    /// The blocks right of the diagonal.
+    pub fn blocks(&self) -> usize {
+        self.elimination.later.len()
     }
 
     /// Whether it takes the tangent for symmetric.
@@ -84,58 +98,19 @@ impl BlockSolver {
 
     /// Solves with the last factorisation; one entry an equation.
     pub fn solve(&mut self, pattern: &Pattern, x: &mut [f64]) {
+        if pattern.width() == WIDTH { self.solve_by::<WIDTH>(pattern, x) } else { self.solve_by::<3>(pattern, x) }
+    }
+
+    fn solve_by<const W: usize>(&mut self, pattern: &Pattern, x: &mut [f64]) {
         let Self { elimination, factor, parts } = self;
-        for (part, &group) in parts.chunks_exact_mut(pattern.width()).zip(&elimination.order) {
-            for (entry, &number) in part.iter_mut().zip(pattern.numbers(group as usize)) {
-                *entry = x.get(number as usize).copied().unwrap_or(0.0);
+        threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
+            for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
+                let numbers = pattern.numbers(group as usize).iter();
+                part.iter_mut().zip(numbers).for_each(|(entry, &k)| *entry = x.get(k as usize).copied().unwrap_or(0.0));
             }
-        }
+        });
         factor.solve(elimination, parts);
-        for (part, &group) in parts.chunks_exact(pattern.width()).zip(&elimination.order) {
-            for (entry, &number) in part.iter().zip(pattern.numbers(group as usize)) {
-                if let Some(x) = x.get_mut(number as usize) {
-                    *x = *entry;
-                }
-            }
-        }
-    }
-}
-
-/// Rows of zeros; `None` where memory for them cannot be had.
-fn tiles<const W: usize>(count: usize) -> Option<Vec<Tile<W>>> {
-    let mut out = Vec::new();
-    out.try_reserve_exact(count).ok()?;
-    out.resize(count, zero());
-    Some(out)
-}
-
-/// The tiles of the tangent in the order of the elimination, by rows; what stands left of the diagonal is transposed. Directions
-/// that are no equations get a one on the diagonal.
-#[inline(always)]
-fn load<const W: usize>(
-    elimination: &Elimination,
-    system: &System,
-    diagonal: &mut [Tile<W>],
-    upper: &mut [Tile<W>],
-    mut lower: Option<&mut [Tile<W>]>,
-) {
-    // Fill begins at zero.
-    upper.fill(zero());
-    if let Some(lower) = lower.as_deref_mut() {
-        lower.fill(zero());
-    }
-    for (columns, place) in system.tiles::<W>().iter().zip(&elimination.places) {
-        match (*place, lower.as_deref_mut()) {
-            // Of a symmetric tangent the one half is the other one's transpose.
-            (Place::Diagonal(row), None) => diagonal[row as usize] = *columns,
-            (Place::Lower(k), None) => upper[k as usize] = *columns,
-            (Place::Upper(_), None) => {}
-            (Place::Diagonal(row), Some(_)) => diagonal[row as usize] = tile::transposed(columns),
-            (Place::Upper(k), Some(_)) => upper[k as usize] = tile::transposed(columns),
-            (Place::Lower(k), Some(lower)) => lower[k as usize] = *columns,
-        }
-    }
-    for &(group, direction) in &system.pattern.idle {
-        diagonal[elimination.row_of[group as usize] as usize][direction as usize][direction as usize] = 1.0;
+        let parts = parts.as_chunks::<W>().0;
+        pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
     }
 }

@@ -105,6 +105,15 @@ pub const fn zero<const W: usize>() -> Tile<W> {
     [[0.0; W]; W]
 }
 
+/// A tile of the tangent; nothing where elimination fills it.
+#[inline(always)]
+pub fn of<const W: usize>(tiles: &[Tile<W>], number: u32) -> Tile<W> {
+    match tiles.get(number as usize) {
+        Some(tile) => *tile,
+        None => zero(),
+    }
+}
+
 #[inline(always)]
 fn row<const W: usize>(part: &Part<W>) -> <Width<W> as Rows<W>>::Row
 where

@@ -1,0 +1,154 @@
+//! A factorisation in pieces: branches of the elimination tree, which are eliminated at once, and the trunk, where they meet.
+
+use super::Factor;
+use super::elimination::Elimination;
+use super::tile::Part;
+use crate::real::Instructions;
+use crate::system::System;
+use crate::threads;
+use std::ops::Range;
+
+/// The numbers of rows that follow each other.
+pub trait Piece<const W: usize>: Send + Sync + Sized {
+    /// What it does, in a word
+    const NAME: &'static str;
+
+    /// Whether it is one of symmetric tangents, whose pivots have signs that count
+    const SYMMETRIC: bool;
+
+    /// Of these rows, and blocks right of the diagonal. `None` where memory cannot be had.
+    fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self>;
+
+    /// Takes over the tangent.
+    fn load(&mut self, elimination: &Elimination, system: &System);
+
+    /// Adds what belongs to the same rows.
+    fn add(&mut self, other: &Self);
+
+    /// Sets all numbers to zero.
+    fn clear(&mut self);
+
+    /// Eliminates its rows; what that changes in later rows goes to `beyond`. The number of negative pivots; `None` where one is zero or
+    /// no number.
+    fn eliminate(&mut self, elimination: &Elimination, beyond: &mut Self) -> Option<usize>;
+
+    /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to `beyond`.
+    fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]);
+
+    /// Solves with the upper factor for its own part `x`, where all later rows are solved.
+    fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]);
+}
+
+/// Branches and trunk.
+pub struct Pieces<P, const W: usize> {
+    branches: Vec<P>,
+    /// What each branch changes in the trunk
+    changes: Vec<P>,
+    trunk: P,
+    /// Later than the trunk there is nothing.
+    nothing: P,
+    /// Pivots below zero in the last factorisation
+    negative: usize,
+}
+
+impl<P: Piece<W>, const W: usize> Pieces<P, W> {
+    /// For an elimination. `None` where memory cannot be had.
+    pub fn new(elimination: &Elimination) -> Option<Self> {
+        let blocks =
+            |rows: &Range<usize>| elimination.starts[rows.start] as usize..elimination.starts[rows.end] as usize;
+        let piece = |rows: &Range<usize>| P::new(rows.clone(), blocks(rows));
+        let (trunk, end) = (&elimination.trunk, elimination.trunk.end);
+        Some(Self {
+            branches: elimination.branches.iter().map(piece).collect::<Option<_>>()?,
+            changes: elimination.branches.iter().map(|_| piece(trunk)).collect::<Option<_>>()?,
+            trunk: piece(trunk)?,
+            nothing: piece(&(end..end))?,
+            negative: 0,
+        })
+    }
+}
+
+impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
+    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
+        let Self { branches, changes, trunk, nothing, negative } = self;
+        let branch = |(piece, change): (&mut P, &mut P)| {
+            change.clear();
+            eliminate(piece, elimination, system, change)
+        };
+        let mut counted = Some(0);
+        let add = |count: Option<usize>| counted = counted.zip(count).map(|(sum, count)| sum + count);
+        threads::in_order(branches.iter_mut().zip(&mut *changes), branch, add);
+        let Some(counted) = counted else { return false };
+        Instructions::here().run(
+            #[inline(always)]
+            || trunk.load(elimination, system),
+        );
+        changes.iter().for_each(|change| trunk.add(change));
+        let last = Instructions::here().run(
+            #[inline(always)]
+            || trunk.eliminate(elimination, nothing),
+        );
+        *negative = counted + last.unwrap_or_default();
+        last.is_some()
+    }
+
+    fn negative(&self) -> Option<usize> {
+        P::SYMMETRIC.then_some(self.negative)
+    }
+
+    fn name(&self) -> &'static str {
+        P::NAME
+    }
+
+    fn solve(&self, elimination: &Elimination, x: &mut [f64]) {
+        let ends = elimination.pieces().map(|rows| rows.end);
+        let mut parts = threads::split(x.as_chunks_mut().0, ends);
+        let Some(trunk) = parts.pop() else { return };
+        let down = |(piece, x): (&P, &mut &mut [Part<W>])| {
+            let mut change = vec![[0.0; W]; elimination.trunk.len()];
+            forward(piece, elimination, x, &mut change);
+            change
+        };
+        threads::in_order(self.branches.iter().zip(&mut parts), down, |change| {
+            trunk.as_flattened_mut().iter_mut().zip(change.as_flattened()).for_each(|(x, change)| *x += change);
+        });
+        forward(&self.trunk, elimination, trunk, &mut []);
+        backward(&self.trunk, elimination, trunk, &[]);
+        let up = |(piece, x): (&P, &mut [Part<W>])| backward(piece, elimination, x, trunk);
+        threads::each(self.branches.iter().zip(parts), up);
+    }
+}
+
+fn eliminate<const W: usize, P: Piece<W>>(
+    piece: &mut P,
+    elimination: &Elimination,
+    system: &System,
+    beyond: &mut P,
+) -> Option<usize> {
+    Instructions::here().run(
+        #[inline(always)]
+        || {
+            piece.load(elimination, system);
+            piece.eliminate(elimination, beyond)
+        },
+    )
+}
+
+fn forward<const W: usize, P: Piece<W>>(
+    piece: &P,
+    elimination: &Elimination,
+    x: &mut [Part<W>],
+    beyond: &mut [Part<W>],
+) {
+    Instructions::here().run(
+        #[inline(always)]
+        || piece.forward(elimination, x, beyond),
+    );
+}
+
+fn backward<const W: usize, P: Piece<W>>(piece: &P, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
+    Instructions::here().run(
+        #[inline(always)]
+        || piece.backward(elimination, x, beyond),
+    );
+}

@@ -1,0 +1,65 @@
+//! A part of a long list that is called by the places in the list.
+
+use super::tile::Tile;
+use std::ops::{Index, IndexMut, Range};
+
+/// Entries that follow each other.
+pub struct Stretch<T> {
+    start: usize,
+    entries: Vec<T>,
+}
+
+impl<T: Clone> Stretch<T> {
+    /// At these places. `None` where memory cannot be had.
+    pub fn new(places: Range<usize>, entry: T) -> Option<Self> {
+        let mut entries = Vec::new();
+        entries.try_reserve_exact(places.len()).ok()?;
+        entries.resize(places.len(), entry);
+        Some(Self { start: places.start, entries })
+    }
+
+    /// Its places.
+    #[inline(always)]
+    pub fn range(&self) -> Range<usize> {
+        self.start..self.start + self.entries.len()
+    }
+
+    /// Sets all entries.
+    #[inline(always)]
+    pub fn fill(&mut self, entry: impl Fn(usize) -> T) {
+        (self.start..).zip(&mut self.entries).for_each(|(place, own)| *own = entry(place));
+    }
+
+    /// The entry at a place, of this stretch or of one beyond.
+    #[inline(always)]
+    pub fn or<'a>(&'a mut self, beyond: &'a mut Self, place: usize) -> &'a mut T {
+        match self.entries.get_mut(place - self.start) {
+            Some(own) => own,
+            None => &mut beyond[place],
+        }
+    }
+}
+
+impl<const W: usize> Stretch<Tile<W>> {
+    /// Adds another one at the same places.
+    pub fn add(&mut self, other: &Self) {
+        let numbers = self.entries.as_flattened_mut().as_flattened_mut().iter_mut();
+        numbers.zip(other.entries.as_flattened().as_flattened()).for_each(|(sum, other)| *sum += other);
+    }
+}
+
+impl<T> Index<usize> for Stretch<T> {
+    type Output = T;
+
+    #[inline(always)]
+    fn index(&self, place: usize) -> &T {
+        &self.entries[place - self.start]
+    }
+}
+
+impl<T> IndexMut<usize> for Stretch<T> {
+    #[inline(always)]
+    fn index_mut(&mut self, place: usize) -> &mut T {
+        &mut self.entries[place - self.start]
+    }
+}

@@ -1,0 +1,469 @@
+//! Where effects add their forces and tangents: to the whole system, or to the part of it that belongs to a region.
+
+use super::assembly::Category;
+use super::equations::Equations;
+use super::pattern::{Pattern, Places, TILE, WIDTH};
+use super::plane::Plane;
+use super::state::Slot;
+use crate::kernel::{ElementSystem, MAX_NODES, PlanarSystem};
+use crate::real::{LANES, Lanes, each_lane};
+use crate::tensor::{Mat3, Vec3};
+use std::ops::Range;
+
+/// A stretch of the system: that of a region, to which others add nothing meanwhile, or all of it.
+pub struct Part<'a> {
+    pub(super) pattern: &'a Pattern,
+    /// `None` for all of it
+    pub(super) region: Option<usize>,
+    /// Of its slots, by category
+    pub(super) force: [&'a mut [Vec3]; 4],
+    /// Of its tiles
+    pub(super) values: &'a mut [f64],
+    /// Of all slots, where increments are prescribed
+    pub(super) lift: Option<&'a [Vec3]>,
+    /// Of its equations
+    pub(super) lifted: &'a mut [f64],
+    pub(super) room: &'a mut Vec<ElementSystem<Lanes>>,
+}
+
+impl<'a> Part<'a> {
+    /// Sets forces to zero, and the tangent where it is to be formed.
+    pub fn clear(&mut self, with_tangent: bool) {
+        self.force.iter_mut().for_each(|force| force.fill(Vec3::ZERO));
+        self.lifted.fill(0.0);
+        if with_tangent {
+            self.values.fill(0.0);
+        }
+    }
+
+    /// The instances of an effect that lie in the region; of the whole those that lie in none.
+    pub fn instances(&self, effect: usize) -> &'a [Range<usize>] {
+        self.pattern.places[effect].shares.of(self.region)
+    }
+
+    /// The sink of these instances of effect number `effect`.
+    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool, instances: Range<usize>) -> Sink<'_> {
+        let Part { pattern, region, force, values, lift, lifted, room } = self;
+        let force = force.each_mut().map(|force| &mut force[..]);
+        let part = Part { pattern, region: *region, force, values, lift: *lift, lifted, room };
+        part.into_sink(effect, category, with_tangent, instances)
+    }
+
+    /// The same, with what it borrows.
+    pub(super) fn into_sink(
+        self,
+        effect: usize,
+        category: Category,
+        with_tangent: bool,
+        instances: Range<usize>,
+    ) -> Sink<'a> {
+        let Part { pattern, region, force, values, lift, lifted, room } = self;
+        let start = region.map(|region| &pattern.regions[region]);
+        let [internal, inertia, external, damping] = force;
+        let (force, damping) = match category {
+            Category::Internal => (internal, Some(damping)),
+            Category::Inertia => (inertia, Some(damping)),
+            Category::External => (external, Some(damping)),
+            Category::Damping => (damping, None),
+        };
+        Sink {
+            places: &pattern.places[effect],
+            equations: &pattern.equations,
+            instances,
+            first_slot: start.map_or(0, |region| region.slots.start),
+            first_value: start.map_or(0, |region| region.tiles.start * pattern.width() * pattern.width()),
+            first_equation: start.map_or(0, |region| region.equations.start),
+            force,
+            damping,
+            values,
+            lift,
+            lifted,
+            room,
+            with_tangent,
+        }
+    }
+}
+
+/// Adds one lane of a tile to its place.
+#[inline(always)]
+fn add_lane(place: &mut [f64], tile: &[Lanes; TILE], lane: usize) {
+    for (sums, lanes) in place.as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
+        *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
+    }
+}
+
+/// Through this an effect adds the force and tangent of its instances.
+pub struct Sink<'a> {
+    places: &'a Places,
+    equations: &'a Equations,
+    instances: Range<usize>,
+    /// What stretches begin with
+    first_slot: usize,
+    first_value: usize,
+    first_equation: usize,
+    /// Forces of its own category
+    force: &'a mut [Vec3],
+    /// And those that damp, where these are not the same
+    damping: Option<&'a mut [Vec3]>,
+    values: &'a mut [f64],
+    lift: Option<&'a [Vec3]>,
+    lifted: &'a mut [f64],
+    room: &'a mut Vec<ElementSystem<Lanes>>,
+    with_tangent: bool,
+}
+
+impl Sink<'_> {
+    /// The instances that it takes: all of them, unless the effect is [divisible](Cliques::divisible).
+    pub fn instances(&self) -> Range<usize> {
+        self.instances.clone()
+    }
+
+    /// A system of zeros to compute with, of so many blocks.
+    pub fn lend(&mut self, blocks: usize) -> ElementSystem<Lanes> {
+        let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
+            return ElementSystem::new(blocks);
+        };
+        let mut system = self.room.swap_remove(fits);
+        system.clear();
+        system
+    }
+
+    /// Takes it back for the next evaluation.
+    pub fn take_back(&mut self, system: ElementSystem<Lanes>) {
+        self.room.push(system);
+    }
+
+    /// Adds instance `k`; the blocks of `element` are in the order of the slots of its clique.
+    #[inline]
+    pub fn add(&mut self, k: usize, element: &ElementSystem) {
+        let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        for (force, &slot) in element.forces().iter().zip(self.places.cliques.get(k)) {
+            forces[slot as usize - first_slot] += Vec3(*force);
+        }
+        if !self.with_tangent {
+            return;
+        }
+        if self.equations.plane().is_some() {
+            if let Some(lift) = self.lift {
+                self.add_lift(k, &self.in_local_axes(k, element), lift);
+            }
+            return self.add_in_plane(k, element.tiles(), |value| *value);
+        }
+        if self.places.special[k] {
+            return self.add_special(k, element);
+        }
+        self.add_tangent(k, element);
+    }
+
+    /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
+    /// beside whom. An instance that `is_apart` is left to `alone`.
+    #[inline(always)]
+    pub fn add_lanes(
+        &mut self,
+        first: usize,
+        count: usize,
+        elements: &ElementSystem<Lanes>,
+        is_apart: impl Fn(usize) -> bool,
+        mut alone: impl FnMut(usize, &mut Self),
+    ) {
+        // In a plane all are special, and none is but where increments are prescribed.
+        let special = |sink: &Self, lane: usize| {
+            let special =
+                if sink.equations.plane().is_some() { sink.lift.is_some() } else { sink.places.special[first + lane] };
+            sink.with_tangent && special
+        };
+        if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
+            return self.add_plain(first, 0..count, elements);
+        }
+        for lane in 0..count {
+            if is_apart(lane) {
+                alone(lane, self);
+            } else if special(self, lane) {
+                self.add(first + lane, &elements.lane(lane));
+            } else {
+                self.add_plain(first, lane..lane + 1, elements);
+            }
+        }
+    }
+
+    /// The same where none touches a held direction or turned axes.
+    #[inline(always)]
+    fn add_plain(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
+        let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        for lane in lanes.clone() {
+            for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(first + lane)) {
+                forces[slot as usize - first_slot] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
+            }
+        }
+        if !self.with_tangent {
+            return;
+        }
+        if self.equations.plane().is_some() {
+            for lane in lanes.clone() {
+                self.add_in_plane(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
+            }
+            return;
+        }
+        if self.places.whole {
+            return self.add_whole(first, lanes, elements);
+        }
+        for lane in lanes {
+            self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
+        }
+    }
+
+    /// Adds the tangents of elements of whole nodes, one element after the other.
+    #[inline(always)]
+    fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
+        for lane in lanes {
+            for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
+                add_lane(self.values_from(place, TILE), tile, lane);
+            }
+        }
+    }
+
+    /// Adds instances that lie in the plane, as [`Sink::add_lanes`] does those in space; each couples whole nodes.
+    #[inline(always)]
+    pub fn add_planar<const N: usize>(
+        &mut self,
+        plane: &Plane,
+        first: usize,
+        count: usize,
+        elements: &PlanarSystem<N, Lanes>,
+        is_apart: impl Fn(usize) -> bool,
+        mut alone: impl FnMut(usize, &mut Self),
+    ) {
+        let forces = elements.forces_in_space(plane.axes());
+        for lane in 0..count {
+            if is_apart(lane) || (self.with_tangent && self.places.special[first + lane]) {
+                alone(lane, self);
+                continue;
+            }
+            let (all, first_slot) = (&mut *self.force, self.first_slot);
+            for (force, &slot) in forces.as_flattened().iter().zip(self.places.cliques.get(first + lane)) {
+                all[slot as usize - first_slot] += Vec3(force.0.map(|component| component.0[lane]));
+            }
+            if !self.with_tangent {
+                continue;
+            }
+            if !self.places.whole {
+                self.add_planar_parts(first + lane, elements, lane);
+                continue;
+            }
+            for (tile, &place) in elements.tangent.as_flattened().iter().zip(self.places.of(first + lane)) {
+                let target = self.values_from(place, tile.len());
+                target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value.0[lane]);
+            }
+        }
+    }
+
+    /// Whether prescribed increments act through the tangent.
+    pub fn lifts(&self) -> bool {
+        self.with_tangent && self.lift.is_some()
+    }
+
+    /// Adds instances that couple displacements alone, in lanes, by mass matrices of the plane: their forces (global components), and
+    /// `weight` times the matrices.
+    #[inline(always)]
+    pub fn add_planar_mass<const N: usize>(
+        &mut self,
+        plane: &Plane,
+        first: usize,
+        count: usize,
+        forces: &[Vec3<Lanes>; N],
+        mass: &[[Lanes; N]; N],
+        weight: f64,
+    ) {
+        for lane in 0..count {
+            let k = first + lane;
+            let (all, first_slot) = (&mut *self.force, self.first_slot);
+            for (force, &slot) in forces.iter().zip(self.places.cliques.get(k)) {
+                all[slot as usize - first_slot] += Vec3(force.0.map(|component| component.0[lane]));
+            }
+            if !self.with_tangent || weight == 0.0 {
+                continue;
+            }
+            let entries = mass.as_flattened().iter().map(|entry| entry.0[lane] * weight);
+            if self.places.special[k] {
+                self.add_constrained_mass(plane, k, N, entries);
+                continue;
+            }
+            for (entry, &place) in entries.zip(self.places.of(k)) {
+                let target = self.values_from(place, 5);
+                target[0] += entry;
+                target[4] += entry;
+            }
+        }
+    }
+
+    /// The same where directions are held: a mass is one in all directions, and between slots with other axes their cosine.
+    #[cold]
+    fn add_constrained_mass(&mut self, plane: &Plane, k: usize, nodes: usize, entries: impl Iterator<Item = f64>) {
+        let slots = self.places.cliques.get(k);
+        let frame = |slot: Slot| self.equations.frame(slot).unwrap_or(*plane.axes());
+        for (number, (entry, &place)) in entries.zip(self.places.of(k)).enumerate() {
+            let (i, j) = (slots[number / nodes], slots[number % nodes]);
+            let (rows, columns) = (self.equations.of(i), self.equations.of(j));
+            let cosines = frame(i).transpose_matmul(frame(j));
+            for c in (0..2).filter(|&c| columns[c] != Equations::HELD) {
+                for r in (0..2).filter(|&r| rows[r] != Equations::HELD) {
+                    self.values[place as usize - self.first_value + 3 * c + r] += cosines.0[r][c] * entry;
+                }
+            }
+        }
+    }
+
+    /// Adds the tangent of one lane where nodes may share displacements: each entry of a tile goes to where those of its slots meet.
+    fn add_planar_parts<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
+        let places = self.places.of(k);
+        let slot = |node: usize, direction: usize| 2 * node + direction / 2;
+        for (i, tiles) in elements.tangent.iter().enumerate() {
+            for (j, tile) in tiles.iter().enumerate() {
+                for (entry, value) in tile.iter().enumerate() {
+                    let (row, column) = (slot(i, entry % 3), slot(j, entry / 3));
+                    self.values[places[2 * N * row + column] as usize - self.first_value + entry] += value.0[lane];
+                }
+            }
+        }
+    }
+
+    /// So many values of the tangent from a place on.
+    #[inline(always)]
+    fn values_from(&mut self, place: u32, count: usize) -> &mut [f64] {
+        let start = place as usize - self.first_value;
+        &mut self.values[start..start + count]
+    }
+
+    #[inline]
+    fn add_tangent(&mut self, k: usize, element: &ElementSystem) {
+        if !self.places.whole {
+            return self.add_blocks(k, element.blocks(), element.tiles(), |value| *value);
+        }
+        for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
+            let target = self.values_from(place, TILE);
+            target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
+        }
+    }
+
+    /// Adds to the tiles of a plane what the tangent of an element in space has there; `pick` takes the instance's number from each entry.
+    #[inline(always)]
+    fn add_in_plane<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
+        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
+        let (shared, across) = if self.places.whole { (2, slots.len() / 2) } else { (1, slots.len()) };
+        for (row, &i) in slots.iter().enumerate() {
+            for (column, &j) in slots.iter().enumerate() {
+                let (from_rows, from_columns) = (self.equations.of(i), self.equations.of(j));
+                let tile = &tiles[row / 2 * slots.len().div_ceil(2) + column / 2];
+                let entry = |r: usize, c: usize| pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
+                let mut block = Mat3([0, 1, 2].map(|r| [0, 1, 2].map(|c| entry(r, c))));
+                if let Some(frame) = self.equations.frame(i) {
+                    block = frame.transpose_matmul(block);
+                }
+                if let Some(frame) = self.equations.frame(j) {
+                    block = block * frame;
+                }
+                let place = places[row / shared * across + column / shared] as usize - self.first_value;
+                for c in (0..3).filter(|&c| from_columns[c] != Equations::HELD) {
+                    for r in (0..3).filter(|&r| from_rows[r] != Equations::HELD) {
+                        self.values[place + 3 * c + r] += block.0[r][c];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
+    #[inline(always)]
+    fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
+        for (number, &place) in self.places.of(k).iter().enumerate() {
+            let (row, column) = (number / blocks, number % blocks);
+            let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
+            for c in 0..3 {
+                let (from, to) =
+                    ((column % 2 * 3 + c) * WIDTH + row % 2 * 3, place as usize - self.first_value + c * WIDTH);
+                for r in 0..3 {
+                    self.values[to + r] += pick(&tile[from + r]);
+                }
+            }
+        }
+    }
+
+    /// Adds forces of instance `k` that damp, block by block; their tangent goes with the others.
+    pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
+        for (&slot, &force) in self.places.cliques.get(k).iter().zip(force) {
+            self.damping.as_deref_mut().unwrap_or(self.force)[slot as usize - self.first_slot] += force;
+        }
+    }
+
+    /// As [`Sink::add`], for instances with turned axes or held directions.
+    #[cold]
+    #[inline(never)]
+    fn add_special(&mut self, k: usize, element: &ElementSystem) {
+        let mut local = self.in_local_axes(k, element);
+        if let Some(lift) = self.lift {
+            self.add_lift(k, &local, lift);
+        }
+        self.drop_held(self.places.cliques.get(k), &mut local);
+        self.add_tangent(k, &local);
+    }
+
+    /// The tangent in the axes of its slots.
+    fn in_local_axes(&self, k: usize, element: &ElementSystem) -> ElementSystem {
+        let slots = self.places.cliques.get(k);
+        let mut local = element.clone();
+        let mut frames: [Option<Mat3>; 2 * MAX_NODES] = [None; 2 * MAX_NODES];
+        for (frame, &slot) in frames.iter_mut().zip(slots) {
+            *frame = self.equations.frame(slot);
+        }
+        for row in 0..slots.len() {
+            for column in 0..slots.len() {
+                let mut block = element.tangent_block(row, column);
+                if let Some(frame) = frames[row] {
+                    block = frame.transpose_matmul(block);
+                }
+                if let Some(frame) = frames[column] {
+                    block = block * frame;
+                }
+                local.set_tangent(row, column, block);
+            }
+        }
+        local
+    }
+
+    /// Rows and columns of held directions are no part of the tangent.
+    fn drop_held(&self, slots: &[Slot], local: &mut ElementSystem) {
+        let free = |slot: &Slot| self.equations.of(*slot).map(|number| number != Equations::HELD);
+        for (row, rows) in slots.iter().map(free).enumerate() {
+            for (column, columns) in slots.iter().map(free).enumerate() {
+                let mut block = local.tangent_block(row, column);
+                for (r, line) in block.0.iter_mut().enumerate() {
+                    line.iter_mut().zip(columns).filter(|(_, free)| !(rows[r] && *free)).for_each(|(x, _)| *x = 0.0);
+                }
+                local.set_tangent(row, column, block);
+            }
+        }
+    }
+
+    fn add_lift(&mut self, k: usize, local: &ElementSystem, lift: &[Vec3]) {
+        let slots = self.places.cliques.get(k);
+        for (column, &slot) in slots.iter().enumerate() {
+            let mut increment = self.equations.to_local(slot, lift[slot as usize]);
+            for (j, number) in self.equations.of(slot).into_iter().enumerate() {
+                if number != Equations::HELD {
+                    increment.0[j] = 0.0;
+                }
+            }
+            if increment == Vec3::ZERO {
+                continue;
+            }
+            for (row, &other) in slots.iter().enumerate() {
+                let push = local.tangent_block(row, column) * increment;
+                for (i, number) in self.equations.of(other).into_iter().enumerate() {
+                    if number != Equations::HELD {
+                        self.lifted[number as usize - self.first_equation] += push.0[i];
+                    }
+                }
+            }
+        }
+    }
+}

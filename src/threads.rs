@@ -1,0 +1,77 @@
+//! Many items of work at once, on the threads that whoever calls has given for it.
+//!
+//! Who has much to do cuts it by the scene alone, never by the number of threads, and puts together what items give in their order:
+//! results are the same on any number of threads, to the last bit.
+
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+use std::ops::Range;
+
+/// Of each thread; that of the main thread on most systems
+const STACK: usize = 8 << 20;
+
+/// Does work that may use so many threads; with one, and where the system gives no more, nothing is done at once.
+pub fn on<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK);
+    match (threads > 1).then(|| builder.build().ok()).flatten() {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+}
+
+/// Does something with each item.
+pub fn each<T: Send>(items: impl Iterator<Item = T>, work: impl Fn(T) + Send + Sync) {
+    in_order(items, work, |()| ());
+}
+
+/// Takes what items give, in their order.
+pub fn in_order<T: Send, R: Send>(
+    items: impl Iterator<Item = T>,
+    work: impl Fn(T) -> R + Send + Sync,
+    mut take: impl FnMut(R),
+) {
+    if !are_given() {
+        return items.for_each(|item| take(work(item)));
+    }
+    let items: Vec<T> = items.collect();
+    let results: Vec<R> = items.into_par_iter().with_max_len(1).map(work).collect();
+    results.into_iter().for_each(take);
+}
+
+/// Whether whoever calls has given threads.
+fn are_given() -> bool {
+    rayon::current_thread_index().is_some()
+}
+
+/// Entries of a long list that one thread takes at a time.
+pub const PART: usize = 2048;
+
+/// Does something with each part of a list, which begins at a place in it.
+pub fn each_part<T: Send>(list: &mut [T], work: impl Fn(usize, &mut [T]) + Send + Sync) {
+    if !are_given() {
+        return work(0, list);
+    }
+    each(list.chunks_mut(PART).enumerate(), |(number, part)| work(PART * number, part));
+}
+
+/// The largest of what parts of a list give: ranges of places.
+pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Sync) -> f64 {
+    if !are_given() {
+        return of_part(0..length).max(0.0);
+    }
+    let parts = (0..length).step_by(PART).map(|start| start..length.min(start + PART));
+    let mut largest = 0.0_f64;
+    in_order(parts, of_part, |part| largest = largest.max(part));
+    largest
+}
+
+/// A list in consecutive parts that end there.
+pub fn split<'a, T>(mut list: &'a mut [T], ends: impl Iterator<Item = usize>) -> Vec<&'a mut [T]> {
+    let mut start = 0;
+    let mut parts = Vec::new();
+    for end in ends {
+        let (part, rest) = list.split_at_mut(end - start);
+        parts.push(part);
+        (list, start) = (rest, end);
+    }
+    parts
+}

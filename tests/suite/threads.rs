@@ -1,0 +1,126 @@
+//! Large scenes on several threads: the same results to the last bit, and the same as without regions but for the order of sums.
+
+use crate::random::Random;
+use beamsim::drive::{Failure, Observer, Run, Snapshot};
+use beamsim::kernel::Weights;
+use beamsim::model::{Assembly, Model, StageContext, StageKind};
+use beamsim::scene;
+use beamsim::system::{Memory, State};
+use beamsim::threads;
+
+/// Cantilevers side by side, tied at their tips, of enough nodes for several regions; effects of every kind that is cut.
+fn deck(stage: &str, order: usize, planar: bool) -> String {
+    let (out, density) = if planar { (0.0, "rhoA = 1") } else { (0.3, "rhoA = 1\nrhoJ = [0.02, 0.01, 0.01]") };
+    format!(
+        "gravity = [0, -1, 0]\n[point]\na = [0, 0, 0]\nb = [10, 0, {out}]\nc = [0, 1, 0]\nd = [10, 1, 0]\n\
+         [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\n{density}\n\
+         [[beam]]\nname = \"p\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = {count}\norder = {order}\n\
+         [[beam]]\nname = \"q\"\nsection = \"s\"\nthrough = [\"c\", \"d\"]\nelements = {count}\norder = {order}\n\
+         [[beam]]\nname = \"r\"\nsection = \"s\"\nthrough = [\"b\", \"d\"]\nelements = 3\n\
+         [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"c\"\nfix = \"all\"\n\
+         [[load]]\nat = \"b\"\nforce = [0, 5, {out}]\n\
+         [[load]]\nalong = \"q\"\nforce = [0.1, -0.4, {out}]\n\
+         {stage}\n",
+        count = 2500 / order + 7
+    )
+}
+
+const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 2";
+const DYNAMIC: &str = "[damping]\nmass = 0.1\nstiffness = 1e-4\n[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01";
+
+#[derive(Default)]
+struct States(Vec<State>);
+
+impl Observer for States {
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
+        self.0.push(snapshot.state.clone());
+        Ok(())
+    }
+}
+
+fn model(text: &str) -> beamsim::scene::Scene {
+    scene::from_text(text).unwrap_or_else(|error| panic!("{error:?}\n{text}")).0
+}
+
+/// Displacements and rotation vectors of all rows, and what the run counted.
+fn history(text: &str, count: usize) -> (Vec<[u64; 3]>, String) {
+    let scene = model(text);
+    threads::on(count, || {
+        let mut states = States::default();
+        let (result, counters) = Run::new(scene.plan.clone(), &mut states).finish();
+        assert_eq!(result, Ok(()));
+        let all = states.0.iter().flat_map(|state| state.q.iter().chain(&state.v).map(|v| v.0.map(f64::to_bits)));
+        (all.collect(), format!("{:?}", counters.evaluations))
+    })
+}
+
+#[test]
+fn results_are_the_same_on_any_number_of_threads() {
+    for (stage, order, planar) in [(STATIC, 1, false), (STATIC, 3, false), (DYNAMIC, 1, false), (DYNAMIC, 2, true)] {
+        let text = deck(stage, order, planar);
+        assert!(model(&text).plan.model.regions() > 1);
+        let one = history(&text, 1);
+        assert!(one.0.iter().flatten().any(|&bits| bits != 0));
+        assert!(history(&text, 2) == one, "two threads, order {order}, planar {planar}: {stage}");
+        assert!(history(&text, 3) == one, "three threads, order {order}, planar {planar}: {stage}");
+    }
+}
+
+fn shaken(model: &Model) -> State {
+    let (mut state, mut random) = (model.rest(), Random::new(9));
+    for field in [&mut state.q, &mut state.v, &mut state.a] {
+        field.iter_mut().for_each(|value| *value = random.vector(0.01));
+    }
+    state.amplitude.fill(0.7);
+    state
+}
+
+/// What regions add up is what one pass over all instances adds up.
+#[test]
+fn regions_change_nothing_but_the_order_of_sums() {
+    for order in [1, 2, 3] {
+        let mut model = model(&deck(DYNAMIC, order, false)).plan.model;
+        let (state, kind) = (shaken(&model), StageKind::Dynamic);
+        let equations = model.begin_stage(0, kind, &state).unwrap();
+        let stage = StageContext { number: 0, kind, rotating: false };
+        let mut assembly = Assembly::new(&stage, equations, &model);
+        assert!(assembly.system.is_cut());
+        let weights = Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 };
+        assembly.evaluate(&state, weights, None);
+        let cut = (forces(&assembly), assembly.system.values.clone());
+        assembly.system.clear(None);
+        for (number, effect) in model.acting(&stage).iter().enumerate() {
+            let with_tangent = effect.has_tangent();
+            let weights = if with_tangent { weights } else { Weights::NONE };
+            let mut sink = assembly.system.sink(number, effect.category(), with_tangent);
+            effect.add(&state, &Memory::default(), weights, &mut sink);
+        }
+        assert!(apart(&cut.0, &forces(&assembly)) < 1e-14);
+        assert!(apart(&cut.1, &assembly.system.values) < 1e-15);
+    }
+}
+
+fn forces(assembly: &Assembly) -> Vec<f64> {
+    (0..assembly.system.force[0].len()).flat_map(|slot| assembly.system.total(slot).0).collect()
+}
+
+/// The largest difference over the largest number.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    let largest = a.iter().chain(b).fold(0.0_f64, |m, x| m.max(x.abs()));
+    assert!(largest > 0.0 && a.len() == b.len());
+    a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / largest
+}
+
+/// Rows of elements in a plane are cut as those in space.
+#[test]
+fn regions_of_a_plane_are_those_of_space() {
+    let numbers = |text: &str| -> Vec<f64> {
+        let bits = history(text, 1).0;
+        bits.iter().flatten().map(|&bits| f64::from_bits(bits)).collect()
+    };
+    for (stage, order) in [(STATIC, 1), (DYNAMIC, 3)] {
+        let text = deck(stage, order, true);
+        let in_space = format!("{text}[effects]\nplanar = false\n");
+        assert!(apart(&numbers(&text), &numbers(&in_space)) < 1e-9);
+    }
+}
