@@ -65,7 +65,7 @@ pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Syn
 }
 
 /// A list in consecutive parts that end there.
-pub fn split<'a, T>(mut list: &'a mut [T], ends: impl Iterator<Item = usize>) -> Vec<&'a mut [T]> {
+pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
     let mut start = 0;
     let mut parts = Vec::new();
     for end in ends {

@@ -3,7 +3,7 @@
 use super::beam_mass::BeamMass;
 use super::rigid_body::{RigidBody, are_centred};
 use super::volume::VolumeElement;
-use super::{ByOrder, Effect, PlanarForm, at_slots, own_blocks};
+use super::{ByOrder, PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::PlanarBody;
 use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
@@ -79,11 +79,7 @@ fn add_masses<const N: usize>(
 }
 
 impl PlanarForm for PlanarMass {
-    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
-        // Prescribed increments push through the mass as well, which the effect in space knows.
-        if out.lifts() {
-            return self.spatial.add(at, memory, weights, out);
-        }
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         let (blocks, plane) = (&self.blocks, &self.plane);
         let (two, three) = (self.spatial.elements.two.len(), self.spatial.elements.three.len());
         Instructions::here().run(

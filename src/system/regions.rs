@@ -37,7 +37,8 @@ impl Shares {
     /// Of instances that couple these slots.
     pub fn new(cliques: &Cliques, groups: &Groups, regions: &[Region]) -> Self {
         if regions.len() < 2 || !cliques.divisible {
-            return Self { inside: vec![Vec::new(); regions.len()], others: vec![0..cliques.len()] };
+            let all = std::iter::once(0..cliques.len());
+            return Self { inside: vec![Vec::new(); regions.len()], others: all.collect() };
         }
         let region = |slot: u32| groups.of(slot).0 / regions[0].groups.len();
         let mut out = Self { inside: vec![Vec::new(); regions.len()], others: Vec::new() };

@@ -235,7 +235,8 @@ impl Sink<'_> {
     ) {
         let forces = elements.forces_in_space(plane.axes());
         for lane in 0..count {
-            if is_apart(lane) || (self.with_tangent && self.places.special[first + lane]) {
+            let special = self.with_tangent && self.places.special[first + lane];
+            if is_apart(lane) || (special && self.has_turned_axes(plane, first + lane)) {
                 alone(lane, self);
                 continue;
             }
@@ -246,8 +247,8 @@ impl Sink<'_> {
             if !self.with_tangent {
                 continue;
             }
-            if !self.places.whole {
-                self.add_planar_parts(first + lane, elements, lane);
+            if special || !self.places.whole {
+                self.add_planar_entries(first + lane, elements, lane);
                 continue;
             }
             for (tile, &place) in elements.tangent.as_flattened().iter().zip(self.places.of(first + lane)) {
@@ -255,11 +256,6 @@ impl Sink<'_> {
                 target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value.0[lane]);
             }
         }
-    }
-
-    /// Whether prescribed increments act through the tangent.
-    pub fn lifts(&self) -> bool {
-        self.with_tangent && self.lift.is_some()
     }
 
     /// Adds instances that couple displacements alone, in lanes, by mass matrices of the plane: their forces (global components), and
@@ -296,7 +292,7 @@ impl Sink<'_> {
         }
     }
 
-    /// The same where directions are held: a mass is one in all directions, and between slots with other axes their cosine.
+    /// The same where directions are held or moved: a mass is one in all directions, and between slots with other axes their cosine.
     #[cold]
     fn add_constrained_mass(&mut self, plane: &Plane, k: usize, nodes: usize, entries: impl Iterator<Item = f64>) {
         let slots = self.places.cliques.get(k);
@@ -305,23 +301,49 @@ impl Sink<'_> {
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
             let (rows, columns) = (self.equations.of(i), self.equations.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
-            for c in (0..2).filter(|&c| columns[c] != Equations::HELD) {
+            let lift = self.lift.map_or(Vec3::ZERO, |lift| self.equations.to_local(j, lift[j as usize]));
+            for c in 0..2 {
                 for r in (0..2).filter(|&r| rows[r] != Equations::HELD) {
-                    self.values[place as usize - self.first_value + 3 * c + r] += cosines.0[r][c] * entry;
+                    let value = cosines.0[r][c] * entry;
+                    match columns[c] {
+                        Equations::HELD => self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c],
+                        _ => self.values[place as usize - self.first_value + 3 * c + r] += value,
+                    }
                 }
             }
         }
     }
 
-    /// Adds the tangent of one lane where nodes may share displacements: each entry of a tile goes to where those of its slots meet.
-    fn add_planar_parts<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
-        let places = self.places.of(k);
-        let slot = |node: usize, direction: usize| 2 * node + direction / 2;
+    /// Whether some slot of an instance has other axes than the plane.
+    fn has_turned_axes(&self, plane: &Plane, k: usize) -> bool {
+        let is_turned = |&slot: &Slot| self.equations.frame(slot).is_some_and(|frame| frame != *plane.axes());
+        self.places.cliques.get(k).iter().any(is_turned)
+    }
+
+    /// Adds the tangent of one lane entry by entry, where directions are held or nodes may share displacements: each goes to where those
+    /// of its slots meet, or pushes with the increment that is prescribed.
+    fn add_planar_entries<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
+        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
+        let unknown = |node: usize, direction: usize| {
+            let (number, slot) = (2 * node + direction / 2, slots[2 * node + direction / 2]);
+            (number, slot, self.equations.of(slot)[direction])
+        };
         for (i, tiles) in elements.tangent.iter().enumerate() {
             for (j, tile) in tiles.iter().enumerate() {
                 for (entry, value) in tile.iter().enumerate() {
-                    let (row, column) = (slot(i, entry % 3), slot(j, entry / 3));
-                    self.values[places[2 * N * row + column] as usize - self.first_value + entry] += value.0[lane];
+                    let ((row, _, to), (column, slot, from)) = (unknown(i, entry % 3), unknown(j, entry / 3));
+                    if to == Equations::HELD {
+                        continue;
+                    }
+                    if from == Equations::HELD {
+                        let increment = self
+                            .lift
+                            .map_or(0.0, |lift| self.equations.to_local(slot, lift[slot as usize]).0[entry / 3]);
+                        self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
+                        continue;
+                    }
+                    let place = if self.places.whole { places[N * i + j] } else { places[2 * N * row + column] };
+                    self.values[place as usize - self.first_value + entry] += value.0[lane];
                 }
             }
         }

@@ -26,7 +26,11 @@ const AIM: f64 = 0.9;
 const MOST_OF_THE_LESSER: f64 = 0.7;
 
 /// A share of the error below this part of what is wanted is not looked at again when only the other changes.
-const NEGLIGIBLE: f64 = 0.05;
+const SMALL: f64 = 0.3;
+
+/// A mesh whose share is smaller becomes coarser where the other share calls for other runs anyway; a larger one leaves too little to
+/// the steps, which cost more.
+const FINE_ENOUGH: f64 = 0.1;
 
 /// A share of the coarsest mesh below this part of what it may be calls for elements of a lower order.
 const LOWER_ORDER: f64 = 1e-2;
@@ -71,10 +75,10 @@ impl<T: PartialEq> Axis<T> {
         Self { fall: Fall::default(), last: Vec::new() }
     }
 
-    /// The share of a mesh, or pace, where it is known and negligible.
-    fn negligible(&self, of: &T) -> Option<Share> {
-        let known = self.last.iter().find(|(last, share)| last == of && share.largest < NEGLIGIBLE);
-        known.map(|(_, share)| share.clone())
+    /// The share of a mesh, or pace, where it is known and small.
+    fn known(&self, of: &T) -> Option<Share> {
+        let small = self.last.iter().find(|(last, share)| last == of && share.largest < SMALL);
+        small.map(|(_, share)| share.clone())
     }
 }
 
@@ -190,7 +194,7 @@ impl<'a> Search<'a> {
             ..Point::new(self.family.clone(), elements.clone(), pace)
         };
         let mesh = self.mesher.elements(order, self.mesh);
-        let known = self.in_space.negligible(&(order, mesh.clone())).is_some();
+        let known = self.in_space.known(&(order, mesh.clone())).is_some();
         let (own, coarse) = match order.filter(|_| !known).map(|_| self.mesher.companion(order, &mesh)) {
             None => (mesh, None),
             Some((other, ratio)) if ratio > 1.0 => (mesh, Some((other, ratio))),
@@ -200,7 +204,7 @@ impl<'a> Search<'a> {
         let on_coarser_mesh = coarse.map(|(coarse, ratio)| (point(&coarse, self.pace), ratio));
         let own = point(&own, self.pace);
         let step = |point: &Point| point.step(self.mesher.deck).unwrap_or(1.0);
-        let longer = matches!(self.pace, Pace::Steps(_)) && self.in_time.negligible(&self.pace).is_none();
+        let longer = matches!(self.pace, Pace::Steps(_)) && self.in_time.known(&self.pace).is_none();
         let longer = longer.then(|| point(&own.elements, coarser(self.pace)));
         let with_longer_step = longer.map(|longer| (longer.clone(), step(&longer) / step(&own)));
         Round { own, on_coarser_mesh, with_longer_step }
@@ -220,14 +224,14 @@ impl<'a> Search<'a> {
             _ => unknown(),
         };
         let mesh = (self.family.order, round.own.elements.clone());
-        let of_mesh = match (&round.on_coarser_mesh, self.in_space.negligible(&mesh)) {
+        let of_mesh = match (&round.on_coarser_mesh, self.in_space.known(&mesh)) {
             (Some((_, ratio)), _) => {
                 let source = Source::Mesh(self.family.order.unwrap_or(1));
                 share(&mut self.in_space.fall, source, round.own.width(), *ratio)
             }
             (None, known) => known.unwrap_or_else(none),
         };
-        let of_step = match (&round.with_longer_step, self.in_time.negligible(&self.pace)) {
+        let of_step = match (&round.with_longer_step, self.in_time.known(&self.pace)) {
             (Some((_, ratio)), _) => {
                 let width = round.own.step(self.mesher.deck).unwrap_or(1.0);
                 share(&mut self.in_time.fall, Source::Steps, width, *ratio)
@@ -274,25 +278,36 @@ impl<'a> Search<'a> {
     fn refine(&mut self, estimate: &Estimate) {
         let (mesh, step) = (estimate.mesh.largest, estimate.step.largest);
         let (of_mesh, of_step) = (allowed(mesh, step), allowed(step, mesh));
-        self.change_mesh(mesh / of_mesh, step > of_step);
+        self.change_mesh(mesh, mesh / of_mesh, step > of_step);
         self.change_step(step / of_step, mesh > of_mesh);
     }
 
-    /// `over` is the share of the mesh over what it may be.
-    fn change_mesh(&mut self, over: f64, other_changes: bool) {
+    /// `over` is the `share` of the mesh over what it may be.
+    fn change_mesh(&mut self, share: f64, over: f64, other_changes: bool) {
         let Some(order) = self.family.order else { return };
         if over > 1.0 {
             let order = self.in_space.fall.low_order().unwrap_or(self.in_space.fall.planned_orders(order).0);
             let factor = if over.is_finite() { over.powf(1.0 / order) } else { 2.0 };
             self.mesh *= factor.clamp(MESH_GROWS[0], MESH_GROWS[1]);
+            self.grow_past_the_last();
         } else if other_changes && over < LOWER_ORDER && order > 1 && self.is_coarsest() {
             self.family.order = Some(order - 1);
             self.in_space.fall = Fall::default();
         } else if other_changes && !self.is_coarsest() {
+            let over = over.max(share / FINE_ENOUGH);
             let factor = over.powf(1.0 / self.in_space.fall.planned_orders(order).1);
             if factor < MESH_SHRINKS[0] {
                 self.mesh *= factor.max(MESH_SHRINKS[1]);
             }
+        }
+    }
+
+    /// Until another mesh comes of it than that of the last round, which was finer than it should be where pieces had but one element.
+    fn grow_past_the_last(&mut self) {
+        let Some((_, last)) = self.in_space.last.first().map(|(mesh, _)| mesh.clone()) else { return };
+        let count = |elements: &[Vec<usize>]| elements.iter().flatten().sum::<usize>();
+        while count(&self.mesher.elements(self.family.order, self.mesh)) <= count(&last) && count(&last) < MOST_NODES {
+            self.mesh *= MESH_GROWS[0];
         }
     }
 
