@@ -12,6 +12,12 @@ use crate::system::{Slot, System};
 /// tangents whose pivots fail across blocks are left to LU with partial pivoting.
 pub struct LinearSolver {
     way: Way,
+    /// Blocks, while pivots are taken instead, or the other way round
+    other: Option<Way>,
+    /// Solutions until blocks have another chance, and how many there will be when they fail again
+    absence: [u32; 2],
+    /// Whether pivots have not helped either since the last solution
+    in_vain: bool,
     /// Whether the last factorisation has come to its end
     factored: bool,
     /// That of the tangent that was factorised last, where it stays
@@ -46,7 +52,8 @@ impl LinearSolver {
             Some(blocks) => Way::Blocks(Box::new(blocks)),
             None => Way::General(Box::new(GeneralSolver::new(system)?)),
         };
-        Some(Self { way, factored: false, revision: None, multipliers: multipliers.to_vec(), pivots: None })
+        let multipliers = multipliers.to_vec();
+        Some(Self { way, other: None, absence: [0, 1], in_vain: false, factored: false, revision: None, multipliers, pivots: None })
     }
 
     /// Its factorisation in blocks, where it has one.
@@ -164,21 +171,52 @@ impl LinearSolver {
         error <= LARGEST_BACKWARD_ERROR
     }
 
-    /// After corrections that led nowhere: from here on in general where few digits of the softest stiffness are left, of which
-    /// pivots save more.
+    /// After corrections that led nowhere: in general where few digits of the softest stiffness are left, of which pivots save more; and
+    /// back to blocks where they did not help either.
     pub fn doubt(&mut self, system: &System) {
         let few = |vector: NullVector| vector.digits(system) < FEW_DIGITS;
+        if matches!(self.way, Way::General(_)) {
+            self.return_to_blocks();
+            self.in_vain = true;
+            return;
+        }
         // The factorisation may be that of the iterate before.
-        if matches!(self.way, Way::Blocks(_)) && self.factorise(system) && self.softest(system).is_none_or(few) {
+        if !self.in_vain && self.factorise(system) && self.softest(system).is_none_or(few) {
             self.factored = self.leave_blocks(system);
         }
     }
 
-    /// From here on in general.
+    /// From here on in general, until blocks have another chance.
     fn leave_blocks(&mut self, system: &System) -> bool {
-        let Some(mut general) = GeneralSolver::new(system) else { return false };
-        let done = general.factorise(system);
-        self.way = Way::General(Box::new(general));
+        let known = self.other.take();
+        let Some(mut general) = known.or_else(|| GeneralSolver::new(system).map(Box::new).map(Way::General)) else {
+            return false;
+        };
+        let done = match &mut general {
+            Way::General(general) => general.factorise(system),
+            Way::Blocks(_) => false,
+        };
+        self.other = Some(std::mem::replace(&mut self.way, general));
+        let [rest, next] = &mut self.absence;
+        (*rest, *next) = (*next, next.saturating_mul(2));
         done
+    }
+
+    /// After a solution in balance. An iterate that flies far away loses digits that the structure has: blocks come back, after twice as many
+    /// solutions each time.
+    pub fn succeeded(&mut self) {
+        self.in_vain = false;
+        self.absence[0] = self.absence[0].saturating_sub(1);
+        if self.absence[0] == 0 {
+            self.return_to_blocks();
+        }
+    }
+
+    /// Where there are some.
+    fn return_to_blocks(&mut self) {
+        if let Some(blocks) = self.other.take_if(|other| matches!(other, Way::Blocks(_))) {
+            self.other = Some(std::mem::replace(&mut self.way, blocks));
+            (self.factored, self.revision) = (false, None);
+        }
     }
 }

@@ -179,7 +179,7 @@ impl Newton {
                     if residual.ratio > 0.0 {
                         self.polish(model, assembly, state, method, forms, work);
                     }
-                    self.reuse.end();
+                    self.end();
                     return Ok(());
                 }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
@@ -187,7 +187,7 @@ impl Newton {
                     let refined = refinement.look(model, &self.dq, size(model, state));
                     if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
-                        self.reuse.end();
+                        self.end();
                         return Ok(());
                     }
                 }
@@ -230,6 +230,12 @@ impl Newton {
                 self.change_charts(model, state, work);
             }
         }
+    }
+
+    /// A solution is found.
+    fn end(&mut self) {
+        self.reuse.end();
+        self.solver.succeeded();
     }
 
     /// Forces and the tangent.

@@ -26,7 +26,7 @@ const AIM: f64 = 0.9;
 const MOST_OF_THE_LESSER: f64 = 0.7;
 
 /// A share of the error below this part of what is wanted is not looked at again when only the other changes.
-const SMALL: f64 = 0.3;
+const SMALL: f64 = 0.7;
 
 /// A mesh whose share is smaller becomes coarser where the other share calls for other runs anyway; a larger one leaves too little to
 /// the steps, which cost more.
