@@ -53,7 +53,16 @@ impl LinearSolver {
             None => Way::General(Box::new(GeneralSolver::new(system)?)),
         };
         let multipliers = multipliers.to_vec();
-        Some(Self { way, other: None, absence: [0, 1], in_vain: false, factored: false, revision: None, multipliers, pivots: None })
+        Some(Self {
+            way,
+            other: None,
+            absence: [0, 1],
+            in_vain: false,
+            factored: false,
+            revision: None,
+            multipliers,
+            pivots: None,
+        })
     }
 
     /// Its factorisation in blocks, where it has one.

@@ -1,13 +1,14 @@
 //! The search for a variant of a deck that is accurate enough.
 
 use super::estimate::{Fall, Share, Source, left_by_newton};
-use super::{Found, coarser, is_offer, scaled};
+use super::{CUBIC, Found, coarser, is_offer, scaled};
 use crate::deck::{Accuracy, StageBody};
 use crate::drive::Failure;
 use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Trial};
 
-/// The first mesh over that of the deck, in nodes.
+/// The first mesh over that of the deck, in nodes; and where steps cost nothing and a loose accuracy is wanted.
 const FIRST_MESH: f64 = 0.5;
+const COARSE_MESH: f64 = 0.35;
 
 /// How much finer a mesh may become from round to round, and how little is worth a round; and how much coarser.
 const MESH_GROWS: [f64; 2] = [1.3, 4.0];
@@ -112,7 +113,9 @@ impl Estimate {
 impl<'a> Search<'a> {
     pub fn new(wanted: &'a Accuracy, mesher: Mesher<'a>, family: Family, pace: Pace, newton: f64) -> Self {
         let (in_space, in_time) = (Axis::new(), Axis::new());
-        Self { wanted, mesher, family, newton, mesh: FIRST_MESH, pace, longest: pace, in_space, in_time }
+        let coarse = pace == Pace::Timeless && wanted.least() >= CUBIC;
+        let mesh = if coarse { COARSE_MESH } else { FIRST_MESH };
+        Self { wanted, mesher, family, newton, mesh, pace, longest: pace, in_space, in_time }
     }
 
     pub fn run(&mut self, mut crew: Crew) -> Result<Found, Refusal> {
@@ -127,7 +130,15 @@ impl<'a> Search<'a> {
             }
             let points = round.points();
             crew.expect(points.len());
-            let trials = match (crew.run(&points), best.take()) {
+            // A step that is too long for the variant is none for those that it is compared with.
+            let tried = is_offer(&round.own).then(|| crew.run(&points[..1])).transpose();
+            let is_lost = |trials: &Vec<Option<Trial>>| trials.iter().flatten().any(|trial| trial.status == "limit");
+            let ran = match tried {
+                Ok(Some(trials)) if is_lost(&trials) => Ok(trials),
+                Ok(_) => crew.run(&points),
+                Err(refusal) => Err(refusal),
+            };
+            let trials = match (ran, best.take()) {
                 (Err(Refusal::Failure(stopped)), Some(found)) => {
                     return Ok(Found { runs, stopped: Some(stopped), ..found });
                 }
