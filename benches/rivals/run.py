@@ -235,7 +235,7 @@ def run_beamsim(beamsim, job, timeout):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.toml"
         path.write_text(deck.deck(job))
-        code, text, cpu, peak = run_process([beamsim, "run", path, "--out", f"{folder}/out"], timeout)
+        code, text, cpu, peak = run_process([beamsim, "run", path, "--threads", "1", "--out", f"{folder}/out"], timeout)
         if code:
             raise Failed(f"exit status {code}: {cause(text)}")
         run = json.loads((Path(folder) / "out" / "run.json").read_text())

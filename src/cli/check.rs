@@ -1,12 +1,13 @@
 //! `beamsim check`
 
 use super::load::Loaded;
-use super::{Status, Verdict, json, load, say};
+use super::{Status, Verdict, cores, json, load, say};
 use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
 use crate::tensor::{Mat3, Vec3};
+use crate::threads;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -55,7 +56,8 @@ fn tell(scene: &Scene) -> Result<(), String> {
 
 /// How long a run will take. One that an accuracy is wanted of begins with a search among other meshes and steps.
 fn tell_time(loaded: &Loaded, reading: Duration) -> f64 {
-    let Forecast { seconds, watched, ended, at } = forecast(&loaded.scene, PATIENCE);
+    let count = cores(None).min(loaded.scene.plan.model.regions());
+    let Forecast { seconds, watched, ended, at } = threads::on(count, || forecast(&loaded.scene, PATIENCE));
     let whole = duration(seconds + reading.as_secs_f64());
     let Moment { stage, time, load } = at;
     let how = match ended {
@@ -64,7 +66,8 @@ fn tell_time(loaded: &Loaded, reading: Duration) -> f64 {
         None => format!("{} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}", duration(watched)),
     };
     let own = if loaded.deck.accuracy.is_some() { ", with its own elements and steps" } else { "" };
-    say::line(&format!("run: about {whole} on this machine{own} ({how})"));
+    let on = if count > 1 { format!(", on {count} threads") } else { String::new() };
+    say::line(&format!("run: about {whole} on this machine{on}{own} ({how})"));
     seconds + reading.as_secs_f64()
 }
 

@@ -84,6 +84,8 @@ pub struct Finished {
     pub film: Option<Film>,
     /// What stands in run.json
     pub record: Option<Record>,
+    /// The threads it had
+    pub threads: usize,
 }
 
 impl Finished {
@@ -226,7 +228,7 @@ pub fn simulate(
             result = Err(io_failure(error));
         }
     }
-    Finished { result, counters, seconds, film: watcher.film, record }
+    Finished { result, counters, seconds, film: watcher.film, record, threads }
 }
 
 /// The record is whole before anything gets its name, and gets its own when all else has.
@@ -251,7 +253,8 @@ fn write_results(
 
 /// A few lines after a run.
 fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
-    let Finished { result, counters, seconds, .. } = finished;
+    let Finished { result, counters, seconds, threads, .. } = finished;
+    let on = if *threads > 1 { format!(" on {threads} threads") } else { String::new() };
     let work = &counters.work;
     if let Some(title) = &scene.title {
         say::line(&format!("{name}: {title}"));
@@ -262,7 +265,7 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
     let acting = planar.chain(evaluated).collect::<Vec<_>>().join(", ");
     say::line(&format!("  {} elements, {unknowns} unknowns; {acting}", scene.mesh.elements.len()));
     say::line(&format!(
-        "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s",
+        "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s{on}",
         counters.steps, work.iterations, counters.cutbacks, work.chart_switches, counters.mixed_elements
     ));
     match result {

@@ -11,8 +11,8 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// The elements of an effect in space, side by side in their order. Where something is held, or nodes sit in different charts, the
-/// effect in space does the work.
+/// The elements of an effect in space, side by side in their order. Where axes are turned in the plane, or nodes sit in
+/// different charts, the effect in space does the work.
 pub struct PlanarElasticity<I> {
     plane: Plane,
     spatial: Arc<BeamElasticity<I>>,

@@ -3,7 +3,7 @@
 //! It stands for all inertia of its stage: of steady states, and of small motions about them.
 
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements, inertia_aspects};
+use super::{Effect, VolumeElements, inertia_aspects, own_part};
 use crate::kernel::inertia::{Inertia, SteadilyTurned, steadily_turned};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
@@ -57,7 +57,8 @@ impl Effect for RotatingFrame {
         self.elements.add(&SteadilyTurned { spin, about: self.about }, at, weights, out);
         let first = self.elements.two.len() + self.elements.three.len() + self.elements.four.len();
         let mut system = ElementSystem::new(2);
-        for (k, body) in self.bodies.iter().enumerate() {
+        for k in own_part(first, self.bodies.len(), &out.instances()) {
+            let body = &self.bodies[k];
             let from_axis = body.place - self.about + at.q[body.node.u as usize];
             let force = steadily_turned(&body.inertia, (spin, from_axis), &at.rotation(body.node.p), weights);
             system.clear();

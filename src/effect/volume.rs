@@ -20,7 +20,7 @@ pub struct VolumeElement<const N: usize, Q> {
 pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, VolumeElement<4, Q>>;
 
 impl<Q: Copy> VolumeElements<Q> {
-    /// The slots that meet in each element.
+    /// The slots that meet in each element; effects add no others than those that a sink takes.
     pub fn cliques(&self, blocks: Blocks) -> Cliques {
         let mut cliques = Cliques::divisible();
         for_each_batch!(self, |_first, batch| for element in batch {

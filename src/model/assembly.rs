@@ -6,7 +6,6 @@ use crate::effect::{Effect, Noise, PlanarForm};
 use crate::kernel::Weights;
 use crate::system::{Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, System};
 use crate::tensor::Vec3;
-use crate::threads;
 use std::sync::Arc;
 
 /// The effects of one stage with their scratch, and the system they add to.
@@ -131,14 +130,13 @@ impl Assembly {
     /// Regions of a large scene at once, each after it was made ready, then what lies in none.
     fn add_effects(&mut self, state: &State, weights: Weights, make_ready: impl Fn(&mut Part) + Send + Sync) {
         let Self { effects, system, evaluations, .. } = self;
-        match system.is_cut() {
-            true => threads::each(system.parts().into_iter(), |mut part| {
-                make_ready(&mut part);
-                add_part(effects, state, weights, &mut part);
-            }),
-            false => make_ready(&mut system.whole()),
+        system.each_part(|part| {
+            make_ready(part);
+            add_part(effects, state, weights, part);
+        });
+        if system.is_cut() {
+            add_part(effects, state, weights, &mut system.whole());
         }
-        add_part(effects, state, weights, &mut system.whole());
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 

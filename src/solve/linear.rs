@@ -11,13 +11,11 @@ use crate::system::{Slot, System};
 /// Blocks serve what consists of nodes and is not too much of a net; joints with multipliers, whose diagonal is empty, and
 /// tangents whose pivots fail across blocks are left to LU with partial pivoting.
 pub struct LinearSolver {
-    way: Way,
-    /// Blocks, while pivots are taken instead, or the other way round
-    other: Option<Way>,
-    /// Solutions until blocks have another chance, and how many there will be when they fail again
-    absence: [u32; 2],
-    /// Whether pivots have not helped either since the last solution
-    in_vain: bool,
+    /// Where the pattern suits them
+    blocks: Option<Box<BlockSolver>>,
+    /// Once blocks were left, or where there are none
+    general: Option<Box<GeneralSolver>>,
+    trust: Trust,
     /// Whether the last factorisation has come to its end
     factored: bool,
     /// That of the tangent that was factorised last, where it stays
@@ -27,9 +25,15 @@ pub struct LinearSolver {
     pub(super) pivots: Option<Pivots>,
 }
 
-enum Way {
-    Blocks(Box<BlockSolver>),
-    General(Box<GeneralSolver>),
+/// Whether blocks do the work, where there are any.
+#[derive(Clone, Copy)]
+struct Trust {
+    in_blocks: bool,
+    /// Solutions until they have another chance, and how many there will be when they fail again
+    absence: u32,
+    next: u32,
+    /// Whether pivots have just not helped either
+    in_vain: bool,
 }
 
 /// A solution is one of a system whose entries differ by no more than this, relative to each (Oettli and Prager 1964).
@@ -48,51 +52,46 @@ impl LinearSolver {
     /// Analyses the pattern of a system. `None` where memory for it cannot be had.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
         let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, system.symmetric)).flatten();
-        let way = match blocks {
-            Some(blocks) => Way::Blocks(Box::new(blocks)),
-            None => Way::General(Box::new(GeneralSolver::new(system)?)),
-        };
-        let multipliers = multipliers.to_vec();
+        let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
-            way,
-            other: None,
-            absence: [0, 1],
-            in_vain: false,
+            trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false },
+            blocks: blocks.map(Box::new),
+            general,
             factored: false,
             revision: None,
-            multipliers,
+            multipliers: multipliers.to_vec(),
             pivots: None,
         })
     }
 
-    /// Its factorisation in blocks, where it has one.
+    /// Its solver in blocks, where it has one, whether it is in use or not.
     pub(super) fn blocks(&self) -> Option<&BlockSolver> {
-        match &self.way {
-            Way::Blocks(blocks) => Some(blocks),
-            Way::General(_) => None,
-        }
+        self.blocks.as_deref()
+    }
+
+    /// The same while it is in use.
+    fn blocks_in_use(&mut self) -> Option<&mut BlockSolver> {
+        self.blocks.as_deref_mut().filter(|_| self.trust.in_blocks)
     }
 
     /// Whether its factorisation is one of symmetric tangents, without pivoting.
     pub(super) fn is_symmetric(&self) -> bool {
-        self.blocks().is_some_and(BlockSolver::is_symmetric)
+        self.trust.in_blocks && self.blocks().is_some_and(BlockSolver::is_symmetric)
     }
 
     /// Factorises, as far as it can by blocks, and counts negative pivots.
     pub(super) fn negative_of_own(&mut self, system: &System) -> Option<usize> {
         let known = self.has_factorised(system);
-        let Way::Blocks(blocks) = &mut self.way else { return None };
-        self.factored = known || blocks.factorise(system);
-        self.revision = self.factored.then_some(system.revision);
-        self.factored.then(|| blocks.negative()).flatten()
+        let blocks = self.blocks_in_use()?;
+        let done = known || blocks.factorise(system);
+        let negative = blocks.negative();
+        (self.factored, self.revision) = (done, done.then_some(system.revision));
+        negative.filter(|_| done)
     }
 
     /// How it solves, in a few words.
     pub fn name(&self) -> &'static str {
-        match &self.way {
-            Way::Blocks(blocks) => blocks.name(),
-            Way::General(_) => "sparse LU",
-        }
+        self.blocks().filter(|_| self.trust.in_blocks).map_or("sparse LU", BlockSolver::name)
     }
 
     /// Whether its last factorisation is that of this tangent.
@@ -114,9 +113,9 @@ impl LinearSolver {
     pub fn factorise(&mut self, system: &System) -> bool {
         // Its values may not stay.
         self.revision = None;
-        self.factored = match &mut self.way {
-            Way::Blocks(blocks) => blocks.factorise(system) || self.leave_blocks(system),
-            Way::General(general) => general.factorise(system),
+        self.factored = match self.blocks_in_use() {
+            Some(blocks) => blocks.factorise(system) || self.leave_blocks(system),
+            None => self.general.as_mut().is_some_and(|general| general.factorise(system)),
         };
         self.factored
     }
@@ -134,7 +133,7 @@ impl LinearSolver {
     /// Solves with the last factorisation, which is that of `system`; `false` where there is no solution. What blocks leave
     /// of the residual is refined.
     pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
-        if matches!(self.way, Way::General(_)) {
+        if !self.trust.in_blocks {
             return self.solve_once(system, right_hand_side);
         }
         let wanted = right_hand_side.to_vec();
@@ -154,9 +153,10 @@ impl LinearSolver {
         if !self.factored {
             return false;
         }
-        match &mut self.way {
-            Way::Blocks(blocks) => blocks.solve(&system.pattern, right_hand_side),
-            Way::General(general) => general.solve(right_hand_side),
+        match (self.blocks_in_use().is_some(), &mut self.blocks, &mut self.general) {
+            (true, Some(blocks), _) => blocks.solve(&system.pattern, right_hand_side),
+            (false, _, Some(general)) => general.solve(right_hand_side),
+            _ => return false,
         }
         right_hand_side.iter().all(|x| x.is_finite())
     }
@@ -181,50 +181,53 @@ impl LinearSolver {
     }
 
     /// After corrections that led nowhere: in general where few digits of the softest stiffness are left, of which pivots save more; and
-    /// back to blocks where they did not help either.
+    /// in turns with blocks where that did not help either.
     pub fn doubt(&mut self, system: &System) {
         let few = |vector: NullVector| vector.digits(system) < FEW_DIGITS;
-        if matches!(self.way, Way::General(_)) {
+        if !self.trust.in_blocks {
             self.return_to_blocks();
-            self.in_vain = true;
+            self.trust.in_vain = true;
             return;
         }
-        // The factorisation may be that of the iterate before.
-        if !self.in_vain && self.factorise(system) && self.softest(system).is_none_or(few) {
+        if std::mem::take(&mut self.trust.in_vain) {
+            return;
+        }
+        // The factorisation may be that of the iterate before; either may leave blocks itself.
+        let doubtful = self.factorise(system) && self.softest(system).is_none_or(few);
+        if doubtful && self.trust.in_blocks {
             self.factored = self.leave_blocks(system);
         }
     }
 
     /// From here on in general, until blocks have another chance.
     fn leave_blocks(&mut self, system: &System) -> bool {
-        let known = self.other.take();
-        let Some(mut general) = known.or_else(|| GeneralSolver::new(system).map(Box::new).map(Way::General)) else {
-            return false;
-        };
-        let done = match &mut general {
-            Way::General(general) => general.factorise(system),
-            Way::Blocks(_) => false,
-        };
-        self.other = Some(std::mem::replace(&mut self.way, general));
-        let [rest, next] = &mut self.absence;
-        (*rest, *next) = (*next, next.saturating_mul(2));
-        done
+        if self.general.is_none() {
+            self.general = GeneralSolver::new(system).map(Box::new);
+        }
+        let Some(general) = &mut self.general else { return false };
+        let next = self.trust.next;
+        self.trust = Trust { in_blocks: false, absence: next, next: next.saturating_mul(2), in_vain: false };
+        general.factorise(system)
     }
 
     /// After a solution in balance. An iterate that flies far away loses digits that the structure has: blocks come back, after twice as many
-    /// solutions each time.
+    /// solutions each time that they fail, and one less for each that they find.
     pub fn succeeded(&mut self) {
-        self.in_vain = false;
-        self.absence[0] = self.absence[0].saturating_sub(1);
-        if self.absence[0] == 0 {
+        self.trust.in_vain = false;
+        if self.trust.in_blocks {
+            self.trust.next = (self.trust.next - 1).max(1);
+            return;
+        }
+        self.trust.absence = self.trust.absence.saturating_sub(1);
+        if self.trust.absence == 0 {
             self.return_to_blocks();
         }
     }
 
     /// Where there are some.
     fn return_to_blocks(&mut self) {
-        if let Some(blocks) = self.other.take_if(|other| matches!(other, Way::Blocks(_))) {
-            self.other = Some(std::mem::replace(&mut self.way, blocks));
+        if self.blocks.is_some() {
+            self.trust = Trust { in_blocks: true, absence: 0, ..self.trust };
             (self.factored, self.revision) = (false, None);
         }
     }

@@ -68,13 +68,14 @@ impl System {
     /// shall take with it.
     pub fn clear(&mut self, lift: Option<&[Vec3]>) {
         self.begin(true, lift);
-        self.clear_parts(true);
+        self.each_part(|part| part.clear(true));
     }
 
-    fn clear_parts(&mut self, with_tangent: bool) {
+    /// Does something with what each region adds to, at once, or with all of the system where it is not cut.
+    pub fn each_part(&mut self, work: impl Fn(&mut Part) + Send + Sync) {
         match self.is_cut() {
-            true => threads::each(self.parts().into_iter(), |mut part| part.clear(with_tangent)),
-            false => self.whole().clear(with_tangent),
+            true => threads::each(self.parts().into_iter(), |mut part| work(&mut part)),
+            false => work(&mut self.whole()),
         }
     }
 
@@ -96,7 +97,7 @@ impl System {
     /// Sets forces to zero for a new evaluation, without prescribed increments; the tangent is left as it is.
     pub fn clear_forces(&mut self) {
         self.begin(false, None);
-        self.clear_parts(false);
+        self.each_part(|part| part.clear(false));
     }
 
     /// Drops all forces and keeps the tangent.
@@ -244,7 +245,7 @@ impl System {
     }
 
     /// What each region adds to.
-    pub fn parts(&mut self) -> Vec<Part<'_>> {
+    fn parts(&mut self) -> Vec<Part<'_>> {
         let Self { pattern, force, values, lift, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);

@@ -3,7 +3,7 @@
 use crate::random::Random;
 use beamsim::drive::{Failure, Observer, Run, Snapshot};
 use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model, StageContext, StageKind};
+use beamsim::model::{Assembly, Model};
 use beamsim::scene;
 use beamsim::system::{Memory, State};
 use beamsim::threads;
@@ -27,6 +27,8 @@ fn deck(stage: &str, order: usize, planar: bool) -> String {
 
 const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 2";
 const DYNAMIC: &str = "[damping]\nmass = 0.1\nstiffness = 1e-4\n[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01";
+
+const TURNING: &str = "[[stage]]\nkind = \"static\"\nframe = { spin = [0, 0, 0.05], about = [0, 0, 0] }\nsteps = 1";
 
 #[derive(Default)]
 struct States(Vec<State>);
@@ -56,7 +58,8 @@ fn history(text: &str, count: usize) -> (Vec<[u64; 3]>, String) {
 
 #[test]
 fn results_are_the_same_on_any_number_of_threads() {
-    for (stage, order, planar) in [(STATIC, 1, false), (STATIC, 3, false), (DYNAMIC, 1, false), (DYNAMIC, 2, true)] {
+    let scenes = [(STATIC, 1, false), (STATIC, 3, false), (DYNAMIC, 1, false), (DYNAMIC, 2, true), (TURNING, 1, false)];
+    for (stage, order, planar) in scenes {
         let text = deck(stage, order, planar);
         assert!(model(&text).plan.model.regions() > 1);
         let one = history(&text, 1);
@@ -78,11 +81,11 @@ fn shaken(model: &Model) -> State {
 /// What regions add up is what one pass over all instances adds up.
 #[test]
 fn regions_change_nothing_but_the_order_of_sums() {
-    for order in [1, 2, 3] {
-        let mut model = model(&deck(DYNAMIC, order, false)).plan.model;
-        let (state, kind) = (shaken(&model), StageKind::Dynamic);
-        let equations = model.begin_stage(0, kind, &state).unwrap();
-        let stage = StageContext { number: 0, kind, rotating: false };
+    for (text, order) in [(DYNAMIC, 1), (DYNAMIC, 2), (DYNAMIC, 3), (TURNING, 1), (TURNING, 2)] {
+        let plan = model(&deck(text, order, false)).plan;
+        let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+        let state = shaken(&model);
+        let equations = model.begin_stage(0, stage.kind, &state).unwrap();
         let mut assembly = Assembly::new(&stage, equations, &model);
         assert!(assembly.system.is_cut());
         let weights = Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 };

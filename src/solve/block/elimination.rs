@@ -42,7 +42,7 @@ pub struct Elimination {
 }
 
 impl Elimination {
-    /// By approximate minimum degree: without any fill on chains and trees. `None` where fill makes it slow, or memory for
+    /// In the order of [`order::find`]: without any fill on chains and trees. `None` where fill makes it slow, or memory for
     /// the analysis cannot be had.
     pub fn new(pattern: &Pattern) -> Option<Self> {
         let most = MOST_FILL * (pattern.tiles() - pattern.groups.count()) / 2;

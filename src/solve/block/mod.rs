@@ -1,8 +1,8 @@
 //! Factorisations of the tangent in blocks, the unknowns of one node each, 6 x 6 or in a plane 3 x 3: L D L^T where it is symmetric, LU
 //! where not.
 //!
-//! The order of elimination is that of least degree, so that chains and trees get no fill at all. Pivots are not looked for
-//! across blocks: who uses this looks at the residual of what it solved.
+//! The order of elimination is that of least degree, in large scenes turned towards a middle, so that chains and trees get no fill at all.
+//! Pivots are not looked for across blocks: who uses this looks at the residual of what it solved.
 
 mod elimination;
 mod ldl;

@@ -13,8 +13,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-/// A branch has at least so many rows.
-const LEAST: usize = 512;
+/// Smaller scenes are eliminated as they come.
+const LEAST: usize = 1024;
 
 /// The rows of a trunk are looked for so long.
 const MOST_TRUNK: usize = 64;
@@ -115,7 +115,7 @@ impl Neighbours {
 pub fn find(pattern: &Pattern, most: usize) -> Option<Order> {
     let order = minimum_degree(pattern)?;
     let neighbours = Neighbours::new(pattern, &order, most)?;
-    if order.len() < 2 * LEAST {
+    if order.len() < LEAST {
         return Some(Order { order, branches: Vec::new(), neighbours });
     }
     let order = permuted(&order, &towards_the_middle(&neighbours));
@@ -185,7 +185,7 @@ fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
 /// The row below which, and beside whose later neighbours, no part of the tree has more than half of the rows.
 fn middle(parents: &[u32]) -> usize {
     let sizes = sizes(parents);
-    // From the last row on: the largest child of each row that holds more than half comes before it.
+    // Children come before their parents.
     (0..parents.len()).find(|&row| 2 * sizes[row] as usize > parents.len()).unwrap_or(parents.len() - 1)
 }
 

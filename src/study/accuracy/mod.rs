@@ -1,7 +1,7 @@
 //! A wanted accuracy instead of elements and steps: the deck is run on finer meshes and with smaller steps until the estimated error of all
 //! outputs is below what is wanted.
 //!
-//! Each round runs three variants, the last of the search so far, one with half its elements and one with twice its step. The differences
+//! Each round runs up to three variants, the last of the search so far, one with half its elements and one with twice its step. The differences
 //! tell the errors of mesh and step: with a ratio r of widths and an order q,
 //!
 //! ```text

@@ -26,11 +26,13 @@ const AIM: f64 = 0.9;
 /// The lesser share of the error may stay as it is up to this.
 const MOST_OF_THE_LESSER: f64 = 0.7;
 
-/// A share of the error below this part of what is wanted is not looked at again when only the other changes.
+/// A share of the error below this part of what is wanted is not looked at again when only the other changes, by no more than so many
+/// halvings.
 const SMALL: f64 = 0.7;
+const NEAR: f64 = 2.0;
 
 /// A mesh whose share is smaller becomes coarser where the other share calls for other runs anyway; a larger one leaves too little to
-/// the steps, which cost more.
+/// the steps, which cost more. A share below this holds whatever the other does.
 const FINE_ENOUGH: f64 = 0.1;
 
 /// A share of the coarsest mesh below this part of what it may be calls for elements of a lower order.
@@ -69,16 +71,20 @@ struct Axis<T> {
     fall: Fall,
     /// The meshes, or paces, of the last round with their shares
     last: Vec<(T, Share)>,
+    /// The width of what the other axis had when these were found
+    beside: f64,
 }
 
 impl<T: PartialEq> Axis<T> {
     fn new() -> Self {
-        Self { fall: Fall::default(), last: Vec::new() }
+        Self { fall: Fall::default(), last: Vec::new(), beside: 1.0 }
     }
 
-    /// The share of a mesh, or pace, where it is known and small.
-    fn known(&self, of: &T) -> Option<Share> {
-        let small = self.last.iter().find(|(last, share)| last == of && share.largest < SMALL);
+    /// The share of a mesh, or pace, where it is known well enough beside the other axis.
+    fn known(&self, of: &T, beside: f64) -> Option<Share> {
+        let near = (beside / self.beside).log2().abs() <= NEAR;
+        let largest = if near { SMALL } else { FINE_ENOUGH };
+        let small = self.last.iter().find(|(last, share)| last == of && share.largest < largest);
         small.map(|(_, share)| share.clone())
     }
 }
@@ -129,16 +135,7 @@ impl<'a> Search<'a> {
                 break;
             }
             let points = round.points();
-            crew.expect(points.len());
-            // A step that is too long for the variant is none for those that it is compared with.
-            let tried = is_offer(&round.own).then(|| crew.run(&points[..1])).transpose();
-            let is_lost = |trials: &Vec<Option<Trial>>| trials.iter().flatten().any(|trial| trial.status == "limit");
-            let ran = match tried {
-                Ok(Some(trials)) if is_lost(&trials) => Ok(trials),
-                Ok(_) => crew.run(&points),
-                Err(refusal) => Err(refusal),
-            };
-            let trials = match (ran, best.take()) {
+            let trials = match (run_round(&mut crew, &points), best.take()) {
                 (Err(Refusal::Failure(stopped)), Some(found)) => {
                     return Ok(Found { runs, stopped: Some(stopped), ..found });
                 }
@@ -198,6 +195,14 @@ impl<'a> Search<'a> {
         point.count() * self.family.order.unwrap_or(1) > MOST_NODES || steps > MOST_STEPS
     }
 
+    /// The steps over the deck's.
+    fn stretch(&self) -> f64 {
+        match self.pace {
+            Pace::Steps(factor) => factor,
+            _ => 1.0,
+        }
+    }
+
     fn round(&self) -> Round {
         let order = self.family.order;
         let point = |elements: &Vec<Vec<usize>>, pace| Point {
@@ -205,7 +210,7 @@ impl<'a> Search<'a> {
             ..Point::new(self.family.clone(), elements.clone(), pace)
         };
         let mesh = self.mesher.elements(order, self.mesh);
-        let known = self.in_space.known(&(order, mesh.clone())).is_some();
+        let known = self.in_space.known(&(order, mesh.clone()), self.stretch()).is_some();
         let (own, coarse) = match order.filter(|_| !known).map(|_| self.mesher.companion(order, &mesh)) {
             None => (mesh, None),
             Some((other, ratio)) if ratio > 1.0 => (mesh, Some((other, ratio))),
@@ -215,7 +220,7 @@ impl<'a> Search<'a> {
         let on_coarser_mesh = coarse.map(|(coarse, ratio)| (point(&coarse, self.pace), ratio));
         let own = point(&own, self.pace);
         let step = |point: &Point| point.step(self.mesher.deck).unwrap_or(1.0);
-        let longer = matches!(self.pace, Pace::Steps(_)) && self.in_time.known(&self.pace).is_none();
+        let longer = matches!(self.pace, Pace::Steps(_)) && self.in_time.known(&self.pace, own.width()).is_none();
         let longer = longer.then(|| point(&own.elements, coarser(self.pace)));
         let with_longer_step = longer.map(|longer| (longer.clone(), step(&longer) / step(&own)));
         Round { own, on_coarser_mesh, with_longer_step }
@@ -235,14 +240,14 @@ impl<'a> Search<'a> {
             _ => unknown(),
         };
         let mesh = (self.family.order, round.own.elements.clone());
-        let of_mesh = match (&round.on_coarser_mesh, self.in_space.known(&mesh)) {
+        let of_mesh = match (&round.on_coarser_mesh, self.in_space.known(&mesh, self.stretch())) {
             (Some((_, ratio)), _) => {
                 let source = Source::Mesh(self.family.order.unwrap_or(1));
                 share(&mut self.in_space.fall, source, round.own.width(), *ratio)
             }
             (None, known) => known.unwrap_or_else(none),
         };
-        let of_step = match (&round.with_longer_step, self.in_time.known(&self.pace)) {
+        let of_step = match (&round.with_longer_step, self.in_time.known(&self.pace, round.own.width())) {
             (Some((_, ratio)), _) => {
                 let width = round.own.step(self.mesher.deck).unwrap_or(1.0);
                 share(&mut self.in_time.fall, Source::Steps, width, *ratio)
@@ -254,6 +259,12 @@ impl<'a> Search<'a> {
         self.in_space.last = vec![(mesh, of_mesh.clone())];
         self.in_space.last.extend(coarser_mesh.map(|mesh| (mesh, of_mesh.of_coarser())));
         self.in_time.last = vec![(self.pace, of_step.clone())];
+        if round.on_coarser_mesh.is_some() {
+            self.in_space.beside = self.stretch();
+        }
+        if round.with_longer_step.is_some() {
+            self.in_time.beside = round.own.width();
+        }
         if failed { Estimate { mesh: unknown(), step: unknown() } } else { Estimate { mesh: of_mesh, step: of_step } }
     }
 
@@ -341,4 +352,18 @@ impl<'a> Search<'a> {
             self.pace = coarser(self.pace);
         }
     }
+}
+
+/// Runs the variants of a round, `None` for those that the budget left out. A step on offer is tried alone: where it is too long for the
+/// first one, nothing is compared with it.
+fn run_round(crew: &mut Crew, points: &[Point]) -> Result<Vec<Option<Trial>>, Refusal> {
+    let alone = if is_offer(&points[0]) { 1 } else { points.len() };
+    crew.expect(alone);
+    let mut trials = crew.run(&points[..alone])?;
+    let is_lost = trials[0].as_ref().is_none_or(|trial| trial.status == "limit");
+    if !is_lost && alone < points.len() {
+        crew.expect(points.len() - alone);
+        trials.extend(crew.run(&points[alone..])?);
+    }
+    Ok(trials)
 }
