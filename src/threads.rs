@@ -53,6 +53,14 @@ pub fn each_part<T: Send>(list: &mut [T], work: impl Fn(usize, &mut [T]) + Send 
     each(list.chunks_mut(PART).enumerate(), |(number, part)| work(PART * number, part));
 }
 
+/// A list of what is found for each place.
+pub fn list<T: Send>(length: usize, entry: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    match are_given() {
+        false => (0..length).map(entry).collect(),
+        true => (0..length).into_par_iter().with_min_len(PART).map(entry).collect(),
+    }
+}
+
 /// The largest of what parts of a list give: ranges of places.
 pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Sync) -> f64 {
     if !are_given() {

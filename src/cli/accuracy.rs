@@ -25,8 +25,8 @@ pub struct Target {
     /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two coarser runs
     #[arg(long)]
     error_bars: bool,
-    /// Threads (default: one a core); they serve a search, and a large scene, whose results are the same on any number of them
-    #[arg(long, value_name = "N")]
+    /// Threads, at most (default: one a core); they serve a search and large scenes, whose results are the same on any number of them
+    #[arg(long, value_parser = say::threads, value_name = "N")]
     pub threads: Option<NonZero<usize>>,
     /// Also write report.html, a page that plays the run back
     #[arg(long)]

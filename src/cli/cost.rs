@@ -32,7 +32,7 @@ pub struct Wanted {
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Runs at a time (default: one a core)
-    #[arg(long)]
+    #[arg(long, value_parser = say::threads, value_name = "N")]
     threads: Option<NonZero<usize>>,
 }
 

@@ -1,6 +1,7 @@
 //! Words to the user. A closed pipe is a quiet end.
 
 use std::io::{self, IsTerminal, Write};
+use std::num::NonZero;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
@@ -113,6 +114,11 @@ pub fn time(seconds: f64) -> String {
         0
     };
     format!("{number:.digits$} {unit}")
+}
+
+/// A count of threads as it stands on a command line.
+pub fn threads(text: &str) -> Result<NonZero<usize>, String> {
+    text.parse().map_err(|_| "threads are counted from 1".into())
 }
 
 /// A time as it stands on a command line: 90, 90s, 1.5m, 2h.

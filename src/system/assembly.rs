@@ -185,11 +185,7 @@ impl System {
 
     fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
         let (parts, wanted) = (self.pattern.apart::<W>(x), self.pattern.apart::<W>(b));
-        let mut residuals = vec![[[0.0; W]; 2]; wanted.len()];
-        threads::each_part(&mut residuals, |start, residuals| {
-            let own = residuals.iter_mut().zip(&wanted[start..]);
-            own.for_each(|(residual, wanted)| *residual = [*wanted, wanted.map(f64::abs)]);
-        });
+        let mut residuals = threads::list(wanted.len(), |group| [wanted[group], wanted[group].map(f64::abs)]);
         self.each_row::<W, _>(&self.values, &mut residuals, |[residual, size], column, tile| {
             for (line, &x) in tile.iter().zip(&parts[column]) {
                 for r in 0..W {

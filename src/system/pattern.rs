@@ -163,13 +163,9 @@ impl Pattern {
 
     /// One number an equation as one part a group; zero where a row has no equation.
     pub fn apart<const W: usize>(&self, x: &[f64]) -> Vec<[f64; W]> {
-        let mut parts = vec![[0.0; W]; self.groups.count()];
-        threads::each_part(&mut parts, |start, parts| {
-            for (part, numbers) in parts.iter_mut().zip(&self.numbers.as_chunks::<W>().0[start..]) {
-                *part = numbers.map(|number| x.get(number as usize).copied().unwrap_or(0.0));
-            }
-        });
-        parts
+        let numbers = self.numbers.as_chunks::<W>().0;
+        let part = |group: usize| numbers[group].map(|number| x.get(number as usize).copied().unwrap_or(0.0));
+        threads::list(numbers.len(), part)
     }
 
     /// The reverse of [`Pattern::apart`], for parts that are found by their groups.

@@ -11,6 +11,7 @@ use beamsim::kernel::elastic::{Stiffness, Strain};
 use beamsim::kernel::inertia::{Inertia, Spin, body};
 use beamsim::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
 use beamsim::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
+use beamsim::model::Assembly;
 use beamsim::real::Real;
 use beamsim::scene::{self, Scene};
 use beamsim::system::Plane;
@@ -334,6 +335,54 @@ fn supports_joints_and_curved_beams_act_as_in_space() {
         for (what, scene) in scenes {
             for stage in [STATIC, DYNAMIC] {
                 agrees_with_space(what, &format!("{scene}{stage}"));
+            }
+        }
+    }
+}
+
+/// What increments that are prescribed push the rest with, and the forces of a shaken frame, along all free directions of the plane.
+fn pushes(text: &str, normal: Vec3) -> Vec<f64> {
+    let plan = scene_of(text).plan;
+    let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+    let (mut state, mut random) = (model.rest(), Random::new(11));
+    let mut in_plane = |slot: usize| {
+        let v = random.vector(0.1);
+        let along = normal * normal.dot(v);
+        if slot.is_multiple_of(2) { v - along } else { along }
+    };
+    let equations = model.begin_stage(0, stage.kind, &state).unwrap();
+    let mut lift = state.q.clone();
+    for field in [&mut state.q, &mut state.v, &mut state.a, &mut lift] {
+        field.iter_mut().enumerate().for_each(|(slot, value)| *value = in_plane(slot));
+    }
+    let mut assembly = Assembly::new(&stage, equations, &model);
+    assembly.evaluate(&state, Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 }, Some(&lift));
+    let equations = &assembly.system.pattern.equations;
+    let (mut pushed, mut field) = (vec![0.0; equations.count()], state.q.clone());
+    assembly.system.right_hand_side(&mut pushed);
+    equations.scatter(&pushed, None, &mut field);
+    let seen = |(slot, v): (usize, &Vec3)| {
+        let along = normal * normal.dot(*v);
+        if slot.is_multiple_of(2) { *v - along } else { along }.0
+    };
+    field.iter().enumerate().flat_map(seen).collect()
+}
+
+#[test]
+fn what_is_prescribed_pushes_as_in_space() {
+    for (interpolation, order) in [("relative", 1), ("total", 2), ("relative", 3)] {
+        for tilted in [false, true] {
+            let normal = if tilted { TILTED } else { Vec3::UNIT[2] };
+            for (what, action) in actions(tilted).iter().filter(|(what, _)| what.starts_with("prescribed")) {
+                let along = action
+                    .replace("ux = 0.4", "ux = 0.4\nhistory = \"h\"")
+                    .replace("angle = 2", "angle = 2\nhistory = \"h\"");
+                let history = "[history.h]\nexpr = \"t^2\"\n";
+                let damping = "[damping]\nmass = 0.3\nstiffness = 0.002\n";
+                let text = format!("{}{along}{history}{DYNAMIC}{damping}", frame(tilted, interpolation, order));
+                let planar = pushes(&text, normal);
+                assert!(planar.iter().any(|push| push.abs() > 1.0));
+                agree(what, &planar, &pushes(&format!("{text}[effects]\nplanar = false\n"), normal), 1e-10);
             }
         }
     }

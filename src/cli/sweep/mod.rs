@@ -43,7 +43,7 @@ pub struct Wanted {
     #[arg(long)]
     error_bars: bool,
     /// Points at a time (default: one a core)
-    #[arg(long)]
+    #[arg(long, value_parser = say::threads, value_name = "N")]
     threads: Option<NonZero<usize>>,
     /// Folder of the results (default: results/<deck name>)
     #[arg(long, value_name = "DIR")]

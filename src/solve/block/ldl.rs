@@ -28,10 +28,10 @@ where
     fn load(&mut self, elimination: &Elimination, system: &System) {
         let tiles = system.tiles::<W>();
         for row in self.diagonal.range() {
-            self.diagonal[row] = tile::of(tiles, elimination.diagonal[row]);
+            self.diagonal[row] = *tile::of(tiles, elimination.diagonal[row]);
             for k in elimination.neighbours(row) {
                 // The one half of a symmetric tangent is the other one's transpose.
-                self.upper[k] = tile::of(tiles, elimination.sources[k][1]);
+                self.upper[k] = *tile::of(tiles, elimination.sources[k][1]);
             }
         }
         for &(row, direction) in elimination.idle(&self.diagonal.range()) {

@@ -36,11 +36,11 @@ where
     fn load(&mut self, elimination: &Elimination, system: &System) {
         let tiles = system.tiles::<W>();
         for row in self.diagonal.range() {
-            self.diagonal[row] = tile::transposed(&tile::of(tiles, elimination.diagonal[row]));
+            self.diagonal[row] = tile::transposed(tile::of(tiles, elimination.diagonal[row]));
             for k in elimination.neighbours(row) {
                 let [upper, lower] = elimination.sources[k];
-                self.upper[k] = tile::transposed(&tile::of(tiles, upper));
-                self.lower[k] = tile::of(tiles, lower);
+                self.upper[k] = tile::transposed(tile::of(tiles, upper));
+                self.lower[k] = *tile::of(tiles, lower);
             }
         }
         for &(row, direction) in elimination.idle(&self.diagonal.range()) {

@@ -107,11 +107,8 @@ pub const fn zero<const W: usize>() -> Tile<W> {
 
 /// A tile of the tangent; nothing where elimination fills it.
 #[inline(always)]
-pub fn of<const W: usize>(tiles: &[Tile<W>], number: u32) -> Tile<W> {
-    match tiles.get(number as usize) {
-        Some(tile) => *tile,
-        None => zero(),
-    }
+pub fn of<const W: usize>(tiles: &[Tile<W>], number: u32) -> &Tile<W> {
+    tiles.get(number as usize).unwrap_or(const { &zero() })
 }
 
 #[inline(always)]
