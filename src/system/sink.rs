@@ -113,7 +113,7 @@ pub struct Sink<'a> {
 }
 
 impl Sink<'_> {
-    /// The instances that it takes: all of them, unless the effect is [divisible](Cliques::divisible).
+    /// The instances that it takes: all of them, unless the effect is [divisible](super::Cliques::divisible).
     pub fn instances(&self) -> Range<usize> {
         self.instances.clone()
     }
