@@ -90,7 +90,7 @@ impl Amplitude {
     /// The first time behind `time` at which it takes another course.
     pub fn next_corner(&self, time: f64) -> Option<f64> {
         match self.course {
-            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_corner(time),
+            Course::History(kind) => self.history.as_ref()?.next_corner_in_stage(kind, time),
             _ => None,
         }
     }
@@ -100,11 +100,7 @@ impl Amplitude {
         match self.course {
             Course::Hold(value) => [value, 0.0, 0.0],
             Course::Ramp { from, to } => [from + (to - from) * load, 0.0, 0.0],
-            Course::History(kind) => {
-                let still = kind == StageKind::Static;
-                let at = self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.at(if still { load } else { time }));
-                if still { [at[0], 0.0, 0.0] } else { at }
-            }
+            Course::History(kind) => self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.in_stage(kind, time, load)),
         }
     }
 }

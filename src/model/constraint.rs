@@ -171,7 +171,7 @@ impl Motion {
     /// The first time behind `time` at which it takes another course.
     pub fn next_corner(&self, time: f64) -> Option<f64> {
         match self.course {
-            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_corner(time),
+            Course::History(kind) => self.history.as_ref()?.next_corner_in_stage(kind, time),
             _ => None,
         }
     }
@@ -183,10 +183,8 @@ impl Motion {
             Course::Hold(value) => [value, 0.0, 0.0],
             Course::Ramp { from } => [from + (self.value - from) * load, 0.0, 0.0],
             Course::History(kind) => {
-                let x = if kind == StageKind::Static { load } else { time };
-                let [value, rate, rate2] = self.history.as_ref().map_or([1.0, 0.0, 0.0], |history| history.at(x));
-                let moves = if kind == StageKind::Static { 0.0 } else { self.value };
-                [self.value * value, moves * rate, moves * rate2]
+                let history = self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.in_stage(kind, time, load));
+                history.map(|factor| self.value * factor)
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Functions of time (or of the load factor), with exact first and second derivatives.
 
+use super::StageKind;
+
 /// A function of one variable.
 pub trait History: Send + Sync {
     /// Value, first and second derivative at `x`.
@@ -8,6 +10,16 @@ pub trait History: Send + Sync {
     /// The first place behind `x` where it takes another course, if it knows of one.
     fn next_corner(&self, _x: f64) -> Option<f64> {
         None
+    }
+
+    /// The value in a stage, and its derivatives over time. In statics the load takes the place of the time, and nothing moves.
+    fn in_stage(&self, kind: StageKind, time: f64, load: f64) -> [f64; 3] {
+        if kind == StageKind::Static { [self.at(load)[0], 0.0, 0.0] } else { self.at(time) }
+    }
+
+    /// The first time behind `time` in a stage where it takes another course.
+    fn next_corner_in_stage(&self, kind: StageKind, time: f64) -> Option<f64> {
+        if kind == StageKind::Dynamic { self.next_corner(time) } else { None }
     }
 }
 

@@ -299,8 +299,7 @@ impl Model {
 
     /// How many regions of it can be evaluated at once: one where it is not large.
     pub fn regions(&self) -> usize {
-        let turns = |pair: &[SlotInfo]| pair[0].kind == SlotKind::Displacement && pair[1].kind == SlotKind::Rotation;
-        most_regions(self.slots.len() - self.slots.windows(2).filter(|pair| turns(pair)).count())
+        most_regions(self.groups(Layout::Spatial).count())
     }
 
     /// The effects that act in a stage.
