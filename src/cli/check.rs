@@ -1,7 +1,7 @@
 //! `beamsim check`
 
 use super::load::Loaded;
-use super::{Status, Verdict, cores, json, load, say};
+use super::{Status, Verdict, json, load, on_threads, say, threads_of};
 use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
@@ -56,7 +56,7 @@ fn tell(scene: &Scene) -> Result<(), String> {
 
 /// How long a run will take. One that an accuracy is wanted of begins with a search among other meshes and steps.
 fn tell_time(loaded: &Loaded, reading: Duration) -> f64 {
-    let count = cores(None).min(loaded.scene.plan.model.regions());
+    let count = threads_of(&loaded.scene, None);
     let Forecast { seconds, watched, ended, at } = threads::on(count, || forecast(&loaded.scene, PATIENCE));
     let whole = duration(seconds + reading.as_secs_f64());
     let Moment { stage, time, load } = at;
@@ -66,8 +66,7 @@ fn tell_time(loaded: &Loaded, reading: Duration) -> f64 {
         None => format!("{} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}", duration(watched)),
     };
     let own = if loaded.deck.accuracy.is_some() { ", with its own elements and steps" } else { "" };
-    let on = if count > 1 { format!(", on {count} threads") } else { String::new() };
-    say::line(&format!("run: about {whole} on this machine{on}{own} ({how})"));
+    say::line(&format!("run: about {whole} on this machine{}{own} ({how})", on_threads(count)));
     seconds + reading.as_secs_f64()
 }
 

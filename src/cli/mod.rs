@@ -17,6 +17,7 @@ mod sweep;
 mod verify;
 mod words;
 
+use crate::scene::Scene;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -206,6 +207,16 @@ impl Status {
 /// How many runs at a time: as many as are wanted, or one a core.
 fn cores(wanted: Option<NonZero<usize>>) -> usize {
     wanted.or(std::thread::available_parallelism().ok()).map_or(1, NonZero::get)
+}
+
+/// The threads of one run: those that are wanted, or one a core, as far as the scene has use for them.
+fn threads_of(scene: &Scene, wanted: Option<NonZero<usize>>) -> usize {
+    cores(wanted).min(scene.plan.model.regions())
+}
+
+/// Threads in words, where there are several.
+fn on_threads(count: usize) -> String {
+    if count > 1 { format!(" on {count} threads") } else { String::new() }
 }
 
 /// The outcome of a command over several decks: its status is the worst, and its last line names it.

@@ -2,7 +2,7 @@
 
 use super::load::Refusal;
 use super::run::{Beyond, simulate};
-use super::{Status, Verdict, cores, json, load, say, signals};
+use super::{Status, Verdict, json, load, say, signals, threads_of};
 use crate::output::{Film, Record, Report};
 use crate::scene::{self, Scene};
 use std::fs;
@@ -45,7 +45,7 @@ fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
 
 fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
     let beyond = Beyond { film: Some(Film::of(scene)), ..Beyond::default() };
-    let finished = simulate(scene, name, None, None, beyond, cores(None));
+    let finished = simulate(scene, name, None, None, beyond, threads_of(scene, None));
     if signals::caught().is_some() {
         let status = finished.status();
         return Err(Refusal::of(status, "interrupted", "stopped before the report was written".into()));

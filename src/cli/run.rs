@@ -2,7 +2,7 @@
 
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
-use super::{Status, Verdict, cores, json, load, report, say, signals};
+use super::{Status, Verdict, json, load, on_threads, report, say, signals, threads_of};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, RowCounter, Rows,
@@ -27,7 +27,7 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
             Ok(Aimed { text, scene, reached, bars, film }) => {
                 let folder = folder(out, &name, decks.len() > 1);
                 let beyond = Beyond { reached, bars, text, film };
-                let threads = cores(target.threads);
+                let threads = threads_of(&scene, target.threads);
                 let mut finished = simulate(&scene, &name, Some(&folder), None, beyond, threads);
                 summarise(&name, &scene, &finished, &folder);
                 finished.record.iter().for_each(|record| json::run(path, &folder, record));
@@ -174,8 +174,7 @@ pub struct Beyond {
     pub film: Option<Film>,
 }
 
-/// Runs a scene on so many threads where it is large; with a folder it leaves its results there, and a recorder follows what is
-/// expected.
+/// Runs a scene on so many threads; with a folder it leaves its results there, and a recorder follows what is expected.
 pub fn simulate(
     scene: &Scene,
     name: &str,
@@ -188,7 +187,6 @@ pub fn simulate(
     // From here on signals are answered by the run.
     signals::caught();
     let Beyond { reached, bars, text, film } = beyond;
-    let threads = threads.min(scene.plan.model.regions());
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
     let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), beside)).transpose();
     let dynamic: Vec<bool> =
@@ -254,7 +252,6 @@ fn write_results(
 /// A few lines after a run.
 fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
     let Finished { result, counters, seconds, threads, .. } = finished;
-    let on = if *threads > 1 { format!(" on {threads} threads") } else { String::new() };
     let work = &counters.work;
     if let Some(title) = &scene.title {
         say::line(&format!("{name}: {title}"));
@@ -265,8 +262,13 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
     let acting = planar.chain(evaluated).collect::<Vec<_>>().join(", ");
     say::line(&format!("  {} elements, {unknowns} unknowns; {acting}", scene.mesh.elements.len()));
     say::line(&format!(
-        "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s{on}",
-        counters.steps, work.iterations, counters.cutbacks, work.chart_switches, counters.mixed_elements
+        "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s{}",
+        counters.steps,
+        work.iterations,
+        counters.cutbacks,
+        work.chart_switches,
+        counters.mixed_elements,
+        on_threads(*threads)
     ));
     match result {
         Ok(()) => say::line(&format!("  {}", folder.join("history.csv").display())),

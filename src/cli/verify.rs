@@ -1,7 +1,7 @@
 //! `beamsim verify`
 
 use super::run::{Beyond, folder, simulate};
-use super::{Status, Verdict, cores, json, load, say, signals};
+use super::{Status, Verdict, json, load, say, signals, threads_of};
 use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
                     folder.as_deref(),
                     Some(&mut recorder),
                     Beyond { text, ..Beyond::default() },
-                    cores(None),
+                    threads_of(&scene, None),
                 );
                 if let Some(signal) = signals::caught() {
                     say::error("interrupted", &format!("stopped by signal {signal}"));

@@ -79,14 +79,13 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
         let add = |count: Option<usize>| counted = counted.zip(count).map(|(sum, count)| sum + count);
         threads::in_order(branches.iter_mut().zip(&mut *changes), branch, add);
         let Some(counted) = counted else { return false };
-        Instructions::here().run(
-            #[inline(always)]
-            || trunk.load(elimination, system),
-        );
-        changes.iter().for_each(|change| trunk.add(change));
         let last = Instructions::here().run(
             #[inline(always)]
-            || trunk.eliminate(elimination, nothing),
+            || {
+                trunk.load(elimination, system);
+                changes.iter().for_each(|change| trunk.add(change));
+                trunk.eliminate(elimination, nothing)
+            },
         );
         *negative = counted + last.unwrap_or_default();
         last.is_some()
