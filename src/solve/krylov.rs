@@ -3,7 +3,8 @@
 //! Blocks find eigenvalues that occur several times, such as the six rigid motions of a free body or the bending modes of a
 //! round section. The basis is orthonormal in an inner product x . W y that makes the operator symmetric where there is one.
 
-use nalgebra::{Complex, DMatrix, Schur, SymmetricEigen};
+use crate::real::{LANES, Lanes};
+use nalgebra::{Complex, DMatrix, Schur};
 
 /// A linear operator on vectors.
 pub trait Operator {
@@ -92,8 +93,12 @@ struct Space {
     projected: Vec<Vec<f64>>,
 }
 
+/// In lanes, whose sums do not wait for each other.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let sums = a.iter().zip(b).fold(Lanes([0.0; LANES]), |sums, (x, y)| sums + Lanes(*x) * Lanes(*y));
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    sums.0.iter().sum::<f64>() + rest
 }
 
 impl Space {
@@ -144,7 +149,7 @@ impl Space {
         let entry = |i: usize, j: usize| self.projected[i][j];
         let mut values: Vec<Complex<f64>> = if operator.is_symmetric() {
             let matrix = DMatrix::from_fn(n, n, |i, j| 0.5 * (entry(i, j) + entry(j, i)));
-            SymmetricEigen::new(matrix).eigenvalues.iter().map(|&v| Complex::new(v, 0.0)).collect()
+            matrix.symmetric_eigenvalues().iter().map(|&v| Complex::new(v, 0.0)).collect()
         } else {
             let schur = Schur::try_new(DMatrix::from_fn(n, n, entry), f64::EPSILON, 10_000);
             schur.map_or_else(Vec::new, |schur| schur.complex_eigenvalues().iter().copied().collect())
