@@ -263,7 +263,8 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     out: &mut Sink,
 ) {
     let stiffness = weights.stiffness;
-    let (mut systems, mut scratch) = (out.lend(2 * N), Scratch::new(N));
+    let mut systems = out.lend(2 * N, stiffness != 0.0);
+    let mut scratch = Scratch::lent(N, I::CARRIES_BACK && !is_half_way(N, G), out);
     let mut alone = None;
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
@@ -278,6 +279,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         });
     }
     out.take_back(systems);
+    scratch.give_back(out);
 }
 
 /// Element systems to compute with, one element of the batch at a time.

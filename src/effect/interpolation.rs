@@ -8,7 +8,7 @@ use crate::kernel::relative::Relative;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::rotation::Rotation;
-use crate::system::State;
+use crate::system::{Sink, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// Where the nodes of an element are, or those of several elements side by side; rotation vectors all in one chart.
@@ -110,6 +110,18 @@ impl<T: Real> Scratch<T> {
     }
 }
 
+impl Scratch<Lanes> {
+    /// With systems of a sink, where they are `needed`.
+    pub fn lent(nodes: usize, needed: bool, sink: &mut Sink) -> Self {
+        Self { nodes, systems: needed.then(|| [(); 2].map(|()| sink.lend(2 * nodes, true))) }
+    }
+
+    /// Gives them back.
+    pub fn give_back(self, sink: &mut Sink) {
+        self.systems.into_iter().flatten().for_each(|system| sink.take_back(system));
+    }
+}
+
 /// An element as its interpolation sees it.
 pub trait View<const N: usize, T: Real> {
     /// Sees the element.
@@ -163,6 +175,8 @@ pub trait Interpolation: Send + Sync + 'static {
     const NAME: &'static str;
     /// What their damping by strain rates is called
     const DAMPING_NAME: &'static str;
+    /// Whether what the kernel gives is carried back to other nodes, for which systems are needed
+    const CARRIES_BACK: bool;
     /// What it makes of an element
     type View<const N: usize, T: Real>: View<N, T>;
 
@@ -206,6 +220,7 @@ pub struct TotalVectors;
 impl Interpolation for TotalVectors {
     const NAME: &'static str = "beam elasticity";
     const DAMPING_NAME: &'static str = "strain-rate damping";
+    const CARRIES_BACK: bool = false;
     type View<const N: usize, T: Real> = AsItIs<N, T>;
 }
 
@@ -216,6 +231,7 @@ pub struct RelativeVectors;
 impl Interpolation for RelativeVectors {
     const NAME: &'static str = "beam elasticity, relative";
     const DAMPING_NAME: &'static str = "strain-rate damping, relative";
+    const CARRIES_BACK: bool = true;
     type View<const N: usize, T: Real> = FromItsFrame<N, T>;
 }
 
@@ -310,9 +326,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
             return self.seen.fill_half_way(&self.rotations, point, free, geometric, stiffness, out);
         }
         let [local, geometric] = scratch.systems();
-        let weights = Weights { stiffness, ..Weights::NONE };
-        out.clear_for(weights);
-        local.clear_for(weights);
+        local.clear_for(Weights { stiffness, ..Weights::NONE });
         sum.add(&self.seen.nodes, stiffness, local);
         geometric.clear_force();
         let other = stiffness != 0.0 && sum.add_geometric(&self.seen.nodes, geometric);

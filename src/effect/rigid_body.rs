@@ -107,7 +107,7 @@ impl RigidBody {
 
     #[inline(always)]
     fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Sink) {
-        let mut systems = out.lend(2);
+        let mut systems = out.lend(2, weights != Weights::NONE);
         let (own, before) = (&self.bodies[out.instances()], out.instances().start);
         for first in (0..own.len()).step_by(LANES) {
             let bodies = side_by_side(own, first);

@@ -103,7 +103,7 @@ fn add_batch<K, const N: usize>(
     K: VolumeKernel,
     K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
 {
-    let mut systems = out.lend(K::BLOCKS.count(N));
+    let mut systems = out.lend(K::BLOCKS.count(N), weights != Weights::NONE);
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let nodes = motions(each_lane!(|k| &elements[k].connection), at);

@@ -147,7 +147,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         self.frame * Rotation::new(theta).r
     }
 
-    /// Carries force and tangent of the element in its frame (`local`, whose tangent is symmetric) back to the nodes.
+    /// Carries force and tangent of the element in its frame (`local`, whose tangent is symmetric) back to the nodes, in the place of
+    /// what stands in `out`.
     ///
     /// `stiffness` is the weight of the tangent, zero where there is none. `geometric` holds the forces in the frame that
     /// geometric parts are formed with, if they are not those of `local`.
@@ -162,8 +163,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
     ) {
         let forces = self.spin_forces(local);
         for i in 0..N {
-            out.add_force(2 * i, forces.displacement[i]);
-            out.add_force(2 * i + 1, rotations[i].t.transpose_mul(forces.spin[i]));
+            out.set_force(2 * i, forces.displacement[i]);
+            out.set_force(2 * i + 1, rotations[i].t.transpose_mul(forces.spin[i]));
         }
         if stiffness != 0.0 {
             let source = geometric.unwrap_or(local);
@@ -230,8 +231,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if let Some(following) = following[j] {
                     xp += over.displacement[i] * following;
                 }
-                out.add_tangent(2 * i, 2 * j + 1, xp);
-                out.add_tangent(2 * j + 1, 2 * i, xp.transpose());
+                out.set_tangent(2 * i, 2 * j + 1, xp);
+                out.set_tangent(2 * j + 1, 2 * i, xp.transpose());
                 if j < i {
                     continue;
                 }
@@ -249,11 +250,11 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if i == j {
                     pp += rotations[i].c2(forces.spin[i]).scale(s) - own[i].transpose_matmul(over.own[i] * own[i]);
                 }
-                out.add_tangent(2 * i, 2 * j, xx);
-                out.add_tangent(2 * i + 1, 2 * j + 1, pp);
+                out.set_tangent(2 * i, 2 * j, xx);
+                out.set_tangent(2 * i + 1, 2 * j + 1, pp);
                 if j > i {
-                    out.add_tangent(2 * j, 2 * i, xx.transpose());
-                    out.add_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
+                    out.set_tangent(2 * j, 2 * i, xx.transpose());
+                    out.set_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
                 }
             }
         }

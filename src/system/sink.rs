@@ -5,7 +5,7 @@ use super::equations::Equations;
 use super::pattern::{Pattern, Places, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
-use crate::kernel::{ElementSystem, MAX_NODES, PlanarSystem};
+use crate::kernel::{ElementSystem, PlanarSystem};
 use crate::real::{LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
 use std::ops::Range;
@@ -118,13 +118,15 @@ impl Sink<'_> {
         self.instances.clone()
     }
 
-    /// A system of zeros to compute with, of so many blocks.
-    pub fn lend(&mut self, blocks: usize) -> ElementSystem<Lanes> {
+    /// A system to compute with, of so many blocks; its tangent, where there is one, is zero, unless it is going to be formed anew.
+    pub fn lend(&mut self, blocks: usize, forms_tangent: bool) -> ElementSystem<Lanes> {
         let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
             return ElementSystem::new(blocks);
         };
         let mut system = self.room.swap_remove(fits);
-        system.clear();
+        if self.with_tangent && !forms_tangent {
+            system.clear();
+        }
         system
     }
 
@@ -140,19 +142,11 @@ impl Sink<'_> {
         for (force, &slot) in element.forces().iter().zip(self.places.cliques.get(k)) {
             forces[slot as usize - first_slot] += Vec3(*force);
         }
-        if !self.with_tangent {
-            return;
+        match () {
+            () if !self.with_tangent => {}
+            () if self.is_constrained(k) => self.add_constrained(k, element.tiles(), |value| *value),
+            () => self.add_tangent(k, element),
         }
-        if self.equations.plane().is_some() {
-            if let Some(lift) = self.lift {
-                self.add_lift(k, &self.in_local_axes(k, element), lift);
-            }
-            return self.add_in_plane(k, element.tiles(), |value| *value);
-        }
-        if self.places.special[k] {
-            return self.add_special(k, element);
-        }
-        self.add_tangent(k, element);
     }
 
     /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
@@ -166,49 +160,49 @@ impl Sink<'_> {
         is_apart: impl Fn(usize) -> bool,
         mut alone: impl FnMut(usize, &mut Self),
     ) {
-        // In a plane all are special, and none is but where increments are prescribed.
-        let special = |sink: &Self, lane: usize| {
-            let special =
-                if sink.equations.plane().is_some() { sink.lift.is_some() } else { sink.places.special[first + lane] };
-            sink.with_tangent && special
-        };
-        if !(0..count).any(|lane| is_apart(lane) || special(self, lane)) {
-            return self.add_plain(first, 0..count, elements);
+        if !(0..count).any(|lane| is_apart(lane) || self.is_constrained(first + lane)) {
+            return self.add_free(first, 0..count, elements);
         }
         for lane in 0..count {
             if is_apart(lane) {
                 alone(lane, self);
-            } else if special(self, lane) {
-                self.add(first + lane, &elements.lane(lane));
+            } else if self.is_constrained(first + lane) {
+                self.add_forces(first + lane, elements, lane);
+                self.add_constrained(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
             } else {
-                self.add_plain(first, lane..lane + 1, elements);
+                self.add_free(first, lane..lane + 1, elements);
             }
         }
     }
 
-    /// The same where none touches a held direction or turned axes.
+    /// Whether the tangent of an instance has entries to leave out, or to turn. In a plane all have.
     #[inline(always)]
-    fn add_plain(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
+    fn is_constrained(&self, k: usize) -> bool {
+        self.with_tangent && (self.places.special[k] || self.equations.plane().is_some())
+    }
+
+    #[inline(always)]
+    fn add_forces(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
         let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(k)) {
+            forces[slot as usize - first_slot] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
+        }
+    }
+
+    /// The same where none is constrained.
+    #[inline(always)]
+    fn add_free(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
         for lane in lanes.clone() {
-            for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(first + lane)) {
-                forces[slot as usize - first_slot] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
+            self.add_forces(first + lane, elements, lane);
+        }
+        match () {
+            () if !self.with_tangent => {}
+            () if self.places.whole => self.add_whole(first, lanes, elements),
+            () => {
+                for lane in lanes {
+                    self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
+                }
             }
-        }
-        if !self.with_tangent {
-            return;
-        }
-        if self.equations.plane().is_some() {
-            for lane in lanes.clone() {
-                self.add_in_plane(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
-            }
-            return;
-        }
-        if self.places.whole {
-            return self.add_whole(first, lanes, elements);
-        }
-        for lane in lanes {
-            self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
         }
     }
 
@@ -367,30 +361,68 @@ impl Sink<'_> {
         }
     }
 
-    /// Adds to the tiles of a plane what the tangent of an element in space has there; `pick` takes the instance's number from each entry.
+    /// Adds the tangent of an instance in the axes of its slots, block by block; columns of held directions push with the increments
+    /// that are prescribed instead. `pick` takes the instance's number from each entry.
     #[inline(always)]
-    fn add_in_plane<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
-        let (shared, across) = if self.places.whole { (2, slots.len() / 2) } else { (1, slots.len()) };
-        for (row, &i) in slots.iter().enumerate() {
-            for (column, &j) in slots.iter().enumerate() {
-                let (from_rows, from_columns) = (self.equations.of(i), self.equations.of(j));
-                let tile = &tiles[row / 2 * slots.len().div_ceil(2) + column / 2];
-                let entry = |r: usize, c: usize| pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
-                let mut block = Mat3([0, 1, 2].map(|r| [0, 1, 2].map(|c| entry(r, c))));
+    fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
+        let slots = self.places.cliques.get(k);
+        let across = slots.len().div_ceil(2);
+        for (column, &j) in slots.iter().enumerate() {
+            let (columns, turn) = (self.equations.of(j), self.equations.frame(j));
+            let lift = self.lift.map(|lift| self.equations.to_local(j, lift[j as usize]));
+            for (row, &i) in slots.iter().enumerate() {
+                let tile = &tiles[row / 2 * across + column / 2];
+                let mut block = Mat3::ZERO;
+                for c in 0..3 {
+                    for r in 0..3 {
+                        block.0[r][c] = pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
+                    }
+                }
                 if let Some(frame) = self.equations.frame(i) {
                     block = frame.transpose_matmul(block);
                 }
-                if let Some(frame) = self.equations.frame(j) {
+                if let Some(frame) = turn {
                     block = block * frame;
                 }
-                let place = places[row / shared * across + column / shared] as usize - self.first_value;
-                for c in (0..3).filter(|&c| from_columns[c] != Equations::HELD) {
-                    for r in (0..3).filter(|&r| from_rows[r] != Equations::HELD) {
-                        self.values[place + 3 * c + r] += block.0[r][c];
+                let rows = self.equations.of(i);
+                let (place, width) = self.place_of(k, row, column);
+                if ![rows, columns].as_flattened().contains(&Equations::HELD) {
+                    for c in 0..3 {
+                        for r in 0..3 {
+                            self.values[place + c * width + r] += block.0[r][c];
+                        }
+                    }
+                    continue;
+                }
+                for c in 0..3 {
+                    for r in (0..3).filter(|&r| rows[r] != Equations::HELD) {
+                        match (columns[c], lift) {
+                            (Equations::HELD, None) => {}
+                            (Equations::HELD, Some(lift)) => {
+                                self.lifted[rows[r] as usize - self.first_equation] += block.0[r][c] * lift.0[c];
+                            }
+                            _ => self.values[place + c * width + r] += block.0[r][c],
+                        }
                     }
                 }
             }
+        }
+    }
+
+    /// Where the block of two slots of an instance begins, and how far its columns are apart. In a plane slots of a node share a tile,
+    /// each with the directions that it moves in.
+    #[inline(always)]
+    fn place_of(&self, k: usize, row: usize, column: usize) -> (usize, usize) {
+        let (places, count) = (self.places.of(k), self.places.cliques.get(k).len());
+        let place = match self.places.whole {
+            true => places[row / 2 * count.div_ceil(2) + column / 2],
+            false => places[row * count + column],
+        };
+        let start = place as usize - self.first_value;
+        match self.equations.plane() {
+            Some(_) => (start, 3),
+            None if self.places.whole => (start + column % 2 * 3 * WIDTH + row % 2 * 3, WIDTH),
+            None => (start, WIDTH),
         }
     }
 
@@ -414,78 +446,6 @@ impl Sink<'_> {
     pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
         for (&slot, &force) in self.places.cliques.get(k).iter().zip(force) {
             self.damping.as_deref_mut().unwrap_or(self.force)[slot as usize - self.first_slot] += force;
-        }
-    }
-
-    /// As [`Sink::add`], for instances with turned axes or held directions.
-    #[cold]
-    #[inline(never)]
-    fn add_special(&mut self, k: usize, element: &ElementSystem) {
-        let mut local = self.in_local_axes(k, element);
-        if let Some(lift) = self.lift {
-            self.add_lift(k, &local, lift);
-        }
-        self.drop_held(self.places.cliques.get(k), &mut local);
-        self.add_tangent(k, &local);
-    }
-
-    /// The tangent in the axes of its slots.
-    fn in_local_axes(&self, k: usize, element: &ElementSystem) -> ElementSystem {
-        let slots = self.places.cliques.get(k);
-        let mut local = element.clone();
-        let mut frames: [Option<Mat3>; 2 * MAX_NODES] = [None; 2 * MAX_NODES];
-        for (frame, &slot) in frames.iter_mut().zip(slots) {
-            *frame = self.equations.frame(slot);
-        }
-        for row in 0..slots.len() {
-            for column in 0..slots.len() {
-                let mut block = element.tangent_block(row, column);
-                if let Some(frame) = frames[row] {
-                    block = frame.transpose_matmul(block);
-                }
-                if let Some(frame) = frames[column] {
-                    block = block * frame;
-                }
-                local.set_tangent(row, column, block);
-            }
-        }
-        local
-    }
-
-    /// Rows and columns of held directions are no part of the tangent.
-    fn drop_held(&self, slots: &[Slot], local: &mut ElementSystem) {
-        let free = |slot: &Slot| self.equations.of(*slot).map(|number| number != Equations::HELD);
-        for (row, rows) in slots.iter().map(free).enumerate() {
-            for (column, columns) in slots.iter().map(free).enumerate() {
-                let mut block = local.tangent_block(row, column);
-                for (r, line) in block.0.iter_mut().enumerate() {
-                    line.iter_mut().zip(columns).filter(|(_, free)| !(rows[r] && *free)).for_each(|(x, _)| *x = 0.0);
-                }
-                local.set_tangent(row, column, block);
-            }
-        }
-    }
-
-    fn add_lift(&mut self, k: usize, local: &ElementSystem, lift: &[Vec3]) {
-        let slots = self.places.cliques.get(k);
-        for (column, &slot) in slots.iter().enumerate() {
-            let mut increment = self.equations.to_local(slot, lift[slot as usize]);
-            for (j, number) in self.equations.of(slot).into_iter().enumerate() {
-                if number != Equations::HELD {
-                    increment.0[j] = 0.0;
-                }
-            }
-            if increment == Vec3::ZERO {
-                continue;
-            }
-            for (row, &other) in slots.iter().enumerate() {
-                let push = local.tangent_block(row, column) * increment;
-                for (i, number) in self.equations.of(other).into_iter().enumerate() {
-                    if number != Equations::HELD {
-                        self.lifted[number as usize - self.first_equation] += push.0[i];
-                    }
-                }
-            }
         }
     }
 }
