@@ -6,6 +6,7 @@ use super::{Status, cores, load, run, say, signals};
 use crate::deck::{Accuracy, Deck};
 use crate::output::{Film, Reached};
 use crate::scene::Scene;
+use crate::study::Outcome;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Journal, Options, Pace, Point};
 use crate::study::error_bars::{ErrorBars, error_bars, refuse_paths};
@@ -41,6 +42,8 @@ pub struct Aimed {
     pub scene: Scene,
     /// The accuracy that was wanted and reached
     pub reached: Option<Reached>,
+    /// Its outputs, where the search for that accuracy has run it
+    pub outcome: Option<Outcome>,
     /// Error bars, where they are wanted
     pub bars: Option<ErrorBars>,
     /// What films it for a report, where one is wanted
@@ -58,13 +61,13 @@ impl Target {
                 let why = "--budget bounds the search for an accuracy: give --accuracy, or `accuracy` in the deck";
                 return Err(usage(why.into()));
             }
-            return self.with_bars(path, loaded, None);
+            return self.with_bars(path, loaded, None, None);
         };
         if self.error_bars {
             refuse_paths(&loaded.deck).map_err(|why| refused(cost::Refusal::Deck(why), path, &loaded))?;
         }
         let start = Instant::now();
-        let found = self.search(name, path, &loaded, &wanted)?;
+        let mut found = self.search(name, path, &loaded, &wanted)?;
         tell(name, &loaded.deck, &found, &wanted);
         let columns = found.columns.iter().zip(&found.estimates).filter(|(_, estimate)| !estimate.is_nan());
         let columns = columns.map(|(column, &estimate)| (column.clone(), wanted.of(column), estimate));
@@ -75,14 +78,20 @@ impl Target {
             seconds: start.elapsed().as_secs_f64(),
         };
         let loaded = load::deck(path, &[settings, &found.settings].concat())?;
-        self.with_bars(path, loaded, Some(reached))
+        self.with_bars(path, loaded, Some(reached), found.outcome.take())
     }
 
-    fn with_bars(&self, path: &Path, loaded: Loaded, reached: Option<Reached>) -> Result<Aimed, Refusal> {
+    fn with_bars(
+        &self,
+        path: &Path,
+        loaded: Loaded,
+        reached: Option<Reached>,
+        outcome: Option<Outcome>,
+    ) -> Result<Aimed, Refusal> {
         let made = || error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
         let bars = self.error_bars.then(made).transpose().map_err(|refusal| refused(refusal, path, &loaded))?;
         let film = self.report.then(|| Film::of(&loaded.scene));
-        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, bars, film })
+        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, outcome, bars, film })
     }
 
     fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {

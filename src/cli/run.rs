@@ -5,12 +5,12 @@ use super::progress::Progress;
 use super::{Status, Verdict, json, load, on_threads, report, say, signals, threads_of};
 use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
 use crate::output::{
-    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, RowCounter, Rows,
+    Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Row, RowCounter, Rows,
     remove_fields, remove_if_there,
 };
 use crate::scene::Scene;
-use crate::study::Recorder;
 use crate::study::error_bars::ErrorBars;
+use crate::study::{self, Recorder};
 use crate::threads;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -24,9 +24,9 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
     for path in decks {
         let name = load::name(path);
         match target.aim(&name, path, settings) {
-            Ok(Aimed { text, scene, reached, bars, film }) => {
+            Ok(Aimed { text, scene, reached, outcome, bars, film }) => {
                 let folder = folder(out, &name, decks.len() > 1);
-                let beyond = Beyond { reached, bars, text, film };
+                let beyond = Beyond { reached, outcome, bars, text, film };
                 let threads = threads_of(&scene, target.threads);
                 let mut finished = simulate(&scene, &name, Some(&folder), None, beyond, threads);
                 summarise(&name, &scene, &finished, &folder);
@@ -107,7 +107,10 @@ pub fn status_of(failure: &Failure) -> Status {
 
 /// What watches a run from the command line.
 struct Watcher<'r> {
+    scene: &'r Scene,
     history: Option<HistoryWriter>,
+    /// The numbers of a row
+    values: Vec<f64>,
     /// What is expected on the way, where that is judged
     recorder: Option<&'r mut Recorder>,
     progress: Progress,
@@ -118,15 +121,37 @@ struct Watcher<'r> {
     film: Option<Film>,
 }
 
+impl Watcher<'_> {
+    /// A row of the history.
+    fn write(&mut self, at: Moment, values: &[f64]) -> Result<Row, Failure> {
+        let row = self.rows.next(self.dynamic[at.stage - 1], at.time);
+        let column = self.history.as_mut().map_or(Ok(None), |history| history.row(at, values, row));
+        match column.map_err(io_failure)? {
+            Some(node) => Err(Failure::NonFinite { at, effect: Some("a column of the history"), node }),
+            None => Ok(row),
+        }
+    }
+
+    /// Tells of a run that is over.
+    fn retell(&mut self, outcome: study::Outcome) -> (Result<(), Failure>, Counters) {
+        outcome.warnings.iter().for_each(|message| self.warn(message));
+        let written = outcome.history().try_for_each(|(at, values)| self.write(at, values).map(|_| ()));
+        self.modes = outcome.found;
+        (written.and(outcome.ended), outcome.counters)
+    }
+}
+
 impl Observer for Watcher<'_> {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
-        let row = self.rows.next(self.dynamic[snapshot.stage - 1], snapshot.state.time);
-        let column = self.history.as_mut().map_or(Ok(None), |history| history.row(snapshot, row));
-        if let Some(column) = column.map_err(io_failure)? {
-            let at = Moment { stage: snapshot.stage, time: snapshot.state.time, load: snapshot.state.load };
-            return Err(Failure::NonFinite { at, effect: Some("a column of the history"), node: column });
+        let mut values = std::mem::take(&mut self.values);
+        values.clear();
+        if self.history.is_some() {
+            self.scene.probes.iter().for_each(|probe| probe.read(snapshot, &mut values));
         }
+        let row = self.write(snapshot.moment(), &values);
+        self.values = values;
+        let row = row?;
         self.film.iter_mut().for_each(|film| film.row(snapshot, row));
         self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
     }
@@ -166,6 +191,8 @@ fn io_failure(error: std::io::Error) -> Failure {
 pub struct Beyond {
     /// The accuracy that was wanted and reached
     pub reached: Option<Reached>,
+    /// The outputs of the run, where it is over already
+    pub outcome: Option<study::Outcome>,
     /// Error bars
     pub bars: Option<ErrorBars>,
     /// The deck as it was read
@@ -186,9 +213,10 @@ pub fn simulate(
     let start = Instant::now();
     // From here on signals are answered by the run.
     signals::caught();
-    let Beyond { reached, bars, text, film } = beyond;
+    let Beyond { reached, outcome, bars, text, film } = beyond;
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
-    let history = folder.map(|folder| HistoryWriter::create(folder, scene.probes.clone(), beside)).transpose();
+    let names = || scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
+    let history = folder.map(|folder| HistoryWriter::create(folder, names(), beside)).transpose();
     let dynamic: Vec<bool> =
         scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect();
     let timed = dynamic.iter().all(|dynamic| *dynamic);
@@ -197,8 +225,12 @@ pub fn simulate(
         (Ok(history), Ok(fields)) => (history, fields, Ok(())),
         (Err(error), _) | (_, Err(error)) => (None, None, Err(io_failure(error))),
     };
+    // Pictures need the whole state.
+    let outcome = outcome.filter(|_| film.is_none() && fields.is_none());
     let mut watcher = Watcher {
+        scene,
         history,
+        values: Vec::new(),
         recorder,
         progress: Progress::new(name),
         modes: ModesWriter::default(),
@@ -207,12 +239,15 @@ pub fn simulate(
         dynamic,
         rows: RowCounter::new(Rows { every: scene.every, interval: scene.plan.interval }),
     };
-    let (mut result, counters) = match opened {
-        Ok(()) => threads::on(threads, || Run::new(scene.plan.clone(), &mut watcher).finish()),
-        Err(failure) => (Err(failure), Counters::default()),
+    let before = outcome.as_ref().map(|outcome| outcome.seconds);
+    let threads = if before.is_some() { 1 } else { threads };
+    let (mut result, counters) = match (opened, outcome) {
+        (Err(failure), _) => (Err(failure), Counters::default()),
+        (Ok(()), Some(outcome)) => watcher.retell(outcome),
+        (Ok(()), None) => threads::on(threads, || Run::new(scene.plan.clone(), &mut watcher).finish()),
     };
     watcher.progress.done();
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = before.unwrap_or_else(|| start.elapsed().as_secs_f64());
     let mut record = None;
     if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
         let reached = reached.as_ref();

@@ -165,6 +165,13 @@ pub struct Snapshot<'a> {
     pub counters: &'a Counters,
 }
 
+impl Snapshot<'_> {
+    /// When it is.
+    pub fn moment(&self) -> Moment {
+        Moment { stage: self.stage, time: self.state.time, load: self.state.load }
+    }
+}
+
 /// Watches a run. It cannot change it, only end it.
 pub trait Observer {
     /// A converged state: the start, a load level, a time step.

@@ -1,8 +1,7 @@
 //! history.csv: one row a load level or time step, one column a number.
 
 use super::files::{PartFile, remove_if_there};
-use crate::drive::Snapshot;
-use crate::probe::Probe;
+use crate::drive::Moment;
 use std::fmt::Write;
 use std::fs::File;
 use std::io;
@@ -77,9 +76,8 @@ pub struct HistoryWriter {
     folder: PathBuf,
     part: PartFile,
     writer: csv::Writer<File>,
-    probes: Vec<Probe>,
+    names: Vec<String>,
     beside: Option<Box<dyn Beside>>,
-    values: Vec<f64>,
     text: String,
     record: csv::ByteRecord,
     /// Whether the last row was not wanted, and so is not written yet
@@ -89,21 +87,19 @@ pub struct HistoryWriter {
 }
 
 impl HistoryWriter {
-    /// Begins a history in `folder`.
-    pub fn create(folder: &Path, probes: Vec<Probe>, beside: Option<Box<dyn Beside>>) -> io::Result<Self> {
+    /// Begins a history in `folder` with columns of these names.
+    pub fn create(folder: &Path, names: Vec<String>, beside: Option<Box<dyn Beside>>) -> io::Result<Self> {
         let (part, file) = PartFile::create(folder, "history.csv")?;
         let mut writer = csv::Writer::from_writer(file);
-        let mut names: Vec<String> = probes.iter().flat_map(|probe| probe.names.clone()).collect();
-        names.extend(beside.as_ref().map_or(Vec::new(), |beside| beside.names(&names)));
-        let names = names.iter().map(String::as_str);
-        writer.write_record(["stage", "time", "load"].into_iter().chain(names)).map_err(io::Error::from)?;
+        let others = beside.as_ref().map_or(Vec::new(), |beside| beside.names(&names));
+        let all = names.iter().chain(&others).map(String::as_str);
+        writer.write_record(["stage", "time", "load"].into_iter().chain(all)).map_err(io::Error::from)?;
         Ok(Self {
             folder: folder.into(),
             part,
             writer,
-            probes,
+            names,
             beside,
-            values: Vec::new(),
             text: String::new(),
             record: csv::ByteRecord::new(),
             pending: false,
@@ -111,33 +107,29 @@ impl HistoryWriter {
         })
     }
 
-    /// Takes a converged state; writes it if its row is wanted. Gives the name of a column that is not finite, if one is.
-    pub fn row(&mut self, at: &Snapshot, row: Row) -> io::Result<Option<String>> {
-        self.values.clear();
-        self.values.extend([at.state.time, at.state.load]);
-        for probe in &self.probes {
-            probe.read(at, &mut self.values);
-        }
-        if let Some(k) = self.values.iter().position(|value| !value.is_finite()) {
-            // Time and load come before the probes.
-            let mut names = self.probes.iter().flat_map(|probe| &probe.names);
-            return Ok(names.nth(k.saturating_sub(2)).cloned().or(Some("time".into())));
+    /// Takes the numbers of a converged state; writes them if its row is wanted. Gives the name of a column that is not finite, if one is.
+    pub fn row(&mut self, at: Moment, values: &[f64], row: Row) -> io::Result<Option<String>> {
+        let clocks = [at.time, at.load];
+        if let Some(k) = clocks.iter().chain(values).position(|value| !value.is_finite()) {
+            let name = k.checked_sub(clocks.len()).and_then(|k| self.names.get(k));
+            return Ok(name.cloned().or(Some("time".into())));
         }
         self.record.clear();
         self.record.push_field(at.stage.to_string().as_bytes());
-        push(&mut self.record, &mut self.text, &self.values);
+        push(&mut self.record, &mut self.text, &clocks);
+        push(&mut self.record, &mut self.text, values);
         self.pending = !row.wanted;
         if self.beside.is_some() {
-            self.wait_for_what_stands_beside(at, row.dynamic)?;
+            self.wait_for_what_stands_beside(at, values, row.dynamic)?;
         } else if !self.pending {
             self.writer.write_byte_record(&self.record)?;
         }
         Ok(None)
     }
 
-    fn wait_for_what_stands_beside(&mut self, at: &Snapshot, dynamic: bool) -> io::Result<()> {
-        let clock = if dynamic { at.state.time } else { at.state.load };
-        if self.beside.as_mut().is_some_and(|beside| beside.take(at.stage, clock, &self.values[2..])) {
+    fn wait_for_what_stands_beside(&mut self, at: Moment, values: &[f64], dynamic: bool) -> io::Result<()> {
+        let clock = if dynamic { at.time } else { at.load };
+        if self.beside.as_mut().is_some_and(|beside| beside.take(at.stage, clock, values)) {
             self.write_waiting()?;
         }
         if !self.pending {

@@ -14,4 +14,5 @@ mod variant;
 mod verify;
 
 pub use compare::{Comparison, compare};
+pub use outcome::Outcome;
 pub use verify::{Judgement, Recorder, expected_failure, expected_values, judge};

@@ -1,9 +1,9 @@
 //! A run of a scene: all its outputs, and what they took.
 
 use crate::deck::{Diagnostic, Spanned, is_named, nearest};
-use crate::drive::{Counters, Failure, Mode, Observer, Run, Snapshot, Stage, StageWork};
+use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
 use crate::model::StageKind;
-use crate::output::HistoryReader;
+use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
 use crate::study::Recorder;
 use std::time::Instant;
@@ -17,16 +17,20 @@ pub struct Outcome {
     dynamic: Vec<bool>,
     /// Stage and clock of each row: the time, or in static stages the load factor
     pub(in crate::study) clocks: Vec<(usize, f64)>,
+    /// When each row was
+    moments: Vec<Moment>,
     /// Row by row
     pub(in crate::study) rows: Vec<Vec<f64>>,
+    /// Modes and critical loads as they were found
+    pub found: ModesWriter,
     /// Modes and critical loads, by the columns behind those of the rows
     pub(in crate::study) modes: Vec<f64>,
     /// Expected numbers, where they were asked for
     pub(in crate::study) expected: Vec<f64>,
     /// Steps and levels tried
     pub(in crate::study) attempts: u64,
-    /// The first warning
-    pub(in crate::study) warning: Option<String>,
+    /// Remarks on the way
+    pub warnings: Vec<String>,
     /// Work done
     pub counters: Counters,
     /// Wall-clock seconds
@@ -41,16 +45,36 @@ impl Outcome {
         most_attempts: u64,
         interrupted: &dyn Fn() -> Option<i32>,
     ) -> Self {
-        let (clocks, rows, modes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut columns =
-            Columns { scene, recorder, clocks, rows, modes, attempts: 0, warning: None, most_attempts, interrupted };
+        let mut columns = Columns {
+            scene,
+            recorder,
+            clocks: Vec::new(),
+            moments: Vec::new(),
+            rows: Vec::new(),
+            found: ModesWriter::default(),
+            modes: Vec::new(),
+            attempts: 0,
+            warnings: Vec::new(),
+            most_attempts,
+            interrupted,
+        };
         let start = Instant::now();
         let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
         let seconds = start.elapsed().as_secs_f64();
-        let Columns { recorder, clocks, rows, modes, attempts, warning, .. } = columns;
+        let Columns { recorder, clocks, moments, rows, found, modes, attempts, warnings, .. } = columns;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
         let dynamic = scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect();
-        Self { ended, dynamic, clocks, rows, modes, expected, attempts, warning, counters, seconds }
+        Self { ended, dynamic, clocks, moments, rows, found, modes, expected, attempts, warnings, counters, seconds }
+    }
+
+    /// The rows of the history, with their moments.
+    pub fn history(&self) -> impl Iterator<Item = (Moment, &[f64])> {
+        self.moments.iter().zip(&self.rows).map(|(&at, row)| (at, &row[..]))
+    }
+
+    /// How many numbers it holds.
+    pub(in crate::study) fn size(&self) -> usize {
+        self.rows.len() * self.rows.first().map_or(0, Vec::len)
     }
 }
 
@@ -111,11 +135,13 @@ impl Outcome {
             ended: Ok(()),
             dynamic: Vec::new(),
             clocks: table.rows.iter().map(clock).collect(),
+            moments: Vec::new(),
             rows: table.rows.iter().map(row).collect(),
+            found: ModesWriter::default(),
             modes: vec![f64::NAN; places.len() - history.len()],
             expected: Vec::new(),
             attempts: 0,
-            warning: None,
+            warnings: Vec::new(),
             counters: Counters::default(),
             seconds: 0.0,
         }
@@ -160,10 +186,12 @@ struct Columns<'a> {
     scene: &'a Scene,
     recorder: Option<Recorder>,
     clocks: Vec<(usize, f64)>,
+    moments: Vec<Moment>,
     rows: Vec<Vec<f64>>,
+    found: ModesWriter,
     modes: Vec<f64>,
     attempts: u64,
-    warning: Option<String>,
+    warnings: Vec<String>,
     most_attempts: u64,
     interrupted: &'a dyn Fn() -> Option<i32>,
 }
@@ -182,6 +210,7 @@ impl Observer for Columns<'_> {
         self.scene.probes.iter().for_each(|probe| probe.read(at, &mut row));
         let dynamic = self.scene.plan.stages[at.stage - 1].work.kind() == StageKind::Dynamic;
         self.clocks.push((at.stage, if dynamic { at.state.time } else { at.state.load }));
+        self.moments.push(at.moment());
         self.rows.push(row);
         self.recorder.iter_mut().for_each(|recorder| recorder.row(at));
         Ok(())
@@ -189,6 +218,7 @@ impl Observer for Columns<'_> {
 
     fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
+        self.found.push_modes(stage, modes);
         let found = modes.iter().flat_map(|mode| [mode.omega, mode.growth]);
         self.take_modes(stage, found.collect());
         Ok(())
@@ -196,15 +226,16 @@ impl Observer for Columns<'_> {
 
     fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
+        self.found.push_loads(stage, loads);
         self.take_modes(stage, loads.to_vec());
         Ok(())
     }
 
     fn warn(&mut self, message: &str) {
-        self.warning.get_or_insert_with(|| message.to_string());
+        self.warnings.push(message.to_string());
     }
 
-    fn progress(&mut self, at: crate::drive::Moment, _done: f64) -> Result<(), Failure> {
+    fn progress(&mut self, at: Moment, _done: f64) -> Result<(), Failure> {
         self.attempts += 1;
         match (self.interrupted)() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),

@@ -286,6 +286,36 @@ fn run_reaches_an_accuracy_and_says_with_what() {
     assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--budget", "5s"])), 2);
 }
 
+/// Rows at an interval, modes of a stage before, error bars, a warning; and pictures, for which it does run again.
+#[test]
+fn what_a_search_has_run_is_written_as_if_it_ran_again() {
+    let folder = Folder::new("retold");
+    let more = "[[stage]]\nkind = \"modal\"\nmodes = 3\n[[stage]]\nkind = \"dynamic\"\nend = 0.4\nstep = 0.02\n[output]\ninterval = 0.1\n";
+    let (deck, _) = GOOD.split_once("[[expect]]").unwrap();
+    folder.write("deck.toml", &format!("{deck}{more}"));
+    for (number, extra) in [&[][..], &["--error-bars"], &["--report"]].into_iter().enumerate() {
+        let [found, again] = ["found", "again"].map(|name| format!("{name}{number}"));
+        let run = [&["run", "deck.toml", "--accuracy", "1e-3", "--out", &found][..], extra].concat();
+        assert_eq!(status(&folder.beamsim(&run)), 0);
+        let read = |name: &str, file: &str| fs::read(folder.0.join(name).join(file)).unwrap();
+        let record = |name: &str| serde_json::from_slice::<serde_json::Value>(&read(name, "run.json")).unwrap();
+        let settings = record(&found)["accuracy"]["settings"].clone();
+        let settings: Vec<&str> = settings.as_array().unwrap().iter().map(|s| s.as_str().unwrap()).collect();
+        let again_with: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+        let run = [&["run", "deck.toml", "--out", &again][..], extra, &again_with].concat();
+        assert_eq!(status(&folder.beamsim(&run)), 0);
+        assert_eq!(folder.names(&found), folder.names(&again));
+        for file in ["history.csv", "modes.csv"] {
+            assert!(read(&found, file) == read(&again, file), "{file} with {extra:?}");
+        }
+        let [found, again] = [&found, &again].map(|name| record(name));
+        assert_eq!(
+            [&found["counters"], &found["deck"], &found["text"]],
+            [&again["counters"], &again["deck"], &again["text"]]
+        );
+    }
+}
+
 #[test]
 fn error_bars_hold_the_error() {
     let folder = Folder::new("error_bars");

@@ -1,8 +1,8 @@
 //! A wanted accuracy instead of elements and steps: the deck is run on finer meshes and with smaller steps until the estimated error of all
 //! outputs is below what is wanted.
 //!
-//! Each round runs up to three variants, the last of the search so far, one with half its elements and one with twice its step. The differences
-//! tell the errors of mesh and step: with a ratio r of widths and an order q,
+//! Each round runs up to three variants: the last of the search so far, one with twice its step, and one with half its elements and, after the
+//! first round, that longer step too. The differences tell the errors of mesh and step: with a ratio r of widths and an order q,
 //!
 //! ```text
 //! e = |U - U_coarse| / (r^q - 1)
@@ -10,9 +10,10 @@
 //!
 //! where q is half an order less than smooth scenes have at the least, 2 for steps, the order of elements for resultants and one more for all else, or half way from
 //! there to what is seen from round to round: so estimates are above errors. The error of the coarser run is r^q times that, so the cheapest
-//! of the three that is accurate enough is what is found.
+//! that is accurate enough is what is found.
 
 mod estimate;
+mod round;
 mod search;
 
 use estimate::largest_tolerance;
@@ -22,6 +23,7 @@ use super::cost::{Crew, Family, Mesher, Options, Pace, Patience, Point, Refusal,
 use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
 use crate::drive::Failure;
 use crate::scene::Scene;
+use crate::study::Outcome;
 use search::Search;
 
 /// From this accuracy on, cubic elements are cheaper than quadratic ones.
@@ -52,6 +54,8 @@ pub struct Found {
     pub stopped: Option<Failure>,
     /// Variants that were run
     pub runs: usize,
+    /// All outputs of the variant, where they were kept: it need not run again
+    pub outcome: Option<Outcome>,
 }
 
 impl Found {
@@ -83,7 +87,8 @@ pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options:
     };
     let newton = (NEWTON * wanted.least() / largest_tolerance(deck)).min(1.0);
     let crew = Crew::new(text, deck, &sampler, options)
-        .with_patience(|point| if is_offer(point) { Patience::SHORT } else { Patience::LONG });
+        .with_patience(|point| if is_offer(point) { Patience::SHORT } else { Patience::LONG })
+        .with_outcomes();
     Search::new(wanted, mesher, family, pace, newton).run(crew)
 }
 

@@ -1,10 +1,11 @@
 //! The search for a variant of a deck that is accurate enough.
 
 use super::estimate::{Fall, Share, Source, left_by_newton};
+use super::round::{Round, Trials};
 use super::{CUBIC, Found, coarser, is_offer, scaled};
 use crate::deck::{Accuracy, StageBody};
 use crate::drive::Failure;
-use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Trial};
+use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Sampler, Trial};
 
 /// The first mesh over that of the deck, in nodes; and where steps cost nothing and a loose accuracy is wanted.
 const FIRST_MESH: f64 = 0.5;
@@ -36,7 +37,7 @@ const NEAR: f64 = 2.0;
 const FINE_ENOUGH: f64 = 0.1;
 
 /// A share of the coarsest mesh below this part of what it may be calls for elements of a lower order.
-const LOWER_ORDER: f64 = 1e-2;
+const LOWER_ORDER: f64 = 0.1;
 
 /// Rounds, nodes, and steps to the end of the run, at most.
 const MOST_ROUNDS: usize = 24;
@@ -89,21 +90,8 @@ impl<T: PartialEq> Axis<T> {
     }
 }
 
-/// The variants of a round: one, and those that tell the shares of its error, with ratios of widths.
-struct Round {
-    own: Point,
-    on_coarser_mesh: Option<(Point, f64)>,
-    with_longer_step: Option<(Point, f64)>,
-}
-
-impl Round {
-    fn points(&self) -> Vec<Point> {
-        let others = [&self.on_coarser_mesh, &self.with_longer_step].into_iter().flatten();
-        std::iter::once(&self.own).chain(others.map(|(point, _)| point)).cloned().collect()
-    }
-}
-
 /// The error of a variant.
+#[derive(Clone)]
 struct Estimate {
     mesh: Share,
     step: Share,
@@ -113,6 +101,42 @@ impl Estimate {
     /// The largest of all outputs, over what is wanted of it
     fn ratio(&self) -> f64 {
         self.mesh.largest + self.step.largest
+    }
+}
+
+/// The errors that a round tells of.
+struct Estimates {
+    own: Estimate,
+    /// The share of the other mesh
+    remeshed: Option<Share>,
+}
+
+/// A variant that is accurate enough.
+struct Candidate {
+    point: Point,
+    estimate: Estimate,
+    /// Whether the round has run it
+    has_run: bool,
+}
+
+impl Estimates {
+    /// The variants of a round that are accurate enough, the cheapest first.
+    fn accurate_enough(&self, round: &Round) -> Vec<Candidate> {
+        let step = |pace: Pace| if pace == round.own.pace { self.own.step.clone() } else { self.own.step.of_coarser() };
+        let of = |point: &Point, mesh: &Share, has_run| {
+            let estimate = Estimate { mesh: mesh.clone(), step: step(point.pace) };
+            Candidate { point: point.clone(), estimate, has_run }
+        };
+        let mut all = vec![of(&round.own, &self.own.mesh, true)];
+        all.extend(round.longer.as_ref().map(|(longer, _)| of(longer, &self.own.mesh, true)));
+        if let (Some(share), Some((remeshed, _))) = (&self.remeshed, &round.remeshed) {
+            all.push(of(remeshed, share, true));
+            let alike = round.remeshed_alike().filter(|alike| alike.pace != remeshed.pace);
+            all.extend(alike.map(|alike| of(&alike, share, false)));
+        }
+        all.retain(|candidate| candidate.estimate.ratio() <= 1.0);
+        all.sort_by(|a, b| a.point.work().total_cmp(&b.point.work()));
+        all
     }
 }
 
@@ -129,13 +153,12 @@ impl<'a> Search<'a> {
         let mut runs = 0;
         let mut ended = String::from(" within the budget");
         for _ in 0..MOST_ROUNDS {
-            let round = self.round();
+            let mut round = self.round();
             if self.is_too_large(&round.own) {
                 ended = format!(" with fewer than {MOST_NODES} nodes and {MOST_STEPS:e} steps");
                 break;
             }
-            let points = round.points();
-            let trials = match (run_round(&mut crew, &points), best.take()) {
+            let trials = match (round.run(&mut crew), best.take()) {
                 (Err(Refusal::Failure(stopped)), Some(found)) => {
                     return Ok(Found { runs, stopped: Some(stopped), ..found });
                 }
@@ -144,17 +167,18 @@ impl<'a> Search<'a> {
                     trials?
                 }
             };
-            let Some(trials) = trials.into_iter().collect::<Option<Vec<Trial>>>() else { break };
-            runs += trials.len();
-            ended = format!("; the last of {runs} ended with `{}`", trials[0].status);
-            match trials[0].status.as_str() {
+            let Some(trials) = trials else { break };
+            runs += trials.runs;
+            let status = trials.own.status.as_str();
+            ended = format!("; the last of {runs} ended with `{status}`");
+            match status {
                 // No mesh mends that.
                 "singular" if best.is_none() => {
                     let again = || Failure::Limit("the first run of the search ended with `singular`".into());
                     return Err(Refusal::Failure(crew.own_failure().unwrap_or_else(again)));
                 }
                 "finished" => {
-                    let scales = self.mesher.sampler.scales(&trials[0].samples);
+                    let scales = self.mesher.sampler.scales(&trials.own.samples);
                     self.mesher.sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
                 }
                 "singular" | "deck" => break,
@@ -166,19 +190,23 @@ impl<'a> Search<'a> {
                 }
                 _ => {}
             }
-            if round.with_longer_step.is_some() && trials.last().is_some_and(|longer| longer.status == "limit") {
+            if trials.longer.as_ref().is_some_and(|longer| longer.status == "limit") {
                 // A pace needs one twice as long to compare with.
                 self.longest = scaled(self.pace, 0.5);
             }
-            let estimate = self.estimate(&round, &trials);
-            let found = self.cheapest(round, &estimate, runs);
-            if found.reached {
-                return Ok(found);
+            let estimates = self.estimates(&round, &trials);
+            for Candidate { point, estimate, has_run } in estimates.accurate_enough(&round) {
+                runs += usize::from(!has_run);
+                if has_run || comes_to_its_end(&point, &mut crew)? {
+                    let outcome = crew.take_outcome(&point);
+                    return Ok(Found { outcome, ..self.found(point, &estimate, runs) });
+                }
             }
+            let found = self.found(round.own, &estimates.own, runs);
             if found.ratio.is_finite() && best.as_ref().is_none_or(|best| found.ratio < best.ratio) {
                 best = Some(found);
             }
-            self.refine(&estimate);
+            self.refine(&estimates.own);
         }
         best.map(|best| Found { runs, ..best }).ok_or_else(|| {
             let message = format!("no run came to its end whose error could be estimated{ended}");
@@ -195,90 +223,79 @@ impl<'a> Search<'a> {
         point.count() * self.family.order.unwrap_or(1) > MOST_NODES || steps > MOST_STEPS
     }
 
-    /// The steps over the deck's.
-    fn stretch(&self) -> f64 {
-        match self.pace {
-            Pace::Steps(factor) => factor,
-            _ => 1.0,
-        }
-    }
-
     fn round(&self) -> Round {
         let order = self.family.order;
         let point = |elements: &Vec<Vec<usize>>, pace| Point {
             newton: self.newton,
             ..Point::new(self.family.clone(), elements.clone(), pace)
         };
-        let mesh = self.mesher.elements(order, self.mesh);
-        let known = self.in_space.known(&(order, mesh.clone()), self.stretch()).is_some();
-        let (own, coarse) = match order.filter(|_| !known).map(|_| self.mesher.companion(order, &mesh)) {
-            None => (mesh, None),
-            Some((other, ratio)) if ratio > 1.0 => (mesh, Some((other, ratio))),
-            // Where some piece has but one element, the finer mesh stands for the variant.
-            Some((other, ratio)) => (other, Some((mesh, 1.0 / ratio))),
-        };
-        let on_coarser_mesh = coarse.map(|(coarse, ratio)| (point(&coarse, self.pace), ratio));
-        let own = point(&own, self.pace);
+        let own = point(&self.mesher.elements(order, self.mesh), self.pace);
         let step = |point: &Point| point.step(self.mesher.deck).unwrap_or(1.0);
         let longer = matches!(self.pace, Pace::Steps(_)) && self.in_time.known(&self.pace, own.width()).is_none();
         let longer = longer.then(|| point(&own.elements, coarser(self.pace)));
-        let with_longer_step = longer.map(|longer| (longer.clone(), step(&longer) / step(&own)));
-        Round { own, on_coarser_mesh, with_longer_step }
+        let longer = longer.map(|longer| (longer.clone(), step(&longer) / step(&own)));
+        let known = self.in_space.known(&(order, own.elements.clone()), stretch(self.pace)).is_some();
+        // The first step may be too long for meshes to differ by what they differ by elsewhere.
+        let is_first = self.in_time.last.is_empty();
+        let pace = longer.as_ref().filter(|_| !is_first).map_or(self.pace, |(longer, _)| longer.pace);
+        let remeshed = order.filter(|_| !known).map(|_| {
+            let (other, ratio) = self.mesher.companion(order, &own.elements);
+            (point(&other, pace), ratio)
+        });
+        Round { own, longer, remeshed }
     }
 
-    fn estimate(&mut self, round: &Round, trials: &[Trial]) -> Estimate {
-        let (sampler, wanted) = (self.mesher.sampler, self.wanted);
-        let unknown = || Share::unknown(sampler.columns.len());
-        let none = || Share::none(sampler.columns.len());
-        let mut others = trials[1..].iter();
-        let mut share = |fall: &mut Fall, source, width, ratio: f64| match others.next() {
-            Some(other) if other.finished() && trials[0].finished() && ratio > 1.0 => {
-                let samples = (&trials[0].samples, &other.samples);
-                fall.share(source, (width, ratio), samples, (sampler, wanted))
-            }
-            // Nothing is known of what a run that failed would tell, or one that is the same.
-            _ => unknown(),
-        };
-        let mesh = (self.family.order, round.own.elements.clone());
-        let of_mesh = match (&round.on_coarser_mesh, self.in_space.known(&mesh, self.stretch())) {
-            (Some((_, ratio)), _) => {
-                let source = Source::Mesh(self.family.order.unwrap_or(1));
-                share(&mut self.in_space.fall, source, round.own.width(), *ratio)
-            }
-            (None, known) => known.unwrap_or_else(none),
-        };
-        let of_step = match (&round.with_longer_step, self.in_time.known(&self.pace, round.own.width())) {
-            (Some((_, ratio)), _) => {
-                let width = round.own.step(self.mesher.deck).unwrap_or(1.0);
-                share(&mut self.in_time.fall, Source::Steps, width, *ratio)
-            }
-            (None, known) => known.unwrap_or_else(none),
-        };
-        let failed = !trials[0].finished();
-        let coarser_mesh = round.on_coarser_mesh.as_ref().map(|(point, _)| (self.family.order, point.elements.clone()));
-        self.in_space.last = vec![(mesh, of_mesh.clone())];
-        self.in_space.last.extend(coarser_mesh.map(|mesh| (mesh, of_mesh.of_coarser())));
-        self.in_time.last = vec![(self.pace, of_step.clone())];
-        if round.on_coarser_mesh.is_some() {
-            self.in_space.beside = self.stretch();
+    fn estimates(&mut self, round: &Round, trials: &Trials) -> Estimates {
+        if !trials.own.finished() {
+            let unknown = || Share::unknown(self.mesher.sampler.columns.len());
+            self.in_space.last = vec![((self.family.order, round.own.elements.clone()), unknown())];
+            self.in_time.last = vec![(self.pace, unknown())];
+            return Estimates { own: Estimate { mesh: unknown(), step: unknown() }, remeshed: None };
         }
-        if round.with_longer_step.is_some() {
-            self.in_time.beside = round.own.width();
-        }
-        if failed { Estimate { mesh: unknown(), step: unknown() } } else { Estimate { mesh: of_mesh, step: of_step } }
+        let step = self.share_of_steps(round, trials);
+        let (mesh, remeshed) = self.shares_of_meshes(round, trials);
+        Estimates { own: Estimate { mesh, step }, remeshed }
     }
 
-    /// The cheapest variant of a round that is accurate enough, or its own.
-    fn cheapest(&self, round: Round, own: &Estimate, runs: usize) -> Found {
-        let mesh = |(point, _)| (point, Estimate { mesh: own.mesh.of_coarser(), step: own.step.clone() });
-        let step = |(point, _)| (point, Estimate { mesh: own.mesh.clone(), step: own.step.of_coarser() });
-        let others = round.on_coarser_mesh.map(mesh).into_iter().chain(round.with_longer_step.map(step));
-        let enough = others.filter(|(_, estimate)| estimate.ratio() <= 1.0);
-        let cheapest = enough.min_by(|(a, _), (b, _)| a.work().total_cmp(&b.work()));
-        match cheapest {
-            Some((point, estimate)) => self.found(point, &estimate, runs),
-            None => self.found(round.own, own, runs),
-        }
+    fn share_of_steps(&mut self, round: &Round, trials: &Trials) -> Share {
+        let (own, width) = (&trials.own, round.own.step(self.mesher.deck).unwrap_or(1.0));
+        let share = match (&round.longer, &trials.longer) {
+            (Some((_, ratio)), longer) => {
+                let pair = longer.as_ref().map(|longer| (own, longer));
+                self.in_time.beside = round.own.width();
+                share(&mut self.in_time.fall, Source::Steps, (width, *ratio), pair, (self.mesher.sampler, self.wanted))
+            }
+            (None, _) => self.in_time.known(&self.pace, round.own.width()).unwrap_or_else(|| self.none()),
+        };
+        self.in_time.last = vec![(self.pace, share.clone())];
+        share
+    }
+
+    /// Of the variant and of the other mesh.
+    fn shares_of_meshes(&mut self, round: &Round, trials: &Trials) -> (Share, Option<Share>) {
+        let mesh = |point: &Point| (self.family.order, point.elements.clone());
+        let Some((other, ratio)) = &round.remeshed else {
+            let known = self.in_space.known(&mesh(&round.own), stretch(self.pace)).unwrap_or_else(|| self.none());
+            self.in_space.last = vec![(mesh(&round.own), known.clone())];
+            return (known, None);
+        };
+        let own = if other.pace == round.own.pace { Some(&trials.own) } else { trials.longer.as_ref() };
+        let pair = own.zip(trials.remeshed.as_ref());
+        let source = Source::Mesh(self.family.order.unwrap_or(1));
+        let is_finer = *ratio < 1.0;
+        let (finer, ratio) = if is_finer { (other, 1.0 / ratio) } else { (&round.own, *ratio) };
+        let pair = if is_finer { pair.map(|(own, other)| (other, own)) } else { pair };
+        let told = (self.mesher.sampler, self.wanted);
+        let of_finer = share(&mut self.in_space.fall, source, (finer.width(), ratio), pair, told);
+        let of_wider = of_finer.of_coarser();
+        let (of_own, of_other) = if is_finer { (of_wider, of_finer) } else { (of_finer, of_wider) };
+        self.in_space.last = vec![(mesh(&round.own), of_own.clone()), (mesh(other), of_other.clone())];
+        self.in_space.beside = stretch(other.pace);
+        (of_own, Some(of_other))
+    }
+
+    fn none(&self) -> Share {
+        Share::none(self.mesher.sampler.columns.len())
     }
 
     fn found(&self, point: Point, estimate: &Estimate, runs: usize) -> Found {
@@ -293,6 +310,7 @@ impl<'a> Search<'a> {
             stopped: None,
             runs,
             point,
+            outcome: None,
         }
     }
 
@@ -354,16 +372,33 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Runs the variants of a round, `None` for those that the budget left out. A step on offer is tried alone: where it is too long for the
-/// first one, nothing is compared with it.
-fn run_round(crew: &mut Crew, points: &[Point]) -> Result<Vec<Option<Trial>>, Refusal> {
-    let alone = if is_offer(&points[0]) { 1 } else { points.len() };
-    crew.expect(alone);
-    let mut trials = crew.run(&points[..alone])?;
-    let is_lost = trials[0].as_ref().is_none_or(|trial| trial.status == "limit");
-    if !is_lost && alone < points.len() {
-        crew.expect(points.len() - alone);
-        trials.extend(crew.run(&points[alone..])?);
+/// The steps over the deck's.
+fn stretch(pace: Pace) -> f64 {
+    match pace {
+        Pace::Steps(factor) => factor,
+        _ => 1.0,
     }
-    Ok(trials)
+}
+
+/// What a run and a coarser one tell of its error. Nothing is known of what a run that failed would tell, or one that is the same.
+fn share(
+    fall: &mut Fall,
+    source: Source,
+    (width, ratio): (f64, f64),
+    pair: Option<(&Trial, &Trial)>,
+    (sampler, wanted): (&Sampler, &Accuracy),
+) -> Share {
+    match pair {
+        Some((own, coarser)) if own.finished() && coarser.finished() && ratio > 1.0 => {
+            fall.share(source, (width, ratio), (&own.samples, &coarser.samples), (sampler, wanted))
+        }
+        _ => Share::unknown(sampler.columns.len()),
+    }
+}
+
+/// Whether a variant that is thought to be accurate enough runs; where the budget is over, it is taken to.
+fn comes_to_its_end(point: &Point, crew: &mut Crew) -> Result<bool, Refusal> {
+    crew.expect(1);
+    let trials = crew.run(std::slice::from_ref(point))?;
+    Ok(trials[0].as_ref().is_none_or(Trial::finished))
 }

@@ -8,6 +8,8 @@ use super::{Options, Refusal, Run, Timing};
 use crate::deck::Deck;
 use crate::drive::{Failure, Moment};
 use crate::study::crowd::side_by_side;
+use crate::study::outcome::Outcome;
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 /// A run alone is repeated until it has taken so many seconds in all.
@@ -18,6 +20,9 @@ const REPEATS: [usize; 2] = [3, 25];
 const ROUNDS: usize = 4;
 /// Runs that were slower than the fastest of their accuracy by less than this may be it.
 const NEAR: f64 = 1.5;
+
+/// The most numbers of an outcome that is kept: 64 MB of them.
+const KEPT: usize = 1 << 23;
 
 /// The moment after which no run is begun, and running ones are given up.
 #[derive(Clone, Copy)]
@@ -44,17 +49,50 @@ pub(in crate::study) struct Crew<'a, 'o> {
     deadline: Deadline,
     done: usize,
     expected: usize,
+    /// All outputs of some runs, by their settings; `None` where nobody asks for them
+    outcomes: Option<HashMap<String, Outcome>>,
 }
 
 impl<'a, 'o> Crew<'a, 'o> {
     pub fn new(text: &'a str, deck: &'a Deck, sampler: &'a Sampler, options: Options<'o>) -> Self {
         let deadline = Deadline::after(options.budget);
-        Self { text, deck, sampler, options, patience: |_| Patience::LONG, deadline, done: 0, expected: 0 }
+        Self {
+            text,
+            deck,
+            sampler,
+            options,
+            patience: |_| Patience::LONG,
+            deadline,
+            done: 0,
+            expected: 0,
+            outcomes: None,
+        }
     }
 
     /// With its patience for each run.
     pub fn with_patience(self, patience: fn(&Point) -> Patience) -> Self {
         Self { patience, ..self }
+    }
+
+    /// Keeping all outputs of the last runs.
+    pub fn with_outcomes(self) -> Self {
+        Self { outcomes: Some(HashMap::new()), ..self }
+    }
+
+    /// Forgets the outputs of runs other than these.
+    pub fn forget_all_but(&mut self, points: &[Point]) {
+        let keys: Vec<String> = points.iter().map(|point| self.key(point)).collect();
+        self.outcomes.iter_mut().for_each(|outcomes| outcomes.retain(|key, _| keys.contains(key)));
+    }
+
+    /// All outputs of a variant, if it was among the last runs.
+    pub fn take_outcome(&mut self, point: &Point) -> Option<Outcome> {
+        let key = self.key(point);
+        self.outcomes.as_mut()?.remove(&key)
+    }
+
+    fn key(&self, point: &Point) -> String {
+        point.settings(self.deck, self.text).join(" ")
     }
 
     /// Tells how many runs there will be, for those who wait.
@@ -84,13 +122,18 @@ impl<'a, 'o> Crew<'a, 'o> {
         let (text, sampler, patience, deadline) = (self.text, self.sampler, self.patience, self.deadline);
         let signals = self.options.interrupted;
         let stopped = || signals().or_else(|| deadline.is_over().then_some(0));
+        let keeps = self.outcomes.is_some();
         let run = |k: usize| {
-            let trial = trial::run(text, &settings[k], sampler, patience(&points[k]), &stopped);
-            (trial.status != "interrupted").then_some(trial)
+            let (trial, outcome) = trial::run(text, &settings[k], sampler, patience(&points[k]), &stopped);
+            let outcome = outcome.filter(|outcome| keeps && trial.finished() && outcome.size() < KEPT);
+            (trial.status != "interrupted").then_some((trial, outcome))
         };
-        let broken = |_| Trial::ended("broke off");
-        side_by_side(self.options.threads, open, &|| stopped().is_some(), &run, &broken, |k, trial| {
+        let broken = |_| (Trial::ended("broke off"), None);
+        side_by_side(self.options.threads, open, &|| stopped().is_some(), &run, &broken, |k, (trial, outcome)| {
             self.done += 1;
+            if let (Some(outcomes), Some(outcome)) = (&mut self.outcomes, outcome) {
+                outcomes.insert(keys[k].clone(), outcome);
+            }
             (self.options.tell)(self.done, self.expected);
             self.options.journal.keep(&keys[k], &trial);
             trials[k] = Some(trial);
@@ -130,7 +173,7 @@ impl<'a, 'o> Crew<'a, 'o> {
                 if self.deadline.is_over() || (round >= REPEATS[0] && spent > TIMED) {
                     continue;
                 }
-                let trial =
+                let (trial, _) =
                     trial::run(self.text, &runs[k].settings, self.sampler, Patience::LONG, &self.options.interrupted);
                 if let Some(signal) = (self.options.interrupted)() {
                     return Err(Refusal::Failure(interrupted(signal)));

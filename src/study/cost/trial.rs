@@ -67,26 +67,26 @@ impl Trial {
     }
 }
 
-/// Runs the deck `text` with settings. `interrupted` tells of signals.
+/// Runs the deck `text` with settings; beside what came of it all its outputs, where there is such a scene. `interrupted` tells of signals.
 pub fn run(
     text: &str,
     settings: &[String],
     sampler: &Sampler,
     patience: Patience,
     interrupted: &dyn Fn() -> Option<i32>,
-) -> Trial {
+) -> (Trial, Option<Outcome>) {
     let (cpu, wall) = (ThreadTime::try_now().ok(), Instant::now());
     let outcome = simulate(text, settings, sampler, patience, interrupted);
     let wall = wall.elapsed().as_secs_f64();
     // A system that does not tell the time of threads has that on the wall.
     let cpu = cpu.and_then(|start| start.try_elapsed().ok()).map_or(wall, |time| time.as_secs_f64());
     let seconds = Seconds { cpu, wall };
-    match outcome {
+    let trial = match &outcome {
         Ok(outcome) => {
             let failure = outcome.ended.as_ref().err().map(Failure::name);
             Trial {
                 status: failure.unwrap_or("finished").into(),
-                samples: if failure.is_none() { sampler.of(&outcome) } else { Vec::new() },
+                samples: if failure.is_none() { sampler.of(outcome) } else { Vec::new() },
                 steps: outcome.counters.steps,
                 iterations: outcome.counters.work.iterations,
                 factorisations: outcome.counters.work.factorisations,
@@ -94,7 +94,8 @@ pub fn run(
             }
         }
         Err(_) => Trial { seconds, ..Trial::ended("deck") },
-    }
+    };
+    (trial, outcome.ok())
 }
 
 /// Whether the deck `text` with settings makes sense and has the outputs that are looked at.

@@ -74,7 +74,8 @@ fn simulate(variant: Variant, error_bars: bool, interrupted: &dyn Fn() -> Option
             let expected = expected_values(&scene.expectations);
             let missed = expected.iter().zip(&run.expected).find(|(_, value)| value.is_nan());
             let missed = missed.map(|((name, _), _)| format!("`{name}` was not reached"));
-            let message = missed.or(run.warning.map(|warning| format!("warning: {warning}"))).unwrap_or_default();
+            let message =
+                missed.or(run.warnings.first().map(|warning| format!("warning: {warning}"))).unwrap_or_default();
             Outcome { status: "finished".into(), message, values: run.expected, errors, ..outcome }
         }
         // What was run is worth having without.
