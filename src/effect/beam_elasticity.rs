@@ -1,28 +1,18 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
+use super::elastic_element::ElasticElement;
 use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
 use super::planar_elasticity::PlanarElasticity;
-use super::{AT_ONCE, ByOrder, Connection, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
+use super::{AT_ONCE, ByOrder, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane, pack};
+use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::marker::PhantomData;
 use std::sync::Arc;
-
-/// An element of N nodes with G = N - 1 points for internal forces.
-#[derive(Clone, Debug)]
-pub struct ElasticElement<const N: usize, const G: usize> {
-    /// Its place in the scene
-    pub connection: Connection<N>,
-    /// Its integration points
-    pub points: [StiffnessPoint<N>; G],
-    /// The number of the amplitude of its free strain
-    pub free: Option<usize>,
-}
 
 /// Elastic elements of all orders.
 pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, ElasticElement<4, 3>>;
@@ -44,7 +34,7 @@ impl<I: Interpolation> BeamElasticity<I> {
     pub fn new(elements: ElasticElements) -> Self {
         let mut rounding = Vec::new();
         for_each_batch!(elements, |_first, batch| {
-            rounding.extend(batch.iter().flat_map(|element| &element.points).map(Rounding::of));
+            rounding.extend(batch.iter().flat_map(|element| element.points()).map(|point| Rounding::of(&point)));
         });
         Self { elements, unstressed: None, rounding, way: PhantomData }
     }
@@ -114,7 +104,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch {
             element.connection.places.iter().for_each(|&place| show(Aspect::Place(place)));
-            for point in &element.points {
+            for point in element.points() {
                 show(Aspect::Vector(point.tangent));
                 show(Aspect::Tensor(point.stiffness.cn));
                 show(Aspect::Tensor(point.stiffness.cm));
@@ -181,9 +171,9 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
-        for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free.is_some()) {
+        for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element
-                .points
+                .points()
                 .iter()
                 .zip(&element.strains_and_stresses::<I>(at))
                 .map(|(point, (_, stress))| {
@@ -199,7 +189,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         let mut largest = Noise::default();
         for_each_batch!(self.elements, |first, batch| {
             let points = &self.rounding[self.points_before(first)..];
-            let parts = batch.chunks(AT_ONCE).zip(points.chunks(AT_ONCE * batch[0].points.len()));
+            let parts = batch.chunks(AT_ONCE).zip(points.chunks(AT_ONCE * batch[0].points().len()));
             threads::in_order(
                 parts,
                 |(batch, points)| noise_of(batch, points, at),
@@ -304,7 +294,7 @@ struct Sum<const N: usize, const G: usize, T> {
 impl<const N: usize, const G: usize> Sum<N, G, Lanes> {
     #[inline(always)]
     fn side_by_side(elements: [&ElasticElement<N, G>; LANES], remembered: &[[f64; 6]], at: &State) -> Self {
-        let points = pack!(elements.points);
+        let points = ElasticElement::points_side_by_side(elements);
         let free = Lanes(each_lane!(|k| elements[k].free_amplitude(at)));
         let none = Stress { n: Vec3::zero(), m: Vec3::zero() };
         let mut stresses = (!remembered.is_empty()).then_some([none; G]);
@@ -454,18 +444,18 @@ fn strain_energy<const N: usize, const G: usize, T: Real>(
 
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
     pub(super) fn free_amplitude(&self, at: &State) -> f64 {
-        self.free.map_or(0.0, |number| at.amplitude[number])
+        self.free().map_or(0.0, |number| at.amplitude[number])
     }
 
     /// Strain and stress at each integration point (material, global components).
     pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
         let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
-        self.points.map(|point| point.strain_and_stress(view.nodes(), free))
+        self.points().map(|point| point.strain_and_stress(view.nodes(), free))
     }
 
     #[inline(never)]
     fn energy<I: Interpolation>(&self, at: &State) -> f64 {
-        strain_energy(&self.points, I::see(&self.connection, at).nodes(), self.free_amplitude(at))
+        strain_energy(&self.points(), I::see(&self.connection, at).nodes(), self.free_amplitude(at))
     }
 
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.
@@ -475,7 +465,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
         };
-        self.points.iter().map(at_point).fold(0.0, f64::max)
+        self.points().iter().map(at_point).fold(0.0, f64::max)
     }
 
     /// Adds the element alone as instance `number`; its nodes may sit in different charts.
@@ -489,7 +479,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         (system, scratch): &mut (ElementSystem, Scratch),
         out: &mut Sink,
     ) {
-        let sum = Sum { points: self.points, stresses, free: self.free_amplitude(at) };
+        let sum = Sum { points: self.points(), stresses, free: self.free_amplitude(at) };
         I::evaluate(&self.connection, at, stiffness, scratch, system, &sum);
         out.add(number, system);
     }
@@ -499,7 +489,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
         let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
         let (du, dp) = self.connection.variations_in_one_chart(at, dq);
-        let stresses = view.extrapolated(&self.points, free, &du, &dp);
+        let stresses = view.extrapolated(&self.points(), free, &du, &dp);
         out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));
     }
 }

@@ -4,6 +4,7 @@
 
 pub mod beam_elasticity;
 pub mod beam_mass;
+pub mod elastic_element;
 pub mod gravity;
 pub mod interpolation;
 pub mod joint;
@@ -91,6 +92,11 @@ pub trait Effect: Send + Sync {
 
     /// What its forces are.
     fn category(&self) -> Category;
+
+    /// Whether it adds forces that damp beside those of its category.
+    fn damps(&self) -> bool {
+        false
+    }
 
     /// The slots that meet in each instance; [divisible](Cliques::divisible) where many instances make it worth while.
     fn cliques(&self) -> Cliques;
@@ -340,6 +346,13 @@ impl<A, B, C> ByOrder<A, B, C> {
     /// Whether no element is in any batch.
     pub fn is_empty(&self) -> bool {
         self.two.is_empty() && self.three.is_empty() && self.four.is_empty()
+    }
+
+    /// Gives back what lists have grown to beyond their ends.
+    pub fn shrink_to_fit(&mut self) {
+        self.two.shrink_to_fit();
+        self.three.shrink_to_fit();
+        self.four.shrink_to_fit();
     }
 }
 

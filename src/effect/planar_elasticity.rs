@@ -1,6 +1,7 @@
 //! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a node.
 
-use super::beam_elasticity::{BeamElasticity, ElasticElement, stresses_of, workspace};
+use super::beam_elasticity::{BeamElasticity, stresses_of, workspace};
+use super::elastic_element::ElasticElement;
 use super::interpolation::Interpolation;
 use super::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
@@ -43,7 +44,7 @@ fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane:
     let block = |elements: &[ElasticElement<N, G>]| {
         let all: [&ElasticElement<N, G>; LANES] = each_lane!(|k| &elements[k.min(elements.len() - 1)]);
         let point = |g: usize| {
-            let points = all.map(|element| PlanarPoint::new(&element.points[g], plane.axes()));
+            let points = all.map(|element| PlanarPoint::new(&element.points()[g], plane.axes()));
             PlanarPoint::pack(points.each_ref())
         };
         Block {

@@ -11,7 +11,8 @@
 //! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s, whatever its interpolation. b_k is
 //! its force under a unit stress, and G_k qd the rate of that: a jet along the motion brings both.
 
-use super::beam_elasticity::{BeamElasticity, ElasticElement};
+use super::beam_elasticity::BeamElasticity;
+use super::elastic_element::ElasticElement;
 use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
 use super::{Connection, Effect, after_displacement, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
@@ -69,7 +70,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
         let connection = &element.connection;
         connection.evaluate(at, weights, true, after_displacement, &mut system, &|nodes, weights, out| {
             let motion = Motion::new(connection, nodes, at);
-            motion.add::<I, G>(&element.points, factor, weights, &mut room.borrow_mut(), out);
+            motion.add::<I, G>(&element.points(), factor, weights, &mut room.borrow_mut(), out);
         });
         out.add(first + k, &system);
     }

@@ -34,19 +34,26 @@ pub fn interpolate<T: Real, const N: usize>(shape: &[T; N], value: impl Fn(usize
 
 impl<const N: usize> StiffnessPoint<N> {
     /// The same point for another scalar.
+    #[inline(always)]
     pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T> {
-        let strain = |s: Strain| Strain { gamma: Vec3::constant(s.gamma), kappa: Vec3::constant(s.kappa) };
+        let Self { weight, tangent, stiffness, .. } = self;
+        let (mut shape, mut slope) = ([T::zero(); N], [T::zero(); N]);
+        for i in 0..N {
+            (shape[i], slope[i]) = (T::constant(self.shape[i]), T::constant(self.slope[i]));
+        }
+        let free = match &self.free {
+            None => None,
+            Some(own) => Some(Strain { gamma: Vec3::constant(own.gamma), kappa: Vec3::constant(own.kappa) }),
+        };
+        let cc = stiffness.cc.map(Mat3::constant);
+        let stiffness = Stiffness { cn: Mat3::constant(stiffness.cn), cm: Mat3::constant(stiffness.cm), cc };
         StiffnessPoint {
-            shape: self.shape.map(T::constant),
-            slope: self.slope.map(T::constant),
-            weight: T::constant(self.weight),
-            tangent: Vec3::constant(self.tangent),
-            stiffness: Stiffness {
-                cn: Mat3::constant(self.stiffness.cn),
-                cm: Mat3::constant(self.stiffness.cm),
-                cc: self.stiffness.cc.map(Mat3::constant),
-            },
-            free: self.free.map(strain),
+            shape,
+            slope,
+            weight: T::constant(*weight),
+            tangent: Vec3::constant(*tangent),
+            stiffness,
+            free,
         }
     }
 }

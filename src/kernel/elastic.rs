@@ -19,7 +19,7 @@ pub struct Stiffness<T = f64> {
 }
 
 /// Gamma (translational strain, 1) and K (change of curvature, 1/length), both material.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Strain<T = f64> {
     /// Gamma = R^T x' - E1
     pub gamma: Vec3<T>,

@@ -9,7 +9,8 @@ use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh, Rule, Station};
 use super::names;
 use crate::deck::{self, Deck, Diagnostic, EffectWord, InterpolationWord};
-use crate::effect::beam_elasticity::{BeamElasticity, ElasticElement, ElasticElements, StressField};
+use crate::effect::beam_elasticity::{BeamElasticity, ElasticElements, StressField};
+use crate::effect::elastic_element::ElasticElement;
 use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
 use crate::effect::rigid_body::Body;
 use crate::effect::strain_rate_damping::StrainRateDamping;
@@ -188,11 +189,12 @@ impl Composer<'_> {
             }
             let free = free.get(&element.beam.name).copied();
             match element.nodes.len() {
-                2 => elements.two.push(elastic::<2, 1>(element, free)),
-                3 => elements.three.push(elastic::<3, 2>(element, free)),
-                _ => elements.four.push(elastic::<4, 3>(element, free)),
+                2 => elements.two.push(elastic(element, free, elements.two.last())),
+                3 => elements.three.push(elastic(element, free, elements.three.last())),
+                _ => elements.four.push(elastic(element, free, elements.four.last())),
             }
         });
+        elements.shrink_to_fit();
         if elements.is_empty() {
             return self.reason(
                 I::NAME,
@@ -295,7 +297,11 @@ fn volume<const N: usize, Q: Copy>(
     VolumeElement { connection: connect(element), points: std::array::from_fn(point) }
 }
 
-fn elastic<const N: usize, const G: usize>(element: &BeamElement, free: Option<usize>) -> ElasticElement<N, G> {
+fn elastic<const N: usize, const G: usize>(
+    element: &BeamElement,
+    free: Option<usize>,
+    neighbour: Option<&ElasticElement<N, G>>,
+) -> ElasticElement<N, G> {
     let (beam, stations) = (element.beam, element.stations(Rule::Inner));
     let point = |k: usize| {
         let station = &stations[k];
@@ -308,7 +314,7 @@ fn elastic<const N: usize, const G: usize>(element: &BeamElement, free: Option<u
             free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
         }
     };
-    ElasticElement { connection: connect(element), points: std::array::from_fn(point), free }
+    ElasticElement::new(connect(element), std::array::from_fn(point), free, neighbour)
 }
 
 /// From section axes to global components.
