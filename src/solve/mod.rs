@@ -3,6 +3,7 @@
 mod block;
 mod columns;
 mod convergence;
+mod foresight;
 mod general;
 mod krylov;
 mod linear;

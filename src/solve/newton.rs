@@ -1,6 +1,7 @@
 //! Newton's iteration on one step or load level.
 
 use super::convergence::{Convergence, Residual, Verdict, correction};
+use super::foresight::Foresight;
 use super::linear::LinearSolver;
 use super::mechanism::mechanism;
 use super::refinement::Refinement;
@@ -105,6 +106,7 @@ pub struct Newton {
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
     pub first: Vec<Vec3>,
     reuse: Reuse,
+    foresight: Foresight,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
     given: Option<u64>,
 }
@@ -130,6 +132,7 @@ impl Newton {
             dq,
             first: Vec::new(),
             reuse: Reuse::new(),
+            foresight: Foresight::default(),
             given: None,
         }
     }
@@ -159,7 +162,7 @@ impl Newton {
         mut lift: Option<&[Vec3]>,
         work: &mut Work,
     ) -> Result<(), NewtonFailure> {
-        assembly.forget();
+        self.foresight.forget(assembly);
         let noise = assembly.noise(state);
         let mut iterations = 0;
         self.first.clear();
@@ -169,6 +172,9 @@ impl Newton {
         loop {
             let forms = lift.is_some() || noisy || iterations >= self.max_iterations || self.reuse.expects_tangent();
             let weights = if forms { method.weights() } else { Weights::NONE };
+            if forms {
+                self.foresight.foresee(assembly, state, &self.dq);
+            }
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
             let last = (iterations > 0).then_some(&self.dq[..]);
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
@@ -217,9 +223,9 @@ impl Newton {
             }
             // Where balance is expected the next tangent, if any, is that of the state itself.
             if !noisy && self.reuse.expects_balance() {
-                assembly.forget();
+                self.foresight.forget(assembly);
             } else {
-                assembly.extrapolate(state, &self.dq);
+                self.foresight.remember(state);
             }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {
@@ -227,7 +233,7 @@ impl Newton {
             }
             Self::add(model, state, method, &self.dq);
             if changes_charts {
-                self.change_charts(model, state, work);
+                self.change_charts(model, assembly, state, work);
             }
         }
     }
@@ -239,7 +245,8 @@ impl Newton {
     }
 
     /// Forces and the tangent.
-    fn form(&self, assembly: &mut Assembly, state: &State, method: &dyn Method, work: &mut Work) {
+    fn form(&mut self, assembly: &mut Assembly, state: &mut State, method: &dyn Method, work: &mut Work) {
+        self.foresight.foresee(assembly, state, &self.dq);
         timed(&mut work.evaluation_seconds, || assembly.evaluate(state, method.weights(), None));
     }
 
@@ -309,12 +316,13 @@ impl Newton {
     }
 
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn.
-    fn change_charts(&mut self, model: &Model, state: &mut State, work: &mut Work) {
+    fn change_charts(&mut self, model: &Model, assembly: &mut Assembly, state: &mut State, work: &mut Work) {
         let switched = charts::switch(state, &model.charted.rotations, charts::STATIC_BAND, None);
         if switched > 0 {
             work.chart_switches += switched as u64;
             charts::freeze(state, &model.charted.elements);
             self.reuse.forget();
+            self.foresight.foresee(assembly, state, &self.dq);
             // What was a correction before is none in the new chart: it may not end the iteration.
             self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }
