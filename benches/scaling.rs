@@ -9,6 +9,7 @@ use beamsim::kernel::{ElementSystem, Weights};
 use beamsim::model::{Assembly, Model, StageContext, StageKind};
 use beamsim::scene;
 use beamsim::solve::{Convergence, LinearSolver};
+use beamsim::system::Leftover;
 use beamsim::tensor::Vec3;
 use std::hint::black_box;
 use std::time::Instant;
@@ -100,8 +101,9 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     let mut x = vec![1.0; system.pattern.equations.count()];
     let solve = quickest(|| assert!(solver.solve_once(system, &mut x)));
     let b = vec![1.0; x.len()];
+    let mut room = Leftover::default();
     let residual = quickest(|| {
-        black_box(system.residual(&b, &x));
+        black_box(system.residual(&b, &x, &mut room));
     });
     let convergence = Convergence { tolerance: 1e-8 };
     let judge = quickest(|| {

@@ -59,12 +59,12 @@ impl Bookkeeper {
 
     /// Adds the work of the step that ends here.
     pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
-        for (slot, info) in model.slots.iter().enumerate() {
+        for (slot, &kind) in model.kinds.iter().enumerate() {
             let drag = system.force[Category::Damping as usize][slot];
             let wound = state.wound[slot] - self.wound[slot];
-            self.ledger.damped += work(info.kind, (self.q[slot], self.drag[slot]), (state.q[slot], drag), wound);
+            self.ledger.damped += work(kind, (self.q[slot], self.drag[slot]), (state.q[slot], drag), wound);
             let (before, after) = (self.force[slot], outside(system, slot));
-            self.ledger.external += work(info.kind, (self.q[slot], before), (state.q[slot], after), wound);
+            self.ledger.external += work(kind, (self.q[slot], before), (state.q[slot], after), wound);
         }
         let drives = model.drives(state);
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {

@@ -360,6 +360,10 @@ impl Effect for Joints {
         Category::Internal
     }
 
+    fn damps(&self) -> bool {
+        true
+    }
+
     fn cliques(&self) -> Cliques {
         let mut cliques = Cliques::default();
         self.joints.iter().for_each(|joint| cliques.push(joint.slots().into_iter().flatten()));

@@ -98,6 +98,10 @@ impl Effect for Links {
         Category::Internal
     }
 
+    fn damps(&self) -> bool {
+        true
+    }
+
     fn cliques(&self) -> Cliques {
         let mut cliques = Cliques::default();
         self.links.iter().for_each(|link| cliques.push(link.nodes.map(|node| node.u)));

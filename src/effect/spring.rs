@@ -48,6 +48,10 @@ impl Effect for Spring {
         Category::Internal
     }
 
+    fn damps(&self) -> bool {
+        true
+    }
+
     fn cliques(&self) -> Cliques {
         let mut cliques = Cliques::default();
         self.springs.iter().for_each(|spring| cliques.push([spring.node.u, spring.node.p]));

@@ -4,7 +4,7 @@ use super::linear::Linear;
 use super::{Model, StageContext};
 use crate::effect::{Effect, Noise, PlanarForm};
 use crate::kernel::Weights;
-use crate::system::{Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, System};
+use crate::system::{Category, Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, System};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -38,6 +38,11 @@ impl Acting {
 
     fn is_symmetric(&self) -> bool {
         self.planar.as_ref().map_or_else(|| self.effect.is_symmetric(), |planar| planar.is_symmetric())
+    }
+
+    /// Of its forces.
+    fn categories(&self) -> impl Iterator<Item = Category> {
+        std::iter::once(self.effect.category()).chain(self.effect.damps().then_some(Category::Damping))
     }
 
     fn add(&self, at: &State, weights: Weights, out: &mut Sink) {
@@ -75,10 +80,14 @@ impl Assembly {
         let acts = |(effect, own): (Arc<dyn Effect>, &Cliques)| Acting::new(effect, equations.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&cliques).map(acts).collect();
         let symmetric = effects.iter().all(Acting::is_symmetric);
+        let categories: Vec<Category> = match model.is_linear(stage.kind) {
+            true => Category::ALL.to_vec(),
+            false => effects.iter().flat_map(Acting::categories).collect(),
+        };
         let groups = model.groups(equations.layout());
         Self {
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
-            system: System::new(Pattern::new(equations, groups, cliques), model.slots.len(), symmetric),
+            system: System::new(Pattern::new(equations, groups, cliques), model.slots.len(), symmetric, &categories),
             effects,
             linear: None,
         }

@@ -98,6 +98,8 @@ pub struct Charted {
 pub struct Model {
     /// All slots
     pub slots: Arc<Vec<SlotInfo>>,
+    /// What they hold, for who looks at all of them again and again
+    pub kinds: Arc<Vec<SlotKind>>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle

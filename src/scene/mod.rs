@@ -207,8 +207,10 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
     let rotating = Arc::new(charted(&mesh));
+    let slots = [slots(&mesh), composition.multipliers].concat();
     let mut model = Model {
-        slots: Arc::new([slots(&mesh), composition.multipliers].concat()),
+        kinds: Arc::new(slots.iter().map(|info| info.kind).collect()),
+        slots: Arc::new(slots),
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),

@@ -142,16 +142,18 @@ impl Peaks {
         // Vectors in a tilted plane are rounded aside.
         let tilted = equations.plane().is_some_and(Plane::is_tilted);
         let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
-        for (slot, info) in slots.clone().zip(&model.slots[slots]) {
-            let parts = system.force.each_ref().map(|force| force[slot]);
-            let total = parts.into_iter().fold(Vec3::ZERO, |total, part| total + part);
+        for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
+            let (mut total, mut largest, mut sum) = (Vec3::ZERO, 0.0, 0.0);
+            for force in system.acting() {
+                let size = measure(force[slot]);
+                (total, largest, sum) = (total + force[slot], larger(size, largest), sum + size);
+            }
             let whole = !tilted && equations.is_plain(slot as Slot);
             let free = if whole { total } else { free_part(equations, slot as Slot, total) };
-            let [a, b, c, d] = parts.map(measure);
             let [held, free] = [measure(total - free), measure(free)];
-            poison += ((a + b) + (c + d)) * 0.0;
-            let kind = info.kind as usize;
-            forces[kind] = larger(larger(larger(a, b), larger(c, d)), larger(held, forces[kind]));
+            poison += sum * 0.0;
+            let kind = kind as usize;
+            forces[kind] = larger(largest, larger(held, forces[kind]));
             if free > residuals[kind].size {
                 residuals[kind] = Peak { size: free, slot: slot as Slot };
             }

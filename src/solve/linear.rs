@@ -4,7 +4,7 @@ use super::block::BlockSolver;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
 use super::softest::NullVector;
-use crate::system::{Slot, System};
+use crate::system::{Leftover, Slot, System};
 
 /// Solves with tangents of one pattern.
 ///
@@ -23,6 +23,9 @@ pub struct LinearSolver {
     pub(super) multipliers: Vec<Slot>,
     /// Where it cannot count them itself
     pub(super) pivots: Option<Pivots>,
+    /// The last right-hand side, and what its solution left of it
+    wanted: Vec<f64>,
+    leftover: Leftover,
 }
 
 /// Whether blocks do the work, where there are any.
@@ -61,6 +64,8 @@ impl LinearSolver {
             revision: None,
             multipliers: multipliers.to_vec(),
             pivots: None,
+            wanted: Vec::new(),
+            leftover: Leftover::default(),
         })
     }
 
@@ -136,13 +141,17 @@ impl LinearSolver {
         if !self.trust.in_blocks {
             return self.solve_once(system, right_hand_side);
         }
-        let wanted = right_hand_side.to_vec();
-        if self.solve_once(system, right_hand_side) && self.refine(system, &wanted, right_hand_side) {
-            return true;
+        let mut wanted = std::mem::take(&mut self.wanted);
+        wanted.clear();
+        wanted.extend_from_slice(right_hand_side);
+        let mut done = self.solve_once(system, right_hand_side) && self.refine(system, &wanted, right_hand_side);
+        if !done {
+            right_hand_side.copy_from_slice(&wanted);
+            self.factored = self.leave_blocks(system);
+            done = self.solve_once(system, right_hand_side);
         }
-        right_hand_side.copy_from_slice(&wanted);
-        self.factored = self.leave_blocks(system);
-        self.solve_once(system, right_hand_side)
+        self.wanted = wanted;
+        done
     }
 
     /// Solves with the last factorisation; `false` where the solution is not finite.
@@ -165,13 +174,15 @@ impl LinearSolver {
     fn refine(&mut self, system: &System, wanted: &[f64], x: &mut [f64]) -> bool {
         let mut error = f64::INFINITY;
         for _ in 0..=REFINEMENTS {
-            let (mut residual, now) = system.residual(wanted, x);
+            let now = system.residual(wanted, x, &mut self.leftover);
             // A last correction that made it worse is round-off.
             if now <= BACKWARD_ERROR || now >= error {
                 error = error.min(now);
                 break;
             }
             error = now;
+            let mut residual = vec![0.0; x.len()];
+            system.last_residual(&self.leftover, &mut residual);
             if !self.solve_once(system, &mut residual) {
                 return false;
             }

@@ -23,6 +23,25 @@ pub enum Category {
     Damping,
 }
 
+impl Category {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::Internal, Self::Inertia, Self::External, Self::Damping];
+}
+
+/// Room to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for again and again.
+#[derive(Default)]
+pub struct Leftover {
+    parts: Vec<f64>,
+    residuals: Vec<f64>,
+}
+
+impl Leftover {
+    fn resize(&mut self, length: usize) {
+        self.parts.resize(length, 0.0);
+        self.residuals.resize(2 * length, 0.0);
+    }
+}
+
 /// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
 ///
 /// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).
@@ -32,6 +51,8 @@ pub struct System {
     pub pattern: Pattern,
     /// By category and slot
     pub force: [Vec<Vec3>; 4],
+    /// The numbers of those that something may add to; the others stay zero
+    acting: Vec<usize>,
     /// Whether each effect's tangent is symmetric, and so their sum
     pub symmetric: bool,
     /// The values of the tangent, tile by tile: that of the last evaluation with weights
@@ -47,8 +68,8 @@ pub struct System {
 }
 
 impl System {
-    /// A system of zeros.
-    pub fn new(pattern: Pattern, slots: usize, symmetric: bool) -> Self {
+    /// A system of zeros, for forces of these categories beside internal ones.
+    pub fn new(pattern: Pattern, slots: usize, symmetric: bool, categories: &[Category]) -> Self {
         let zero = vec![Vec3::ZERO; slots];
         let (values, equations) = (pattern.values(), pattern.equations.count());
         Self {
@@ -56,6 +77,11 @@ impl System {
             pattern,
             symmetric,
             force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
+            acting: Category::ALL
+                .into_iter()
+                .filter(|k| *k == Category::Internal || categories.contains(k))
+                .map(|k| k as usize)
+                .collect(),
             values: vec![0.0; values],
             revision: 0,
             lift: zero,
@@ -82,6 +108,9 @@ impl System {
     /// Begins an evaluation for which each part is still to be [cleared](Part::clear).
     pub fn begin(&mut self, with_tangent: bool, lift: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
+        if self.lifts || lift.is_some() {
+            self.lifted.fill(0.0);
+        }
         self.lifts = lift.is_some();
         if let Some(lift) = lift {
             self.lift.copy_from_slice(lift);
@@ -91,7 +120,13 @@ impl System {
     /// The sum of the forces at a slot.
     #[inline]
     pub fn total(&self, slot: usize) -> Vec3 {
-        self.force[0][slot] + self.force[1][slot] + self.force[2][slot] + self.force[3][slot]
+        self.acting().fold(Vec3::ZERO, |sum, force| sum + force[slot])
+    }
+
+    /// Forces of the categories that something may add to.
+    #[inline]
+    pub fn acting(&self) -> impl Iterator<Item = &[Vec3]> {
+        self.acting.iter().map(|&category| &self.force[category][..])
     }
 
     /// Sets forces to zero for a new evaluation, without prescribed increments; the tangent is left as it is.
@@ -178,15 +213,30 @@ impl System {
         }
     }
 
-    /// b - A x, and its largest component over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
-    pub fn residual(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        if self.pattern.width() == WIDTH { self.residual_of::<WIDTH>(b, x) } else { self.residual_of::<3>(b, x) }
+    /// The largest component of b - A x over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
+    pub fn residual(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+        if self.pattern.width() == WIDTH {
+            self.residual_of::<WIDTH>(b, x, room)
+        } else {
+            self.residual_of::<3>(b, x, room)
+        }
     }
 
-    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64]) -> (Vec<f64>, f64) {
-        let (parts, wanted) = (self.pattern.apart::<W>(x), self.pattern.apart::<W>(b));
-        let mut residuals = threads::list(wanted.len(), |group| [wanted[group], wanted[group].map(f64::abs)]);
-        self.each_row::<W, _>(&self.values, &mut residuals, |[residual, size], column, tile| {
+    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+        let pattern = &self.pattern;
+        room.resize(W * pattern.groups.count());
+        let (parts, residuals) = (room.parts.as_chunks_mut::<W>().0, room.residuals.as_chunks_mut::<W>().0);
+        let residuals = residuals.as_chunks_mut::<2>().0;
+        threads::each_part(parts, |start, parts| {
+            (start..).zip(parts).for_each(|(group, part)| *part = pattern.part(group, x));
+        });
+        threads::each_part(residuals, |start, residuals| {
+            for (group, [residual, size]) in (start..).zip(residuals) {
+                *residual = pattern.part(group, b);
+                *size = residual.map(f64::abs);
+            }
+        });
+        self.each_row::<W, _>(&self.values, residuals, |[residual, size], column, tile| {
             for (line, &x) in tile.iter().zip(&parts[column]) {
                 for r in 0..W {
                     let term = line[r] * x;
@@ -198,10 +248,17 @@ impl System {
         // Numbers that small have lost digits of their own.
         let ratio = |(r, size): (&f64, &f64)| r.abs() / size.max(1e-280);
         let of_part = |[part, sizes]: &[[f64; W]; 2]| part.iter().zip(sizes).map(ratio).fold(0.0, f64::max);
-        let worst = threads::largest(residuals.len(), |own| residuals[own].iter().map(of_part).fold(0.0, f64::max));
-        let mut residual = vec![0.0; b.len()];
-        self.pattern.join(|group| &residuals[group][0], &mut residual);
-        (residual, worst)
+        threads::largest(residuals.len(), |own| residuals[own].iter().map(of_part).fold(0.0, f64::max))
+    }
+
+    /// The b - A x that was looked at last.
+    pub fn last_residual(&self, room: &Leftover, out: &mut [f64]) {
+        if self.pattern.width() == WIDTH { self.join::<WIDTH>(room, out) } else { self.join::<3>(room, out) }
+    }
+
+    fn join<const W: usize>(&self, room: &Leftover, out: &mut [f64]) {
+        let residuals = room.residuals.as_chunks::<W>().0;
+        self.pattern.join(|group| &residuals[2 * group], out);
     }
 
     /// The right-hand side of the correction: -g - J lift on the free equations.
@@ -242,7 +299,7 @@ impl System {
 
     /// What each region adds to.
     fn parts(&mut self) -> Vec<Part<'_>> {
-        let Self { pattern, force, values, lift, lifts, lifted, rooms, .. } = self;
+        let Self { pattern, acting, force, values, lift, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
         let size = pattern.width() * pattern.width();
@@ -252,6 +309,7 @@ impl System {
         let stretches = values.into_iter().zip(lifted).zip(&mut rooms[1..]).enumerate();
         let part = |(region, ((values, lifted), room))| Part {
             pattern,
+            acting,
             region: Some(region),
             force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
             values,
@@ -266,6 +324,7 @@ impl System {
     pub fn whole(&mut self) -> Part<'_> {
         Part {
             pattern: &self.pattern,
+            acting: &self.acting,
             region: None,
             force: self.force.each_mut().map(|force| &mut force[..]),
             values: &mut self.values,

@@ -10,7 +10,7 @@ mod sink;
 mod stage;
 mod state;
 
-pub use assembly::{Category, System};
+pub use assembly::{Category, Leftover, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use groups::{Groups, Layout};
 pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH};

@@ -163,9 +163,17 @@ impl Pattern {
 
     /// One number an equation as one part a group; zero where a row has no equation.
     pub fn apart<const W: usize>(&self, x: &[f64]) -> Vec<[f64; W]> {
-        let numbers = self.numbers.as_chunks::<W>().0;
-        let part = |group: usize| numbers[group].map(|number| x.get(number as usize).copied().unwrap_or(0.0));
-        threads::list(numbers.len(), part)
+        threads::list(self.groups.count(), |group| self.part(group, x))
+    }
+
+    /// The part of a group.
+    #[inline]
+    pub fn part<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
+        let mut part = [0.0; W];
+        for (entry, &number) in part.iter_mut().zip(self.numbers(group)) {
+            *entry = x.get(number as usize).copied().unwrap_or(0.0);
+        }
+        part
     }
 
     /// The reverse of [`Pattern::apart`], for parts that are found by their groups.

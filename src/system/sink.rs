@@ -13,6 +13,8 @@ use std::ops::Range;
 /// A stretch of the system: that of a region, to which others add nothing meanwhile, or all of it.
 pub struct Part<'a> {
     pub(super) pattern: &'a Pattern,
+    /// The categories that something may add to
+    pub(super) acting: &'a [usize],
     /// `None` for all of it
     pub(super) region: Option<usize>,
     /// Of its slots, by category
@@ -29,8 +31,7 @@ pub struct Part<'a> {
 impl<'a> Part<'a> {
     /// Sets forces to zero, and the tangent where it is to be formed.
     pub fn clear(&mut self, with_tangent: bool) {
-        self.force.iter_mut().for_each(|force| force.fill(Vec3::ZERO));
-        self.lifted.fill(0.0);
+        self.acting.iter().for_each(|&category| self.force[category].fill(Vec3::ZERO));
         if with_tangent {
             self.values.fill(0.0);
         }
@@ -43,9 +44,9 @@ impl<'a> Part<'a> {
 
     /// The sink of these instances of effect number `effect`.
     pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool, instances: Range<usize>) -> Sink<'_> {
-        let Part { pattern, region, force, values, lift, lifted, room } = self;
+        let Part { pattern, acting, region, force, values, lift, lifted, room } = self;
         let force = force.each_mut().map(|force| &mut force[..]);
-        let part = Part { pattern, region: *region, force, values, lift: *lift, lifted, room };
+        let part = Part { pattern, acting, region: *region, force, values, lift: *lift, lifted, room };
         part.into_sink(effect, category, with_tangent, instances)
     }
 
@@ -57,7 +58,8 @@ impl<'a> Part<'a> {
         with_tangent: bool,
         instances: Range<usize>,
     ) -> Sink<'a> {
-        let Part { pattern, region, force, values, lift, lifted, room } = self;
+        let Part { pattern, acting, region, force, values, lift, lifted, room } = self;
+        debug_assert!(acting.contains(&(category as usize)), "forces of a category that nothing clears");
         let start = region.map(|region| &pattern.regions[region]);
         let [internal, inertia, external, damping] = force;
         let (force, damping) = match category {
