@@ -77,7 +77,8 @@ impl Target {
             runs: found.runs,
             seconds: start.elapsed().as_secs_f64(),
         };
-        let loaded = load::deck(path, &[settings, &found.settings].concat())?;
+        // The file may have changed since it was read.
+        let loaded = load::again(path, &loaded.text, &found.settings)?;
         self.with_bars(path, loaded, Some(reached), found.outcome.take())
     }
 

@@ -48,8 +48,12 @@ pub struct Loaded {
 
 /// Reads a deck and builds its scene; warnings are shown, errors returned, all at once.
 pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
-    let own = text(path)?;
-    let text = deck::apply(&own, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
+    again(path, &text(path)?, settings)
+}
+
+/// The same for a text that was read from there before.
+pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Refusal> {
+    let text = deck::apply(own, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
     // Settings may have moved lines.
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());

@@ -21,7 +21,7 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
     if refuse_twins(decks, &mut verdict) {
         return verdict.finish(1);
     }
-    for path in decks {
+    for (number, path) in decks.iter().enumerate() {
         let name = load::name(path);
         match target.aim(&name, path, settings) {
             Ok(Aimed { text, scene, reached, outcome, bars, film }) => {
@@ -42,7 +42,10 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
             }
             Err(refusal) => verdict.refuse(refusal),
         }
-        if signals::caught().is_some() {
+        if let Some(signal) = signals::caught() {
+            if number + 1 < decks.len() {
+                verdict.fail(Status::after(signal), "interrupted", format!("stopped by signal {signal}"));
+            }
             break;
         }
     }

@@ -63,8 +63,10 @@ impl Run<'_> {
             // Of the loads on this side of the present one it is number `before`.
             let before = passed[usize::from(back)];
             passed[usize::from(back)] += 1;
-            let done = number as f64 / loads.len() as f64;
-            loads[number] = self.follow(workshop, loads[number], before, done)?;
+            // The look from the start is as much work as a search.
+            let count = loads.len() as f64;
+            let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
+            loads[number] = self.follow(workshop, loads[number], before, &done)?;
             self.state.copy_from(&start);
             self.good.copy_from(&start);
         }
@@ -74,8 +76,15 @@ impl Run<'_> {
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the
-    /// last point before it, since behind it the way back is not sure to be the same. `done` is the part of the stage that lies behind.
-    fn follow(&mut self, workshop: &mut Workshop, estimate: f64, before: usize, done: f64) -> Result<f64, Failure> {
+    /// last point before it, since behind it the way back is not sure to be the same. `done` tells the part of the stage that lies behind with
+    /// some part of this.
+    fn follow(
+        &mut self,
+        workshop: &mut Workshop,
+        estimate: f64,
+        before: usize,
+        done: &dyn Fn(f64) -> f64,
+    ) -> Result<f64, Failure> {
         let way = (estimate - self.state.load).signum();
         let none = self.negative_pivots(workshop);
         let mut search =
@@ -92,7 +101,7 @@ impl Run<'_> {
             let target = search.target();
             self.state.copy_from(&search.here);
             self.good.copy_from(&search.here);
-            self.observer.progress(self.moment(), self.static_progress(done))?;
+            self.observer.progress(self.moment(), self.static_progress(done(search.come())))?;
             let walked = self.continue_path(workshop, target);
             if walked != Walked::There || self.has_leapt(workshop, &search.here)? {
                 // Load control ends at limit points, or comes down on another branch.
@@ -149,11 +158,11 @@ impl Run<'_> {
         workshop: &mut Workshop,
         mut critical: f64,
         before: usize,
-        done: f64,
+        done: &dyn Fn(f64) -> f64,
     ) -> Result<f64, Failure> {
         let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
-            self.observer.progress(self.moment(), self.static_progress(done))?;
+            self.observer.progress(self.moment(), self.static_progress(done(0.0)))?;
             let from = self.state.load;
             let near = self.critical_loads(workshop, before + 4)?;
             // Those that were passed lie behind: it is the one that looks most like the last estimate.
@@ -307,6 +316,12 @@ impl Search {
         let between = (self.estimate - from) * self.way > 0.0 && (beyond - self.estimate) * self.way > 0.0;
         let closed = (beyond - from).abs() <= CLOSED * beyond.abs();
         closed.then_some(if between { self.estimate } else { 0.5 * (from + beyond) })
+    }
+
+    /// The part of the search that lies behind: digits that both points around the load share.
+    fn come(&self) -> f64 {
+        let apart = self.beyond.map_or(1.0, |beyond| (beyond - self.here.load).abs() / beyond.abs());
+        (apart.ln() / CLOSED.ln()).clamp(0.0, 1.0)
     }
 
     /// The path by load control ends before this load.

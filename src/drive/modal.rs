@@ -68,7 +68,9 @@ impl Run<'_> {
 
     /// Twice: the second time about a shift that suits the frequencies themselves.
     fn find_modes(&mut self, workshop: &mut Workshop, matrices: &Matrices, modes: usize) -> Result<Vec<Mode>, Failure> {
-        let (moment, done) = (self.moment(), self.static_progress(0.5));
+        let moment = self.moment();
+        // Two looks, which take most of the stage.
+        let ends = [0.5, 1.0].map(|done| self.static_progress(done));
         let Workshop { assembly, newton, .. } = workshop;
         let [stiffest, heaviest, dampest] =
             [&matrices.stiffness, &matrices.mass, &matrices.damping].map(|v| largest(v));
@@ -82,8 +84,8 @@ impl Run<'_> {
         }
         let damped = dampest > NO_DAMPING * (stiffest * heaviest).sqrt();
         let mut found = Vec::new();
-        for look in 0..2 {
-            self.observer.progress(moment, done)?;
+        for (look, end) in ends.into_iter().enumerate() {
+            self.observer.progress(moment, end)?;
             matrices.combine(shift, &mut assembly.system.values);
             self.counters.work.factorisations += 1;
             let done = newton.solver.factorise_surely(&assembly.system);

@@ -189,7 +189,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         let mut largest = Noise::default();
         for_each_batch!(self.elements, |first, batch| {
             let points = &self.rounding[self.points_before(first)..];
-            let parts = batch.chunks(AT_ONCE).zip(points.chunks(AT_ONCE * batch[0].points().len()));
+            let parts = batch.chunks(AT_ONCE).zip(points.chunks(AT_ONCE * points_of(batch)));
             threads::in_order(
                 parts,
                 |(batch, points)| noise_of(batch, points, at),
@@ -198,6 +198,11 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         });
         largest
     }
+}
+
+/// How many points each of these has.
+fn points_of<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> usize {
+    G
 }
 
 /// The largest round-off of the forces of some elements.

@@ -139,7 +139,8 @@ pub trait Effect: Send + Sync {
     /// Adds forces, and the tangent of the weights that are not zero.
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink);
 
-    /// After a solve, before the state is corrected by `dq`: remembers what the next tangent is formed with.
+    /// Remembers what the next tangent is formed with: what unknowns and charts were before they were corrected by `dq`. Rates of `at` may be
+    /// those after it.
     fn extrapolate(&self, _at: &State, _dq: &[Vec3], _memory: &mut Memory) {}
 
     /// Stored energy.

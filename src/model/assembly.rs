@@ -149,7 +149,7 @@ impl Assembly {
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 
-    /// Lets effects remember what the next tangent is formed with, before the state is corrected by `dq`.
+    /// Lets effects remember what the next tangent is formed with, see [`Effect::extrapolate`].
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
         if self.linear.is_some() {
             return;

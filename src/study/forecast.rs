@@ -68,7 +68,10 @@ impl Watch<'_> {
         // What comes before the first attempt is done once.
         let an_iteration = (watched - self.seen[0].elapsed) / counters.work.iterations.max(1) as f64;
         let pace = |from: &Attempt| (last.elapsed - from.elapsed) / (last.done - from.done);
-        let of_this = [middle, first].into_iter().map(pace).find(|pace| pace.is_finite() && *pace > 0.0);
+        // Searches for critical loads begin slowly and end fast.
+        let searches = matches!(self.scene.plan.stages[last.stage].work, StageWork::Buckling { .. });
+        let from = if searches { [first, middle] } else { [middle, first] };
+        let of_this = from.into_iter().map(pace).find(|pace| pace.is_finite() && *pace > 0.0);
         let of_this = of_this.unwrap_or(an_iteration * self.iterations(last.stage));
         let later = last.stage + 1..self.scene.plan.stages.len();
         of_this * (1.0 - last.done) + later.map(|stage| an_iteration * self.iterations(stage)).sum::<f64>()

@@ -72,9 +72,9 @@ impl Outcome {
         self.moments.iter().zip(&self.rows).map(|(&at, row)| (at, &row[..]))
     }
 
-    /// How many numbers it holds.
+    /// How many numbers it holds, with clocks and lists.
     pub(in crate::study) fn size(&self) -> usize {
-        self.rows.len() * self.rows.first().map_or(0, Vec::len)
+        self.rows.len() * (12 + self.rows.first().map_or(0, Vec::len))
     }
 }
 

@@ -82,6 +82,7 @@ impl<'a> Part<'a> {
             lifted,
             room,
             with_tangent,
+            may_damp: acting.contains(&(Category::Damping as usize)),
         }
     }
 }
@@ -112,6 +113,8 @@ pub struct Sink<'a> {
     lifted: &'a mut [f64],
     room: &'a mut Vec<ElementSystem<Lanes>>,
     with_tangent: bool,
+    /// Whether damping forces are cleared
+    may_damp: bool,
 }
 
 impl Sink<'_> {
@@ -120,7 +123,7 @@ impl Sink<'_> {
         self.instances.clone()
     }
 
-    /// A system to compute with, of so many blocks; its tangent, where there is one, is zero, unless it is going to be formed anew.
+    /// A system to compute with, of so many blocks, whose forces are those of who had it last; its tangent, where there is one, is zero, unless it is going to be formed anew.
     pub fn lend(&mut self, blocks: usize, forms_tangent: bool) -> ElementSystem<Lanes> {
         let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
             return ElementSystem::new(blocks);
@@ -297,12 +300,15 @@ impl Sink<'_> {
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
             let (rows, columns) = (self.equations.of(i), self.equations.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
-            let lift = self.lift.map_or(Vec3::ZERO, |lift| self.equations.to_local(j, lift[j as usize]));
+            let lift = self.lift.map(|lift| self.equations.to_local(j, lift[j as usize]));
             for c in 0..2 {
                 for r in (0..2).filter(|&r| rows[r] != Equations::HELD) {
                     let value = cosines.0[r][c] * entry;
-                    match columns[c] {
-                        Equations::HELD => self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c],
+                    match (columns[c], lift) {
+                        (Equations::HELD, None) => {}
+                        (Equations::HELD, Some(lift)) => {
+                            self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c];
+                        }
                         _ => self.values[place as usize - self.first_value + 3 * c + r] += value,
                     }
                 }
@@ -332,10 +338,10 @@ impl Sink<'_> {
                         continue;
                     }
                     if from == Equations::HELD {
-                        let increment = self
-                            .lift
-                            .map_or(0.0, |lift| self.equations.to_local(slot, lift[slot as usize]).0[entry / 3]);
-                        self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
+                        if let Some(lift) = self.lift {
+                            let increment = self.equations.to_local(slot, lift[slot as usize]).0[entry / 3];
+                            self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
+                        }
                         continue;
                     }
                     let place = if self.places.whole { places[N * i + j] } else { places[2 * N * row + column] };
@@ -446,6 +452,7 @@ impl Sink<'_> {
 
     /// Adds forces of instance `k` that damp, block by block; their tangent goes with the others.
     pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
+        debug_assert!(self.may_damp, "an effect that damps says so");
         for (&slot, &force) in self.places.cliques.get(k).iter().zip(force) {
             self.damping.as_deref_mut().unwrap_or(self.force)[slot as usize - self.first_slot] += force;
         }

@@ -57,7 +57,8 @@ impl Round {
         let longer = self.longer.as_ref().and_then(|_| trials.next());
         let remeshed = self.remeshed.as_ref().and_then(|_| trials.next());
         let trials = Trials { own, longer, remeshed, runs };
-        if trials.own.finished() && trials.longer.as_ref().is_some_and(|longer| !longer.finished()) {
+        let failed = |trial: &Option<Trial>| trial.as_ref().is_some_and(|trial| !trial.finished());
+        if trials.own.finished() && (failed(&trials.longer) || failed(&trials.remeshed)) {
             return self.run_meshes_alike(trials, crew);
         }
         Ok(Some(trials))
@@ -65,7 +66,10 @@ impl Round {
 
     /// Where the longer step is too long, the meshes are compared with the other one.
     fn run_meshes_alike(&mut self, trials: Trials, crew: &mut Crew) -> Result<Option<Trials>, Refusal> {
-        let Some(alike) = self.remeshed_alike() else { return Ok(Some(trials)) };
+        let pace = self.remeshed.as_ref().map(|(point, _)| point.pace);
+        let Some(alike) = self.remeshed_alike().filter(|alike| Some(alike.pace) != pace) else {
+            return Ok(Some(trials));
+        };
         crew.expect(1);
         let again = crew.run(std::slice::from_ref(&alike))?.remove(0);
         if let Some((point, _)) = &mut self.remeshed {

@@ -195,12 +195,8 @@ impl<'a> Search<'a> {
                 self.longest = scaled(self.pace, 0.5);
             }
             let estimates = self.estimates(&round, &trials);
-            for Candidate { point, estimate, has_run } in estimates.accurate_enough(&round) {
-                runs += usize::from(!has_run);
-                if has_run || comes_to_its_end(&point, &mut crew)? {
-                    let outcome = crew.take_outcome(&point);
-                    return Ok(Found { outcome, ..self.found(point, &estimate, runs) });
-                }
+            if let Some(found) = self.choose(estimates.accurate_enough(&round), &mut crew, &mut runs)? {
+                return Ok(found);
             }
             let found = self.found(round.own, &estimates.own, runs);
             if found.ratio.is_finite() && best.as_ref().is_none_or(|best| found.ratio < best.ratio) {
@@ -212,6 +208,23 @@ impl<'a> Search<'a> {
             let message = format!("no run came to its end whose error could be estimated{ended}");
             Refusal::Failure(Failure::Limit(message))
         })
+    }
+
+    /// The first of these that runs; one that the round has not run does so now, if the budget allows it.
+    fn choose(&self, candidates: Vec<Candidate>, crew: &mut Crew, runs: &mut usize) -> Result<Option<Found>, Refusal> {
+        for Candidate { point, estimate, has_run } in candidates {
+            if !has_run {
+                crew.expect(1);
+                let Some(trial) = crew.run(std::slice::from_ref(&point))?.remove(0) else { continue };
+                *runs += 1;
+                if !trial.finished() {
+                    continue;
+                }
+            }
+            let outcome = crew.take_outcome(&point);
+            return Ok(Some(Found { outcome, ..self.found(point, &estimate, *runs) }));
+        }
+        Ok(None)
     }
 
     fn is_too_large(&self, point: &Point) -> bool {
@@ -342,7 +355,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Until another mesh comes of it than that of the last round, which was finer than it should be where pieces had but one element.
+    /// Until another mesh comes of it than that of the last round: counts are rounded.
     fn grow_past_the_last(&mut self) {
         let Some((_, last)) = self.in_space.last.first().map(|(mesh, _)| mesh.clone()) else { return };
         let count = |elements: &[Vec<usize>]| elements.iter().flatten().sum::<usize>();
@@ -394,11 +407,4 @@ fn share(
         }
         _ => Share::unknown(sampler.columns.len()),
     }
-}
-
-/// Whether a variant that is thought to be accurate enough runs; where the budget is over, it is taken to.
-fn comes_to_its_end(point: &Point, crew: &mut Crew) -> Result<bool, Refusal> {
-    crew.expect(1);
-    let trials = crew.run(std::slice::from_ref(point))?;
-    Ok(trials[0].as_ref().is_none_or(Trial::finished))
 }

@@ -21,7 +21,7 @@ const ROUNDS: usize = 4;
 /// Runs that were slower than the fastest of their accuracy by less than this may be it.
 const NEAR: f64 = 1.5;
 
-/// The most numbers of an outcome that is kept: 64 MB of them.
+/// The most numbers of an outcome that is kept, with what a row takes beside its own: 64 MB.
 const KEPT: usize = 1 << 23;
 
 /// The moment after which no run is begun, and running ones are given up.
