@@ -37,8 +37,8 @@ impl Falls {
 /// The lowest order that is believed.
 const LEAST_ORDER: f64 = 0.5;
 
-/// What Newton's method leaves of its tolerance, about: its last iteration does better than it must.
-const LEFT_BY_NEWTON: f64 = 1e-2;
+/// What Newton's method leaves of its tolerance, about: its last iteration does better than it must, though with a kept tangent not by much.
+const LEFT_BY_NEWTON: f64 = 0.2;
 
 /// What Newton's method leaves of all outputs, over the largest value of their kind.
 pub fn left_by_newton(deck: &Deck) -> f64 {
