@@ -55,6 +55,12 @@ pub struct Drive {
     pub motor: Option<Motor>,
 }
 
+impl Drive {
+    fn damps(&self) -> bool {
+        self.damping != 0.0 && self.motor.is_none()
+    }
+}
+
 /// One joint.
 #[derive(Clone, Debug)]
 pub struct Instance {
@@ -361,7 +367,7 @@ impl Effect for Joints {
     }
 
     fn damps(&self) -> bool {
-        true
+        self.joints.iter().any(|joint| joint.drive.damps())
     }
 
     fn cliques(&self) -> Cliques {
@@ -377,7 +383,7 @@ impl Effect for Joints {
             joint.system(at, weights, &mut whole);
             let present: Vec<usize> = (0..block::COUNT).filter(|&b| joint.slots()[b].is_some()).collect();
             out.add(k, &whole.part(&present));
-            if joint.drive.damping != 0.0 && joint.drive.motor.is_none() {
+            if joint.drive.damps() {
                 let drag = joint.drag(at);
                 let parts: Vec<Vec3> = present.iter().map(|&b| drag.get(b).copied().unwrap_or(Vec3::ZERO)).collect();
                 out.add_damping(k, &parts);

@@ -99,7 +99,7 @@ impl Effect for Links {
     }
 
     fn damps(&self) -> bool {
-        true
+        self.links.iter().any(|link| link.damping != 0.0)
     }
 
     fn cliques(&self) -> Cliques {
@@ -109,7 +109,7 @@ impl Effect for Links {
     }
 
     fn is_symmetric(&self) -> bool {
-        self.links.iter().all(|link| link.damping == 0.0)
+        !self.damps()
     }
 
     fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
@@ -131,7 +131,9 @@ impl Effect for Links {
                 system.add_tangent(row, column, tangent.scale(sign));
             }
             out.add(k, &system);
-            out.add_damping(k, &[-pull.damping * on, pull.damping * on]);
+            if link.damping != 0.0 {
+                out.add_damping(k, &[-pull.damping * on, pull.damping * on]);
+            }
         }
     }
 

@@ -49,7 +49,7 @@ impl Effect for Spring {
     }
 
     fn damps(&self) -> bool {
-        true
+        self.springs.iter().any(Instance::is_damped)
     }
 
     fn cliques(&self) -> Cliques {
@@ -59,9 +59,7 @@ impl Effect for Spring {
     }
 
     fn is_symmetric(&self) -> bool {
-        self.springs
-            .iter()
-            .all(|spring| spring.translation_damping == Mat3::ZERO && spring.rotation_damping == Mat3::ZERO)
+        !self.damps()
     }
 
     fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
@@ -84,10 +82,10 @@ impl Effect for Spring {
             system.add_force(1, moment);
             system.add_tangent(0, 0, spring.translation * (on * weights.stiffness));
             system.add_tangent(1, 1, tangent * weights.stiffness);
-            let damping = (weights.damping != 0.0
+            let moves = weights.damping != 0.0
                 || at.v[spring.node.u as usize] != Vec3::ZERO
-                || at.v[spring.node.p as usize] != Vec3::ZERO)
-                .then(|| spring.damping(at, weights));
+                || at.v[spring.node.p as usize] != Vec3::ZERO;
+            let damping = (spring.is_damped() && moves).then(|| spring.damping(at, weights));
             if let Some((force, moment, tangents)) = damping {
                 system.add_tangent(0, 0, tangents[0] * on);
                 system.add_tangent(1, 1, tangents[1] * on);
@@ -123,6 +121,10 @@ impl Effect for Spring {
 }
 
 impl Instance {
+    fn is_damped(&self) -> bool {
+        self.translation_damping != Mat3::ZERO || self.rotation_damping != Mat3::ZERO
+    }
+
     /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P = T c w, whose tangent is
     /// C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
     fn damping(&self, at: &State, weights: Weights) -> (Vec3, Vec3, [Mat3; 2]) {
