@@ -15,8 +15,6 @@ pub struct Outcome {
     pub ended: Result<(), Failure>,
     /// For each stage whether its clock is the time
     dynamic: Vec<bool>,
-    /// Stage and clock of each row: the time, or in static stages the load factor
-    pub(in crate::study) clocks: Vec<(usize, f64)>,
     /// When each row was
     moments: Vec<Moment>,
     /// Row by row
@@ -48,7 +46,6 @@ impl Outcome {
         let mut columns = Columns {
             scene,
             recorder,
-            clocks: Vec::new(),
             moments: Vec::new(),
             rows: Vec::new(),
             found: ModesWriter::default(),
@@ -61,15 +58,33 @@ impl Outcome {
         let start = Instant::now();
         let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
         let seconds = start.elapsed().as_secs_f64();
-        let Columns { recorder, clocks, moments, rows, found, modes, attempts, warnings, .. } = columns;
+        let Columns { recorder, moments, rows, found, modes, attempts, warnings, .. } = columns;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
-        let dynamic = scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect();
-        Self { ended, dynamic, clocks, moments, rows, found, modes, expected, attempts, warnings, counters, seconds }
+        let dynamic = are_dynamic(scene);
+        Self { ended, dynamic, moments, rows, found, modes, expected, attempts, warnings, counters, seconds }
     }
 
     /// The rows of the history, with their moments.
     pub fn history(&self) -> impl Iterator<Item = (Moment, &[f64])> {
         self.moments.iter().zip(&self.rows).map(|(&at, row)| (at, &row[..]))
+    }
+
+    /// The stage and clock of a row: the time, or in static stages the load factor.
+    pub(in crate::study) fn clock(&self, row: usize) -> (usize, f64) {
+        self.clock_at(&self.moments[row])
+    }
+
+    fn clock_at(&self, &Moment { stage, time, load }: &Moment) -> (usize, f64) {
+        (stage, if self.is_dynamic(stage) { time } else { load })
+    }
+
+    /// Those of all rows.
+    pub(in crate::study) fn clocks(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.moments.iter().map(|at| self.clock_at(at))
+    }
+
+    fn is_dynamic(&self, stage: usize) -> bool {
+        self.dynamic.get(stage.wrapping_sub(1)) == Some(&true)
     }
 
     /// How many numbers it holds, with clocks and lists.
@@ -98,20 +113,21 @@ pub(in crate::study) enum Presence {
 impl Outcome {
     /// The number of the row of a stage (from 1) and clock, not before row `from`.
     pub(in crate::study) fn row_at(&self, from: usize, stage: usize, clock: f64) -> Option<usize> {
-        let hit = |&(s, c): &(usize, f64)| s == stage && (c - clock).abs() <= slack(clock);
-        self.clocks[from..].iter().position(hit).map(|after| from + after)
+        let hit = |at: &Moment| at.stage == stage && (self.clock_at(at).1 - clock).abs() <= slack(clock);
+        self.moments[from..].iter().position(hit).map(|after| from + after)
     }
 
     /// What there is of a stage (from 1) at a clock, not before row `from`.
     pub(in crate::study) fn presence(&self, from: usize, stage: usize, clock: f64) -> Presence {
-        let first = from + self.clocks[from..].partition_point(|&(s, _)| s < stage);
-        let end = first + self.clocks[first..].partition_point(|&(s, _)| s == stage);
+        let first = from + self.moments[from..].partition_point(|at| at.stage < stage);
+        let end = first + self.moments[first..].partition_point(|at| at.stage == stage);
         // Times only rise; load factors may fall on a detour.
-        let rises = self.dynamic.get(stage - 1) == Some(&true);
-        let begin = first + self.clocks[first..end].partition_point(|&(_, c)| rises && c < clock - slack(clock));
+        let rises = self.is_dynamic(stage);
+        let before = |at: &Moment| rises && self.clock_at(at).1 < clock - slack(clock);
+        let begin = first + self.moments[first..end].partition_point(before);
         let last = if rises { end.min(begin + 1) } else { end };
-        let here = |&(_, c): &(usize, f64)| (c - clock).abs() <= slack(clock);
-        match self.clocks[begin..last].iter().position(here) {
+        let here = |at: &Moment| (self.clock_at(at).1 - clock).abs() <= slack(clock);
+        match self.moments[begin..last].iter().position(here) {
             Some(after) => Presence::Row(begin + after),
             None if begin < end => Presence::Between,
             None => Presence::Over,
@@ -123,19 +139,16 @@ impl Outcome {
         let find = |name: &str| table.names.iter().position(|known| known == name);
         let places: Vec<Option<usize>> = columns(scene).iter().map(|name| find(name)).collect();
         let cell = |row: &Vec<f64>, place: Option<usize>| place.and_then(|k| row.get(k)).copied();
-        let clock = |row: &Vec<f64>| {
-            let stage = cell(row, find("stage")).map_or(1, |stage| stage as usize);
-            let dynamic =
-                scene.plan.stages.get(stage.wrapping_sub(1)).map(|s| s.work.kind()) == Some(StageKind::Dynamic);
-            (stage, cell(row, find(if dynamic { "time" } else { "load" })).unwrap_or(f64::NAN))
-        };
+        let number = |row: &Vec<f64>, name: &str| cell(row, find(name)).unwrap_or(f64::NAN);
+        let stage = |row: &Vec<f64>| cell(row, find("stage")).map_or(1, |stage| stage as usize);
+        let moment =
+            |row: &Vec<f64>| Moment { stage: stage(row), time: number(row, "time"), load: number(row, "load") };
         let history = &places[..columns_of_history(scene)];
         let row = |row: &Vec<f64>| history.iter().map(|&place| cell(row, place).unwrap_or(f64::NAN)).collect();
         Self {
             ended: Ok(()),
-            dynamic: Vec::new(),
-            clocks: table.rows.iter().map(clock).collect(),
-            moments: Vec::new(),
+            dynamic: are_dynamic(scene),
+            moments: table.rows.iter().map(moment).collect(),
             rows: table.rows.iter().map(row).collect(),
             found: ModesWriter::default(),
             modes: vec![f64::NAN; places.len() - history.len()],
@@ -146,6 +159,11 @@ impl Outcome {
             seconds: 0.0,
         }
     }
+}
+
+/// For each stage whether its clock is the time.
+fn are_dynamic(scene: &Scene) -> Vec<bool> {
+    scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect()
 }
 
 /// The names of all outputs: the columns of the history, then modes and critical loads, stage by stage.
@@ -185,7 +203,6 @@ fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
 struct Columns<'a> {
     scene: &'a Scene,
     recorder: Option<Recorder>,
-    clocks: Vec<(usize, f64)>,
     moments: Vec<Moment>,
     rows: Vec<Vec<f64>>,
     found: ModesWriter,
@@ -208,8 +225,6 @@ impl Observer for Columns<'_> {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
         let mut row = Vec::new();
         self.scene.probes.iter().for_each(|probe| probe.read(at, &mut row));
-        let dynamic = self.scene.plan.stages[at.stage - 1].work.kind() == StageKind::Dynamic;
-        self.clocks.push((at.stage, if dynamic { at.state.time } else { at.state.load }));
         self.moments.push(at.moment());
         self.rows.push(row);
         self.recorder.iter_mut().for_each(|recorder| recorder.row(at));

@@ -37,26 +37,27 @@ impl Outcome {
     /// The row that belongs to row `k` of another run: at its clock, between two rows where there is none. Of stages whose clock goes
     /// back, and of others that ended elsewhere, the last row is compared with the last.
     fn at(&self, other: &Self, k: usize) -> Option<Vec<f64>> {
-        let (stage, clock) = other.clocks[k];
-        if self.clocks.get(k) == Some(&(stage, clock)) {
+        let (stage, clock) = other.clock(k);
+        if k < self.rows.len() && self.clock(k) == (stage, clock) {
             return self.rows.get(k).cloned();
         }
         if k + 1 == other.rows.len() {
             return self.rows.last().cloned();
         }
         let goes_on = |outcome: &Self| {
-            let own = outcome.clocks.iter().filter(|(s, _)| *s == stage).map(|(_, clock)| *clock);
+            let own = outcome.clocks().filter(|(s, _)| *s == stage).map(|(_, clock)| clock);
             own.is_sorted()
         };
         if !(goes_on(self) && goes_on(other)) {
             return None;
         }
-        let after = self.clocks.iter().position(|&(s, c)| s == stage && c >= clock)?;
-        if self.clocks[after].1 == clock {
+        let after = self.clocks().position(|(s, c)| s == stage && c >= clock)?;
+        let (_, c1) = self.clock(after);
+        if c1 == clock {
             return Some(self.rows[after].clone());
         }
-        let (s, c0) = *self.clocks.get(after.checked_sub(1)?)?;
-        let share = (s == stage).then(|| (clock - c0) / (self.clocks[after].1 - c0))?;
+        let (s, c0) = self.clock(after.checked_sub(1)?);
+        let share = (s == stage).then(|| (clock - c0) / (c1 - c0))?;
         let (a, b) = (&self.rows[after - 1], &self.rows[after]);
         Some(a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect())
     }

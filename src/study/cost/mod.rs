@@ -195,7 +195,7 @@ fn sampler(
         Against::Table(table) => {
             let stored = Outcome::of_table(scene, table);
             reaches_the_end(deck, &stored)?;
-            let sampler = Sampler::of_table(deck, scene, outputs, stored.clocks.clone());
+            let sampler = Sampler::of_table(deck, scene, outputs, stored.clocks().collect());
             let samples = sampler.of(&stored);
             (sampler, samples, "the given history")
         }
@@ -226,7 +226,7 @@ fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
     let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| rows(&stage.body)) else {
         return Ok(());
     };
-    let (stage, clock) = stored.clocks.last().copied().unwrap_or((1, 0.0));
+    let (stage, clock) = stored.clocks().last().unwrap_or((1, 0.0));
     let early = match last.body {
         StageBody::Dynamic { end, .. } if stage == k + 1 => last.until.is_none() && clock < end * (1.0 - 1e-9),
         _ => stage < k + 1,
