@@ -12,6 +12,7 @@
 //! there to what is seen from round to round: so estimates are above errors. The error of the coarser run is r^q times that, so the cheapest
 //! that is accurate enough is what is found.
 
+mod candidates;
 mod estimate;
 mod round;
 mod search;

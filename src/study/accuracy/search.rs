@@ -1,5 +1,6 @@
 //! The search for a variant of a deck that is accurate enough.
 
+use super::candidates::{Candidate, Estimate, Estimates};
 use super::estimate::{Fall, Share, Source, left_by_newton};
 use super::round::{Round, Trials};
 use super::{CUBIC, Found, coarser, is_offer, scaled};
@@ -90,54 +91,14 @@ impl<T: PartialEq> Axis<T> {
     }
 }
 
-/// The error of a variant.
-#[derive(Clone)]
-struct Estimate {
-    mesh: Share,
-    step: Share,
-}
-
-impl Estimate {
-    /// The largest of all outputs, over what is wanted of it
-    fn ratio(&self) -> f64 {
-        self.mesh.largest + self.step.largest
-    }
-}
-
-/// The errors that a round tells of.
-struct Estimates {
-    own: Estimate,
-    /// The share of the other mesh
-    remeshed: Option<Share>,
-}
-
-/// A variant that is accurate enough.
-struct Candidate {
-    point: Point,
-    estimate: Estimate,
-    /// Whether the round has run it
-    has_run: bool,
-}
-
-impl Estimates {
-    /// The variants of a round that are accurate enough, the cheapest first.
-    fn accurate_enough(&self, round: &Round) -> Vec<Candidate> {
-        let step = |pace: Pace| if pace == round.own.pace { self.own.step.clone() } else { self.own.step.of_coarser() };
-        let of = |point: &Point, mesh: &Share, has_run| {
-            let estimate = Estimate { mesh: mesh.clone(), step: step(point.pace) };
-            Candidate { point: point.clone(), estimate, has_run }
-        };
-        let mut all = vec![of(&round.own, &self.own.mesh, true)];
-        all.extend(round.longer.as_ref().map(|(longer, _)| of(longer, &self.own.mesh, true)));
-        if let (Some(share), Some((remeshed, _))) = (&self.remeshed, &round.remeshed) {
-            all.push(of(remeshed, share, true));
-            let alike = round.remeshed_alike().filter(|alike| alike.pace != remeshed.pace);
-            all.extend(alike.map(|alike| of(&alike, share, false)));
-        }
-        all.retain(|candidate| candidate.estimate.ratio() <= 1.0);
-        all.sort_by(|a, b| a.point.work().total_cmp(&b.point.work()));
-        all
-    }
+/// What comes after the first look at a round.
+enum Next {
+    /// Its errors are estimated.
+    Estimates,
+    /// Another round, from which this one has told enough
+    Another,
+    /// No other round would tell more.
+    Nothing,
 }
 
 impl<'a> Search<'a> {
@@ -169,36 +130,29 @@ impl<'a> Search<'a> {
             };
             let Some(trials) = trials else { break };
             runs += trials.runs;
-            let status = trials.own.status.as_str();
-            ended = format!("; the last of {runs} ended with `{status}`");
-            match status {
-                // No mesh mends that.
-                "singular" if best.is_none() => {
-                    let again = || Failure::Limit("the first run of the search ended with `singular`".into());
-                    return Err(Refusal::Failure(crew.own_failure().unwrap_or_else(again)));
-                }
-                "finished" => {
-                    let scales = self.mesher.sampler.scales(&trials.own.samples);
-                    self.mesher.sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
-                }
-                "singular" | "deck" => break,
-                // The longer step is no easier: two halvings leave one to compare with.
-                "limit" if is_offer(&round.own) => {
-                    self.pace = scaled(self.pace, 0.25);
-                    self.longest = self.pace;
-                    continue;
-                }
-                _ => {}
+            ended = format!("; the last of {runs} ended with `{}`", trials.own.status);
+            match self.look_at(&round, &trials.own, best.is_none(), &crew)? {
+                Next::Estimates => {}
+                Next::Another => continue,
+                Next::Nothing => break,
             }
             if trials.longer.as_ref().is_some_and(|longer| longer.status == "limit") {
                 // A pace needs one twice as long to compare with.
                 self.longest = scaled(self.pace, 0.5);
             }
             let estimates = self.estimates(&round, &trials);
-            if let Some(found) = self.choose(estimates.accurate_enough(&round), &mut crew, &mut runs)? {
-                return Ok(found);
-            }
+            let chosen = self.choose(estimates.accurate_enough(&round), &mut crew, &mut runs);
             let found = self.found(round.own, &estimates.own, runs);
+            match chosen {
+                Err(Refusal::Failure(stopped)) => {
+                    return Ok(Found { reached: false, stopped: Some(stopped), ..found });
+                }
+                chosen => {
+                    if let Some(chosen) = chosen? {
+                        return Ok(chosen);
+                    }
+                }
+            }
             if found.ratio.is_finite() && best.as_ref().is_none_or(|best| found.ratio < best.ratio) {
                 best = Some(found);
             }
@@ -208,6 +162,30 @@ impl<'a> Search<'a> {
             let message = format!("no run came to its end whose error could be estimated{ended}");
             Refusal::Failure(Failure::Limit(message))
         })
+    }
+
+    /// How the variant of a round has ended; `first` where no round before told an error.
+    fn look_at(&mut self, round: &Round, own: &Trial, first: bool, crew: &Crew) -> Result<Next, Refusal> {
+        match own.status.as_str() {
+            // No mesh mends that.
+            "singular" if first => {
+                let again = || Failure::Limit("the first run of the search ended with `singular`".into());
+                Err(Refusal::Failure(crew.own_failure().unwrap_or_else(again)))
+            }
+            "singular" | "deck" => Ok(Next::Nothing),
+            "finished" => {
+                let scales = self.mesher.sampler.scales(&own.samples);
+                self.mesher.sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
+                Ok(Next::Estimates)
+            }
+            // The longer step is no easier: two halvings leave one to compare with.
+            "limit" if is_offer(&round.own) => {
+                self.pace = scaled(self.pace, 0.25);
+                self.longest = self.pace;
+                Ok(Next::Another)
+            }
+            _ => Ok(Next::Estimates),
+        }
     }
 
     /// The first of these that runs; one that the round has not run does so now, if the budget allows it.
