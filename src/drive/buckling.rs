@@ -320,7 +320,8 @@ impl Search {
 
     /// The part of the search that lies behind: digits that both points around the load share.
     fn come(&self) -> f64 {
-        let apart = self.beyond.map_or(1.0, |beyond| (beyond - self.here.load).abs() / beyond.abs());
+        let beyond = self.beyond.filter(|&beyond| beyond != 0.0);
+        let apart = beyond.map_or(1.0, |beyond| (beyond - self.here.load).abs() / beyond.abs());
         (apart.ln() / CLOSED.ln()).clamp(0.0, 1.0)
     }
 
