@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
-use crate::solve::{NewtonFailure, Verdict, mechanism, timed};
+use crate::solve::{NewtonFailure, Verdict, correction, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -409,7 +409,7 @@ impl Path {
         let mut load = self.predict(run, length);
         workshop.assembly.forget();
         let noise = workshop.assembly.noise(&run.state);
-        let mut last: Option<Vec<Vec3>> = None;
+        let mut last = None;
         let (mut iterations, mut history) = (0, Vec::new());
         loop {
             // Held directions are put where they belong, free of the round-off of predictor and corrections.
@@ -418,7 +418,7 @@ impl Path {
             let Workshop { assembly, newton, lift, .. } = workshop;
             let seconds = &mut run.counters.work.evaluation_seconds;
             timed(seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
-            let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last.as_deref());
+            let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last);
             history.push(residual.ratio);
             match verdict {
                 Verdict::Converged | Verdict::Noisy => return Ok(iterations),
@@ -436,7 +436,7 @@ impl Path {
             load += dl;
             let switched = correct(run, workshop, &dq);
             // What was a correction before is none in a new chart.
-            last = (!switched).then_some(dq);
+            last = (!switched).then(|| correction(&run.model, &dq));
             iterations += 1;
         }
     }

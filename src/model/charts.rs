@@ -116,8 +116,9 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     for &slot in rotations {
         let k = slot as usize;
         let (p, old, wound) = (state.q[k], before.q[k], before.wound[k]);
-        let plain = wound == old && state.wound[k] == wound && (p - old).squared() < 1.0;
-        if plain {
+        // Then all that follows comes to P itself.
+        let is_near = wound == old && (p - old).squared() < 0.5;
+        if is_near && (state.wound[k] == old || state.wound[k] == p) {
             state.wound[k] = p;
             continue;
         }

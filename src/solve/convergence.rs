@@ -1,7 +1,7 @@
 //! The stop test of Newton's iteration, in terms that do not depend on units.
 
 use crate::effect::Noise;
-use crate::model::{Model, SlotInfo, SlotKind};
+use crate::model::{Model, SlotKind};
 use crate::system::{Equations, Plane, Slot, System};
 use crate::tensor::Vec3;
 use crate::threads;
@@ -56,13 +56,13 @@ pub enum Verdict {
 }
 
 impl Convergence {
-    /// Judges the forces of `system`, and the last correction where there was one.
-    pub fn judge(&self, model: &Model, system: &System, noise: Noise, dq: Option<&[Vec3]>) -> (Verdict, Residual) {
+    /// Judges the forces of `system`, and the size of the last correction where there was one.
+    pub fn judge(&self, model: &Model, system: &System, noise: Noise, last: Option<f64>) -> (Verdict, Residual) {
         let residual = self.residual(model, system, noise);
         if !(residual.ratio.is_finite() && residual.force.is_finite()) {
             return (Verdict::NotFinite, residual);
         }
-        let small = dq.is_some_and(|dq| correction(model, dq) <= SMALLEST_CORRECTION);
+        let small = last.is_some_and(|size| size <= SMALLEST_CORRECTION);
         let verdict = match residual.ratio {
             _ if small => Verdict::Converged,
             ratio if ratio > 1.0 => Verdict::Continue,
@@ -200,10 +200,16 @@ fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
 }
 
 /// The largest correction, displacements over the length of the scene.
-pub(super) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
-    let size = |(info, dq): (&SlotInfo, &Vec3)| dq.norm() * info.arm(model.length) / model.length;
+pub(crate) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
+    let length = model.length;
     threads::largest(dq.len(), |slots| {
-        let slots = model.slots[slots.clone()].iter().zip(&dq[slots]);
-        slots.filter(|(info, _)| !info.is_multiplier()).map(size).fold(0.0, f64::max)
+        let mut squares = [0.0; 4];
+        for (&kind, dq) in model.kinds[slots.clone()].iter().zip(&dq[slots]) {
+            let largest = &mut squares[kind as usize];
+            *largest = larger(dq.squared(), *largest);
+        }
+        let [displacement, rotation] =
+            [SlotKind::Displacement, SlotKind::Rotation].map(|kind| squares[kind as usize].sqrt());
+        (displacement / length).max(rotation * length / length)
     })
 }

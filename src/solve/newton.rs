@@ -103,6 +103,8 @@ pub struct Newton {
     pub solver: LinearSolver,
     right_hand_side: Vec<f64>,
     dq: Vec<Vec3>,
+    /// The size of the last correction of a solution
+    last: Option<f64>,
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
     pub first: Vec<Vec3>,
     reuse: Reuse,
@@ -130,6 +132,7 @@ impl Newton {
             solver,
             right_hand_side,
             dq,
+            last: None,
             first: Vec::new(),
             reuse: Reuse::new(),
             foresight: Foresight::default(),
@@ -165,6 +168,7 @@ impl Newton {
         self.foresight.forget(assembly);
         let noise = assembly.noise(state);
         let mut iterations = 0;
+        self.last = None;
         self.first.clear();
         self.reuse.begin(self.given.take() == Some(assembly.system.revision));
         let mut refinement = Refinement::default();
@@ -176,8 +180,7 @@ impl Newton {
                 self.foresight.foresee(assembly, state, &self.dq);
             }
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
-            let last = (iterations > 0).then_some(&self.dq[..]);
-            let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, last);
+            let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, self.last);
             self.reuse.history.push(residual.ratio);
             noisy = verdict == Verdict::Noisy;
             match verdict {
@@ -214,7 +217,8 @@ impl Newton {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, assembly, model, state)));
             }
             iterations += 1;
-            if correction(model, &self.dq) > RUNAWAY {
+            let length = correction(model, &self.dq);
+            if length > RUNAWAY {
                 // Round-off may have left a stiffness where there is none.
                 return Err(match mechanism(&mut self.solver, assembly, model, state) {
                     Some(vector) => NewtonFailure::Singular(Some(vector)),
@@ -232,9 +236,9 @@ impl Newton {
                 self.first.clone_from(&self.dq);
             }
             Self::add(model, state, method, &self.dq);
-            if changes_charts {
-                self.change_charts(model, assembly, state, work);
-            }
+            // What was a correction before is none in a new chart: it may not end the iteration.
+            let switched = changes_charts && self.change_charts(model, assembly, state, work);
+            self.last = Some(if switched { f64::INFINITY } else { length });
         }
     }
 
@@ -263,9 +267,8 @@ impl Newton {
         work: &mut Work,
     ) {
         // A correction that grows is none; without one before, one that is large for its residual is of something loose.
-        let first = self.reuse.history.len() == 1;
-        let most = if first { self.convergence.tolerance.sqrt() } else { correction(model, &self.dq) };
-        if first && method.changes_charts() {
+        let most = self.last.unwrap_or_else(|| self.convergence.tolerance.sqrt());
+        if self.last.is_none() && method.changes_charts() {
             return;
         }
         if !formed && !self.reuse.has_tangent() {
@@ -315,16 +318,17 @@ impl Newton {
         solved
     }
 
-    /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn.
-    fn change_charts(&mut self, model: &Model, assembly: &mut Assembly, state: &mut State, work: &mut Work) {
+    /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn; whether one did.
+    fn change_charts(&mut self, model: &Model, assembly: &mut Assembly, state: &mut State, work: &mut Work) -> bool {
         let switched = charts::switch(state, &model.charted.rotations, charts::STATIC_BAND, None);
         if switched > 0 {
             work.chart_switches += switched as u64;
             charts::freeze(state, &model.charted.elements);
             self.reuse.forget();
             self.foresight.foresee(assembly, state, &self.dq);
-            // What was a correction before is none in the new chart: it may not end the iteration.
+            // Nor does it tell how the next one refines.
             self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }
+        switched > 0
     }
 }
