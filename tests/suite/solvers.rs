@@ -122,6 +122,25 @@ fn blocks_solve_what_faer_solves() {
     }
 }
 
+/// Taken as it stands, a pivot of 1e-13 would leave three digits.
+#[test]
+fn rows_with_small_pivots_wait() {
+    let mut random = Random::new(12);
+    let mut system = system(&tree(20, &mut random), false, 0.0, &mut random);
+    let n = system.pattern.equations.count() as u32;
+    for k in 0..n {
+        let place = system.pattern.find(k, k).unwrap();
+        system.values[place] = 1e-13;
+    }
+    let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
+    let mut x = wanted.clone();
+    let mut blocks = BlockSolver::new(&system.pattern, false).unwrap();
+    assert!(blocks.factorise(&system));
+    blocks.solve(&system.pattern, &mut x);
+    let left = system.residual(&wanted, &x, &mut Leftover::default());
+    assert!(left < 1e-11, "{left:e}");
+}
+
 #[test]
 fn negative_pivots_are_negative_eigenvalues() {
     let mut random = Random::new(4);

@@ -64,6 +64,13 @@ impl Elimination {
         self.starts[row] as usize..self.starts[row + 1] as usize
     }
 
+    /// The end of these rows and of those before `end` that their elimination changes.
+    pub fn reach(&self, rows: &Range<usize>, end: usize) -> usize {
+        let later = &self.later[self.starts[rows.start] as usize..self.starts[rows.end] as usize];
+        let ends = later.iter().map(|&row| row as usize + 1).filter(|&after| after <= end);
+        ends.fold(rows.end, usize::max)
+    }
+
     /// Branches and trunk.
     pub fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
         self.branches.iter().chain([&self.trunk]).cloned()

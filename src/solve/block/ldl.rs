@@ -7,7 +7,7 @@ use super::tile::{self, Part, Rows, Tile, Width};
 use crate::system::System;
 use std::ops::Range;
 
-/// With Y = L_kk^-1 A_kj right of the diagonal, L_jk = Y^T D_k^-1.
+/// With Y = L_kk^-1 A_kj, L_jk = Y^T D_k^-1, whose transpose stands right of the diagonal.
 pub struct Ldl<const W: usize> {
     diagonal: Stretch<Tile<W>>,
     upper: Stretch<Tile<W>>,
@@ -24,17 +24,21 @@ where
         Some(Self { diagonal: Stretch::new(rows, tile::zero())?, upper: Stretch::new(blocks, tile::zero())? })
     }
 
+    fn rows(&self) -> Range<usize> {
+        self.diagonal.range()
+    }
+
     #[inline(always)]
-    fn load(&mut self, elimination: &Elimination, system: &System) {
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System) {
         let tiles = system.tiles::<W>();
-        for row in self.diagonal.range() {
+        for row in rows.clone() {
             self.diagonal[row] = *tile::of(tiles, elimination.diagonal[row]);
             for k in elimination.neighbours(row) {
                 // The one half of a symmetric tangent is the other one's transpose.
                 self.upper[k] = *tile::of(tiles, elimination.sources[k][1]);
             }
         }
-        for &(row, direction) in elimination.idle(&self.diagonal.range()) {
+        for &(row, direction) in elimination.idle(&rows) {
             self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
         }
     }
@@ -50,10 +54,10 @@ where
     }
 
     #[inline(always)]
-    fn eliminate(&mut self, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
+    fn eliminate(&mut self, rows: Range<usize>, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
         let Self { diagonal, upper } = self;
         let mut negative = 0;
-        for row in diagonal.range() {
+        for row in rows {
             negative += tile::factorise_symmetric(&mut diagonal[row])?;
             let factor = diagonal[row];
             let neighbours = elimination.neighbours(row);
@@ -62,14 +66,16 @@ where
             }
             let mut target = elimination.target_starts[row] as usize;
             for k in neighbours.clone() {
-                let w = tile::over_pivots(&factor, &upper[k]);
+                let y = upper[k];
+                let w = tile::over_pivots(&factor, &y);
                 let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
-                tile::subtract_product(changed, &w, &upper[k]);
+                tile::subtract_product(changed, &w, &y);
                 for b in k + 1..neighbours.end {
                     let y = upper[b];
                     tile::subtract_product(upper.or(&mut beyond.upper, elimination.targets[target] as usize), &w, &y);
                     target += 1;
                 }
+                upper[k] = w;
             }
         }
         Some(negative)
@@ -77,30 +83,28 @@ where
 
     #[inline(always)]
     fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
-        let rows = self.diagonal.range();
+        let rows = self.rows();
         for row in rows.clone() {
             let (factor, mut part) = (&self.diagonal[row], x[row - rows.start]);
             tile::solve_forward_symmetric(factor, &mut part);
-            part.iter_mut().enumerate().for_each(|(r, x)| *x *= factor[r][r]);
             for k in elimination.neighbours(row) {
                 let later = elimination.place(&rows, k);
                 tile::subtract_transposed(later.of_mut(x, beyond), &self.upper[k], &part);
             }
+            part.iter_mut().enumerate().for_each(|(r, x)| *x *= factor[r][r]);
             x[row - rows.start] = part;
         }
     }
 
     #[inline(always)]
     fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
-        let rows = self.diagonal.range();
+        let rows = self.rows();
         for row in rows.clone().rev() {
-            let mut sum = [0.0; W];
+            let mut part = x[row - rows.start];
             for k in elimination.neighbours(row) {
-                tile::subtract_times(&mut sum, &self.upper[k], elimination.place(&rows, k).of(x, beyond));
+                tile::subtract_times(&mut part, &self.upper[k], elimination.place(&rows, k).of(x, beyond));
             }
-            let (factor, mut part) = (&self.diagonal[row], x[row - rows.start]);
-            part.iter_mut().enumerate().for_each(|(r, x)| *x += factor[r][r] * sum[r]);
-            tile::solve_backward_symmetric(factor, &mut part);
+            tile::solve_backward_symmetric(&self.diagonal[row], &mut part);
             x[row - rows.start] = part;
         }
     }

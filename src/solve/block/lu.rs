@@ -32,10 +32,14 @@ where
         })
     }
 
+    fn rows(&self) -> Range<usize> {
+        self.diagonal.range()
+    }
+
     #[inline(always)]
-    fn load(&mut self, elimination: &Elimination, system: &System) {
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System) {
         let tiles = system.tiles::<W>();
-        for row in self.diagonal.range() {
+        for row in rows.clone() {
             self.diagonal[row] = tile::transposed(tile::of(tiles, elimination.diagonal[row]));
             for k in elimination.neighbours(row) {
                 let [upper, lower] = elimination.sources[k];
@@ -43,7 +47,7 @@ where
                 self.lower[k] = *tile::of(tiles, lower);
             }
         }
-        for &(row, direction) in elimination.idle(&self.diagonal.range()) {
+        for &(row, direction) in elimination.idle(&rows) {
             self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
         }
     }
@@ -61,9 +65,9 @@ where
     }
 
     #[inline(always)]
-    fn eliminate(&mut self, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
+    fn eliminate(&mut self, rows: Range<usize>, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
         let Self { diagonal, orders, upper, lower } = self;
-        for row in diagonal.range() {
+        for row in rows {
             let order = tile::factorise(&mut diagonal[row])?;
             orders[row] = order;
             let factor = diagonal[row];
@@ -94,7 +98,7 @@ where
 
     #[inline(always)]
     fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
-        let rows = self.diagonal.range();
+        let rows = self.rows();
         for row in rows.clone() {
             let mut part = x[row - rows.start];
             tile::solve_forward(&self.diagonal[row], &self.orders[row], &mut part);
@@ -108,7 +112,7 @@ where
 
     #[inline(always)]
     fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
-        let rows = self.diagonal.range();
+        let rows = self.rows();
         for row in rows.clone().rev() {
             let mut part = x[row - rows.start];
             for k in elimination.neighbours(row) {

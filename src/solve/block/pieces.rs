@@ -8,6 +8,9 @@ use crate::system::System;
 use crate::threads;
 use std::ops::Range;
 
+/// Rows that are eliminated without a look at what has to be loaded for them
+const AT_ONCE: usize = 8;
+
 /// The numbers of rows that follow each other.
 pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// What it does, in a word
@@ -19,8 +22,11 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// Of these rows, and blocks right of the diagonal. `None` where memory cannot be had.
     fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self>;
 
-    /// Takes over the tangent.
-    fn load(&mut self, elimination: &Elimination, system: &System);
+    /// Its rows.
+    fn rows(&self) -> Range<usize>;
+
+    /// Takes over the tangent in some of its rows.
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System);
 
     /// Adds what belongs to the same rows.
     fn add(&mut self, other: &Self);
@@ -28,9 +34,9 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// Sets all numbers to zero.
     fn clear(&mut self);
 
-    /// Eliminates its rows; what that changes in later rows goes to `beyond`. The number of negative pivots; `None` where one is zero or
-    /// no number.
-    fn eliminate(&mut self, elimination: &Elimination, beyond: &mut Self) -> Option<usize>;
+    /// Eliminates the next of its rows; what that changes in rows later than its own goes to `beyond`. The number of negative pivots;
+    /// `None` where one is zero or no number.
+    fn eliminate(&mut self, rows: Range<usize>, elimination: &Elimination, beyond: &mut Self) -> Option<usize>;
 
     /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to `beyond`.
     fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]);
@@ -82,9 +88,9 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
         let last = Instructions::here().run(
             #[inline(always)]
             || {
-                trunk.load(elimination, system);
+                trunk.load(trunk.rows(), elimination, system);
                 changes.iter().for_each(|change| trunk.add(change));
-                trunk.eliminate(elimination, nothing)
+                trunk.eliminate(trunk.rows(), elimination, nothing)
             },
         );
         *negative = counted + last.unwrap_or_default();
@@ -118,6 +124,7 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     }
 }
 
+/// Takes over the tangent not long before it is needed, so that it passes the caches once.
 fn eliminate<const W: usize, P: Piece<W>>(
     piece: &mut P,
     elimination: &Elimination,
@@ -127,8 +134,15 @@ fn eliminate<const W: usize, P: Piece<W>>(
     Instructions::here().run(
         #[inline(always)]
         || {
-            piece.load(elimination, system);
-            piece.eliminate(elimination, beyond)
+            let all = piece.rows();
+            let (mut loaded, mut negative) = (all.start, 0);
+            for start in all.clone().step_by(AT_ONCE) {
+                let rows = start..all.end.min(start + AT_ONCE);
+                let reach = loaded.max(elimination.reach(&rows, all.end));
+                piece.load(std::mem::replace(&mut loaded, reach)..reach, elimination, system);
+                negative += piece.eliminate(rows, elimination, beyond)?;
+            }
+            Some(negative)
         },
     )
 }

@@ -7,6 +7,10 @@ pub use crate::system::Tile;
 /// A part of a vector that belongs to one tile row.
 pub type Part<const W: usize> = [f64; W];
 
+/// Rows of a tile stay in their order as long as no entry of L is larger than this. What it is does not matter much: what a tile loses,
+/// a look at the residual finds.
+const LARGEST: f64 = 4.0;
+
 /// The order in which a tile takes its rows as pivots.
 pub type RowOrder<const W: usize> = [u8; W];
 
@@ -151,14 +155,26 @@ where
     out
 }
 
-/// What `f` gives for each row of a tile, written out: the first `None` ends it.
+/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves loops keep numbers out of registers, and
+/// take twice as long.
 macro_rules! each_row {
-    ($f:ident, $($argument:expr),*) => {{
-        let mut sum = $f::<W, 0>($($argument),*)? + $f::<W, 1>($($argument),*)? + $f::<W, 2>($($argument),*)?;
-        if W > 3 {
-            sum += $f::<W, 3>($($argument),*)? + $f::<W, 4>($($argument),*)? + $f::<W, 5>($($argument),*)?;
-        }
-        sum
+    ($width:ident, |$row:ident| $work:expr) => {{
+        each_row!(@ $width, $row, $work, 0, 1, 2, 3, 4, 5);
+    }};
+    (@ $width:ident, $row:ident, $work:expr, $($number:literal),*) => {
+        $({
+            let $row = $number;
+            if $row < $width {
+                $work;
+            }
+        })*
+    };
+}
+
+/// The same from the last row on.
+macro_rules! each_row_backwards {
+    ($width:ident, |$row:ident| $work:expr) => {{
+        each_row!(@ $width, $row, $work, 5, 4, 3, 2, 1, 0);
     }};
 }
 
@@ -166,11 +182,7 @@ macro_rules! each_row {
 #[inline(always)]
 pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
     let mut out = zero();
-    for (i, row) in tile.iter().enumerate() {
-        for (j, &x) in row.iter().enumerate() {
-            out[j][i] = x;
-        }
-    }
+    each_row!(W, |i| each_row!(W, |j| out[j][i] = tile[i][j]));
     out
 }
 
@@ -181,13 +193,11 @@ where
     Width<W>: Rows<W>,
 {
     let y = rows::<W>(y);
-    for (r, sum) in target.iter_mut().enumerate() {
-        let mut lanes = row::<W>(sum);
-        for d in 0..W {
-            Width::<W>::subtract(&mut lanes, w[d][r], &y[d]);
-        }
-        *sum = part::<W>(lanes);
-    }
+    each_row!(W, |r| {
+        let mut sum = row::<W>(&target[r]);
+        each_row!(W, |d| Width::<W>::subtract(&mut sum, w[d][r], &y[d]));
+        target[r] = part::<W>(sum);
+    });
 }
 
 /// part -= w^T x
@@ -197,9 +207,7 @@ where
     Width<W>: Rows<W>,
 {
     let mut sum = row::<W>(part);
-    for (line, &x) in w.iter().zip(x) {
-        Width::<W>::subtract(&mut sum, x, &row::<W>(line));
-    }
+    each_row!(W, |r| Width::<W>::subtract(&mut sum, x[r], &row::<W>(&w[r])));
     *part = self::part::<W>(sum);
 }
 
@@ -209,9 +217,7 @@ pub fn subtract_times<const W: usize>(part: &mut Part<W>, y: &Tile<W>, x: &Part<
 where
     Width<W>: Rows<W>,
 {
-    for (out, row) in part.iter_mut().zip(y) {
-        *out -= Width::<W>::dot(row, x);
-    }
+    each_row!(W, |r| part[r] -= Width::<W>::dot(&y[r], x));
 }
 
 /// L D L^T of a symmetric tile, whose upper triangle is read: L^T takes the place above the diagonal, 1/D that of the
@@ -221,28 +227,27 @@ pub fn factorise_symmetric<const W: usize>(tile: &mut Tile<W>) -> Option<usize>
 where
     Width<W>: Rows<W>,
 {
-    Some(each_row!(eliminate_symmetric, tile))
+    let mut negative = 0;
+    each_row!(W, |r| {
+        let inverse = inverse(tile[r][r])?;
+        let (pivot, lanes) = (tile[r], row::<W>(&tile[r]));
+        each_row!(W, |k| if k > r {
+            let mut below = row::<W>(&tile[k]);
+            Width::<W>::subtract(&mut below, pivot[k] * inverse, &lanes);
+            tile[k] = part::<W>(below);
+        });
+        tile[r] = part::<W>(Width::<W>::scaled(lanes, inverse));
+        tile[r][r] = inverse;
+        negative += usize::from(inverse < 0.0);
+    });
+    Some(negative)
 }
 
-/// Takes row R as the pivot of those below.
+/// 1/pivot; `None` where that is zero or no number.
 #[inline(always)]
-fn eliminate_symmetric<const W: usize, const R: usize>(tile: &mut Tile<W>) -> Option<usize>
-where
-    Width<W>: Rows<W>,
-{
-    let inverse = 1.0 / tile[R][R];
-    if !inverse.is_finite() || inverse == 0.0 {
-        return None;
-    }
-    let (pivot, lanes) = (tile[R], row::<W>(&tile[R]));
-    for k in R + 1..W {
-        let mut below = row::<W>(&tile[k]);
-        Width::<W>::subtract(&mut below, pivot[k] * inverse, &lanes);
-        tile[k] = part::<W>(below);
-    }
-    tile[R] = part::<W>(Width::<W>::scaled(lanes, inverse));
-    tile[R][R] = inverse;
-    Some(usize::from(inverse < 0.0))
+fn inverse(pivot: f64) -> Option<f64> {
+    let inverse = 1.0 / pivot;
+    (inverse.is_finite() && inverse != 0.0).then_some(inverse)
 }
 
 /// y = L^-1 y, for all columns at once.
@@ -252,12 +257,12 @@ where
     Width<W>: Rows<W>,
 {
     let mut lanes = rows::<W>(y);
-    for r in 0..W {
+    each_row!(W, |r| {
         let pivot = lanes[r];
-        for k in r + 1..W {
+        each_row!(W, |k| if k > r {
             Width::<W>::subtract(&mut lanes[k], factor[r][k], &pivot);
-        }
-    }
+        });
+    });
     *y = parts::<W>(&lanes);
 }
 
@@ -268,75 +273,103 @@ where
     Width<W>: Rows<W>,
 {
     let mut out = zero();
-    for r in 0..W {
-        out[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r]));
-    }
+    each_row!(W, |r| out[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r])));
     out
 }
 
 /// x = L^-1 x
 #[inline(always)]
 pub fn solve_forward_symmetric<const W: usize>(factor: &Tile<W>, x: &mut Part<W>) {
-    for r in 0..W {
-        for k in r + 1..W {
-            x[k] -= factor[r][k] * x[r];
-        }
-    }
+    each_row!(W, |r| each_row!(W, |k| if k > r {
+        x[k] -= factor[r][k] * x[r];
+    }));
 }
 
-/// x = L^-T x
+/// x = L^-T x; what is known last comes last, so that nothing waits for it.
 #[inline(always)]
 pub fn solve_backward_symmetric<const W: usize>(factor: &Tile<W>, x: &mut Part<W>) {
-    for r in (0..W).rev() {
-        for k in r + 1..W {
-            x[r] -= factor[r][k] * x[k];
-        }
-    }
+    each_row_backwards!(W, |r| each_row_backwards!(W, |k| if k > r {
+        x[r] -= factor[r][k] * x[k];
+    }));
 }
 
-/// P A = L U of a tile with rows in the order of the largest pivots: L (its diagonal is one) below, U from the diagonal on,
-/// whose diagonal holds inverses. `None` where a pivot is zero or no number.
+/// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds inverses. Rows stay where they are
+/// if their pivots are large enough; else those with the largest pivots come first. `None` where a pivot is zero or no number.
 #[inline(always)]
 pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<RowOrder<W>>
 where
     Width<W>: Rows<W>,
 {
-    let mut order = std::array::from_fn(|r| r as u8);
-    each_row!(eliminate, tile, &mut order);
-    Some(order)
+    let mut in_order = *tile;
+    if factorise_in_order(&mut in_order) {
+        *tile = in_order;
+        return Some(std::array::from_fn(|r| r as u8));
+    }
+    factorise_by_largest(tile)
 }
 
-/// Takes the row with the largest entry in column R as the pivot of those below.
+/// The same with rows where they are; `false` where some entry of L is larger than [`LARGEST`], or a pivot zero or no
+/// number.
 #[inline(always)]
-fn eliminate<const W: usize, const R: usize>(tile: &mut Tile<W>, order: &mut RowOrder<W>) -> Option<usize>
+fn factorise_in_order<const W: usize>(tile: &mut Tile<W>) -> bool
 where
     Width<W>: Rows<W>,
 {
-    let mut pivot = R;
-    for k in R + 1..W {
-        if tile[k][R].abs() > tile[pivot][R].abs() {
-            pivot = k;
+    each_row!(W, |r| {
+        let inverse = 1.0 / tile[r][r];
+        if !inverse.is_finite() || inverse == 0.0 {
+            return false;
         }
+        take_pivot(tile, r, inverse);
+        each_row!(W, |k| if k > r && tile[k][r].abs() > LARGEST {
+            return false;
+        });
+    });
+    true
+}
+
+/// The same with the row that has the largest entry of its column as the next one.
+#[inline(never)]
+fn factorise_by_largest<const W: usize>(tile: &mut Tile<W>) -> Option<RowOrder<W>>
+where
+    Width<W>: Rows<W>,
+{
+    let mut order = std::array::from_fn(|r| r as u8);
+    for r in 0..W {
+        let mut pivot = r;
+        for k in r + 1..W {
+            if tile[k][r].abs() > tile[pivot][r].abs() {
+                pivot = k;
+            }
+        }
+        tile.swap(r, pivot);
+        order.swap(r, pivot);
+        let inverse = inverse(tile[r][r])?;
+        take_pivot(tile, r, inverse);
     }
-    tile.swap(R, pivot);
-    order.swap(R, pivot);
-    let inverse = 1.0 / tile[R][R];
-    if !inverse.is_finite() || inverse == 0.0 {
-        return None;
-    }
+    Some(order)
+}
+
+/// Takes row r, whose pivot has this inverse, from those below.
+#[inline(always)]
+fn take_pivot<const W: usize>(tile: &mut Tile<W>, r: usize, inverse: f64)
+where
+    Width<W>: Rows<W>,
+{
     // What stands left of the diagonal belongs to L.
-    let mut right = tile[R];
-    right[..=R].fill(0.0);
+    let mut right = tile[r];
+    each_row!(W, |k| if k <= r {
+        right[k] = 0.0;
+    });
     let right = row::<W>(&right);
-    for below in tile.iter_mut().skip(R + 1) {
-        let factor = below[R] * inverse;
-        let mut lanes = row::<W>(below);
-        Width::<W>::subtract(&mut lanes, factor, &right);
-        *below = part::<W>(lanes);
-        below[R] = factor;
-    }
-    tile[R][R] = inverse;
-    Some(0)
+    each_row!(W, |k| if k > r {
+        let factor = tile[k][r] * inverse;
+        let mut below = row::<W>(&tile[k]);
+        Width::<W>::subtract(&mut below, factor, &right);
+        tile[k] = part::<W>(below);
+        tile[k][r] = factor;
+    });
+    tile[r][r] = inverse;
 }
 
 /// Rows in another order.
@@ -352,12 +385,12 @@ where
     Width<W>: Rows<W>,
 {
     let mut lanes = rows::<W>(y);
-    for r in 0..W {
+    each_row!(W, |r| {
         let pivot = lanes[r];
-        for k in r + 1..W {
+        each_row!(W, |k| if k > r {
             Width::<W>::subtract(&mut lanes[k], factor[k][r], &pivot);
-        }
-    }
+        });
+    });
     *y = parts::<W>(&lanes);
 }
 
@@ -368,13 +401,13 @@ where
     Width<W>: Rows<W>,
 {
     let mut lanes = rows::<W>(w);
-    for r in 0..W {
+    each_row!(W, |r| {
         lanes[r] = Width::<W>::scaled(lanes[r], factor[r][r]);
         let pivot = lanes[r];
-        for k in r + 1..W {
+        each_row!(W, |k| if k > r {
             Width::<W>::subtract(&mut lanes[k], factor[r][k], &pivot);
-        }
-    }
+        });
+    });
     *w = parts::<W>(&lanes);
 }
 
@@ -382,20 +415,18 @@ where
 #[inline(always)]
 pub fn solve_forward<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, x: &mut Part<W>) {
     *x = order.map(|r| x[r as usize]);
-    for r in 0..W {
-        for k in r + 1..W {
-            x[k] -= factor[k][r] * x[r];
-        }
-    }
+    each_row!(W, |r| each_row!(W, |k| if k > r {
+        x[k] -= factor[k][r] * x[r];
+    }));
 }
 
-/// x = U^-1 x
+/// x = U^-1 x, as [`solve_backward_symmetric`].
 #[inline(always)]
 pub fn solve_backward<const W: usize>(factor: &Tile<W>, x: &mut Part<W>) {
-    for r in (0..W).rev() {
-        for k in r + 1..W {
+    each_row_backwards!(W, |r| {
+        each_row_backwards!(W, |k| if k > r {
             x[r] -= factor[r][k] * x[k];
-        }
+        });
         x[r] *= factor[r][r];
-    }
+    });
 }
