@@ -30,7 +30,7 @@ pub struct Elimination {
     pub later: Vec<u32>,
     /// Where the targets of each row begin
     pub target_starts: Vec<u32>,
-    /// Row by row, for each pair of later neighbours (a before b), in the order of a and then of b: the block that they
+    /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a: the block that they
     /// share right of the diagonal
     pub targets: Vec<u32>,
     /// The tile of the tangent on the diagonal of each row
@@ -151,8 +151,8 @@ fn targets(starts: &[u32], later: &[u32]) -> (Vec<u32>, Vec<u32>) {
     for row in 0..starts.len() - 1 {
         begins.push(targets.len() as u32);
         let neighbours = &later[starts[row] as usize..starts[row + 1] as usize];
-        for (k, &a) in neighbours.iter().enumerate() {
-            targets.extend(neighbours[k + 1..].iter().map(|&b| find(starts, later, a, b) as u32));
+        for (k, &b) in neighbours.iter().enumerate() {
+            targets.extend(neighbours[..k].iter().map(|&a| find(starts, later, a, b) as u32));
         }
     }
     (begins, targets)

@@ -60,21 +60,18 @@ where
         for row in rows {
             negative += tile::factorise_symmetric(&mut diagonal[row])?;
             let factor = diagonal[row];
-            let neighbours = elimination.neighbours(row);
+            let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
             for k in neighbours.clone() {
-                tile::forward_symmetric(&factor, &mut upper[k]);
-            }
-            let mut target = elimination.target_starts[row] as usize;
-            for k in neighbours.clone() {
-                let y = upper[k];
-                let w = tile::over_pivots(&factor, &y);
-                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
-                tile::subtract_product(changed, &w, &y);
-                for b in k + 1..neighbours.end {
-                    let y = upper[b];
+                let mut y = upper[k];
+                tile::forward_symmetric(&factor, &mut y);
+                for a in neighbours.start..k {
+                    let w = upper[a];
                     tile::subtract_product(upper.or(&mut beyond.upper, elimination.targets[target] as usize), &w, &y);
                     target += 1;
                 }
+                let w = tile::over_pivots(&factor, &y);
+                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
+                tile::subtract_product(changed, &w, &y);
                 upper[k] = w;
             }
         }

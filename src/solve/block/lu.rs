@@ -71,25 +71,21 @@ where
             let order = tile::factorise(&mut diagonal[row])?;
             orders[row] = order;
             let factor = diagonal[row];
-            let neighbours = elimination.neighbours(row);
+            let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
             for k in neighbours.clone() {
-                let mut y = tile::permuted(&order, &upper[k]);
+                let (mut y, mut w) = (tile::permuted(&order, &upper[k]), lower[k]);
                 tile::forward(&factor, &mut y);
-                upper[k] = y;
-                tile::forward_upper(&factor, &mut lower[k]);
-            }
-            let mut target = elimination.target_starts[row] as usize;
-            for k in neighbours.clone() {
-                let (w, y) = (lower[k], upper[k]);
-                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
-                tile::subtract_product(changed, &w, &y);
-                for b in k + 1..neighbours.end {
-                    let (other_w, other_y) = (lower[b], upper[b]);
+                tile::forward_upper(&factor, &mut w);
+                for a in neighbours.start..k {
+                    let (other_y, other_w) = (upper[a], lower[a]);
                     let shared = elimination.targets[target] as usize;
-                    tile::subtract_product(upper.or(&mut beyond.upper, shared), &w, &other_y);
-                    tile::subtract_product(lower.or(&mut beyond.lower, shared), &y, &other_w);
+                    tile::subtract_product(upper.or(&mut beyond.upper, shared), &other_w, &y);
+                    tile::subtract_product(lower.or(&mut beyond.lower, shared), &other_y, &w);
                     target += 1;
                 }
+                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
+                tile::subtract_product(changed, &w, &y);
+                (upper[k], lower[k]) = (y, w);
             }
         }
         // Signs of pivots tell nothing.
