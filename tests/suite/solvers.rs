@@ -6,7 +6,7 @@ use beamsim::kernel::{ElementSystem, Weights};
 use beamsim::model::Assembly;
 use beamsim::scene;
 use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, is_symmetric};
-use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Pattern, System};
+use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Pattern, Plane, System};
 use beamsim::tensor::{Mat3, Vec3};
 use nalgebra::DMatrix;
 
@@ -31,6 +31,11 @@ fn lattice(across: usize) -> Vec<[usize; 2]> {
 /// A tangent of nodes with two slots, each edge an element of two nodes with random blocks, some directions held, some along
 /// turned axes; `shift` of the identity is added at each node.
 fn system(edges: &[[usize; 2]], symmetric: bool, shift: f64, random: &mut Random) -> System {
+    system_in(None, edges, symmetric, shift, random)
+}
+
+/// The same in a plane, where there is one.
+fn system_in(plane: Option<Plane>, edges: &[[usize; 2]], symmetric: bool, shift: f64, random: &mut Random) -> System {
     let nodes = 1 + edges.iter().flatten().max().unwrap();
     let mut cliques = Cliques::default();
     for [a, b] in edges {
@@ -38,10 +43,22 @@ fn system(edges: &[[usize; 2]], symmetric: bool, shift: f64, random: &mut Random
     }
     let mut own = Cliques::default();
     (0..2 * nodes as u32).for_each(|slot| own.push([slot]));
-    let slanted = Direction { slot: 3, axis: Vec3([0.6, 0.0, 0.8]) };
-    let held = [Direction { slot: 0, axis: Vec3::UNIT[1] }, slanted];
-    let equations = Equations::new(2 * nodes, &held).unwrap();
-    let groups = Groups::new(2 * nodes, Layout::Spatial, |slot| slot % 2 == 1);
+    let turns = |slot: u32| slot % 2 == 1;
+    let slanted = match plane {
+        None => Direction { slot: 3, axis: Vec3([0.6, 0.0, 0.8]) },
+        Some(_) => Direction { slot: 2, axis: Vec3([0.6, 0.8, 0.0]) },
+    };
+    let first = Direction { slot: 0, axis: Vec3::UNIT[1] };
+    // In large scenes some that come late in the order of elimination, too.
+    let late = [(nodes as u32 | 1, Vec3::UNIT[2]), (2 * nodes as u32 - 2, Vec3::UNIT[1])];
+    let late = late.map(|(slot, axis)| Direction { slot, axis });
+    let mut held = vec![first, slanted];
+    held.extend(late.into_iter().filter(|_| nodes > 10));
+    let (equations, layout) = match plane {
+        None => (Equations::new(2 * nodes, &held).unwrap(), Layout::Spatial),
+        Some(plane) => (Equations::planar(2 * nodes, &held, plane, turns).unwrap(), Layout::Planar),
+    };
+    let groups = Groups::new(2 * nodes, layout, turns);
     let pattern = Pattern::new(equations, groups, vec![cliques, own]);
     let mut system = System::new(pattern, 2 * nodes, symmetric, &[]);
     system.clear(None);
@@ -98,28 +115,46 @@ fn large_patterns(random: &mut Random) -> Vec<(&'static str, Vec<[usize; 2]>)> {
 fn blocks_solve_what_faer_solves() {
     let mut random = Random::new(3);
     for (name, edges) in [patterns(&mut random), large_patterns(&mut random)].concat() {
-        for symmetric in [true, false] {
-            for shift in [0.0, 30.0] {
-                let system = system(&edges, symmetric, shift, &mut random);
-                let n = system.pattern.equations.count();
-                let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
-                let (mut by_blocks, mut by_faer) = (wanted.clone(), wanted.clone());
-                let mut blocks = BlockSolver::new(&system.pattern, symmetric).unwrap();
-                assert!(blocks.factorise(&system), "{name}");
-                blocks.solve(&system.pattern, &mut by_blocks);
-                let mut general = GeneralSolver::new(&system).unwrap();
-                assert!(general.factorise(&system), "{name}");
-                general.solve(&mut by_faer);
-                let largest = by_faer.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-                let apart = by_blocks.iter().zip(&by_faer).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-                // Without a dominant diagonal pivots that are not looked for across blocks cost digits.
-                let allowed = if shift > 0.0 { 1e-14 } else { 1e-8 };
-                assert!(apart <= allowed * largest, "{name}, symmetric {symmetric}, shift {shift}: {apart:e}");
-                let error = system.residual(&wanted, &by_faer, &mut Leftover::default());
-                assert!(error < 1e-13, "{name}: {error:e}");
+        for plane in [None, Plane::normal_to(Vec3::UNIT[2])] {
+            for (symmetric, shift) in [(true, 0.0), (true, 30.0), (false, 0.0), (false, 30.0)] {
+                let what = format!("{name}, planar {}, symmetric {symmetric}, shift {shift}", plane.is_some());
+                solve_both_ways(&what, plane, &edges, symmetric, shift, &mut random);
             }
         }
     }
+}
+
+fn solve_both_ways(
+    what: &str,
+    plane: Option<Plane>,
+    edges: &[[usize; 2]],
+    symmetric: bool,
+    shift: f64,
+    random: &mut Random,
+) {
+    let other = system_in(plane, edges, symmetric, 30.0, random);
+    let system = system_in(plane, edges, symmetric, shift, random);
+    let n = system.pattern.equations.count();
+    let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
+    let (mut by_blocks, mut by_faer) = (wanted.clone(), wanted.clone());
+    let mut blocks = BlockSolver::new(&system.pattern, symmetric).unwrap();
+    // What other tangents have left behind is gone, even where they broke down half-way.
+    let mut broken = other.clone();
+    let middle = system.pattern.find(n as u32 / 2, n as u32 / 2).unwrap();
+    broken.values[middle] = f64::NAN;
+    assert!(blocks.factorise(&other) && !blocks.factorise(&broken), "{what}");
+    assert!(blocks.factorise(&system), "{what}");
+    blocks.solve(&system.pattern, &mut by_blocks);
+    let mut general = GeneralSolver::new(&system).unwrap();
+    assert!(general.factorise(&system), "{what}");
+    general.solve(&mut by_faer);
+    let largest = by_faer.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let apart = by_blocks.iter().zip(&by_faer).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    // Without a dominant diagonal pivots that are not looked for across blocks cost digits.
+    let allowed = if shift > 0.0 { 1e-14 } else { 1e-8 };
+    assert!(apart <= allowed * largest, "{what}: {apart:e}");
+    let error = system.residual(&wanted, &by_faer, &mut Leftover::default());
+    assert!(error < 1e-13, "{what}: {error:e}");
 }
 
 /// Taken as it stands, a pivot of 1e-13 would leave three digits.
@@ -139,6 +174,40 @@ fn rows_with_small_pivots_wait() {
     blocks.solve(&system.pattern, &mut x);
     let left = system.residual(&wanted, &x, &mut Leftover::default());
     assert!(left < 1e-11, "{left:e}");
+}
+
+#[test]
+fn pivots_that_are_no_numbers_end_a_factorisation() {
+    let mut random = Random::new(13);
+    for plane in [None, Plane::normal_to(Vec3::UNIT[2])] {
+        for symmetric in [true, false] {
+            let system = system_in(plane, &tree(20, &mut random), symmetric, 30.0, &mut random);
+            let n = system.pattern.equations.count() as u32;
+            let mut blocks = BlockSolver::new(&system.pattern, symmetric).unwrap();
+            let mut with = |values: &dyn Fn(u32, u32) -> Option<f64>| {
+                let mut changed = system.clone();
+                for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+                    if let (Some(place), Some(value)) = (system.pattern.find(row, column), values(row, column)) {
+                        changed.values[place] = value;
+                    }
+                }
+                blocks.factorise(&changed)
+            };
+            let at = n / 2;
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                assert!(!with(&|row, column| (row == at && column == at).then_some(value)), "{value} at {at}");
+                assert!(!with(&|row, column| (row == at || column == at).then_some(value)), "{value} beside {at}");
+            }
+            // Nothing, or as good as nothing, in all rows and columns of a node.
+            for value in [0.0, -0.0, 1e-310] {
+                let slot = |k: u32| system.pattern.equations.direction(k as usize).slot / 2;
+                let meets = |row: u32, column: u32| slot(row) == slot(at) || slot(column) == slot(at);
+                let entry = |row: u32, column: u32| if row == column { value } else { 0.0 };
+                assert!(!with(&|row, column| meets(row, column).then(|| entry(row, column))), "{value:e}");
+            }
+            assert!(with(&|_, _| None));
+        }
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal.
+//! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal where those in place are small.
 
 use super::elimination::Elimination;
 use super::pieces::Piece;

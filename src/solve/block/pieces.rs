@@ -25,7 +25,7 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// Its rows.
     fn rows(&self) -> Range<usize>;
 
-    /// Takes over the tangent in some of its rows.
+    /// Takes over the tangent in some of its rows: once, before the first elimination that changes them.
     fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System);
 
     /// Adds what belongs to the same rows.

@@ -7,9 +7,9 @@ pub use crate::system::Tile;
 /// A part of a vector that belongs to one tile row.
 pub type Part<const W: usize> = [f64; W];
 
-/// Rows of a tile stay in their order as long as no entry of L is larger than this. What it is does not matter much: what a tile loses,
-/// a look at the residual finds.
-const LARGEST: f64 = 4.0;
+/// Rows of a tile keep their order as long as no pivot takes so many times its size from the diagonal entry of a row below it: a measure
+/// without units, as entries of L have some. What it is does not matter much: what a tile loses, a look at the residual finds.
+const GROWTH: f64 = 16.0;
 
 /// The order in which a tile takes its rows as pivots.
 pub type RowOrder<const W: usize> = [u8; W];
@@ -159,6 +159,7 @@ where
 /// take twice as long.
 macro_rules! each_row {
     ($width:ident, |$row:ident| $work:expr) => {{
+        const { assert!($width <= 6) };
         each_row!(@ $width, $row, $work, 0, 1, 2, 3, 4, 5);
     }};
     (@ $width:ident, $row:ident, $work:expr, $($number:literal),*) => {
@@ -227,9 +228,10 @@ pub fn factorise_symmetric<const W: usize>(tile: &mut Tile<W>) -> Option<usize>
 where
     Width<W>: Rows<W>,
 {
-    let mut negative = 0;
+    let (mut negative, mut poison) = (0, 0.0);
     each_row!(W, |r| {
-        let inverse = inverse(tile[r][r])?;
+        let inverse = 1.0 / tile[r][r];
+        poison += poison_of(tile[r][r], inverse);
         let (pivot, lanes) = (tile[r], row::<W>(&tile[r]));
         each_row!(W, |k| if k > r {
             let mut below = row::<W>(&tile[k]);
@@ -240,14 +242,13 @@ where
         tile[r][r] = inverse;
         negative += usize::from(inverse < 0.0);
     });
-    Some(negative)
+    (poison == 0.0).then_some(negative)
 }
 
-/// 1/pivot; `None` where that is zero or no number.
+/// Zero; NaN where a pivot or its inverse is infinite or no number. One look at a sum of these costs less than one at each.
 #[inline(always)]
-fn inverse(pivot: f64) -> Option<f64> {
-    let inverse = 1.0 / pivot;
-    (inverse.is_finite() && inverse != 0.0).then_some(inverse)
+fn poison_of(pivot: f64, inverse: f64) -> f64 {
+    (pivot + inverse) * 0.0
 }
 
 /// y = L^-1 y, for all columns at once.
@@ -294,7 +295,7 @@ pub fn solve_backward_symmetric<const W: usize>(factor: &Tile<W>, x: &mut Part<W
 }
 
 /// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds inverses. Rows stay where they are
-/// if their pivots are large enough; else those with the largest pivots come first. `None` where a pivot is zero or no number.
+/// if their pivots are large enough for what is below them; else those with the largest pivots come first. `None` where a pivot is zero or no number.
 #[inline(always)]
 pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<RowOrder<W>>
 where
@@ -308,24 +309,22 @@ where
     factorise_by_largest(tile)
 }
 
-/// The same with rows where they are; `false` where some entry of L is larger than [`LARGEST`], or a pivot zero or no
-/// number.
+/// The same with rows where they are; `false` where a pivot takes too much ([`GROWTH`]), is zero or no number.
 #[inline(always)]
 fn factorise_in_order<const W: usize>(tile: &mut Tile<W>) -> bool
 where
     Width<W>: Rows<W>,
 {
+    let (mut poison, mut fits) = (0.0, true);
     each_row!(W, |r| {
         let inverse = 1.0 / tile[r][r];
-        if !inverse.is_finite() || inverse == 0.0 {
-            return false;
-        }
-        take_pivot(tile, r, inverse);
-        each_row!(W, |k| if k > r && tile[k][r].abs() > LARGEST {
-            return false;
+        poison += poison_of(tile[r][r], inverse);
+        each_row!(W, |k| if k > r {
+            fits &= (tile[k][r] * tile[k][r] * inverse).abs() <= GROWTH * tile[k][k].abs();
         });
+        take_pivot(tile, r, inverse);
     });
-    true
+    fits && poison == 0.0
 }
 
 /// The same with the row that has the largest entry of its column as the next one.
@@ -344,7 +343,10 @@ where
         }
         tile.swap(r, pivot);
         order.swap(r, pivot);
-        let inverse = inverse(tile[r][r])?;
+        let inverse = 1.0 / tile[r][r];
+        if poison_of(tile[r][r], inverse) != 0.0 {
+            return None;
+        }
         take_pivot(tile, r, inverse);
     }
     Some(order)
