@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
-use crate::solve::{NewtonFailure, Verdict, correction, mechanism, timed};
+use crate::solve::{self, NewtonFailure, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -436,7 +436,7 @@ impl Path {
             load += dl;
             let switched = correct(run, workshop, &dq);
             // What was a correction before is none in a new chart.
-            last = (!switched).then(|| correction(&run.model, &dq));
+            last = (!switched).then(|| solve::size(&run.model, &dq));
             iterations += 1;
         }
     }

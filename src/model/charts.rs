@@ -116,8 +116,8 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     for &slot in rotations {
         let k = slot as usize;
         let (p, old, wound) = (state.q[k], before.q[k], before.wound[k]);
-        // Then all that follows comes to P itself.
-        let is_near = wound == old && (p - old).squared() < 0.5;
+        // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away from it.
+        let is_near = wound == old && (p - old).norm() < 0.4 * FAR;
         if is_near && (state.wound[k] == old || state.wound[k] == p) {
             state.wound[k] = p;
             continue;

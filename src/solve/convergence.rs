@@ -56,7 +56,8 @@ pub enum Verdict {
 }
 
 impl Convergence {
-    /// Judges the forces of `system`, and the size of the last correction where there was one.
+    /// Judges the forces of `system`, and the [`size`] of the last correction: `None` before the first, infinite where charts have changed
+    /// since.
     pub fn judge(&self, model: &Model, system: &System, noise: Noise, last: Option<f64>) -> (Verdict, Residual) {
         let residual = self.residual(model, system, noise);
         if !(residual.ratio.is_finite() && residual.force.is_finite()) {
@@ -199,17 +200,17 @@ fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
     force - equations.held_part(slot, force)
 }
 
-/// The largest correction, displacements over the length of the scene.
-pub(crate) fn correction(model: &Model, dq: &[Vec3]) -> f64 {
-    let length = model.length;
-    threads::largest(dq.len(), |slots| {
-        let mut squares = [0.0; 4];
-        for (&kind, dq) in model.kinds[slots.clone()].iter().zip(&dq[slots]) {
+/// The size of a correction, or of any other motion: its largest vector, displacements over the length of the scene. What is no number
+/// does not count.
+pub fn size(model: &Model, motion: &[Vec3]) -> f64 {
+    threads::largest(motion.len(), |slots| {
+        let mut squares = [0.0_f64; 4];
+        for (&kind, vector) in model.kinds[slots.clone()].iter().zip(&motion[slots]) {
             let largest = &mut squares[kind as usize];
-            *largest = larger(dq.squared(), *largest);
+            *largest = largest.max(vector.squared());
         }
         let [displacement, rotation] =
             [SlotKind::Displacement, SlotKind::Rotation].map(|kind| squares[kind as usize].sqrt());
-        (displacement / length).max(rotation * length / length)
+        rotation.max(displacement / model.length)
     })
 }

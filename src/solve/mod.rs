@@ -15,8 +15,7 @@ mod reuse;
 mod softest;
 
 pub use block::BlockSolver;
-pub(crate) use convergence::correction;
-pub use convergence::{Convergence, Residual, Verdict};
+pub use convergence::{Convergence, Residual, Verdict, size};
 pub use general::GeneralSolver;
 pub use krylov::{Operator, largest_eigenvalues};
 pub use linear::LinearSolver;

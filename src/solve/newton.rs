@@ -1,6 +1,6 @@
 //! Newton's iteration on one step or load level.
 
-use super::convergence::{Convergence, Residual, Verdict, correction};
+use super::convergence::{Convergence, Residual, Verdict, size};
 use super::foresight::Foresight;
 use super::linear::LinearSolver;
 use super::mechanism::mechanism;
@@ -103,7 +103,7 @@ pub struct Newton {
     pub solver: LinearSolver,
     right_hand_side: Vec<f64>,
     dq: Vec<Vec3>,
-    /// The size of the last correction of a solution
+    /// The size of the last correction of a solution: `None` before the first, infinite after a change of chart
     last: Option<f64>,
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
     pub first: Vec<Vec3>,
@@ -115,11 +115,6 @@ pub struct Newton {
 
 /// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
 const RUNAWAY: f64 = 1e6;
-
-/// The largest unknown, displacements over the length of the scene.
-fn size(model: &Model, state: &State) -> f64 {
-    correction(model, &state.q)
-}
 
 impl Newton {
     /// For a stage with these unknowns.
@@ -193,7 +188,8 @@ impl Newton {
                 }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
                 Verdict::Noisy if lift.is_none() && iterations > 0 => {
-                    let refined = refinement.look(model, &self.dq, size(model, state));
+                    let last = self.last.unwrap_or_default();
+                    let refined = refinement.look(model, &self.dq, last, size(model, &state.q));
                     if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
                         self.end();
@@ -217,7 +213,7 @@ impl Newton {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, assembly, model, state)));
             }
             iterations += 1;
-            let length = correction(model, &self.dq);
+            let length = size(model, &self.dq);
             if length > RUNAWAY {
                 // Round-off may have left a stiffness where there is none.
                 return Err(match mechanism(&mut self.solver, assembly, model, state) {
@@ -274,7 +270,7 @@ impl Newton {
         if !formed && !self.reuse.has_tangent() {
             self.form(assembly, state, method, work);
         }
-        if self.substitute(&assembly.system, None, formed, work) && correction(model, &self.dq) <= most {
+        if self.substitute(&assembly.system, None, formed, work) && size(model, &self.dq) <= most {
             Self::add(model, state, method, &self.dq);
         }
     }
@@ -326,8 +322,6 @@ impl Newton {
             charts::freeze(state, &model.charted.elements);
             self.reuse.forget();
             self.foresight.foresee(assembly, state, &self.dq);
-            // Nor does it tell how the next one refines.
-            self.dq.iter_mut().for_each(|dq| *dq = Vec3([f64::INFINITY; 3]));
         }
         switched > 0
     }

@@ -1,6 +1,5 @@
 //! Corrections of a solution whose residual is round-off.
 
-use super::convergence::correction;
 use crate::model::Model;
 use crate::tensor::Vec3;
 
@@ -11,6 +10,8 @@ const FINE: f64 = 1e-8;
 #[derive(Default)]
 pub(super) struct Refinement {
     before: Vec<Vec3>,
+    /// Its size
+    size: f64,
     /// The last correction over the unknowns; after a change of chart there is none.
     last: f64,
     /// The last correction over the one before
@@ -20,14 +21,14 @@ pub(super) struct Refinement {
 }
 
 impl Refinement {
-    pub fn look(&mut self, model: &Model, dq: &[Vec3], size: f64) -> &Self {
-        let last = correction(model, dq) / size;
-        self.ratio = if self.before.is_empty() { 0.0 } else { correction(model, dq) / correction(model, &self.before) };
+    /// Looks at a correction of this size; the unknowns have a size, too.
+    pub fn look(&mut self, model: &Model, dq: &[Vec3], size: f64, unknowns: f64) -> &Self {
         let dot = |a: &[Vec3], b: &[Vec3]| model.inner_product(a, b);
         let cosine = dot(dq, &self.before) / (dot(dq, dq) * dot(&self.before, &self.before)).sqrt();
         self.aligned = cosine > 0.5;
-        self.last = last;
-        self.before = if last.is_finite() { dq.to_vec() } else { Vec::new() };
+        self.ratio = if self.before.is_empty() { 0.0 } else { size / self.size };
+        (self.size, self.last) = (size, size / unknowns);
+        self.before = if self.last.is_finite() { dq.to_vec() } else { Vec::new() };
         self
     }
 

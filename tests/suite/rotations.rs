@@ -2,7 +2,9 @@
 
 use crate::dual::{Dual, along, jacobian, tensor_rate, values, variables, vector_rate};
 use crate::random::Random;
+use beamsim::model::charts;
 use beamsim::rotation::{Complement, Rotation, complement, log, nearest_turn, principal, relative_angle, unwound};
+use beamsim::system::State;
 use beamsim::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
@@ -390,4 +392,24 @@ fn the_logarithm_undoes_the_exponential_everywhere() {
         }
     }
     assert!(worst < 1e-12, "{worst:e}");
+}
+
+/// A vector that has not wound is continued by itself, whichever way that is found out: a wound vector that is carried a little aside
+/// takes the long way.
+#[test]
+fn near_vectors_are_continued_by_themselves() {
+    let mut random = Random::new(21);
+    for _ in 0..2000 {
+        let (old, aside) = (random.cube(4.0), random.direction() * 1e-9);
+        let length = random.range(0.0, 0.62);
+        let p = old + random.direction() * length;
+        let mut before = State::rest(1, 0, 0, 0);
+        (before.q[0], before.wound[0]) = (old, old);
+        for carried in [old, p, old + aside] {
+            let mut state = before.clone();
+            (state.q[0], state.wound[0]) = (p, carried);
+            assert!(charts::wind(&mut state, &before, &[0]).is_empty());
+            assert!((state.wound[0] - p).norm() < 1e-12, "{old:?} to {p:?}");
+        }
+    }
 }
