@@ -436,7 +436,7 @@ impl Path {
             load += dl;
             let switched = correct(run, workshop, &dq);
             // What was a correction before is none in a new chart.
-            last = (!switched).then(|| solve::size(&run.model, &dq));
+            last = Some(if switched { f64::INFINITY } else { solve::size(&run.model, &dq) });
             iterations += 1;
         }
     }

@@ -155,8 +155,7 @@ where
     out
 }
 
-/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves loops keep numbers out of registers, and
-/// take twice as long.
+/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves loops keep numbers out of registers.
 macro_rules! each_row {
     ($width:ident, |$row:ident| $work:expr) => {{
         const { assert!($width <= 6) };
