@@ -254,8 +254,7 @@ impl Run<'_> {
         // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.
         let stable = newton.solver.negative_pivots(system) == Some(0);
         let symmetric = stable && self.model.multipliers.is_empty();
-        // Round-off of differences hides the symmetry of what is known to be symmetric.
-        let symmetric = symmetric && (system.symmetric || is_symmetric(&system.pattern, &varied));
+        let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
         let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
         let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default();
         let load = self.state.load;

@@ -87,7 +87,7 @@ impl Assembly {
         let groups = model.groups(equations.layout());
         Self {
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
-            system: System::new(Pattern::new(equations, groups, cliques), model.slots.len(), symmetric, &categories),
+            system: System::new(Pattern::new(equations, groups, cliques, symmetric), model.slots.len(), &categories),
             effects,
             linear: None,
         }

@@ -37,10 +37,10 @@ impl Linear {
         let effects: Vec<&dyn Effect> = effects.collect();
         let slots = model.slots.len();
         let cliques: Vec<Cliques> = effects.iter().map(|effect| effect.cliques()).collect();
-        let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques);
+        let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques, false);
         let mut origin = about.clone();
         origin.stand_still();
-        let mut whole = System::new(pattern, slots, false, &Category::ALL);
+        let mut whole = System::new(pattern, slots, &Category::ALL);
         let mut matrix = |weights: Weights| {
             whole.clear(None);
             let forget = Memory::default();

@@ -54,7 +54,7 @@ const REFINEMENTS: usize = 3;
 impl LinearSolver {
     /// Analyses the pattern of a system. `None` where memory for it cannot be had.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
-        let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, system.symmetric)).flatten();
+        let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern)).flatten();
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
             trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false },

@@ -40,7 +40,7 @@ impl LinearSolver {
     /// How many pivots of the tangent are negative, those of multipliers left out; `None` where it is not symmetric, or a
     /// pivot is lost. Where this solver's own factorisation tells, the tangent is what it has factorised last.
     pub fn negative_pivots(&mut self, system: &System) -> Option<usize> {
-        if !system.symmetric && !is_symmetric(&system.pattern, &system.values) {
+        if !is_symmetric(&system.pattern, &system.values) {
             return None;
         }
         if self.is_symmetric() {
@@ -59,7 +59,7 @@ impl Pivots {
     fn beside(solver: &LinearSolver, system: &System) -> Option<Self> {
         let blocks = match solver.blocks() {
             Some(blocks) => blocks.symmetric_beside(&system.pattern),
-            None => solver.multipliers.is_empty().then(|| BlockSolver::new(&system.pattern, true)).flatten(),
+            None => solver.multipliers.is_empty().then(|| BlockSolver::symmetric(&system.pattern)).flatten(),
         };
         match blocks {
             Some(blocks) => Some(Self::Blocks(Box::new(blocks))),
@@ -119,8 +119,11 @@ impl Entries {
     }
 }
 
-/// Whether each entry is what its mirror image is.
+/// Whether each entry is what its mirror image is. Of tangents that are known to be symmetric one half tells nothing of the other.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
+    if pattern.symmetric {
+        return true;
+    }
     let width = pattern.width();
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let root = |k: usize| match pattern

@@ -147,11 +147,13 @@ fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
         #[inline(always)]
         || {
             system.each_tile::<W>(&system.values, |row, column, tile| {
+                // What is not kept counts as much.
+                let times = if system.pattern.symmetric && row != column { 2.0 } else { 1.0 };
                 for (line, &x) in tile.iter().zip(&parts[column]) {
                     for r in 0..W {
                         let term = parts[row][r] * line[r] * x;
-                        sums[r].add(term);
-                        squares[r] += term * term;
+                        sums[r].add(times * term);
+                        squares[r] += times * term * term;
                     }
                 }
             });

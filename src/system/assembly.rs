@@ -1,7 +1,7 @@
 //! Forces and tangent of the whole scene.
 
 use super::equations::Equations;
-use super::pattern::{Pattern, Tile, WIDTH};
+use super::pattern::{Pattern, Tile, WIDTH, transposed};
 use super::regions::{self, Region};
 use super::sink::{Part, Sink};
 use super::state::Slot;
@@ -53,8 +53,6 @@ pub struct System {
     pub force: [Vec<Vec3>; 4],
     /// The numbers of those that something may add to; the others stay zero
     acting: Vec<usize>,
-    /// Whether each effect's tangent is symmetric, and so their sum
-    pub symmetric: bool,
     /// The values of the tangent, tile by tile: that of the last evaluation with weights
     pub values: Vec<f64>,
     /// Counts how often the tangent has become another one
@@ -69,13 +67,12 @@ pub struct System {
 
 impl System {
     /// A system of zeros, for forces of these categories beside internal ones.
-    pub fn new(pattern: Pattern, slots: usize, symmetric: bool, categories: &[Category]) -> Self {
+    pub fn new(pattern: Pattern, slots: usize, categories: &[Category]) -> Self {
         let zero = vec![Vec3::ZERO; slots];
         let (values, equations) = (pattern.values(), pattern.equations.count());
         Self {
             rooms: vec![Vec::new(); 1 + pattern.regions.len()],
             pattern,
-            symmetric,
             force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
             acting: Category::ALL
                 .into_iter()
@@ -169,17 +166,18 @@ impl System {
         out
     }
 
-    /// Shows each tile with what is kept of the group of its rows, and the group of its columns: regions at once.
+    /// Shows each tile with what belongs to the group of its rows, and the group of its columns: regions at once. Of symmetric tangents
+    /// the tiles that are not kept are shown, too.
     fn each_row<const W: usize, K: Send>(
         &self,
         values: &[f64],
-        kept: &mut [K],
+        of_rows: &mut [K],
         show: impl Fn(&mut K, usize, &Tile<W>) + Send + Sync,
     ) {
-        let (regions, tiles) = (&self.pattern.regions, tiles::<W>(values));
+        let (regions, tiles, symmetric) = (&self.pattern.regions, tiles::<W>(values), self.pattern.symmetric);
         regions::each(
             regions,
-            kept,
+            of_rows,
             |region| region.groups.end,
             |region, part| {
                 Instructions::here().run(
@@ -188,8 +186,12 @@ impl System {
                         for column in region.groups.clone() {
                             for tile in self.pattern.tiles_of(column) {
                                 let row = self.pattern.rows[tile] as usize;
-                                if let Some(kept) = part.get_mut(row.wrapping_sub(region.groups.start)) {
-                                    show(kept, column, &tiles[tile]);
+                                let Some(of_row) = part.get_mut(row.wrapping_sub(region.groups.start)) else {
+                                    continue;
+                                };
+                                show(of_row, column, &tiles[tile]);
+                                if symmetric && row != column {
+                                    show(&mut part[column - region.groups.start], row, &transposed(&tiles[tile]));
                                 }
                             }
                         }
@@ -198,11 +200,15 @@ impl System {
             },
         );
         for &(column, tile) in &self.pattern.between {
-            show(&mut kept[self.pattern.rows[tile] as usize], column, &tiles[tile]);
+            let row = self.pattern.rows[tile] as usize;
+            show(&mut of_rows[row], column, &tiles[tile]);
+            if symmetric && row != column {
+                show(&mut of_rows[column], row, &transposed(&tiles[tile]));
+            }
         }
     }
 
-    /// Shows each tile with the groups of its rows and of its columns.
+    /// Shows each tile that is kept with the groups of its rows and of its columns.
     #[inline(always)]
     pub fn each_tile<const W: usize>(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile<W>)) {
         let mut tiles = tiles(values).iter();

@@ -13,7 +13,7 @@ mod state;
 pub use assembly::{Category, Leftover, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use groups::{Groups, Layout};
-pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH};
+pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH, transposed};
 pub use plane::{Aspect, Plane};
 pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};

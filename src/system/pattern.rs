@@ -6,12 +6,19 @@ use super::regions::{self, Region, Shares};
 use super::state::Slot;
 pub use crate::kernel::{TILE, WIDTH};
 use crate::threads;
+use std::array::from_fn;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
 
 /// A block of the tangent, by columns.
 pub type Tile<const W: usize> = [[f64; W]; W];
+
+/// The transpose.
+#[inline(always)]
+pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
+    from_fn(|c| from_fn(|r| tile[r][c]))
+}
 
 /// The slots that meet in each instance of an effect: one clique an element.
 #[derive(Clone, Debug, Default)]
@@ -57,14 +64,17 @@ impl Cliques {
     }
 }
 
+/// The place of a block that is not kept: that of its transpose is.
+pub(super) const NOT_KEPT: u32 = u32::MAX;
+
 /// Where the blocks of one effect's instances go.
 #[derive(Clone, Debug)]
 pub(super) struct Places {
     pub cliques: Cliques,
     /// Whether each instance couples whole nodes, whose tiles it adds to in one go
     pub whole: bool,
-    /// By instance and then by rows of blocks: the index of the block's first value. Blocks are those of whole nodes, or else
-    /// those of slots.
+    /// By instance and then by rows of blocks: the index of the block's first value, or [`NOT_KEPT`]. Blocks are those of whole nodes,
+    /// or else those of slots.
     pub values: Vec<u32>,
     starts: Vec<u32>,
     /// Instances that touch a held direction or turned axes.
@@ -81,17 +91,24 @@ impl Places {
 
 /// The tangent in compressed columns of tiles, without its values. Tiles of a node and itself are always there.
 ///
-/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero.
+/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero. Of a symmetric tangent
+/// no tiles above the diagonal are kept: they are the transposes of those below it.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     /// The equations that the rows and columns stand for.
     pub equations: Equations,
     /// The slots of tiles
     pub groups: Groups,
+    /// Whether each tangent is symmetric
+    pub symmetric: bool,
     /// Where each column of tiles starts.
     pub column_starts: Vec<u32>,
     /// The group of the rows of each tile.
     pub rows: Vec<u32>,
+    /// Where the tiles of each column begin that are not kept
+    mirror_starts: Vec<u32>,
+    /// These, column by column
+    mirrors: Vec<Mirror>,
     /// The equation of each row, [`Equations::HELD`] for those without
     numbers: Vec<u32>,
     /// Rows without an equation: group, and row of its tile
@@ -101,6 +118,15 @@ pub struct Pattern {
     /// Tiles whose rows lie in another region than their columns: column and number
     pub between: Vec<(usize, usize)>,
     pub(super) places: Vec<Places>,
+}
+
+/// A tile above the diagonal of a symmetric tangent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mirror {
+    /// The group of its rows
+    pub row: u32,
+    /// The number of its transpose
+    pub tile: u32,
 }
 
 /// An entry of the tangent.
@@ -113,23 +139,42 @@ pub struct Entry {
 }
 
 impl Pattern {
-    /// The pattern of several effects, given by the cliques of each.
-    pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>) -> Self {
-        let (column_starts, rows) = compressed_columns(&groups, &effects);
+    /// The pattern of several effects, given by the cliques of each; `symmetric` where all their tangents are.
+    pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>, symmetric: bool) -> Self {
+        let (column_starts, rows) = compressed_columns(&groups, &effects, symmetric);
+        let (mirror_starts, mirrors) = if symmetric { mirrors(&column_starts, &rows) } else { Default::default() };
         let (numbers, width) = (numbers(&equations, &groups), groups.width());
         let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
         let idle = idle.map(|k| ((k / width) as u32, (k % width) as u8)).collect();
         let regions = regions::cut(&groups, &equations, &column_starts);
         let (between, places) = (Vec::new(), Vec::new());
-        let mut pattern = Self { equations, groups, column_starts, rows, numbers, idle, regions, between, places };
+        let mut pattern = Self {
+            equations,
+            groups,
+            symmetric,
+            column_starts,
+            rows,
+            mirror_starts,
+            mirrors,
+            numbers,
+            idle,
+            regions,
+            between,
+            places,
+        };
         pattern.between = pattern.between();
         pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
         pattern
     }
 
-    /// The number of tiles.
+    /// The number of tiles that are kept.
     pub fn tiles(&self) -> usize {
         self.rows.len()
+    }
+
+    /// The number of pairs of groups that meet.
+    pub fn pairs(&self) -> usize {
+        (self.rows.len() + self.mirrors.len() - self.groups.count()) / 2
     }
 
     /// The rows of a tile.
@@ -138,21 +183,35 @@ impl Pattern {
         self.groups.width()
     }
 
-    /// The number of values: those of all tiles.
+    /// The number of values: those of all tiles that are kept.
     pub fn values(&self) -> usize {
         self.width() * self.width() * self.tiles()
     }
 
-    /// The tiles in a column.
+    /// The tiles in a column that are kept.
     #[inline]
     pub fn tiles_of(&self, column: usize) -> std::ops::Range<usize> {
         self.column_starts[column] as usize..self.column_starts[column + 1] as usize
     }
 
-    /// The groups of the rows of the tiles in a column.
+    /// The groups of the rows of these tiles.
     #[inline]
     pub fn rows_of(&self, column: usize) -> &[u32] {
         &self.rows[self.tiles_of(column)]
+    }
+
+    /// The tiles in a column that are not.
+    #[inline]
+    pub fn mirrors_of(&self, column: usize) -> &[Mirror] {
+        match self.mirror_starts.get(column..column + 2) {
+            Some(&[start, end]) => &self.mirrors[start as usize..end as usize],
+            _ => &[],
+        }
+    }
+
+    /// The groups that a group meets, itself among them, in their order.
+    pub fn met_by(&self, group: usize) -> impl Iterator<Item = u32> {
+        self.mirrors_of(group).iter().map(|mirror| mirror.row).chain(self.rows_of(group).iter().copied())
     }
 
     /// The equations of a group's rows.
@@ -197,26 +256,31 @@ impl Pattern {
     /// The entries of an equation's column, by rows.
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
         let ((group, c), width) = (self.row_of(column), self.width());
-        self.tiles_of(group).flat_map(move |tile| {
-            let numbers = self.numbers(self.rows[tile] as usize).iter().enumerate();
-            let held = move |&(_, &row): &(usize, &u32)| row != Equations::HELD;
-            numbers.filter(held).map(move |(r, &row)| Entry { row, place: width * (width * tile + c) + r })
-        })
+        let entries = move |row: u32, place: usize, apart: usize| {
+            let free = self.numbers(row as usize).iter().enumerate().filter(|&(_, &row)| row != Equations::HELD);
+            free.map(move |(r, &row)| Entry { row, place: place + r * apart })
+        };
+        let mirrored = move |mirror: &Mirror| entries(mirror.row, width * width * mirror.tile as usize + c, width);
+        let kept = move |tile: usize| entries(self.rows[tile], width * (width * tile + c), 1);
+        self.mirrors_of(group).iter().flat_map(mirrored).chain(self.tiles_of(group).flat_map(kept))
     }
 
     /// The number of entries between equations.
     pub fn nonzeros(&self) -> usize {
         let free = |group: usize| self.numbers(group).iter().filter(|&&n| n != Equations::HELD).count();
-        let column = |c: usize| free(c) * self.rows_of(c).iter().map(|&row| free(row as usize)).sum::<usize>();
+        let column = |c: usize| free(c) * self.met_by(c).map(|row| free(row as usize)).sum::<usize>();
         (0..self.groups.count()).map(column).sum()
     }
 
-    /// Where an entry is stored: `None` for held directions, and for pairs that no effect couples.
+    /// Where an entry is stored, that of a symmetric tangent perhaps with its mirror image: `None` for held directions, and for pairs
+    /// that no effect couples.
     pub fn find(&self, row: u32, column: u32) -> Option<usize> {
         if row == Equations::HELD || column == Equations::HELD {
             return None;
         }
-        let ((i, r), (j, c)) = (self.row_of(row), self.row_of(column));
+        let (row, column) = (self.row_of(row), self.row_of(column));
+        let kept = self.keeps(row.0, column.0);
+        let ((i, r), (j, c)) = if kept { (row, column) } else { (column, row) };
         Some(self.tile(i, j)? + self.width() * c + r)
     }
 
@@ -227,7 +291,13 @@ impl Pattern {
         (group, first + k as usize)
     }
 
-    /// The index of the first value of a tile; `None` where the groups do not meet.
+    /// Whether the tile of two groups is kept where they meet.
+    #[inline]
+    fn keeps(&self, row: usize, column: usize) -> bool {
+        row >= column || !self.symmetric
+    }
+
+    /// The index of the first value of a tile; `None` where the groups do not meet, or it is not kept.
     pub fn tile(&self, row: usize, column: usize) -> Option<usize> {
         let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
         Some(self.width() * self.width() * (self.column_starts[column] as usize + found))
@@ -258,8 +328,11 @@ impl Pattern {
             places.starts.push(places.values.len() as u32);
             let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.row(slot));
             for (i, r) in corners() {
-                // Cliques are what the pattern was made of.
-                let place = |(j, c): (usize, usize)| self.tile(i, j).map(|tile| (tile + self.width() * c + r) as u32);
+                let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
+                    // Cliques are what the pattern was made of.
+                    true => self.tile(i, j).map(|tile| (tile + self.width() * c + r) as u32),
+                    false => Some(NOT_KEPT),
+                };
                 places.values.extend(corners().filter_map(place));
             }
             places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
@@ -290,8 +363,8 @@ fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
     out
 }
 
-/// Column by column the groups that a group meets, itself among them.
-fn compressed_columns(groups: &Groups, effects: &[Cliques]) -> (Vec<u32>, Vec<u32>) {
+/// Column by column the groups that a group meets, itself among them; of symmetric tangents those that do not come before it.
+fn compressed_columns(groups: &Groups, effects: &[Cliques], symmetric: bool) -> (Vec<u32>, Vec<u32>) {
     // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
     let mut room = vec![1_u32; groups.count()];
     each_meeting(groups, effects, &mut |met| met.iter().for_each(|&group| room[group as usize] += met.len() as u32));
@@ -310,11 +383,11 @@ fn compressed_columns(groups: &Groups, effects: &[Cliques]) -> (Vec<u32>, Vec<u3
     });
     let (mut column_starts, mut rows) = (vec![0], Vec::new());
     let mut start = 0;
-    for end in ends {
+    for (group, end) in ends.into_iter().enumerate() {
         let column = &mut meets[start..end];
         column.sort_unstable();
         let first = rows.len();
-        for &row in &*column {
+        for &row in column.iter().filter(|&&row| row as usize >= group || !symmetric) {
             if rows.get(first..).and_then(<[u32]>::last) != Some(&row) {
                 rows.push(row);
             }
@@ -323,6 +396,27 @@ fn compressed_columns(groups: &Groups, effects: &[Cliques]) -> (Vec<u32>, Vec<u3
         start = end;
     }
     (column_starts, rows)
+}
+
+/// The transposes of all tiles below the diagonal, column by column.
+fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
+    let columns = column_starts.len() - 1;
+    let below = || {
+        let of = |column: usize| column_starts[column] as usize..column_starts[column + 1] as usize;
+        let tiles = (0..columns).flat_map(move |column| of(column).map(move |tile| (column, tile)));
+        tiles.filter(|&(column, tile)| rows[tile] as usize > column)
+    };
+    let mut starts = vec![0_u32; columns + 1];
+    below().for_each(|(_, tile)| starts[rows[tile] as usize + 1] += 1);
+    (0..columns).for_each(|column| starts[column + 1] += starts[column]);
+    let mut ends = starts.clone();
+    let mut mirrors = vec![Mirror::default(); starts[columns] as usize];
+    for (column, tile) in below() {
+        let end = &mut ends[rows[tile] as usize];
+        mirrors[*end as usize] = Mirror { row: column as u32, tile: tile as u32 };
+        *end += 1;
+    }
+    (starts, mirrors)
 }
 
 /// Shows the groups that meet in each instance.

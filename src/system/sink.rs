@@ -2,7 +2,7 @@
 
 use super::assembly::Category;
 use super::equations::Equations;
-use super::pattern::{Pattern, Places, TILE, WIDTH};
+use super::pattern::{NOT_KEPT, Pattern, Places, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
 use crate::kernel::{ElementSystem, PlanarSystem};
@@ -216,7 +216,9 @@ impl Sink<'_> {
     fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
         for lane in lanes {
             for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
-                add_lane(self.values_from(place, TILE), tile, lane);
+                if let Some(values) = self.values_from(place, TILE) {
+                    add_lane(values, tile, lane);
+                }
             }
         }
     }
@@ -251,8 +253,9 @@ impl Sink<'_> {
                 continue;
             }
             for (tile, &place) in elements.tangent.as_flattened().iter().zip(self.places.of(first + lane)) {
-                let target = self.values_from(place, tile.len());
-                target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value.0[lane]);
+                if let Some(values) = self.values_from(place, tile.len()) {
+                    values.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value.0[lane]);
+                }
             }
         }
     }
@@ -284,9 +287,10 @@ impl Sink<'_> {
                 continue;
             }
             for (entry, &place) in entries.zip(self.places.of(k)) {
-                let target = self.values_from(place, 5);
-                target[0] += entry;
-                target[4] += entry;
+                if let Some(values) = self.values_from(place, 5) {
+                    values[0] += entry;
+                    values[4] += entry;
+                }
             }
         }
     }
@@ -309,7 +313,7 @@ impl Sink<'_> {
                         (Equations::HELD, Some(lift)) => {
                             self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c];
                         }
-                        _ => self.values[place as usize - self.first_value + 3 * c + r] += value,
+                        _ => self.add_entry(place, 3 * c + r, value),
                     }
                 }
             }
@@ -345,17 +349,27 @@ impl Sink<'_> {
                         continue;
                     }
                     let place = if self.places.whole { places[N * i + j] } else { places[2 * N * row + column] };
-                    self.values[place as usize - self.first_value + entry] += value.0[lane];
+                    self.add_entry(place, entry, value.0[lane]);
                 }
             }
         }
     }
 
-    /// So many values of the tangent from a place on.
+    /// So many values of the tangent from a place on, where they are kept.
     #[inline(always)]
-    fn values_from(&mut self, place: u32, count: usize) -> &mut [f64] {
-        let start = place as usize - self.first_value;
-        &mut self.values[start..start + count]
+    fn values_from(&mut self, place: u32, count: usize) -> Option<&mut [f64]> {
+        (place != NOT_KEPT).then(|| {
+            let start = place as usize - self.first_value;
+            &mut self.values[start..start + count]
+        })
+    }
+
+    /// Adds to the value that stands so far after a place, where it is kept.
+    #[inline(always)]
+    fn add_entry(&mut self, place: u32, after: usize, value: f64) {
+        if place != NOT_KEPT {
+            self.values[place as usize - self.first_value + after] += value;
+        }
     }
 
     #[inline]
@@ -364,8 +378,9 @@ impl Sink<'_> {
             return self.add_blocks(k, element.blocks(), element.tiles(), |value| *value);
         }
         for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
-            let target = self.values_from(place, TILE);
-            target.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
+            if let Some(values) = self.values_from(place, TILE) {
+                values.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
+            }
         }
     }
 
@@ -393,11 +408,13 @@ impl Sink<'_> {
                     block = block * frame;
                 }
                 let rows = self.equations.of(i);
-                let (place, width) = self.place_of(k, row, column);
+                let (place, start, width) = self.place_of(k, row, column);
                 if ![rows, columns].as_flattened().contains(&Equations::HELD) {
-                    for c in 0..3 {
-                        for r in 0..3 {
-                            self.values[place + c * width + r] += block.0[r][c];
+                    if let Some(values) = self.values_from(place, start + 2 * width + 3) {
+                        for c in 0..3 {
+                            for r in 0..3 {
+                                values[start + c * width + r] += block.0[r][c];
+                            }
                         }
                     }
                     continue;
@@ -409,7 +426,7 @@ impl Sink<'_> {
                             (Equations::HELD, Some(lift)) => {
                                 self.lifted[rows[r] as usize - self.first_equation] += block.0[r][c] * lift.0[c];
                             }
-                            _ => self.values[place + c * width + r] += block.0[r][c],
+                            _ => self.add_entry(place, start + c * width + r, block.0[r][c]),
                         }
                     }
                 }
@@ -417,20 +434,19 @@ impl Sink<'_> {
         }
     }
 
-    /// Where the block of two slots of an instance begins, and how far its columns are apart. In a plane slots of a node share a tile,
-    /// each with the directions that it moves in.
+    /// Where the block of two slots of an instance is kept, how far after that it begins, and how far its columns are apart. In a plane
+    /// slots of a node share a tile, each with the directions that it moves in.
     #[inline(always)]
-    fn place_of(&self, k: usize, row: usize, column: usize) -> (usize, usize) {
+    fn place_of(&self, k: usize, row: usize, column: usize) -> (u32, usize, usize) {
         let (places, count) = (self.places.of(k), self.places.cliques.get(k).len());
         let place = match self.places.whole {
             true => places[row / 2 * count.div_ceil(2) + column / 2],
             false => places[row * count + column],
         };
-        let start = place as usize - self.first_value;
         match self.equations.plane() {
-            Some(_) => (start, 3),
-            None if self.places.whole => (start + column % 2 * 3 * WIDTH + row % 2 * 3, WIDTH),
-            None => (start, WIDTH),
+            Some(_) => (place, 0, 3),
+            None if self.places.whole => (place, column % 2 * 3 * WIDTH + row % 2 * 3, WIDTH),
+            None => (place, 0, WIDTH),
         }
     }
 
@@ -441,10 +457,9 @@ impl Sink<'_> {
             let (row, column) = (number / blocks, number % blocks);
             let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
             for c in 0..3 {
-                let (from, to) =
-                    ((column % 2 * 3 + c) * WIDTH + row % 2 * 3, place as usize - self.first_value + c * WIDTH);
+                let from = (column % 2 * 3 + c) * WIDTH + row % 2 * 3;
                 for r in 0..3 {
-                    self.values[to + r] += pick(&tile[from + r]);
+                    self.add_entry(place, c * WIDTH + r, pick(&tile[from + r]));
                 }
             }
         }

@@ -275,13 +275,13 @@ fn buckling_stages_of_linear_scenes_count_turns() {
     close(load("[effects]\nlarge_rotations = false\n"), whole, 1e-6);
 }
 
-/// A post with an arm that folds to a hairpin before it buckles out of its plane, with four elements each at 81.04 kN (and once
-/// more at 81.12 kN) as a static stage in 2000 levels finds it, with enough of them at 23.6 kN: looks from the unloaded frame go far past it, and whoever follows them in one step
-/// comes down on another branch, another one for every unit of the load.
+/// A post with an arm that folds to a hairpin before it buckles out of its plane, with enough elements at 23.6 kN: looks from the
+/// unloaded frame go far past it, and whoever follows them in one step comes down on another branch, another one for every unit of the
+/// load. With fewer than ten elements each the load that is found, and warned of, hangs on round-off: it differs by percents where E does by 1e-13.
 #[test]
 fn critical_loads_of_a_folded_frame_do_not_depend_on_the_unit_of_the_load() {
     for unit in [1.0, 30.0, 100.0, 20_000.0] {
-        close(unit * critical_loads(&folded_frame(4, unit)).loads[0], 81_080.0, 1e-3);
+        close(unit * critical_loads(&folded_frame(10, unit)).loads[0], 27_046.2, 1e-5);
         let finer = critical_loads(&folded_frame(16, unit));
         close(unit * finer.loads[0], 23_604.5, 1e-5);
         assert!(finer.warnings.is_empty(), "{:?}", finer.warnings);

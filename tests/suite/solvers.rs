@@ -3,10 +3,12 @@
 use crate::decks::decks;
 use crate::random::Random;
 use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::model::Assembly;
+use beamsim::model::{Assembly, Model, StageContext};
 use beamsim::scene;
 use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, is_symmetric};
-use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Pattern, Plane, System};
+use beamsim::system::{
+    Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Memory, Pattern, Plane, State, System,
+};
 use beamsim::tensor::{Mat3, Vec3};
 use nalgebra::DMatrix;
 
@@ -59,8 +61,8 @@ fn system_in(plane: Option<Plane>, edges: &[[usize; 2]], symmetric: bool, shift:
         Some(plane) => (Equations::planar(2 * nodes, &held, plane, turns).unwrap(), Layout::Planar),
     };
     let groups = Groups::new(2 * nodes, layout, turns);
-    let pattern = Pattern::new(equations, groups, vec![cliques, own]);
-    let mut system = System::new(pattern, 2 * nodes, symmetric, &[]);
+    let pattern = Pattern::new(equations, groups, vec![cliques, own], symmetric);
+    let mut system = System::new(pattern, 2 * nodes, &[]);
     system.clear(None);
     for k in 0..edges.len() {
         let mut element = ElementSystem::new(4);
@@ -137,7 +139,7 @@ fn solve_both_ways(
     let n = system.pattern.equations.count();
     let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
     let (mut by_blocks, mut by_faer) = (wanted.clone(), wanted.clone());
-    let mut blocks = BlockSolver::new(&system.pattern, symmetric).unwrap();
+    let mut blocks = BlockSolver::new(&system.pattern).unwrap();
     // What other tangents have left behind is gone, even where they broke down half-way.
     let mut broken = other.clone();
     let middle = system.pattern.find(n as u32 / 2, n as u32 / 2).unwrap();
@@ -169,7 +171,7 @@ fn rows_with_small_pivots_wait() {
     }
     let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
     let mut x = wanted.clone();
-    let mut blocks = BlockSolver::new(&system.pattern, false).unwrap();
+    let mut blocks = BlockSolver::new(&system.pattern).unwrap();
     assert!(blocks.factorise(&system));
     blocks.solve(&system.pattern, &mut x);
     let left = system.residual(&wanted, &x, &mut Leftover::default());
@@ -183,7 +185,7 @@ fn pivots_that_are_no_numbers_end_a_factorisation() {
         for symmetric in [true, false] {
             let system = system_in(plane, &tree(20, &mut random), symmetric, 30.0, &mut random);
             let n = system.pattern.equations.count() as u32;
-            let mut blocks = BlockSolver::new(&system.pattern, symmetric).unwrap();
+            let mut blocks = BlockSolver::new(&system.pattern).unwrap();
             let mut with = |values: &dyn Fn(u32, u32) -> Option<f64>| {
                 let mut changed = system.clone();
                 for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
@@ -217,7 +219,7 @@ fn negative_pivots_are_negative_eigenvalues() {
         let system = system(&edges, true, 1.0, &mut random);
         let eigenvalues = dense(&system).symmetric_eigenvalues();
         let negative = eigenvalues.iter().filter(|&&value| value < 0.0).count();
-        let mut blocks = BlockSolver::new(&system.pattern, true).unwrap();
+        let mut blocks = BlockSolver::new(&system.pattern).unwrap();
         assert!(blocks.factorise(&system));
         assert!(negative > 0);
         assert_eq!(blocks.negative(), Some(negative), "{name}");
@@ -230,7 +232,7 @@ fn large_patterns_are_eliminated_in_branches() {
     let mut random = Random::new(9);
     for (name, edges) in large_patterns(&mut random) {
         let system = system(&edges, true, 30.0, &mut random);
-        let blocks = BlockSolver::new(&system.pattern, true).unwrap();
+        let blocks = BlockSolver::new(&system.pattern).unwrap();
         let sizes = blocks.branches();
         let nodes = system.pattern.groups.count();
         let trunk = nodes - sizes.iter().sum::<usize>();
@@ -238,7 +240,7 @@ fn large_patterns_are_eliminated_in_branches() {
         assert!(sizes.len() > 1 && trunk < 64, "{name}: {sizes:?}");
         assert!(sizes.iter().all(|size| 4 * size <= 3 * nodes), "{name}: {sizes:?}");
         if !name.contains("ring") && name != "ladder" {
-            assert_eq!(blocks.blocks(), (system.pattern.tiles() - nodes) / 2, "{name}");
+            assert_eq!(blocks.blocks(), system.pattern.pairs(), "{name}");
         }
     }
 }
@@ -246,8 +248,14 @@ fn large_patterns_are_eliminated_in_branches() {
 #[test]
 fn what_a_system_multiplies_is_its_matrix() {
     let mut random = Random::new(5);
-    let system = system(&tree(12, &mut random), false, 2.0, &mut random);
-    let matrix = dense(&system);
+    for symmetric in [false, true] {
+        multiply_both_ways(&system(&tree(12, &mut random), symmetric, 2.0, &mut random), &mut random);
+    }
+}
+
+fn multiply_both_ways(system: &System, random: &mut Random) {
+    let matrix = dense(system);
+    assert_eq!(matrix == matrix.transpose(), system.pattern.symmetric);
     let x: Vec<f64> = (0..matrix.ncols()).map(|_| random.range(-1.0, 1.0)).collect();
     let expected = &matrix * nalgebra::DVector::from_column_slice(&x);
     let product = system.multiply(&system.values, &x);
@@ -298,11 +306,11 @@ fn a_lost_pivot_is_no_lost_solution() {
 fn nets_are_left_to_faer() {
     let mut random = Random::new(7);
     let system = system(&lattice(120), true, 30.0, &mut random);
-    assert!(BlockSolver::new(&system.pattern, true).is_none());
+    assert!(BlockSolver::new(&system.pattern).is_none());
     assert_eq!(LinearSolver::new(&system, &[]).unwrap().name(), "sparse LU");
 }
 
-/// Effects that call their tangent symmetric are taken at their word by the solver.
+/// Effects that call their tangent symmetric are taken at their word: one half of it is kept.
 #[test]
 fn what_is_called_symmetric_is() {
     let mut random = Random::new(8);
@@ -317,7 +325,7 @@ fn what_is_called_symmetric_is() {
             continue;
         }
         let mut assembly = Assembly::new(&stage, equations, &model);
-        if !assembly.system.symmetric {
+        if !assembly.system.pattern.symmetric {
             continue;
         }
         model.set_clock(&mut state, 0.1, 0.7);
@@ -326,8 +334,33 @@ fn what_is_called_symmetric_is() {
         }
         let weights = Weights { stiffness: 1.0, damping: 0.3, mass: 0.2 };
         assembly.evaluate(&state, weights, None);
-        assert!(is_symmetric(&assembly.system.pattern, &assembly.system.values), "{}", path.display());
+        let (half, whole) = (&assembly.system, whole_tangent(&assembly, &model, &stage, &state, weights));
+        assert!(!whole.pattern.symmetric && is_symmetric(&whole.pattern, &whole.values), "{}", path.display());
+        assert_eq!((half.pattern.nonzeros(), half.pattern.pairs()), (whole.pattern.nonzeros(), whole.pattern.pairs()));
+        let x: Vec<f64> = (0..half.pattern.equations.count()).map(|_| random.range(-1.0, 1.0)).collect();
+        let products = [half, &whole].map(|system| system.multiply(&system.values, &x));
+        let sizes = whole.multiply(&whole.values.iter().map(|v| v.abs()).collect::<Vec<_>>(), &vec![1.0; x.len()]);
+        let apart = products[0].iter().zip(&products[1]).zip(&sizes);
+        assert!(apart.clone().all(|((a, b), size)| (a - b).abs() <= 1e-12 * size), "{}", path.display());
+        assert!(half.residual(&products[1], &x, &mut Leftover::default()) < 1e-12, "{}", path.display());
         symmetric += 1;
     }
     assert!(symmetric > 50, "{symmetric}");
+}
+
+/// What the effects of a stage add to the tangent, on a pattern that keeps both halves.
+fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state: &State, weights: Weights) -> System {
+    let equations = assembly.system.pattern.equations.clone();
+    let (effects, plane) = (model.acting(stage), equations.plane().copied());
+    let cliques = effects.iter().map(|effect| effect.cliques()).collect();
+    let pattern = Pattern::new(equations.clone(), model.groups(equations.layout()), cliques, false);
+    let mut system = System::new(pattern, model.slots.len(), &Category::ALL);
+    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
+        let mut sink = system.sink(number, effect.category(), true);
+        match plane.and_then(|plane| effect.clone().in_plane(&plane)) {
+            Some(planar) => planar.add(state, &Memory::default(), weights, &mut sink),
+            None => effect.add(state, &Memory::default(), weights, &mut sink),
+        }
+    }
+    system
 }

@@ -7,8 +7,16 @@ use std::ops::Range;
 /// Elimination makes so many blocks out of one at most; beyond, a supernodal factorisation is faster.
 const MOST_FILL: usize = 8;
 
-/// No tile of the tangent: a block that elimination fills.
-pub const FILL: u32 = u32::MAX;
+/// Where a block comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Elimination fills it.
+    Nothing,
+    /// A tile of the tangent
+    Tile(u32),
+    /// The transpose of one
+    Transpose(u32),
+}
 
 /// The elimination of block rows one after the other.
 ///
@@ -35,8 +43,8 @@ pub struct Elimination {
     pub targets: Vec<u32>,
     /// The tile of the tangent on the diagonal of each row
     pub diagonal: Vec<u32>,
-    /// The tiles of each block right of the diagonal and of its mirror image, or [`FILL`]
-    pub sources: Vec<[u32; 2]>,
+    /// Of each block right of the diagonal, and of its mirror image
+    pub sources: Vec<[Source; 2]>,
     /// Rows of tiles that are no equations: row, and row of its tile
     idle: Vec<(u32, u8)>,
 }
@@ -45,7 +53,7 @@ impl Elimination {
     /// In the order of [`order::find`]: without any fill on chains and trees. `None` where fill makes it slow, or memory for
     /// the analysis cannot be had.
     pub fn new(pattern: &Pattern) -> Option<Self> {
-        let most = MOST_FILL * (pattern.tiles() - pattern.groups.count()) / 2;
+        let most = MOST_FILL * pattern.pairs();
         let Order { order, branches, neighbours } = order::find(pattern, most)?;
         let (starts, later) = (neighbours.starts, neighbours.later);
         let (target_starts, targets) = targets(&starts, &later);
@@ -93,15 +101,19 @@ impl Elimination {
 
     fn find_sources(&mut self, pattern: &Pattern) {
         let row_of = &self.row_of;
-        self.diagonal = vec![FILL; self.order.len()];
-        self.sources = vec![[FILL; 2]; self.later.len()];
+        self.diagonal = vec![0; self.order.len()];
+        self.sources = vec![[Source::Nothing; 2]; self.later.len()];
         for column in 0..pattern.groups.count() {
             for tile in pattern.tiles_of(column) {
                 let (i, j) = (row_of[pattern.rows[tile] as usize], row_of[column]);
-                match i.cmp(&j) {
-                    std::cmp::Ordering::Equal => self.diagonal[i as usize] = tile as u32,
-                    std::cmp::Ordering::Less => self.sources[find(&self.starts, &self.later, i, j)][0] = tile as u32,
-                    std::cmp::Ordering::Greater => self.sources[find(&self.starts, &self.later, j, i)][1] = tile as u32,
+                if i == j {
+                    self.diagonal[i as usize] = tile as u32;
+                    continue;
+                }
+                let (block, side) = (find(&self.starts, &self.later, i.min(j), i.max(j)), usize::from(i > j));
+                self.sources[block][side] = Source::Tile(tile as u32);
+                if pattern.symmetric {
+                    self.sources[block][1 - side] = Source::Transpose(tile as u32);
                 }
             }
         }

@@ -32,10 +32,10 @@ where
     fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System) {
         let tiles = system.tiles::<W>();
         for row in rows.clone() {
-            self.diagonal[row] = *tile::of(tiles, elimination.diagonal[row]);
+            self.diagonal[row] = tiles[elimination.diagonal[row] as usize];
             for k in elimination.neighbours(row) {
-                // The one half of a symmetric tangent is the other one's transpose.
-                self.upper[k] = *tile::of(tiles, elimination.sources[k][1]);
+                // By columns it is what its mirror image is by rows.
+                tile::take(&mut self.upper[k], tiles, elimination.sources[k][1]);
             }
         }
         for &(row, direction) in elimination.idle(&rows) {

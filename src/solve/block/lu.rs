@@ -40,11 +40,12 @@ where
     fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System) {
         let tiles = system.tiles::<W>();
         for row in rows.clone() {
-            self.diagonal[row] = tile::transposed(tile::of(tiles, elimination.diagonal[row]));
+            self.diagonal[row] = tile::transposed(&tiles[elimination.diagonal[row] as usize]);
             for k in elimination.neighbours(row) {
                 let [upper, lower] = elimination.sources[k];
-                self.upper[k] = tile::transposed(tile::of(tiles, upper));
-                self.lower[k] = *tile::of(tiles, lower);
+                tile::take(&mut self.upper[k], tiles, upper);
+                self.upper[k] = tile::transposed(&self.upper[k]);
+                tile::take(&mut self.lower[k], tiles, lower);
             }
         }
         for &(row, direction) in elimination.idle(&rows) {

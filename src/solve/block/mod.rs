@@ -45,8 +45,13 @@ trait Factor: Send {
 
 impl BlockSolver {
     /// For tangents of this pattern. `None` where blocks would fill up, or memory cannot be had.
-    pub fn new(pattern: &Pattern, symmetric: bool) -> Option<Self> {
-        Self::by(Arc::new(Elimination::new(pattern)?), pattern, symmetric)
+    pub fn new(pattern: &Pattern) -> Option<Self> {
+        Self::by(Arc::new(Elimination::new(pattern)?), pattern, pattern.symmetric)
+    }
+
+    /// For tangents of this pattern that are symmetric, even where the pattern does not say so.
+    pub fn symmetric(pattern: &Pattern) -> Option<Self> {
+        Self::by(Arc::new(Elimination::new(pattern)?), pattern, true)
     }
 
     /// Another one for tangents of the same pattern, which are symmetric.

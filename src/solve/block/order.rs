@@ -50,7 +50,7 @@ impl Neighbours {
         // Rows whose first later neighbour is this one
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut seen = vec![u32::MAX; n];
-        let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(pattern.tiles() / 2));
+        let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(pattern.pairs()));
         starts.push(0);
         for row in 0..n {
             let start = later.len();
@@ -61,7 +61,7 @@ impl Neighbours {
                     later.push(other);
                 }
             };
-            for &group in pattern.rows_of(order[row] as usize) {
+            for group in pattern.met_by(order[row] as usize) {
                 visit(row_of[group as usize], &mut later);
             }
             for child in std::mem::take(&mut children[row]) {

@@ -1,8 +1,9 @@
 //! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 where a scene is planar. Every loop runs along rows, which lie
 //! next to each other.
 
+use super::elimination::Source;
 use crate::real::Lanes;
-pub use crate::system::Tile;
+pub use crate::system::{Tile, transposed};
 
 /// A part of a vector that belongs to one tile row.
 pub type Part<const W: usize> = [f64; W];
@@ -109,12 +110,6 @@ pub const fn zero<const W: usize>() -> Tile<W> {
     [[0.0; W]; W]
 }
 
-/// A tile of the tangent; nothing where elimination fills it.
-#[inline(always)]
-pub fn of<const W: usize>(tiles: &[Tile<W>], number: u32) -> &Tile<W> {
-    tiles.get(number as usize).unwrap_or(const { &zero() })
-}
-
 #[inline(always)]
 fn row<const W: usize>(part: &Part<W>) -> <Width<W> as Rows<W>>::Row
 where
@@ -178,12 +173,14 @@ macro_rules! each_row_backwards {
     }};
 }
 
-/// The transpose.
+/// Takes a block over from the tangent.
 #[inline(always)]
-pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
-    let mut out = zero();
-    each_row!(W, |i| each_row!(W, |j| out[j][i] = tile[i][j]));
-    out
+pub fn take<const W: usize>(block: &mut Tile<W>, tiles: &[Tile<W>], source: Source) {
+    match source {
+        Source::Nothing => *block = zero(),
+        Source::Tile(number) => *block = tiles[number as usize],
+        Source::Transpose(number) => *block = transposed(&tiles[number as usize]),
+    }
 }
 
 /// target -= w^T y
