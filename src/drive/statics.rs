@@ -44,6 +44,7 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         self.start_static(workshop)?;
         let mut levels = Levels::new(self, workshop, steps, approach);
+        self.good.copy_from(&self.state);
         for number in 1..=steps {
             let reached = self.reach(workshop, number as f64 / steps as f64, &mut levels)?;
             if reached == Reached::Level {
@@ -91,9 +92,8 @@ impl Run<'_> {
         self.open_account(workshop)
     }
 
-    /// Goes to the load factor `target`: at once, in smaller steps, or along the path.
+    /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or along the path.
     fn reach(&mut self, workshop: &mut Workshop, target: f64, levels: &mut Levels) -> Result<Reached, Failure> {
-        self.good.copy_from(&self.state);
         while self.good.load < target {
             let next = levels.next(self.good.load, target);
             self.observer.progress(self.moment(), self.static_progress(next))?;
@@ -101,7 +101,7 @@ impl Run<'_> {
                 Tried::Good(negative) => self.take_step(workshop, negative, levels)?,
                 _ if levels.halve(self.soft) => {
                     self.counters.cutbacks += 1;
-                    self.state.copy_from(&self.good);
+                    self.state.copy_all_but_rates(&self.good);
                 }
                 // Nothing tells better.
                 Tried::Jumped(negative) if levels.approach != Approach::Path => {
@@ -132,7 +132,7 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         self.accept(workshop)?;
         levels.stability.pass(self, negative)?;
-        self.good.copy_from(&self.state);
+        self.good.copy_all_but_rates(&self.state);
         // Where pivots were counted the stiffness is that of this state.
         if negative.is_some() {
             workshop.newton.begin_with(&workshop.assembly.system);

@@ -80,14 +80,18 @@ impl Assembly {
         let acts = |(effect, own): (Arc<dyn Effect>, &Cliques)| Acting::new(effect, equations.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&cliques).map(acts).collect();
         let symmetric = effects.iter().all(Acting::is_symmetric);
-        let categories: Vec<Category> = match model.is_linear(stage.kind) {
-            true => Category::ALL.to_vec(),
-            false => effects.iter().flat_map(Acting::categories).collect(),
-        };
+        // What is linear adds its forces by itself.
+        let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
+        let categories: Vec<Vec<Category>> = effects.iter().map(|acting| acting.categories().collect()).collect();
         let groups = model.groups(equations.layout());
         Self {
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
-            system: System::new(Pattern::new(equations, groups, cliques, symmetric), model.slots.len(), &categories),
+            system: System::new(
+                Pattern::new(equations, groups, cliques, symmetric),
+                model.slots.len(),
+                everywhere,
+                &categories,
+            ),
             effects,
             linear: None,
         }

@@ -40,7 +40,7 @@ impl Linear {
         let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques, false);
         let mut origin = about.clone();
         origin.stand_still();
-        let mut whole = System::new(pattern, slots, &Category::ALL);
+        let mut whole = System::new(pattern, slots, &Category::ALL, &[]);
         let mut matrix = |weights: Weights| {
             whole.clear(None);
             let forget = Memory::default();

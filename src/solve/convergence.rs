@@ -2,10 +2,9 @@
 
 use crate::effect::Noise;
 use crate::model::{Model, SlotKind};
-use crate::system::{Equations, Plane, Slot, System};
+use crate::system::{Equations, Plane, Region, Slot, System};
 use crate::tensor::Vec3;
 use crate::threads;
-use std::ops::Range;
 
 /// The bounds of the test.
 ///
@@ -116,7 +115,7 @@ struct Peak {
 }
 
 /// The largest forces and residuals.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Peaks {
     /// The largest nodal force among all categories and what constraints hold, and the largest moment
     force: f64,
@@ -131,27 +130,30 @@ impl Peaks {
     /// In this measure of vectors.
     fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy + Send + Sync) -> Self {
         let mut all: Option<Self> = None;
-        let regions = system.pattern.regions.iter().map(|region| region.slots.clone());
-        let of_region = |slots| Self::among(slots, model, system, measure);
-        threads::in_order(regions, of_region, |own| all = Some(all.map_or(own, |all| all.or(own))));
-        all.unwrap_or_else(|| Self::among(0..0, model, system, measure))
+        let of_region = |region| Self::among(region, model, system, measure);
+        let add = |own| all = Some(all.map_or(own, |all| all.or(own)));
+        threads::in_order(system.pattern.regions.iter(), of_region, add);
+        // There is at least one region.
+        all.unwrap_or_default()
     }
 
-    /// Those of some slots.
-    fn among(slots: Range<usize>, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
+    /// Those in a region.
+    fn among(region: &Region, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
+        let slots = region.slots.clone();
         let equations = &system.pattern.equations;
         // Vectors in a tilted plane are rounded aside.
         let tilted = equations.plane().is_some_and(Plane::is_tilted);
         let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
         for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
             let (mut total, mut largest, mut sum) = (Vec3::ZERO, 0.0, 0.0);
-            for force in system.acting() {
+            for force in system.acting_in(region) {
                 let size = measure(force[slot]);
                 (total, largest, sum) = (total + force[slot], larger(size, largest), sum + size);
             }
             let whole = !tilted && equations.is_plain(slot as Slot);
             let free = if whole { total } else { free_part(equations, slot as Slot, total) };
-            let [held, free] = [measure(total - free), measure(free)];
+            let held = if whole { 0.0 } else { measure(total - free) };
+            let free = measure(free);
             poison += sum * 0.0;
             let kind = kind as usize;
             forces[kind] = larger(largest, larger(held, forces[kind]));

@@ -51,8 +51,9 @@ pub struct System {
     pub pattern: Pattern,
     /// By category and slot
     pub force: [Vec<Vec3>; 4],
-    /// The numbers of those that something may add to; the others stay zero
+    /// The numbers of those that something may add to, in all and region by region; the others stay zero
     acting: Vec<usize>,
+    acting_in: Vec<Vec<usize>>,
     /// The values of the tangent, tile by tile: that of the last evaluation with weights
     pub values: Vec<f64>,
     /// Counts how often the tangent has become another one
@@ -66,19 +67,18 @@ pub struct System {
 }
 
 impl System {
-    /// A system of zeros, for forces of these categories beside internal ones.
-    pub fn new(pattern: Pattern, slots: usize, categories: &[Category]) -> Self {
+    /// A system of zeros, for internal forces and those of some categories everywhere, and for those of each effect where it acts.
+    pub fn new(pattern: Pattern, slots: usize, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Self {
+        let acting_in = acting_in(&pattern, everywhere, of_effects);
+        let acts = |category: &usize| acting_in.iter().any(|acting| acting.contains(category));
         let zero = vec![Vec3::ZERO; slots];
         let (values, equations) = (pattern.values(), pattern.equations.count());
         Self {
             rooms: vec![Vec::new(); 1 + pattern.regions.len()],
             pattern,
             force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
-            acting: Category::ALL
-                .into_iter()
-                .filter(|k| *k == Category::Internal || categories.contains(k))
-                .map(|k| k as usize)
-                .collect(),
+            acting: (0..Category::ALL.len()).filter(acts).collect(),
+            acting_in,
             values: vec![0.0; values],
             revision: 0,
             lift: zero,
@@ -117,13 +117,13 @@ impl System {
     /// The sum of the forces at a slot.
     #[inline]
     pub fn total(&self, slot: usize) -> Vec3 {
-        self.acting().fold(Vec3::ZERO, |sum, force| sum + force[slot])
+        self.acting.iter().fold(Vec3::ZERO, |sum, &category| sum + self.force[category][slot])
     }
 
-    /// Forces of the categories that something may add to.
+    /// Forces of the categories that something may add to in a region.
     #[inline]
-    pub fn acting(&self) -> impl Iterator<Item = &[Vec3]> {
-        self.acting.iter().map(|&category| &self.force[category][..])
+    pub fn acting_in(&self, region: &Region) -> impl Iterator<Item = &[Vec3]> {
+        self.acting_in[region.number].iter().map(|&category| &self.force[category][..])
     }
 
     /// Sets forces to zero for a new evaluation, without prescribed increments; the tangent is left as it is.
@@ -269,12 +269,14 @@ impl System {
 
     /// The right-hand side of the correction: -g - J lift on the free equations.
     pub fn right_hand_side(&self, out: &mut [f64]) {
-        self.fill_right_hand_side(|slot| self.total(slot), out);
+        let total =
+            |region: &Region, slot: usize| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot]);
+        self.fill_right_hand_side(total, out);
     }
 
     /// The same for other forces than those that were assembled.
     pub fn right_hand_side_of(&self, force: &[Vec3], out: &mut [f64]) {
-        self.fill_right_hand_side(|slot| force[slot], out);
+        self.fill_right_hand_side(|_, slot| force[slot], out);
     }
 
     /// The same again, without what prescribed increments bring.
@@ -283,14 +285,14 @@ impl System {
         out.iter_mut().zip(&self.lifted).for_each(|(out, lifted)| *out += lifted);
     }
 
-    fn fill_right_hand_side(&self, force: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
+    fn fill_right_hand_side(&self, force: impl Fn(&Region, usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
         let equations = &self.pattern.equations;
         self.pattern.each_region(out, |region, out| {
             for slot in region.slots.clone() {
-                let local = equations.to_local(slot as Slot, force(slot));
+                let local = equations.to_local(slot as Slot, force(region, slot));
                 for (k, number) in equations.of(slot as Slot).into_iter().enumerate() {
                     if number != Equations::HELD {
-                        let lifted = self.lifted[number as usize];
+                        let lifted = if self.lifts { self.lifted[number as usize] } else { 0.0 };
                         out[number as usize - region.equations.start] = -local.0[k] - lifted;
                     }
                 }
@@ -305,7 +307,7 @@ impl System {
 
     /// What each region adds to.
     fn parts(&mut self) -> Vec<Part<'_>> {
-        let Self { pattern, acting, force, values, lift, lifts, lifted, rooms, .. } = self;
+        let Self { pattern, acting_in, force, values, lift, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
         let size = pattern.width() * pattern.width();
@@ -313,9 +315,9 @@ impl System {
         let values = threads::split(values, ends(|r| r.tiles.end).map(|end| size * end));
         let lifted = threads::split(lifted, ends(|r| r.equations.end));
         let stretches = values.into_iter().zip(lifted).zip(&mut rooms[1..]).enumerate();
-        let part = |(region, ((values, lifted), room))| Part {
+        let part = |(region, ((values, lifted), room)): (usize, _)| Part {
             pattern,
-            acting,
+            acting: &acting_in[region],
             region: Some(region),
             force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
             values,
@@ -345,6 +347,19 @@ impl System {
         let all = 0..self.pattern.places[effect].cliques.len();
         self.whole().into_sink(effect, category, with_tangent, all)
     }
+}
+
+/// The categories of force in each region.
+fn acting_in(pattern: &Pattern, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Vec<Vec<usize>> {
+    let first = Category::ALL.map(|category| category == Category::Internal || everywhere.contains(&category));
+    let mut acts = vec![first; pattern.regions.len()];
+    for (categories, places) in of_effects.iter().zip(&pattern.places) {
+        let touched = regions::touched(&places.cliques, &pattern.groups, &pattern.regions);
+        for (acts, _) in acts.iter_mut().zip(touched).filter(|(_, touched)| *touched) {
+            categories.iter().for_each(|&category| acts[category as usize] = true);
+        }
+    }
+    acts.iter().map(|acts| (0..acts.len()).filter(|&category| acts[category]).collect()).collect()
 }
 
 /// Values as tiles.

@@ -147,7 +147,12 @@ impl Equations {
     /// The turned axes of a slot as columns.
     #[inline]
     pub fn frame(&self, slot: Slot) -> Option<Mat3> {
-        self.frames.get(self.frame[slot as usize] as usize).copied()
+        self.axes(slot).copied()
+    }
+
+    #[inline]
+    fn axes(&self, slot: Slot) -> Option<&Mat3> {
+        self.frames.get(self.frame[slot as usize] as usize)
     }
 
     /// The slot and the direction (global components) of an equation.
@@ -176,7 +181,7 @@ impl Equations {
                         local.0[k] = solution[self.number[slot][k] as usize];
                     }
                 }
-                *out = self.frame(slot as Slot).map_or(local, |frame| frame * local);
+                *out = self.axes(slot as Slot).map_or(local, |frame| *frame * local);
             }
         });
     }
@@ -201,7 +206,7 @@ impl Equations {
     /// Components in the local directions of a slot.
     #[inline]
     pub fn to_local(&self, slot: Slot, value: Vec3) -> Vec3 {
-        self.frame(slot).map_or(value, |frame| frame.transpose_mul(value))
+        self.axes(slot).map_or(value, |frame| frame.transpose_mul(value))
     }
 }
 

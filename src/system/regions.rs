@@ -16,6 +16,8 @@ const GROUPS: usize = 1024;
 /// What belongs to nodes that follow each other.
 #[derive(Clone, Debug)]
 pub struct Region {
+    /// Its place among all
+    pub number: usize,
     /// Columns of tiles
     pub groups: Range<usize>,
     /// Their slots
@@ -61,6 +63,15 @@ impl Shares {
     }
 }
 
+/// Whether something of an effect lies in each region, or between it and others.
+pub fn touched(cliques: &Cliques, groups: &Groups, regions: &[Region]) -> Vec<bool> {
+    let mut touched = vec![false; regions.len()];
+    for &slot in cliques.iter().flatten() {
+        touched[groups.of(slot).0 / regions[0].groups.len()] = true;
+    }
+    touched
+}
+
 /// Instances that stand side by side: of one shape, as many as there are lanes.
 fn rows(cliques: &Cliques) -> impl Iterator<Item = Range<usize>> {
     let mut start = 0;
@@ -104,7 +115,7 @@ pub fn cut(groups: &Groups, equations: &Equations, column_starts: &[u32]) -> Vec
         let slots = slot(groups.start)..slot(groups.end);
         let equations = equations.before(slots.start)..equations.before(slots.end);
         let tiles = column_starts[groups.start] as usize..column_starts[groups.end] as usize;
-        Region { groups, slots, equations, tiles }
+        Region { number, groups, slots, equations, tiles }
     };
     (0..all.div_ceil(length).max(1)).map(region).collect()
 }

@@ -13,7 +13,7 @@ use std::ops::Range;
 /// A stretch of the system: that of a region, to which others add nothing meanwhile, or all of it.
 pub struct Part<'a> {
     pub(super) pattern: &'a Pattern,
-    /// The categories that something may add to
+    /// The categories that something may add to there
     pub(super) acting: &'a [usize],
     /// `None` for all of it
     pub(super) region: Option<usize>,

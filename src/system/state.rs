@@ -81,12 +81,17 @@ impl State {
 
     /// Takes over another state of the same scene without allocating.
     pub fn copy_from(&mut self, other: &Self) {
-        self.time = other.time;
-        self.load = other.load;
-        self.q.copy_from_slice(&other.q);
         self.v.copy_from_slice(&other.v);
         self.a.copy_from_slice(&other.a);
         self.algorithmic.copy_from_slice(&other.algorithmic);
+        self.copy_all_but_rates(other);
+    }
+
+    /// The same where both stand still.
+    pub fn copy_all_but_rates(&mut self, other: &Self) {
+        self.time = other.time;
+        self.load = other.load;
+        self.q.copy_from_slice(&other.q);
         self.amplitude.copy_from_slice(&other.amplitude);
         self.mixed.copy_from_slice(&other.mixed);
         self.wound.copy_from_slice(&other.wound);

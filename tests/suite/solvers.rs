@@ -62,7 +62,7 @@ fn system_in(plane: Option<Plane>, edges: &[[usize; 2]], symmetric: bool, shift:
     };
     let groups = Groups::new(2 * nodes, layout, turns);
     let pattern = Pattern::new(equations, groups, vec![cliques, own], symmetric);
-    let mut system = System::new(pattern, 2 * nodes, &[]);
+    let mut system = System::new(pattern, 2 * nodes, &[], &[]);
     system.clear(None);
     for k in 0..edges.len() {
         let mut element = ElementSystem::new(4);
@@ -354,7 +354,7 @@ fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state
     let (effects, plane) = (model.acting(stage), equations.plane().copied());
     let cliques = effects.iter().map(|effect| effect.cliques()).collect();
     let pattern = Pattern::new(equations.clone(), model.groups(equations.layout()), cliques, false);
-    let mut system = System::new(pattern, model.slots.len(), &Category::ALL);
+    let mut system = System::new(pattern, model.slots.len(), &Category::ALL, &[]);
     for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
         let mut sink = system.sink(number, effect.category(), true);
         match plane.and_then(|plane| effect.clone().in_plane(&plane)) {
