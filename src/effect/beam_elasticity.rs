@@ -6,7 +6,7 @@ use super::planar_elasticity::PlanarElasticity;
 use super::{AT_ONCE, ByOrder, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
-use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::kernel::{ElementSystem, NodePlace, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
 use crate::tensor::Vec3;
@@ -315,7 +315,7 @@ impl<const N: usize, const G: usize> Sum<N, G, Lanes> {
 
 impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
     #[inline(always)]
-    fn add(&self, nodes: &[NodeMotion<T>; N], stiffness: f64, out: &mut ElementSystem<T>) {
+    fn add(&self, nodes: &[NodePlace<T>; N], stiffness: f64, out: &mut ElementSystem<T>) {
         for g in 0..G {
             let geometric = self.stresses.as_ref().map(|stresses| &stresses[g]);
             self.points[g].add_elastic(nodes, self.free, geometric, stiffness, out);
@@ -323,7 +323,7 @@ impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
     }
 
     #[inline(always)]
-    fn add_geometric(&self, nodes: &[NodeMotion<T>; N], out: &mut ElementSystem<T>) -> bool {
+    fn add_geometric(&self, nodes: &[NodePlace<T>; N], out: &mut ElementSystem<T>) -> bool {
         let Some(stresses) = &self.stresses else { return false };
         for g in 0..G {
             let point = &self.points[g];
@@ -435,7 +435,7 @@ fn each_energy<I: Interpolation, const N: usize, const G: usize>(
 #[inline(always)]
 fn strain_energy<const N: usize, const G: usize, T: Real>(
     points: &[StiffnessPoint<N, T>; G],
-    nodes: &[NodeMotion<T>; N],
+    nodes: &[NodePlace<T>; N],
     free: T,
 ) -> T {
     let mut sum = T::zero();

@@ -1,12 +1,12 @@
 //! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and carries what the kernel
 //! gives back to the nodes of the scene.
 
-use super::{Connection, after_displacement, motions};
+use super::{Connection, after_displacement, at_slots};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Stress;
 use crate::kernel::relative::Relative;
-use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::real::{LANES, Lanes, Pack, Real, pack};
+use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
+use crate::real::{LANES, Lanes, Pack, Real, each_lane, pack};
 use crate::rotation::Rotation;
 use crate::system::{Sink, State};
 use crate::tensor::{Mat3, Vec3};
@@ -37,11 +37,11 @@ impl<const N: usize> Posture<N, Lanes> {
     /// Of elements side by side, each node in its own chart.
     #[inline(always)]
     pub fn side_by_side(connections: [&Connection<N>; LANES], at: &State) -> Self {
-        let nodes = motions(connections, at);
         let mut out = Self { places: [Vec3::zero(); N], u: [Vec3::zero(); N], p: [Vec3::zero(); N], base: None };
         for i in 0..N {
             out.places[i] = pack!(connections.places[i]);
-            (out.u[i], out.p[i]) = (nodes[i].u, nodes[i].p);
+            out.u[i] = at_slots(&at.q, each_lane!(|k| connections[k].nodes[i].u));
+            out.p[i] = at_slots(&at.q, each_lane!(|k| connections[k].nodes[i].p));
         }
         if !at.turns.is_empty() {
             out.base = Some(bases(connections, at));
@@ -66,10 +66,10 @@ fn bases<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [M
 /// What is summed over the points of an element.
 pub trait PointSum<const N: usize, T: Real> {
     /// Adds the force and `stiffness` times the tangent, for nodes that the kernel sees so.
-    fn add(&self, nodes: &[NodeMotion<T>; N], stiffness: f64, out: &mut ElementSystem<T>);
+    fn add(&self, nodes: &[NodePlace<T>; N], stiffness: f64, out: &mut ElementSystem<T>);
 
     /// Adds the forces that geometric parts are formed with; `false` where they are those of `add`.
-    fn add_geometric(&self, nodes: &[NodeMotion<T>; N], out: &mut ElementSystem<T>) -> bool;
+    fn add_geometric(&self, nodes: &[NodePlace<T>; N], out: &mut ElementSystem<T>) -> bool;
 
     /// The elastic point half way between two nodes, where it is all there is: for it the way is short.
     fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
@@ -128,7 +128,7 @@ pub trait View<const N: usize, T: Real> {
     fn new(posture: &Posture<N, T>) -> Self;
 
     /// The nodes that the kernel is shown.
-    fn nodes(&self) -> &[NodeMotion<T>; N];
+    fn nodes(&self) -> &[NodePlace<T>; N];
 
     /// How these vary with displacements and rotation vectors.
     fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N];
@@ -237,13 +237,13 @@ impl Interpolation for RelativeVectors {
 
 /// An element with the nodes that it has.
 pub struct AsItIs<const N: usize, T> {
-    nodes: [NodeMotion<T>; N],
+    nodes: [NodePlace<T>; N],
 }
 
 impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
     #[inline(always)]
     fn new(posture: &Posture<N, T>) -> Self {
-        let mut nodes = [NodeMotion::rest(); N];
+        let mut nodes = [NodePlace::rest(); N];
         for i in 0..N {
             (nodes[i].u, nodes[i].p) = (posture.u[i], posture.p[i]);
         }
@@ -251,7 +251,7 @@ impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
     }
 
     #[inline(always)]
-    fn nodes(&self) -> &[NodeMotion<T>; N] {
+    fn nodes(&self) -> &[NodePlace<T>; N] {
         &self.nodes
     }
 
@@ -293,7 +293,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
     }
 
     #[inline(always)]
-    fn nodes(&self) -> &[NodeMotion<T>; N] {
+    fn nodes(&self) -> &[NodePlace<T>; N] {
         &self.seen.nodes
     }
 

@@ -299,20 +299,26 @@ fn side_by_side<E>(batch: &[E], start: usize) -> [&E; LANES] {
 /// The motions of the nodes of elements side by side, each in its own chart.
 #[inline(always)]
 fn motions<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [NodeMotion<Lanes>; N] {
-    let mut out = [NodeMotion::rest(); N];
-    for i in 0..N {
-        let u: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].u);
-        let p: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].p);
-        out[i] = NodeMotion {
-            u: at_slots(&at.q, u),
-            u_rate: at_slots(&at.v, u),
-            u_rate2: at_slots(&at.a, u),
-            p: at_slots(&at.q, p),
-            p_rate: at_slots(&at.v, p),
-            p_rate2: at_slots(&at.a, p),
-        };
+    let mut out = [motions_of(connections, 0, at); N];
+    for i in 1..N {
+        out[i] = motions_of(connections, i, at);
     }
     out
+}
+
+/// Those of the nodes with this number in their elements.
+#[inline(always)]
+fn motions_of<const N: usize>(connections: [&Connection<N>; LANES], i: usize, at: &State) -> NodeMotion<Lanes> {
+    let u: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].u);
+    let p: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].p);
+    NodeMotion {
+        u: at_slots(&at.q, u),
+        u_rate: at_slots(&at.v, u),
+        u_rate2: at_slots(&at.a, u),
+        p: at_slots(&at.q, p),
+        p_rate: at_slots(&at.v, p),
+        p_rate2: at_slots(&at.a, p),
+    }
 }
 
 /// What a field is at the slots of elements side by side.

@@ -4,6 +4,7 @@ use super::beam_elasticity::{BeamElasticity, stresses_of, workspace};
 use super::elastic_element::ElasticElement;
 use super::interpolation::Interpolation;
 use super::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
+use crate::kernel::elastic::Stress;
 use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, Real, each_lane};
@@ -81,8 +82,13 @@ fn free<const N: usize, const G: usize>(elements: &[ElasticElement<N, G>], at: &
 #[inline(always)]
 fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> PlanarStress<Lanes> {
     let last = memory.len() / G - 1;
-    let packed = <[f64; 6]>::pack(each_lane!(|k| &memory[k.min(last) * G + g]));
-    flattened(&super::beam_elasticity::unpack(&packed), plane.axes())
+    let of = each_lane!(|k| &memory[k.min(last) * G + g]);
+    let mut stress = Stress { n: Vec3::zero(), m: Vec3::zero() };
+    for c in 0..3 {
+        stress.n.0[c] = Lanes(each_lane!(|k| of[k][c]));
+        stress.m.0[c] = Lanes(each_lane!(|k| of[k][c + 3]));
+    }
+    flattened(&stress, plane.axes())
 }
 
 #[inline(always)]
@@ -97,14 +103,14 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Sink,
 ) {
-    let (stiffness, mut alone) = (weights.stiffness, None);
+    let (stiffness, mut alone, mut system) = (weights.stiffness, None, PlanarSystem::zero());
     for number in own_blocks(first, batch.len(), out) {
         let (block, start) = (&blocks[number], number * LANES);
         let elements = &batch[start..batch.len().min(start + LANES)];
         let mut nodes = block.nodes(&at.q, plane);
         in_one_turn(&mut nodes);
         let (free, own) = (free(elements, at), memory.get(start * G..).filter(|own| !own.is_empty()));
-        let mut system = PlanarSystem::zero();
+        system.clear_for(stiffness);
         for g in 0..G {
             let geometric = own.map(|own| remembered::<G>(own, g, plane));
             block.points[g].add(&nodes, free, geometric.as_ref(), stiffness, &mut system);

@@ -17,7 +17,7 @@ use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
 use super::{Connection, Effect, after_displacement, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Point, Stiffness, Strain, Stress};
-use crate::kernel::{ElementSystem, NodeMotion, Weights};
+use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
 use crate::real::Jet;
 use crate::system::{Aspect, Category, Cliques, Memory, RotationRate, Sink, State};
 use crate::tensor::{Mat3, Vec3};
@@ -179,7 +179,7 @@ struct Stressed<'a, const N: usize, const G: usize> {
 }
 
 impl<const N: usize, const G: usize> PointSum<N, f64> for Stressed<'_, N, G> {
-    fn add(&self, nodes: &[NodeMotion; N], stiffness: f64, out: &mut ElementSystem) {
+    fn add(&self, nodes: &[NodePlace; N], stiffness: f64, out: &mut ElementSystem) {
         let none = Stiffness { cn: Mat3::ZERO, cm: Mat3::ZERO, cc: None };
         for (point, stress) in self.points.iter().zip(self.stresses) {
             let place = point.configuration(nodes);
@@ -190,7 +190,7 @@ impl<const N: usize, const G: usize> PointSum<N, f64> for Stressed<'_, N, G> {
         }
     }
 
-    fn add_geometric(&self, _nodes: &[NodeMotion; N], _out: &mut ElementSystem) -> bool {
+    fn add_geometric(&self, _nodes: &[NodePlace; N], _out: &mut ElementSystem) -> bool {
         false
     }
 }
@@ -203,7 +203,7 @@ struct UnitStress<'a, const N: usize> {
 }
 
 impl<const N: usize> PointSum<N, Jet> for UnitStress<'_, N> {
-    fn add(&self, _nodes: &[NodeMotion<Jet>; N], _stiffness: f64, out: &mut ElementSystem<Jet>) {
+    fn add(&self, _nodes: &[NodePlace<Jet>; N], _stiffness: f64, out: &mut ElementSystem<Jet>) {
         let unit = |part: usize| match self.component / 3 == part {
             true => Vec3::constant(Vec3::UNIT[self.component % 3]),
             false => Vec3::zero(),
@@ -211,7 +211,7 @@ impl<const N: usize> PointSum<N, Jet> for UnitStress<'_, N> {
         self.point.add_force(self.place, &Stress { n: unit(0), m: unit(1) }, out);
     }
 
-    fn add_geometric(&self, _nodes: &[NodeMotion<Jet>; N], _out: &mut ElementSystem<Jet>) -> bool {
+    fn add_geometric(&self, _nodes: &[NodePlace<Jet>; N], _out: &mut ElementSystem<Jet>) -> bool {
         false
     }
 }

@@ -1,7 +1,7 @@
 //! Beam elements of N nodes: interpolation, and the sums over Gauss points.
 
 use super::elastic::{Point, PointTangent, Stiffness, Strain, Stress};
-use super::element::{ElementSystem, NodeMotion};
+use super::element::{ElementSystem, Placed};
 use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
 
@@ -77,16 +77,16 @@ impl<const N: usize> Pack for StiffnessPoint<N> {
 impl<const N: usize, T: Real> StiffnessPoint<N, T> {
     /// The configuration at this point; x' = E1 + sum N_i' u_i.
     #[inline(always)]
-    pub fn configuration(&self, nodes: &[NodeMotion<T>; N]) -> Point<T> {
-        let p = interpolate(&self.shape, |i| nodes[i].p);
-        let p_slope = interpolate(&self.slope, |i| nodes[i].p);
-        let x_slope = self.tangent + interpolate(&self.slope, |i| nodes[i].u);
+    pub fn configuration(&self, nodes: &[impl Placed<T>; N]) -> Point<T> {
+        let p = interpolate(&self.shape, |i| nodes[i].place().p);
+        let p_slope = interpolate(&self.slope, |i| nodes[i].place().p);
+        let x_slope = self.tangent + interpolate(&self.slope, |i| nodes[i].place().u);
         Point::new(p, p_slope, x_slope)
     }
 
     /// Strain and stress at this point; `free` is the amplitude of the free strain.
     #[inline(always)]
-    pub fn strain_and_stress(&self, nodes: &[NodeMotion<T>; N], free: T) -> (Strain<T>, Stress<T>) {
+    pub fn strain_and_stress(&self, nodes: &[impl Placed<T>; N], free: T) -> (Strain<T>, Stress<T>) {
         let strain = self.configuration(nodes).strain(self.tangent);
         (strain, self.stress(&strain, free))
     }
@@ -122,7 +122,7 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
     #[inline(always)]
     pub fn extrapolated_stress(
         &self,
-        nodes: &[NodeMotion<T>; N],
+        nodes: &[impl Placed<T>; N],
         free: T,
         du: impl Fn(usize) -> Vec3<T>,
         dp: impl Fn(usize) -> Vec3<T>,
@@ -139,7 +139,7 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
     #[inline(always)]
     pub fn add_elastic(
         &self,
-        nodes: &[NodeMotion<T>; N],
+        nodes: &[impl Placed<T>; N],
         free: T,
         geometric: Option<&Stress<T>>,
         weight: f64,
@@ -187,8 +187,7 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
                 if let Some(xs) = k.xs {
                     up += xs * (w * s[i] * s[j]);
                 }
-                out.add_tangent(2 * i, 2 * j + 1, up);
-                out.add_tangent(2 * j + 1, 2 * i, up.transpose());
+                out.add_symmetric(2 * i, 2 * j + 1, &up);
                 if j < i {
                     continue;
                 }
@@ -197,11 +196,15 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
                     + k.sp * (w * s[i] * n[j])
                     + k.sp.transpose() * (w * n[i] * s[j])
                     + k.pp * (w * n[i] * n[j]);
-                out.add_tangent(2 * i, 2 * j, uu);
-                out.add_tangent(2 * i + 1, 2 * j + 1, pp);
-                if j > i {
-                    out.add_tangent(2 * j, 2 * i, uu.transpose());
-                    out.add_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
+                match j > i {
+                    true => {
+                        out.add_symmetric(2 * i, 2 * j, &uu);
+                        out.add_symmetric(2 * i + 1, 2 * j + 1, &pp);
+                    }
+                    false => {
+                        out.add_tangent(2 * i, 2 * j, uu);
+                        out.add_tangent(2 * i + 1, 2 * j + 1, pp);
+                    }
                 }
             }
         }

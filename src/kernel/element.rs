@@ -45,6 +45,43 @@ pub struct NodeMotion<T = f64> {
     pub p_rate2: Vec3<T>,
 }
 
+/// Displacement and rotation vector at a node (global components).
+#[derive(Clone, Copy, Debug)]
+pub struct NodePlace<T = f64> {
+    /// u
+    pub u: Vec3<T>,
+    /// P, the rotation vector in the chart of the evaluation
+    pub p: Vec3<T>,
+}
+
+impl<T: Real> NodePlace<T> {
+    /// The initial one.
+    #[inline(always)]
+    pub fn rest() -> Self {
+        Self { u: Vec3::zero(), p: Vec3::zero() }
+    }
+}
+
+/// What has a displacement and a rotation vector.
+pub trait Placed<T> {
+    /// These two.
+    fn place(&self) -> NodePlace<T>;
+}
+
+impl<T: Copy> Placed<T> for NodePlace<T> {
+    #[inline(always)]
+    fn place(&self) -> NodePlace<T> {
+        *self
+    }
+}
+
+impl<T: Copy> Placed<T> for NodeMotion<T> {
+    #[inline(always)]
+    fn place(&self) -> NodePlace<T> {
+        NodePlace { u: self.u, p: self.p }
+    }
+}
+
 impl<T: Real> NodeMotion<T> {
     /// At rest in the initial placement.
     pub fn rest() -> Self {
@@ -195,6 +232,19 @@ impl<T: Real> ElementSystem<T> {
         }
     }
 
+    /// Adds to a block of a symmetric tangent, and to its mirror image.
+    #[inline(always)]
+    pub fn add_symmetric(&mut self, row: usize, column: usize, m: &Mat3<T>) {
+        let places = [self.place(row, column), self.place(column, row)];
+        for i in 0..3 {
+            for j in 0..3 {
+                let [(tile, start), (mirrored, begin)] = places;
+                self.tangent[tile][start + j * WIDTH + i] += m.0[i][j];
+                self.tangent[mirrored][begin + i * WIDTH + j] += m.0[i][j];
+            }
+        }
+    }
+
     /// A block of the tangent.
     #[inline(always)]
     pub fn tangent_block(&self, row: usize, column: usize) -> Mat3<T> {
@@ -215,7 +265,7 @@ impl<T: Real> ElementSystem<T> {
         for (row, &i) in blocks.iter().enumerate() {
             out.set_force(row, self.force_block(i));
             for (column, &j) in blocks.iter().enumerate() {
-                out.set_tangent(row, column, self.tangent_block(i, j));
+                out.set_tangent(row, column, &self.tangent_block(i, j));
             }
         }
         out
@@ -223,12 +273,25 @@ impl<T: Real> ElementSystem<T> {
 
     /// Replaces a block of the tangent.
     #[inline(always)]
-    pub fn set_tangent(&mut self, row: usize, column: usize, m: Mat3<T>) {
+    pub fn set_tangent(&mut self, row: usize, column: usize, m: &Mat3<T>) {
         let (tile, start) = self.place(row, column);
         let tile = &mut self.tangent[tile];
         for i in 0..3 {
             for j in 0..3 {
                 tile[start + j * WIDTH + i] = m.0[i][j];
+            }
+        }
+    }
+
+    /// Replaces a block of a symmetric tangent, and its mirror image.
+    #[inline(always)]
+    pub fn set_symmetric(&mut self, row: usize, column: usize, m: &Mat3<T>) {
+        self.set_tangent(row, column, m);
+        let (tile, start) = self.place(column, row);
+        let tile = &mut self.tangent[tile];
+        for i in 0..3 {
+            for j in 0..3 {
+                tile[start + i * WIDTH + j] = m.0[i][j];
             }
         }
     }

@@ -17,5 +17,5 @@ pub mod shape;
 pub mod turn;
 pub mod volume;
 
-pub use element::{ElementSystem, MAX_NODES, NodeMotion, TILE, WIDTH, Weights};
+pub use element::{ElementSystem, MAX_NODES, NodeMotion, NodePlace, Placed, TILE, WIDTH, Weights};
 pub use planar::PlanarSystem;

@@ -200,12 +200,13 @@ impl<const N: usize, T: Real> Relative<N, T> {
             ends[0].transpose_matmul(turned[0].scale(0.5) + m.skew().scale(0.5) - twist),
             ends[1].transpose_matmul(turned[1].scale(0.5) + m.skew().scale(0.5) + twist),
         ];
+        let apart = -xx;
         for j in 0..2 {
             let xp = self.frame * over_x[j] * slope;
-            for (i, xp) in [(0, -xp), (1, xp)] {
-                out.set_tangent(2 * i, 2 * j + 1, xp);
-                out.set_tangent(2 * j + 1, 2 * i, xp.transpose());
-                out.set_tangent(2 * i, 2 * j, if i == j { xx } else { -xx });
+            let xp = [-xp, xp];
+            for i in 0..2 {
+                out.set_symmetric(2 * i, 2 * j + 1, &xp[i]);
+                out.set_tangent(2 * i, 2 * j, if i == j { &xx } else { &apart });
             }
             for i in 0..=j {
                 let mut pp = frame[i].transpose_matmul(over_frame[j])
@@ -214,9 +215,9 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if i == j {
                     pp += rotations[i].c2(forces.spin[i] * w);
                 }
-                out.set_tangent(2 * i + 1, 2 * j + 1, pp);
-                if i < j {
-                    out.set_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
+                match i < j {
+                    true => out.set_symmetric(2 * i + 1, 2 * j + 1, &pp),
+                    false => out.set_tangent(2 * i + 1, 2 * j + 1, &pp),
                 }
             }
         }

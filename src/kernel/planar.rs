@@ -66,6 +66,19 @@ impl<const N: usize, T: Real> PlanarSystem<N, T> {
         Self { force: [[T::zero(); 3]; N], tangent: [[[T::zero(); 9]; N]; N] }
     }
 
+    /// Sets the force to zero, and the tangent where it is going to be added to.
+    #[inline(always)]
+    pub fn clear_for(&mut self, stiffness: f64) {
+        for force in &mut self.force {
+            *force = [T::zero(); 3];
+        }
+        if stiffness != 0.0 {
+            for tile in self.tangent.as_flattened_mut() {
+                *tile = [T::zero(); 9];
+            }
+        }
+    }
+
     /// Forces and moments of the nodes (global components); the plane's axes are the columns of `axes`.
     #[inline(always)]
     pub fn forces_in_space(&self, axes: &Mat3) -> [[Vec3<T>; 2]; N] {

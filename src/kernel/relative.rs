@@ -17,7 +17,7 @@
 //! dxi_i = R_r^T dx_i + xi_i~ t,   dTheta_i = A_i t_i - A_i^T t,   t = sum F_i t_i
 //! ```
 
-use super::element::{ElementSystem, NodeMotion};
+use super::element::{ElementSystem, NodePlace};
 use crate::real::Real;
 use crate::rotation::{Rotation, Series, log};
 use crate::tensor::{Mat3, Vec3};
@@ -25,7 +25,7 @@ use crate::tensor::{Mat3, Vec3};
 /// An element of N nodes seen from its own frame.
 pub struct Relative<const N: usize, T = f64> {
     /// The nodes as the frame sees them: u = xi - X and P = Theta; rates are left at zero.
-    pub nodes: [NodeMotion<T>; N],
+    pub nodes: [NodePlace<T>; N],
     pub(super) frame: Mat3<T>,
     pub(super) arms: [Vec3<T>; N],
     turned: [Rotation<T>; N],
@@ -94,7 +94,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
         // The two nodes that carry the frame stand h away from it on either side.
         let (mut turned, inverse) = ([half.rotation; N], half.rotation.t_inverse());
         let mut back = [inverse; N];
-        let (mut nodes, mut arms) = ([NodeMotion::rest(); N], [Vec3::zero(); N]);
+        let (mut nodes, mut arms) = ([NodePlace::rest(); N], [Vec3::zero(); N]);
         for i in 0..N {
             if i != first && i != last {
                 turned[i] = Rotation::new(log(frame.transpose_matmul(rotations[i].r)));
@@ -231,8 +231,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if let Some(following) = following[j] {
                     xp += over.displacement[i] * following;
                 }
-                out.set_tangent(2 * i, 2 * j + 1, xp);
-                out.set_tangent(2 * j + 1, 2 * i, xp.transpose());
+                out.set_symmetric(2 * i, 2 * j + 1, &xp);
                 if j < i {
                     continue;
                 }
@@ -250,11 +249,11 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if i == j {
                     pp += rotations[i].c2(forces.spin[i]).scale(s) - own[i].transpose_matmul(over.own[i] * own[i]);
                 }
-                out.set_tangent(2 * i, 2 * j, xx);
-                out.set_tangent(2 * i + 1, 2 * j + 1, pp);
+                out.set_tangent(2 * i, 2 * j, &xx);
+                out.set_tangent(2 * i + 1, 2 * j + 1, &pp);
                 if j > i {
-                    out.set_tangent(2 * j, 2 * i, xx.transpose());
-                    out.set_tangent(2 * j + 1, 2 * i + 1, pp.transpose());
+                    out.set_tangent(2 * j, 2 * i, &xx.transpose());
+                    out.set_tangent(2 * j + 1, 2 * i + 1, &pp.transpose());
                 }
             }
         }

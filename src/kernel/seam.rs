@@ -99,7 +99,7 @@ impl<T: Real> Converted<T> {
                     block += mass.tangent_block(row, column)
                         * (change.b_rate2.scale(weights.stiffness) + change.b_rate.scale(2.0 * weights.damping));
                 }
-                out.set_tangent(row, column, block);
+                out.set_tangent(row, column, &block);
             }
         }
         for (j, change) in self.change.iter().enumerate() {
@@ -108,7 +108,7 @@ impl<T: Real> Converted<T> {
             let force = out.force_block(row);
             for column in 0..blocks {
                 let block = change.b.transpose_matmul(out.tangent_block(row, column));
-                out.set_tangent(row, column, block);
+                out.set_tangent(row, column, &block);
             }
             out.add_tangent(row, row, Complement::geometric(self.original[j], force).scale(weights.stiffness));
             out.set_force(row, change.b.transpose_mul(force));

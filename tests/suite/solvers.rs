@@ -69,16 +69,16 @@ fn system_in(plane: Option<Plane>, edges: &[[usize; 2]], symmetric: bool, shift:
         for (row, column) in (0..4).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             let block = random.tensor(1.0);
             let block = if row == column && symmetric { block + block.transpose() } else { block };
-            element.set_tangent(row, column, block);
+            element.set_tangent(row, column, &block);
             if row != column {
-                element.set_tangent(column, row, if symmetric { block.transpose() } else { random.tensor(1.0) });
+                element.set_tangent(column, row, &if symmetric { block.transpose() } else { random.tensor(1.0) });
             }
         }
         system.sink(0, Category::Internal, true).add(k, &element);
     }
     for slot in 0..2 * nodes {
         let mut element = ElementSystem::new(1);
-        element.set_tangent(0, 0, Mat3::IDENTITY.scale(shift));
+        element.set_tangent(0, 0, &Mat3::IDENTITY.scale(shift));
         system.sink(1, Category::Internal, true).add(slot, &element);
     }
     system

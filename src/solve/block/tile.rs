@@ -373,7 +373,9 @@ where
 /// Rows in another order.
 #[inline(always)]
 pub fn permuted<const W: usize>(order: &RowOrder<W>, tile: &Tile<W>) -> Tile<W> {
-    order.map(|r| tile[r as usize])
+    let mut out = zero();
+    each_row!(W, |r| out[r] = tile[order[r] as usize]);
+    out
 }
 
 /// y = L^-1 y, for all columns at once.
@@ -412,7 +414,8 @@ where
 /// x = L^-1 P x
 #[inline(always)]
 pub fn solve_forward<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, x: &mut Part<W>) {
-    *x = order.map(|r| x[r as usize]);
+    let before = *x;
+    each_row!(W, |r| x[r] = before[order[r] as usize]);
     each_row!(W, |r| each_row!(W, |k| if k > r {
         x[k] -= factor[k][r] * x[r];
     }));
