@@ -94,6 +94,10 @@ impl Run<'_> {
 
     /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or along the path.
     fn reach(&mut self, workshop: &mut Workshop, target: f64, levels: &mut Levels) -> Result<Reached, Failure> {
+        debug_assert!(
+            self.state.q == self.good.q && self.state.load == self.good.load,
+            "the last state is not the good one"
+        );
         while self.good.load < target {
             let next = levels.next(self.good.load, target);
             self.observer.progress(self.moment(), self.static_progress(next))?;

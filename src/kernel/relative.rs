@@ -24,7 +24,7 @@ use crate::tensor::{Mat3, Vec3};
 
 /// An element of N nodes seen from its own frame.
 pub struct Relative<const N: usize, T = f64> {
-    /// The nodes as the frame sees them: u = xi - X and P = Theta; rates are left at zero.
+    /// The nodes as the frame sees them: u = xi - X and P = Theta
     pub nodes: [NodePlace<T>; N],
     pub(super) frame: Mat3<T>,
     pub(super) arms: [Vec3<T>; N],

@@ -130,10 +130,10 @@ impl LinearSolver {
         self.factored
     }
 
-    /// The same for systems whose values do not stay: what it solves is looked at here and now.
+    /// The same for systems whose values do not stay: what it solves is looked at here and now, where pivots do not vouch for it.
     pub fn factorise_surely(&mut self, system: &System) -> bool {
-        if !self.factorise(system) {
-            return false;
+        if !self.factorise(system) || self.is_positive_definite() {
+            return self.factored;
         }
         let ones = vec![1.0; system.pattern.equations.count()];
         let mut x = system.multiply(&system.values, &ones);

@@ -6,7 +6,6 @@ use super::regions::{self, Region, Shares};
 use super::state::Slot;
 pub use crate::kernel::{TILE, WIDTH};
 use crate::threads;
-use std::array::from_fn;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
@@ -17,7 +16,13 @@ pub type Tile<const W: usize> = [[f64; W]; W];
 /// The transpose.
 #[inline(always)]
 pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
-    from_fn(|c| from_fn(|r| tile[r][c]))
+    let mut out = [[0.0; W]; W];
+    for c in 0..W {
+        for r in 0..W {
+            out[c][r] = tile[r][c];
+        }
+    }
+    out
 }
 
 /// The slots that meet in each instance of an effect: one clique an element.
@@ -121,12 +126,12 @@ pub struct Pattern {
 }
 
 /// A tile above the diagonal of a symmetric tangent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Mirror {
+#[derive(Clone, Copy, Debug, Default)]
+struct Mirror {
     /// The group of its rows
-    pub row: u32,
+    row: u32,
     /// The number of its transpose
-    pub tile: u32,
+    tile: u32,
 }
 
 /// An entry of the tangent.
@@ -202,7 +207,7 @@ impl Pattern {
 
     /// The tiles in a column that are not.
     #[inline]
-    pub fn mirrors_of(&self, column: usize) -> &[Mirror] {
+    fn mirrors_of(&self, column: usize) -> &[Mirror] {
         match self.mirror_starts.get(column..column + 2) {
             Some(&[start, end]) => &self.mirrors[start as usize..end as usize],
             _ => &[],

@@ -42,7 +42,7 @@ impl Shares {
             let all = std::iter::once(0..cliques.len());
             return Self { inside: vec![Vec::new(); regions.len()], others: all.collect() };
         }
-        let region = |slot: u32| groups.of(slot).0 / regions[0].groups.len();
+        let region = |slot: u32| region_of(slot, groups, regions);
         let mut out = Self { inside: vec![Vec::new(); regions.len()], others: Vec::new() };
         for row in rows(cliques) {
             let mut slots = row.clone().flat_map(|k| cliques.get(k));
@@ -63,11 +63,16 @@ impl Shares {
     }
 }
 
+/// All regions but the last are of the same length.
+fn region_of(slot: u32, groups: &Groups, regions: &[Region]) -> usize {
+    groups.of(slot).0 / regions[0].groups.len()
+}
+
 /// Whether something of an effect lies in each region, or between it and others.
 pub fn touched(cliques: &Cliques, groups: &Groups, regions: &[Region]) -> Vec<bool> {
     let mut touched = vec![false; regions.len()];
     for &slot in cliques.iter().flatten() {
-        touched[groups.of(slot).0 / regions[0].groups.len()] = true;
+        touched[region_of(slot, groups, regions)] = true;
     }
     touched
 }

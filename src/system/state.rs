@@ -87,8 +87,9 @@ impl State {
         self.copy_all_but_rates(other);
     }
 
-    /// The same where both stand still.
+    /// The same where both have the same rates, as in statics.
     pub fn copy_all_but_rates(&mut self, other: &Self) {
+        debug_assert!(self.v == other.v && self.a == other.a && self.algorithmic == other.algorithmic, "rates differ");
         self.time = other.time;
         self.load = other.load;
         self.q.copy_from_slice(&other.q);

@@ -81,14 +81,20 @@ fn shaken(model: &Model) -> State {
 /// What regions add up is what one pass over all instances adds up.
 #[test]
 fn regions_change_nothing_but_the_order_of_sums() {
-    for (text, order) in [(DYNAMIC, 1), (DYNAMIC, 2), (DYNAMIC, 3), (TURNING, 1), (TURNING, 2)] {
-        let plan = model(&deck(text, order, false)).plan;
+    let scenes =
+        [(DYNAMIC, 1), (DYNAMIC, 2), (DYNAMIC, 3), (TURNING, 1), (TURNING, 2), (STATIC, 1), (STATIC, 2), (STATIC, 3)];
+    for text in scenes.map(|(text, order)| deck(text, order, false)).into_iter().chain([loaded_at_a_node()]) {
+        let plan = model(&text).plan;
         let (mut model, stage) = (plan.model, plan.stages[0].context(0));
         let state = shaken(&model);
         let equations = model.begin_stage(0, stage.kind, &state).unwrap();
         let mut assembly = Assembly::new(&stage, equations, &model);
         assert!(assembly.system.is_cut());
         let weights = Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 };
+        // Nothing of another state is left.
+        let mut other = state.clone();
+        other.q.iter_mut().chain(&mut other.v).for_each(|value| *value = *value * -0.5);
+        assembly.evaluate(&other, weights, None);
         assembly.evaluate(&state, weights, None);
         let cut = (forces(&assembly), assembly.system.values.clone());
         assembly.system.clear(None);
@@ -101,6 +107,15 @@ fn regions_change_nothing_but_the_order_of_sums() {
         assert!(apart(&cut.0, &forces(&assembly)) < 1e-14);
         assert!(apart(&cut.1, &assembly.system.values) < 1e-15);
     }
+}
+
+/// One beam, on which something else than elasticity acts in single regions.
+fn loaded_at_a_node() -> String {
+    "[point]\na = [0, 0, 0]\nb = [10, 0, 0]\nc = [20, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\n\
+     [[beam]]\nname = \"p\"\nsection = \"s\"\nthrough = [\"a\", \"b\", \"c\"]\nelements = 2500\n\
+     [[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = [0, 5, 1]\n\
+     [[spring]]\nbetween = [\"b\", \"c\"]\nstiffness = 3\ndamping = 2\n[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01\n"
+        .into()
 }
 
 fn forces(assembly: &Assembly) -> Vec<f64> {

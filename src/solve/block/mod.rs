@@ -2,7 +2,7 @@
 //! where not.
 //!
 //! The order of elimination is that of least degree, in large scenes turned towards a middle, so that chains and trees get no fill at all.
-//! Pivots are not looked for across blocks: who uses this looks at the residual of what it solved.
+//! Pivots are not looked for across blocks: who uses this looks at the residual of what it solved, unless all pivots are positive.
 
 mod elimination;
 mod ldl;
@@ -38,6 +38,9 @@ trait Factor: Send {
 
     /// See [`BlockSolver::negative`].
     fn negative(&self) -> Option<usize>;
+
+    /// See [`BlockSolver::is_symmetric`].
+    fn is_symmetric(&self) -> bool;
 
     /// Solves with the last factorisation, row by row.
     fn solve(&self, elimination: &Elimination, x: &mut [f64]);
@@ -87,7 +90,7 @@ impl BlockSolver {
 
     /// Whether it takes the tangent for symmetric.
     pub fn is_symmetric(&self) -> bool {
-        self.factor.negative().is_some()
+        self.factor.is_symmetric()
     }
 
     /// Factorises; `false` where a pivot is zero or no number.
@@ -96,7 +99,7 @@ impl BlockSolver {
     }
 
     /// How many pivots of the last factorisation are negative: as many as the matrix has negative eigenvalues (Sylvester).
-    /// `None` where it is not symmetric.
+    /// `None` where it is not symmetric, or did not come to its end.
     pub fn negative(&self) -> Option<usize> {
         self.factor.negative()
     }

@@ -53,8 +53,8 @@ pub struct Pieces<P, const W: usize> {
     trunk: P,
     /// Later than the trunk there is nothing.
     nothing: P,
-    /// Pivots below zero in the last factorisation
-    negative: usize,
+    /// Pivots below zero in the last factorisation, where that came to its end
+    negative: Option<usize>,
 }
 
 impl<P: Piece<W>, const W: usize> Pieces<P, W> {
@@ -69,7 +69,7 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
             changes: elimination.branches.iter().map(|_| piece(trunk)).collect::<Option<_>>()?,
             trunk: piece(trunk)?,
             nothing: piece(&(end..end))?,
-            negative: 0,
+            negative: None,
         })
     }
 }
@@ -77,6 +77,7 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
 impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
         let Self { branches, changes, trunk, nothing, negative } = self;
+        *negative = None;
         let branch = |(piece, change): (&mut P, &mut P)| {
             change.clear();
             eliminate(piece, elimination, system, change)
@@ -93,12 +94,16 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
                 trunk.eliminate(trunk.rows(), elimination, nothing)
             },
         );
-        *negative = counted + last.unwrap_or_default();
+        *negative = last.map(|last| counted + last);
         last.is_some()
     }
 
     fn negative(&self) -> Option<usize> {
-        P::SYMMETRIC.then_some(self.negative)
+        self.negative.filter(|_| P::SYMMETRIC)
+    }
+
+    fn is_symmetric(&self) -> bool {
+        P::SYMMETRIC
     }
 
     fn name(&self) -> &'static str {
