@@ -340,7 +340,7 @@ impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
 }
 
 #[inline(always)]
-pub(super) fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
+fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
     Stress { n: Vec3([s[0], s[1], s[2]]), m: Vec3([s[3], s[4], s[5]]) }
 }
 

@@ -249,11 +249,15 @@ impl<const N: usize, T: Real> Relative<N, T> {
                 if i == j {
                     pp += rotations[i].c2(forces.spin[i]).scale(s) - own[i].transpose_matmul(over.own[i] * own[i]);
                 }
-                out.set_tangent(2 * i, 2 * j, &xx);
-                out.set_tangent(2 * i + 1, 2 * j + 1, &pp);
-                if j > i {
-                    out.set_tangent(2 * j, 2 * i, &xx.transpose());
-                    out.set_tangent(2 * j + 1, 2 * i + 1, &pp.transpose());
+                match j > i {
+                    true => {
+                        out.set_symmetric(2 * i, 2 * j, &xx);
+                        out.set_symmetric(2 * i + 1, 2 * j + 1, &pp);
+                    }
+                    false => {
+                        out.set_tangent(2 * i, 2 * j, &xx);
+                        out.set_tangent(2 * i + 1, 2 * j + 1, &pp);
+                    }
                 }
             }
         }

@@ -18,6 +18,18 @@ pub enum Source {
     Transpose(u32),
 }
 
+impl Source {
+    /// Where the transpose of the block comes from.
+    #[inline(always)]
+    pub fn transposed(self) -> Self {
+        match self {
+            Self::Nothing => Self::Nothing,
+            Self::Tile(number) => Self::Transpose(number),
+            Self::Transpose(number) => Self::Tile(number),
+        }
+    }
+}
+
 /// The elimination of block rows one after the other.
 ///
 /// Rows are called by their place in the order. The rows that the elimination of row k changes are its later neighbours;

@@ -43,8 +43,7 @@ where
             self.diagonal[row] = tile::transposed(&tiles[elimination.diagonal[row] as usize]);
             for k in elimination.neighbours(row) {
                 let [upper, lower] = elimination.sources[k];
-                tile::take(&mut self.upper[k], tiles, upper);
-                self.upper[k] = tile::transposed(&self.upper[k]);
+                tile::take(&mut self.upper[k], tiles, upper.transposed());
                 tile::take(&mut self.lower[k], tiles, lower);
             }
         }
