@@ -1,19 +1,84 @@
-//! Translational inertia of beams without eccentric mass: the consistent mass matrix, free of charts.
+//! Translational inertia of beams without eccentric mass: consistent mass matrices, which never change and know no charts.
 
-use super::planar_inertia::PlanarMass;
-use super::volume::VolumeElements;
-use super::{Effect, Energy, Momentum, PlanarForm};
+use super::volume::{VolumeElement, VolumeElements};
+use super::{AT_ONCE, ByOrder, Effect, Energy, Momentum, for_each_batch};
 use crate::kernel::Weights;
-use crate::kernel::inertia::Translation;
-use crate::kernel::volume::Blocks;
-use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
-use std::sync::Arc;
+use crate::system::{Aspect, Category, Cliques, Memory, Sink, Slot, State};
+use crate::tensor::Vec3;
+use crate::threads;
 
-/// All beam elements with mass on their centre line, by their mass per length.
+/// All beam elements with mass on their centre line.
 #[derive(Clone, Debug, Default)]
 pub struct BeamMass {
-    /// The elements
-    pub elements: VolumeElements<f64>,
+    elements: ByOrder<MassElement<2>, MassElement<3>, MassElement<4>>,
+}
+
+/// The mass of an element of N nodes.
+#[derive(Clone, Debug)]
+struct MassElement<const N: usize> {
+    /// Displacements of its nodes
+    u: [Slot; N],
+    /// Their initial places
+    places: [Vec3; N],
+    /// The sum of w rhoA N_i N_j over its points, the same in all directions
+    mass: [[f64; N]; N],
+}
+
+impl<const N: usize> MassElement<N> {
+    fn new(element: &VolumeElement<N, f64>) -> Self {
+        let entry = |i: usize, j: usize| -> f64 {
+            element.points.iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
+        };
+        Self {
+            u: element.connection.nodes.map(|node| node.u),
+            places: element.connection.places,
+            mass: std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))),
+        }
+    }
+
+    /// The mass times what its displacements do: M a, or M v.
+    #[inline(always)]
+    fn times(&self, field: &[Vec3]) -> [Vec3; N] {
+        let mut out = [Vec3::ZERO; N];
+        for j in 0..N {
+            let value = field[self.u[j] as usize];
+            for i in 0..N {
+                out[i] += value * self.mass[i][j];
+            }
+        }
+        out
+    }
+
+    fn energy(&self, at: &State) -> f64 {
+        let linear = self.times(&at.v);
+        let twice = |i: usize| at.v[self.u[i] as usize].dot(linear[i]);
+        0.5 * (0..N).map(twice).sum::<f64>()
+    }
+
+    /// Shows each node's number, its present place and its share of M v.
+    fn each_momentum(&self, at: &State, mut show: impl FnMut(usize, Vec3, Vec3)) {
+        for (i, linear) in self.times(&at.v).into_iter().enumerate() {
+            show(i, self.places[i] + at.q[self.u[i] as usize], linear);
+        }
+    }
+}
+
+impl BeamMass {
+    /// The matrices of elements, by their mass per length.
+    pub fn new(elements: &VolumeElements<f64>) -> Self {
+        let VolumeElements { two, three, four } = elements;
+        let elements = ByOrder {
+            two: two.iter().map(MassElement::new).collect(),
+            three: three.iter().map(MassElement::new).collect(),
+            four: four.iter().map(MassElement::new).collect(),
+        };
+        Self { elements }
+    }
+
+    /// Whether no element has mass.
+    pub fn is_empty(&self) -> bool {
+        self.elements.is_empty()
+    }
 }
 
 impl Effect for BeamMass {
@@ -26,7 +91,9 @@ impl Effect for BeamMass {
     }
 
     fn cliques(&self) -> Cliques {
-        self.elements.cliques(Blocks::Displacements)
+        let mut cliques = Cliques::divisible();
+        for_each_batch!(self.elements, |_first, batch| batch.iter().for_each(|element| cliques.push(element.u)));
+        cliques
     }
 
     fn is_symmetric(&self) -> bool {
@@ -37,26 +104,31 @@ impl Effect for BeamMass {
         // On the centre line, which the beams' elasticity shows.
     }
 
-    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Box<dyn PlanarForm>> {
-        Some(Box::new(PlanarMass::new(self, *plane)))
-    }
-
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        self.elements.add(&Translation, at, weights, out);
+        for_each_batch!(self.elements, out.instances(), |first, batch| {
+            for (k, element) in batch.iter().enumerate() {
+                out.add_mass(first + k, &element.times(&at.a), &element.mass, weights.mass);
+            }
+        });
     }
 
     fn energy(&self, at: &State) -> Energy {
         let mut kinetic = 0.0;
-        self.elements.each_velocity(at, |mass, w, velocity| kinetic += 0.5 * w * mass * velocity.squared());
+        for_each_batch!(self.elements, |_first, batch| {
+            let energy_of = |elements: &[MassElement<_>]| elements.iter().map(|element| element.energy(at)).sum();
+            threads::in_order(batch.chunks(AT_ONCE), energy_of, |own: f64| kinetic += own);
+        });
         Energy { kinetic, strain: 0.0 }
     }
 
     fn momentum(&self, at: &State) -> Momentum {
         let mut sum = Momentum::ZERO;
-        self.elements.each_point(at, |mass, w, place, motion| {
-            let (mass, x) = (mass * w, place + motion.u);
-            let linear = motion.u_rate * mass;
-            sum.add(Momentum { mass, moment: x * mass, linear, angular: x.cross(linear) });
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            element.each_momentum(at, |i, x, linear| {
+                // A row of the matrix is what a node has of the mass.
+                let mass = element.mass[i].iter().sum();
+                sum.add(Momentum { mass, moment: x * mass, linear, angular: x.cross(linear) });
+            });
         });
         sum
     }

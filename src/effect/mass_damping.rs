@@ -72,8 +72,7 @@ impl Effect for BodyMassDamping {
             let body = &self.bodies[k];
             let velocity = at.v[body.node.u as usize];
             let force = drag(&body.inertia, velocity, &at.spin(body.node.p), self.factor, weights);
-            system.clear();
-            force.write(&mut system);
+            force.write(weights, &mut system);
             out.add(k, &system);
         }
     }

@@ -28,7 +28,7 @@ pub use volume::{VolumeElement, VolumeElements};
 use crate::kernel::inertia::Inertia;
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::real::{LANES, Lanes, Pack, each_lane};
+use crate::real::{LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, Slot, StageContext, StageKind, State};
 use crate::tensor::{Mat3, Vec3};
 use std::ops::Range;
@@ -309,8 +309,13 @@ fn motions<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> 
 /// Those of the nodes with this number in their elements.
 #[inline(always)]
 fn motions_of<const N: usize>(connections: [&Connection<N>; LANES], i: usize, at: &State) -> NodeMotion<Lanes> {
-    let u: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].u);
-    let p: [Slot; LANES] = each_lane!(|k| connections[k].nodes[i].p);
+    motion_of(each_lane!(|k| connections[k].nodes[i]), at)
+}
+
+/// The motions of nodes side by side.
+#[inline(always)]
+fn motion_of(nodes: [Node; LANES], at: &State) -> NodeMotion<Lanes> {
+    let [u, p]: [[Slot; LANES]; 2] = [each_lane!(|k| nodes[k].u), each_lane!(|k| nodes[k].p)];
     NodeMotion {
         u: at_slots(&at.q, u),
         u_rate: at_slots(&at.v, u),
@@ -403,6 +408,7 @@ fn inertia_aspects(inertia: &Inertia, show: &mut dyn FnMut(Aspect)) {
 }
 
 /// v . J v / 2
-fn quadratic(j: Mat3, v: Vec3) -> f64 {
-    0.5 * v.dot(j * v)
+#[inline(always)]
+fn quadratic<T: Real>(j: Mat3<T>, v: Vec3<T>) -> T {
+    v.dot(j * v) * 0.5
 }

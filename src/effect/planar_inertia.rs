@@ -1,97 +1,13 @@
-//! Inertia in a scene that lies in a plane: the mass of beams on their centre lines, and bodies at nodes.
+//! Inertia of bodies at nodes in a scene that lies in a plane.
 
-use super::beam_mass::BeamMass;
 use super::rigid_body::{RigidBody, are_centred};
-use super::volume::VolumeElement;
-use super::{ByOrder, PlanarForm, at_slots, own_blocks};
+use super::{PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::PlanarBody;
 use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
 use crate::system::{Memory, Plane, Sink, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
-
-/// Consistent mass matrices, which never change.
-pub struct PlanarMass {
-    plane: Plane,
-    spatial: Arc<BeamMass>,
-    blocks: ByOrder<MassBlock<2>, MassBlock<3>, MassBlock<4>>,
-}
-
-/// Elements side by side.
-struct MassBlock<const N: usize> {
-    u: [[Slot; LANES]; N],
-    count: usize,
-    /// sum of w rhoA N_i N_j over the points
-    mass: [[Lanes; N]; N],
-}
-
-impl PlanarMass {
-    /// The masses of `spatial`, which lie in this plane.
-    pub fn new(spatial: Arc<BeamMass>, plane: Plane) -> Self {
-        let elements = &spatial.elements;
-        let blocks = ByOrder {
-            two: mass_blocks(&elements.two),
-            three: mass_blocks(&elements.three),
-            four: mass_blocks(&elements.four),
-        };
-        Self { plane, spatial, blocks }
-    }
-}
-
-fn mass_blocks<const N: usize>(batch: &[VolumeElement<N, f64>]) -> Vec<MassBlock<N>> {
-    let entry = |element: &VolumeElement<N, f64>, i: usize, j: usize| -> f64 {
-        element.points.iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
-    };
-    let block = |elements: &[VolumeElement<N, f64>]| {
-        let all: [&VolumeElement<N, f64>; LANES] = each_lane!(|k| &elements[k.min(elements.len() - 1)]);
-        MassBlock {
-            u: std::array::from_fn(|i| all.map(|element| element.connection.nodes[i].u)),
-            count: elements.len(),
-            mass: std::array::from_fn(|i| std::array::from_fn(|j| Lanes(all.map(|element| entry(element, i, j))))),
-        }
-    };
-    batch.chunks(LANES).map(block).collect()
-}
-
-/// Adds the elements of one order, `first` instances after the first one of the effect.
-#[inline(always)]
-fn add_masses<const N: usize>(
-    blocks: &[MassBlock<N>],
-    first: usize,
-    at: &State,
-    plane: &Plane,
-    weights: Weights,
-    out: &mut Sink,
-) {
-    let length = blocks.last().map_or(0, |last| LANES * (blocks.len() - 1) + last.count);
-    for number in own_blocks(first, length, out) {
-        let block = &blocks[number];
-        let mut force = [Vec3::zero(); N];
-        for j in 0..N {
-            let acceleration = at_slots(&at.a, block.u[j]);
-            for i in 0..N {
-                force[i] += acceleration * block.mass[i][j];
-            }
-        }
-        out.add_planar_mass(plane, first + number * LANES, block.count, &force, &block.mass, weights.mass);
-    }
-}
-
-impl PlanarForm for PlanarMass {
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        let (blocks, plane) = (&self.blocks, &self.plane);
-        let (two, three) = (self.spatial.elements.two.len(), self.spatial.elements.three.len());
-        Instructions::here().run(
-            #[inline(always)]
-            || {
-                add_masses(&blocks.two, 0, at, plane, weights, out);
-                add_masses(&blocks.three, two, at, plane, weights, out);
-                add_masses(&blocks.four, two + three, at, plane, weights, out);
-            },
-        );
-    }
-}
 
 /// Bodies at nodes.
 pub struct PlanarBodies {

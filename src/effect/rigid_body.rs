@@ -1,12 +1,15 @@
 //! Rigid bodies at nodes, with their mass centre at an offset.
 
 use super::planar_inertia::PlanarBodies;
-use super::{Effect, Energy, Momentum, PlanarForm, at_slots, inertia_aspects, quadratic, side_by_side};
+use super::{
+    AT_ONCE, Effect, Energy, Momentum, PlanarForm, at_slots, inertia_aspects, motion_of, quadratic, side_by_side,
+};
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::real::{Instructions, LANES, Real, each_lane, pack};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, State};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::sync::Arc;
 
 /// A body.
@@ -78,7 +81,9 @@ impl Effect for RigidBody {
     }
 
     fn energy(&self, at: &State) -> Energy {
-        Energy { kinetic: self.bodies.iter().map(|b| kinetic(&b.inertia, &at.motion(b.node))).sum(), strain: 0.0 }
+        let mut kinetic = 0.0;
+        threads::in_order(self.bodies.chunks(AT_ONCE), |bodies| energy_of(bodies, at), |own| kinetic += own);
+        Energy { kinetic, strain: 0.0 }
     }
 
     fn momentum(&self, at: &State) -> Momentum {
@@ -138,8 +143,7 @@ impl RigidBody {
         } else {
             inertia::body(inertia, acceleration, &spin, weights)
         };
-        system.clear_for(weights);
-        force.write(system);
+        force.write(weights, system);
     }
 }
 
@@ -148,12 +152,38 @@ pub(super) fn are_centred(bodies: &[Body]) -> bool {
     bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
 }
 
+/// The kinetic energy of bodies.
+fn energy_of(bodies: &[Body], at: &State) -> f64 {
+    let mut sum = 0.0;
+    let mut add = |energy: f64| sum += energy;
+    let done = Instructions::here().run_side_by_side(
+        #[inline(always)]
+        || each_energy(bodies, at, &mut add),
+    );
+    if done.is_none() {
+        bodies.iter().for_each(|body| add(kinetic(&body.inertia, &at.motion(body.node))));
+    }
+    sum
+}
+
+/// Shows the kinetic energy of each body, in their order.
+#[inline(always)]
+fn each_energy(all: &[Body], at: &State, show: &mut dyn FnMut(f64)) {
+    for first in (0..all.len()).step_by(LANES) {
+        let bodies = side_by_side(all, first);
+        let nodes = each_lane!(|k| bodies[k].node);
+        let energies = kinetic(&pack!(bodies.inertia), &motion_of(nodes, at));
+        energies.0.iter().take(all.len() - first).for_each(|energy| show(*energy));
+    }
+}
+
 /// m v.v/2 + m v.R(Omega x d) + Omega.J0 Omega/2
-pub(super) fn kinetic(inertia: &Inertia, motion: &NodeMotion) -> f64 {
-    let spin = Spin::new(motion.p, motion.p_rate, Vec3::ZERO);
+#[inline(always)]
+pub(super) fn kinetic<T: Real>(inertia: &Inertia<T>, motion: &NodeMotion<T>) -> T {
+    let spin = Spin::new(motion.p, motion.p_rate, Vec3::zero());
     let v = motion.u_rate;
     let relative = spin.rotation.r * spin.omega.cross(inertia.offset);
-    inertia.mass * (0.5 * v.squared() + v.dot(relative)) + quadratic(inertia.about_node, spin.omega)
+    inertia.mass * (v.squared() * 0.5 + v.dot(relative)) + quadratic(inertia.about_node, spin.omega)
 }
 
 /// The momenta of `weight` times these mass properties at the node that started at `place`.

@@ -61,8 +61,7 @@ impl Effect for RotatingFrame {
             let body = &self.bodies[k];
             let from_axis = body.place - self.about + at.q[body.node.u as usize];
             let force = steadily_turned(&body.inertia, (spin, from_axis), &at.rotation(body.node.p), weights);
-            system.clear();
-            force.write(&mut system);
+            force.write(weights, &mut system);
             out.add(first + k, &system);
         }
     }

@@ -26,7 +26,6 @@ impl<Q: Copy> VolumeElements<Q> {
         for_each_batch!(self, |_first, batch| for element in batch {
             let nodes = element.connection.nodes.iter();
             match blocks {
-                Blocks::Displacements => cliques.push(nodes.map(|node| node.u)),
                 Blocks::Rotations => cliques.push(nodes.map(|node| node.p)),
                 Blocks::Both => cliques.push(element.connection.slots()),
             }
@@ -59,16 +58,6 @@ impl<Q: Copy> VolumeElements<Q> {
             for point in &element.points {
                 let place = beam::interpolate(&point.shape, |i| element.connection.places[i]);
                 show(&point.quantity, point.weight, place, &point.motion(&nodes));
-            }
-        });
-    }
-
-    /// Shows each point's quantity, its weight and the velocity of its centre line.
-    pub fn each_velocity(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3)) {
-        for_each_batch!(self, |_first, batch| for element in batch {
-            for point in &element.points {
-                let velocity = |i: usize| at.v[element.connection.nodes[i].u as usize];
-                show(&point.quantity, point.weight, beam::interpolate(&point.shape, velocity));
             }
         });
     }
@@ -112,9 +101,7 @@ fn add_batch<K, const N: usize>(
             let points = each_lane!(|k| elements[k].points[g].map(|quantity| kernel.at_present(quantity)));
             VolumePoint::pack(each_lane!(|k| &points[k])).add(kernel, &nodes, weights, &mut systems);
         }
-        // Displacements know no charts.
-        let charts = K::BLOCKS != Blocks::Displacements;
-        let is_mixed = |k: usize| charts && at.mixed[elements[k].connection.element as usize] != 0;
+        let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
         out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, is_mixed, |k, out| {
             add_alone(kernel, elements[k], first + start + k, at, weights, out);
         });
@@ -138,10 +125,6 @@ fn add_alone<K: VolumeKernel, const N: usize>(
             point.map(|quantity| kernel.at_present(quantity)).add(kernel, nodes, weights, system);
         }
     };
-    if K::BLOCKS == Blocks::Displacements {
-        sum(&element.connection.motions(at), weights, &mut system);
-    } else {
-        element.connection.evaluate(at, weights, K::RATES, |j| K::BLOCKS.rotation(j), &mut system, &sum);
-    }
+    element.connection.evaluate(at, weights, K::RATES, |j| K::BLOCKS.rotation(j), &mut system, &sum);
     out.add(number, &system);
 }

@@ -366,26 +366,6 @@ impl VolumeKernel for SteadilyTurned {
     }
 }
 
-/// Mass per length on the centre line: f_u = rhoA u''.
-pub struct Translation;
-
-impl VolumeKernel for Translation {
-    type Quantity = f64;
-    type Present<T: Real> = T;
-    const BLOCKS: Blocks = Blocks::Displacements;
-    const RATES: bool = false;
-
-    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
-        *quantity
-    }
-
-    #[inline(always)]
-    fn evaluate<T: Real>(&self, mass: &T, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
-        let u = motion.u_rate2 * *mass;
-        VolumeForce { u, uu: Mat3::diagonal([*mass * weights.mass; 3]), ..VolumeForce::zero() }
-    }
-}
-
 /// Rotary inertia per length, see [`rotary`].
 pub struct Rotary {
     /// Whether forces that spins have without accelerations count

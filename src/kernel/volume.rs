@@ -38,23 +38,23 @@ impl<T: Real> VolumeForce<T> {
 }
 
 impl<T: Real> VolumeForce<T> {
-    /// Adds itself to an element of one node.
+    /// Puts itself, with a tangent of weights that are not zero, in the place of what stands in an element of one node.
     #[inline(always)]
-    pub fn write(&self, out: &mut ElementSystem<T>) {
-        out.add_force(0, self.u);
-        out.add_force(1, self.p);
-        out.add_tangent(0, 0, self.uu);
-        out.add_tangent(0, 1, self.up);
-        out.add_tangent(1, 0, self.pu);
-        out.add_tangent(1, 1, self.pp);
+    pub fn write(&self, weights: Weights, out: &mut ElementSystem<T>) {
+        out.set_force(0, self.u);
+        out.set_force(1, self.p);
+        if weights != Weights::NONE {
+            out.set_tangent(0, 0, &self.uu);
+            out.set_tangent(0, 1, &self.up);
+            out.set_tangent(1, 0, &self.pu);
+            out.set_tangent(1, 1, &self.pp);
+        }
     }
 }
 
-/// Which unknowns of its nodes a kernel couples, and so the blocks of its element: u1, u2, … or P1, P2, … or u1, P1, u2, ….
+/// Which unknowns of its nodes a kernel couples, and so the blocks of its element: P1, P2, … or u1, P1, u2, ….
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blocks {
-    /// Displacements alone
-    Displacements,
     /// Rotation vectors alone
     Rotations,
     /// Both
@@ -144,7 +144,6 @@ impl<const N: usize, Q: Copy, T: Real> VolumePoint<N, Q, T> {
         for i in 0..N {
             let w = self.weight * self.shape[i];
             match K::BLOCKS {
-                Blocks::Displacements => out.add_force(i, force.u * w),
                 Blocks::Rotations => out.add_force(i, force.p * w),
                 Blocks::Both => {
                     out.add_force(2 * i, force.u * w);
@@ -157,7 +156,6 @@ impl<const N: usize, Q: Copy, T: Real> VolumePoint<N, Q, T> {
             for j in 0..N {
                 let w = w * self.shape[j];
                 match K::BLOCKS {
-                    Blocks::Displacements => out.add_tangent(i, j, force.uu * w),
                     Blocks::Rotations => out.add_tangent(i, j, force.pp * w),
                     Blocks::Both => {
                         out.add_tangent(2 * i, 2 * j, force.uu * w);

@@ -260,60 +260,52 @@ impl Sink<'_> {
         }
     }
 
-    /// Adds instances that couple displacements alone, in lanes, by mass matrices of the plane: their forces (global components), and
-    /// `weight` times the matrices.
+    /// Adds an instance that couples displacements alone, by a mass matrix that is the same in all directions: its forces (global
+    /// components), and `weight` times the matrix.
     #[inline(always)]
-    pub fn add_planar_mass<const N: usize>(
-        &mut self,
-        plane: &Plane,
-        first: usize,
-        count: usize,
-        forces: &[Vec3<Lanes>; N],
-        mass: &[[Lanes; N]; N],
-        weight: f64,
-    ) {
-        for lane in 0..count {
-            let k = first + lane;
-            let (all, first_slot) = (&mut *self.force, self.first_slot);
-            for (force, &slot) in forces.iter().zip(self.places.cliques.get(k)) {
-                all[slot as usize - first_slot] += Vec3(force.0.map(|component| component.0[lane]));
-            }
-            if !self.with_tangent || weight == 0.0 {
-                continue;
-            }
-            let entries = mass.as_flattened().iter().map(|entry| entry.0[lane] * weight);
-            if self.places.special[k] {
-                self.add_constrained_mass(plane, k, N, entries);
-                continue;
-            }
-            for (entry, &place) in entries.zip(self.places.of(k)) {
-                if let Some(values) = self.values_from(place, 5) {
-                    values[0] += entry;
-                    values[4] += entry;
-                }
+    pub fn add_mass<const N: usize>(&mut self, k: usize, forces: &[Vec3; N], mass: &[[f64; N]; N], weight: f64) {
+        let (all, first_slot) = (&mut *self.force, self.first_slot);
+        for (force, &slot) in forces.iter().zip(self.places.cliques.get(k)) {
+            all[slot as usize - first_slot] += *force;
+        }
+        match self.equations.plane() {
+            _ if !self.with_tangent || weight == 0.0 => {}
+            _ if self.places.special[k] => self.add_constrained_mass(k, N, mass.as_flattened(), weight),
+            None => self.add_free_mass::<{ 2 * WIDTH + 3 }>(k, WIDTH + 1, mass.as_flattened(), weight),
+            Some(_) => self.add_free_mass::<5>(k, 4, mass.as_flattened(), weight),
+        }
+    }
+
+    /// The same where all directions are free: their entries stand `step` apart in SPAN values.
+    #[inline(always)]
+    fn add_free_mass<const SPAN: usize>(&mut self, k: usize, step: usize, mass: &[f64], weight: f64) {
+        for (entry, &place) in mass.iter().zip(self.places.of(k)) {
+            if let Some(values) = self.values_from(place, SPAN) {
+                values.iter_mut().step_by(step).for_each(|value| *value += entry * weight);
             }
         }
     }
 
-    /// The same where directions are held or moved: a mass is one in all directions, and between slots with other axes their cosine.
+    /// The same where directions are held or moved: between slots with other axes it is their cosine that counts.
     #[cold]
-    fn add_constrained_mass(&mut self, plane: &Plane, k: usize, nodes: usize, entries: impl Iterator<Item = f64>) {
+    fn add_constrained_mass(&mut self, k: usize, nodes: usize, mass: &[f64], weight: f64) {
         let slots = self.places.cliques.get(k);
-        let frame = |slot: Slot| self.equations.frame(slot).unwrap_or(*plane.axes());
-        for (number, (entry, &place)) in entries.zip(self.places.of(k)).enumerate() {
+        let (width, directions) = self.equations.plane().map_or((WIDTH, 3), |_| (3, 2));
+        let frame = |slot: Slot| self.equations.frame(slot).unwrap_or(Mat3::IDENTITY);
+        for (number, (entry, &place)) in mass.iter().zip(self.places.of(k)).enumerate() {
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
             let (rows, columns) = (self.equations.of(i), self.equations.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
             let lift = self.lift.map(|lift| self.equations.to_local(j, lift[j as usize]));
-            for c in 0..2 {
-                for r in (0..2).filter(|&r| rows[r] != Equations::HELD) {
-                    let value = cosines.0[r][c] * entry;
+            for c in 0..directions {
+                for r in (0..directions).filter(|&r| rows[r] != Equations::HELD) {
+                    let value = cosines.0[r][c] * entry * weight;
                     match (columns[c], lift) {
                         (Equations::HELD, None) => {}
                         (Equations::HELD, Some(lift)) => {
                             self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c];
                         }
-                        _ => self.add_entry(place, 3 * c + r, value),
+                        _ => self.add_entry(place, width * c + r, value),
                     }
                 }
             }

@@ -136,7 +136,7 @@ const WEIGHTS: [Weights; 4] =
 
 fn volume_tangent(force: &VolumeForce) -> Vec<f64> {
     let mut system = ElementSystem::new(2);
-    force.write(&mut system);
+    force.write(Weights::STIFFNESS, &mut system);
     system.tangent()
 }
 

@@ -40,10 +40,10 @@ impl Composer<'_> {
                 push_volume(&mut rotary, element, stations, |k| found[k].about_node);
             }
         });
-        let mass = BeamMass { elements: mass };
+        let mass = BeamMass::new(&mass);
         let rotary = RotaryInertia { elements: rotary, gyroscopic };
         let eccentric = SectionInertia { elements: eccentric, gyroscopic };
-        if mass.elements.is_empty() {
+        if mass.is_empty() {
             self.reason(names[0], false, "no section has mass on its centre line");
         } else {
             self.push(mass, "a dynamic stage, and sections with `rhoA`".into());
