@@ -123,13 +123,15 @@ fn largest(values: &[f64]) -> f64 {
 
 /// The smallest K_ii / M_ii: no lowest frequency lies above it.
 fn softest_ratio(system: &System, matrices: &Matrices) -> Option<f64> {
-    let pattern = &system.pattern;
-    let ratio = |k: usize| {
-        let place = pattern.find(k as u32, k as u32)?;
+    let mut softest: Option<f64> = None;
+    system.pattern.each_diagonal(|_, place| {
         let (stiffness, mass) = (matrices.stiffness[place], matrices.mass[place]);
-        (mass > 0.0 && stiffness != 0.0).then(|| (stiffness / mass).abs())
-    };
-    (0..pattern.equations.count()).filter_map(ratio).min_by(f64::total_cmp)
+        if mass > 0.0 && stiffness != 0.0 {
+            let ratio = (stiffness / mass).abs();
+            softest = Some(softest.map_or(ratio, |softest| softest.min(ratio)));
+        }
+    });
+    softest
 }
 
 /// Multipliers have no mass.

@@ -103,7 +103,7 @@ impl Run<'_> {
             self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
         }
         self.warn_of_instability(path.here.negative);
-        if path.here.on_limit { Ok(()) } else { self.look_out_of_plane(path.here.negative) }
+        if path.here.on_limit { Ok(()) } else { self.look_out_of_plane(workshop, path.here.negative) }
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
@@ -156,7 +156,7 @@ impl Run<'_> {
                 arrived.on_limit = true;
                 if let Some(beyond) = &beyond {
                     self.state.copy_from(beyond);
-                    self.look_out_of_plane(behind)?;
+                    self.look_out_of_plane(workshop, behind)?;
                 }
             }
             if targets.contains(&goal) && (target.is_none() || target == Some(goal)) {
@@ -215,7 +215,7 @@ impl Run<'_> {
             Some(Target::Turning) => Some(EventKind::Turning),
             _ => None,
         };
-        self.tell_stability(kind, path.here.negative, point.negative)?;
+        self.tell_stability(workshop, kind, path.here.negative, point.negative)?;
         path.here = Point { state: self.state.clone(), ..point };
         self.show(workshop)
     }
@@ -223,6 +223,7 @@ impl Run<'_> {
     /// Names limit and turning points, and branches that were passed: where the number of negative pivots changed.
     pub(super) fn tell_stability(
         &mut self,
+        workshop: &mut Workshop,
         kind: Option<EventKind>,
         before: Option<usize>,
         after: Option<usize>,
@@ -238,7 +239,7 @@ impl Run<'_> {
         }
         self.told.points += 1;
         self.counters.events.push(event);
-        if kind == EventKind::Limit { Ok(()) } else { self.look_out_of_plane(after) }
+        if kind == EventKind::Limit { Ok(()) } else { self.look_out_of_plane(workshop, after) }
     }
 }
 

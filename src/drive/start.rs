@@ -32,7 +32,9 @@ impl Run<'_> {
         self.change_charts(None);
         self.linearise(workshop)?;
         self.refuse_loose(workshop, method)?;
-        self.refuse_loose_in_space(method.weights())?;
+        self.refuse_loose_in_space(workshop, method.weights())?;
+        // Time steps do not look again.
+        workshop.space = None;
         self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
         self.state.algorithmic.copy_from_slice(&self.state.a);

@@ -289,6 +289,17 @@ impl Pattern {
         Some(self.tile(i, j)? + self.width() * c + r)
     }
 
+    /// Shows each equation and where its entry of the diagonal is stored. Tiles on the diagonal are always there.
+    pub fn each_diagonal(&self, mut show: impl FnMut(usize, usize)) {
+        for group in 0..self.groups.count() {
+            let Some(start) = self.tile(group, group) else { continue };
+            for (r, &number) in self.numbers(group).iter().enumerate().filter(|(_, number)| **number != Equations::HELD)
+            {
+                show(number as usize, start + (self.width() + 1) * r);
+            }
+        }
+    }
+
     /// The group and the row of the tile of an equation.
     fn row_of(&self, equation: u32) -> (usize, usize) {
         let (slot, k) = self.equations.origin(equation as usize);
