@@ -66,10 +66,40 @@ pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Syn
     if !are_given() {
         return of_part(0..length).max(0.0);
     }
-    let parts = (0..length).step_by(PART).map(|start| start..length.min(start + PART));
     let mut largest = 0.0_f64;
-    in_order(parts, of_part, |part| largest = largest.max(part));
+    in_order(parts(length), of_part, |part| largest = largest.max(part));
     largest
+}
+
+/// The sum of what parts of a list give: ranges of places, the same ones for any number of threads.
+pub fn sum(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Sync) -> f64 {
+    let mut sum = 0.0;
+    in_order(parts(length), of_part, |part| sum += part);
+    sum
+}
+
+/// The first thing that is found in parts of a list: ranges of places.
+pub fn first<T: Send>(length: usize, in_part: impl Fn(Range<usize>) -> Option<T> + Send + Sync) -> Option<T> {
+    if !are_given() {
+        return in_part(0..length);
+    }
+    let mut first = None;
+    in_order(parts(length), in_part, |found| first = first.take().or(found));
+    first
+}
+
+/// Parts of a list, as ranges of places.
+pub fn parts(length: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..length).step_by(PART).map(move |start| start..length.min(start + PART))
+}
+
+/// Copies a list over another one, which becomes as long.
+pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
+    if to.len() != from.len() {
+        to.clear();
+        return to.extend_from_slice(from);
+    }
+    each_part(to, |start, to| to.copy_from_slice(&from[start..start + to.len()]));
 }
 
 /// A list in consecutive parts that end there.

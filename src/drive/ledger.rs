@@ -5,6 +5,8 @@ use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, log, unwound};
 use crate::system::{Category, Equations, Slot, State, System};
 use crate::tensor::Vec3;
+use crate::threads::{self, PART};
+use std::mem::replace;
 
 /// Energies of one state and the work of loads, gravity and motions so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,7 +29,7 @@ impl Ledger {
 }
 
 /// Keeps the account from step to step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Bookkeeper {
     ledger: Ledger,
     q: Vec<Vec3>,
@@ -38,66 +40,80 @@ pub(super) struct Bookkeeper {
 }
 
 impl Bookkeeper {
-    pub fn new(slots: usize) -> Self {
-        let zero = vec![Vec3::ZERO; slots];
-        Self {
-            ledger: Ledger::default(),
-            q: zero.clone(),
-            wound: zero.clone(),
-            force: zero.clone(),
-            drag: zero,
-            drives: Vec::new(),
-        }
-    }
-
     /// Opens a stage: energies are taken, no work is added.
     pub fn open(&mut self, model: &Model, state: &State, system: &System) {
         self.drives = model.drives(state);
-        self.remember(state, system);
-        self.take_energies(model, state);
+        self.force = threads::list(state.q.len(), |slot| outside(system, slot));
+        if system.has(Category::Damping) {
+            threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
+        }
+        self.take(model, state);
     }
 
     /// Adds the work of the step that ends here.
     pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
-        for (slot, &kind) in model.kinds.iter().enumerate() {
-            let drag = system.force[Category::Damping as usize][slot];
-            let wound = state.wound[slot] - self.wound[slot];
-            self.ledger.damped += work(kind, (self.q[slot], self.drag[slot]), (state.q[slot], drag), wound);
-            let (before, after) = (self.force[slot], outside(system, slot));
-            self.ledger.external += work(kind, (self.q[slot], before), (state.q[slot], after), wound);
+        let Self { ledger, q, wound, force, drag, .. } = self;
+        let way = Way { kinds: &model.kinds, from: (q, wound), to: (&state.q, &state.wound) };
+        ledger.external += way.work(force, |slot| outside(system, slot));
+        if system.has(Category::Damping) {
+            ledger.damped += way.work(drag, |slot| system.force[Category::Damping as usize][slot]);
         }
         let drives = model.drives(state);
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
-            self.ledger.external += 0.5 * (f0 + f1) * (x1 - x0);
+            ledger.external += 0.5 * (f0 + f1) * (x1 - x0);
         }
         self.drives = drives;
-        self.remember(state, system);
-        self.take_energies(model, state);
+        self.take(model, state);
     }
 
     pub fn ledger(&self) -> Ledger {
         self.ledger
     }
 
-    fn remember(&mut self, state: &State, system: &System) {
-        self.q.copy_from_slice(&state.q);
-        self.wound.copy_from_slice(&state.wound);
-        self.drag.copy_from_slice(&system.force[Category::Damping as usize]);
-        for (slot, force) in self.force.iter_mut().enumerate() {
-            *force = outside(system, slot);
-        }
-    }
-
-    fn take_energies(&mut self, model: &Model, state: &State) {
+    /// Takes the energies of a state, and where it is.
+    fn take(&mut self, model: &Model, state: &State) {
+        threads::copy(&mut self.q, &state.q);
+        threads::copy(&mut self.wound, &state.wound);
         let energy = model.energy(state);
         (self.ledger.kinetic, self.ledger.strain) = (energy.kinetic, energy.strain);
+    }
+}
+
+/// The way of all slots from one state to the next, by their unknowns and how far they are wound.
+struct Way<'a> {
+    kinds: &'a [SlotKind],
+    from: (&'a [Vec3], &'a [Vec3]),
+    to: (&'a [Vec3], &'a [Vec3]),
+}
+
+impl Way<'_> {
+    /// The work of forces, which are `after` where it ends and take the place of those `before`.
+    fn work(&self, before: &mut [Vec3], after: impl Fn(usize) -> Vec3 + Send + Sync) -> f64 {
+        let ((q0, wound0), (q1, wound1)) = (self.from, self.to);
+        let of_part = |(number, before): (usize, &mut [Vec3])| {
+            let mut sum = 0.0;
+            for (slot, before) in (PART * number..).zip(before) {
+                let after = after(slot);
+                let before = replace(before, after);
+                let wound = wound1[slot] - wound0[slot];
+                sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), wound);
+            }
+            sum
+        };
+        let mut sum = 0.0;
+        threads::in_order(before.chunks_mut(PART).enumerate(), of_part, |part: f64| sum += part);
+        sum
     }
 }
 
 /// What acts from outside at a slot: loads, and the forces that hold or move constrained directions.
 fn outside(system: &System, slot: usize) -> Vec3 {
     let equations: &Equations = &system.pattern.equations;
-    equations.held_part(slot as Slot, system.total(slot)) - system.force[Category::External as usize][slot]
+    let external = system.force[Category::External as usize][slot];
+    match equations.all_free(slot as Slot) {
+        Some(_) => -external,
+        None => equations.held_part(slot as Slot, system.total(slot)) - external,
+    }
 }
 
 /// Work of a force over the way from the one place to the other, by the trapezoidal rule. A rotation tells by `wound` how far it

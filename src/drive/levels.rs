@@ -7,6 +7,7 @@ use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, relative_angle};
 use crate::system::State;
 use crate::tensor::Vec3;
+use crate::threads;
 
 /// A level is not approached in smaller parts than this.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
@@ -74,9 +75,9 @@ impl Stability {
     }
 
     /// Says where a limit or branch point lies behind.
-    pub fn pass(&mut self, run: &mut Run, negative: Option<usize>) -> Result<(), Failure> {
+    pub fn pass(&mut self, run: &mut Run, workshop: &mut Workshop, negative: Option<usize>) -> Result<(), Failure> {
         let before = std::mem::replace(&mut self.negative, negative);
-        run.tell_stability(None, before, negative)
+        run.tell_stability(workshop, None, before, negative)
     }
 }
 
@@ -148,24 +149,24 @@ impl Levels {
 /// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
 /// displacements tell.
 fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> bool {
-    let [mut along, mut moved, mut expected] = [0.0; 3];
-    let nodes = model.slots.iter().zip(first).enumerate();
-    for (slot, (_, first)) in nodes.filter(|(_, (info, _))| info.kind == SlotKind::Displacement) {
-        let step = to.q[slot] - from.q[slot];
-        along += step.dot(*first);
-        moved += step.squared();
-        expected += first.squared();
-    }
+    let step = |slot: usize| to.q[slot] - from.q[slot];
+    let sum = |of_node: &(dyn Fn(usize) -> f64 + Sync)| {
+        let is_node = |slot: &usize| model.kinds[*slot] == SlotKind::Displacement;
+        threads::sum(first.len(), |part| part.filter(is_node).map(of_node).sum())
+    };
+    let along = sum(&|slot| step(slot).dot(first[slot]));
+    let moved = sum(&|slot| step(slot).squared());
+    let expected = sum(&|slot| first[slot].squared());
     let sizes = [moved.sqrt(), expected.sqrt()];
     sizes.iter().all(|&size| size > NO_MOTION * model.length) && along < BACK * sizes[0] * sizes[1]
 }
 
 /// The largest difference of two states: displacements over the length of the scene, rotations in radians, whatever their charts.
 pub(super) fn distance(model: &Model, a: &State, b: &State) -> f64 {
-    let one = |(slot, kind): (usize, SlotKind)| match kind {
+    let one = |slot: usize| match model.kinds[slot] {
         SlotKind::Displacement => (b.q[slot] - a.q[slot]).norm() / model.length,
         SlotKind::Rotation => relative_angle(Rotation::new(a.q[slot]).r, Rotation::new(b.q[slot]).r),
         SlotKind::Force | SlotKind::Moment => 0.0,
     };
-    model.slots.iter().map(|info| info.kind).enumerate().map(one).fold(0.0, f64::max)
+    threads::largest(model.kinds.len(), |part| part.map(one).fold(0.0, f64::max))
 }

@@ -4,12 +4,14 @@ use super::failure::{Failure, Moment, Tried, place};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use super::levels::Approach;
+use super::space::Space;
 use super::warnings::Told;
 use crate::integrate::{Increments, Scheme, Trend};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, Plane, State, System};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::fmt;
 use std::sync::Arc;
 
@@ -291,6 +293,8 @@ pub struct Run<'o> {
 pub(super) struct Workshop {
     pub assembly: Assembly,
     pub newton: Newton,
+    /// Where a static stage is treated in a plane, once it has been looked at in space
+    pub space: Option<Space>,
     /// Increments of prescribed directions in a load step
     pub lift: Vec<Vec3>,
     pub until: Option<Until>,
@@ -313,7 +317,7 @@ impl<'o> Run<'o> {
         Self {
             state: model.rest(),
             good: model.rest(),
-            bookkeeper: Bookkeeper::new(model.slots.len()),
+            bookkeeper: Bookkeeper::default(),
             model,
             plan,
             counters: Counters::default(),
@@ -396,6 +400,7 @@ impl<'o> Run<'o> {
         Ok(Workshop {
             assembly,
             newton,
+            space: None,
             lift,
             until,
             increments: None,
@@ -505,8 +510,8 @@ impl<'o> Run<'o> {
     /// Motions that overflow leave no force behind that would tell.
     fn refuse_infinities(&self) -> Result<(), Failure> {
         let State { q, v, a, .. } = &self.state;
-        let wrong = (0..q.len()).find(|&slot| !(q[slot].is_finite() && v[slot].is_finite() && a[slot].is_finite()));
-        let Some(slot) = wrong else { return Ok(()) };
+        let is_wrong = |&slot: &usize| !(q[slot].is_finite() && v[slot].is_finite() && a[slot].is_finite());
+        let Some(slot) = threads::first(q.len(), |mut part| part.find(is_wrong)) else { return Ok(()) };
         Err(Failure::NonFinite {
             at: self.moment(),
             effect: Some("the motion"),

@@ -56,7 +56,7 @@ impl Run<'_> {
             }
         }
         self.warn_of_instability(levels.stability.negative);
-        self.look_out_of_plane(levels.stability.negative)
+        self.look_out_of_plane(workshop, levels.stability.negative)
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
@@ -88,7 +88,7 @@ impl Run<'_> {
                 self.observer.warn(&format!("but for the stress it is under at the start of the stage: {named}"));
             }
         }
-        self.refuse_loose_in_space(Weights::STIFFNESS)?;
+        self.refuse_loose_in_space(workshop, Weights::STIFFNESS)?;
         self.open_account(workshop)
     }
 
@@ -135,7 +135,7 @@ impl Run<'_> {
         levels: &mut Levels,
     ) -> Result<(), Failure> {
         self.accept(workshop)?;
-        levels.stability.pass(self, negative)?;
+        levels.stability.pass(self, workshop, negative)?;
         self.good.copy_all_but_rates(&self.state);
         // Where pivots were counted the stiffness is that of this state.
         if negative.is_some() {
@@ -195,17 +195,20 @@ impl Run<'_> {
     /// state and handed to Newton as increments.
     pub(super) fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
         let Workshop { assembly, newton, lift, .. } = workshop;
-        lift.copy_from_slice(&self.state.q);
+        let moves = !self.model.motions.is_empty();
+        if moves {
+            lift.copy_from_slice(&self.state.q);
+        }
         let time = self.state.time;
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        for (lift, q) in lift.iter_mut().zip(&mut self.state.q) {
+        for (lift, q) in lift.iter_mut().zip(&mut self.state.q).filter(|_| moves) {
             let before = *lift;
             *lift = *q - before;
             *q = before;
         }
-        let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
+        let moved = (moves && lift.iter().any(|&v| v != Vec3::ZERO)).then_some(&lift[..]);
         let work = &mut self.counters.work;
         newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
         self.refuse_leaps()

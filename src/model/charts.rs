@@ -5,7 +5,9 @@ use crate::kernel::seam;
 use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
 use crate::system::{Node, Slot, State};
 use crate::tensor::Vec3;
+use crate::threads::{self, PART};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// The band beyond pi in which a node keeps its chart in dynamics, so that it cannot chatter.
 pub const DYNAMIC_BAND: f64 = 1e-3;
@@ -35,13 +37,15 @@ const NEAR_TURN: f64 = 0.5;
 /// the time by which the algorithmic acceleration lies ahead of the state; `None` where it is the rate of a momentum, to
 /// which charts do not matter.
 pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
+    // NaN is never beyond: what is not finite is named by the assembly, not turned for ever.
+    let is_beyond = |p: Vec3| p.squared() > (PI + band) * (PI + band) && p.is_finite();
+    let goes_beyond = |part: Range<usize>| rotations[part].iter().find(|&&slot| is_beyond(state.q[slot as usize]));
+    let Some(first) = threads::first(rotations.len(), goes_beyond) else { return 0 };
     let mut switched = 0;
-    for &slot in rotations {
-        let slot = slot as usize;
+    for slot in rotations.iter().skip_while(|slot| *slot != first).map(|&slot| slot as usize) {
         for _ in 0..MOST_CHANGES {
             let p = state.q[slot];
-            // NaN never passes: what is not finite is named by the assembly, not turned for ever.
-            if p.squared() <= (PI + band) * (PI + band) || !p.is_finite() {
+            if !is_beyond(p) {
                 break;
             }
             let (velocity, acceleration) = (state.v[slot], state.a[slot]);
@@ -77,17 +81,27 @@ pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
 /// Carries the wound rotation vectors along with a correction that the state is about to take. A node may turn further than half
 /// a turn in a load step; how far, only its corrections tell.
 pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
-    for &slot in rotations {
-        let k = slot as usize;
-        let (old, wound, increment) = (state.q[k], state.wound[k], dq[k]);
+    let State { q, wound, .. } = state;
+    each_rotation(wound, rotations, |k, wound| {
+        let (old, increment) = (q[k], dq[k]);
         let p = old + increment;
-        state.wound[k] = match () {
-            () if increment == Vec3::ZERO => wound,
-            () if wound == old => p,
-            () if increment.squared() < 1.0 => continued(p, wound, rotated(old, p)),
-            () => continued(p, wound, Rotation::new(old).t.transpose_mul(increment)),
+        *wound = match () {
+            () if increment == Vec3::ZERO => *wound,
+            () if *wound == old => p,
+            () if increment.squared() < 1.0 => continued(p, *wound, rotated(old, p)),
+            () => continued(p, *wound, Rotation::new(old).t.transpose_mul(increment)),
         };
-    }
+    });
+}
+
+/// Does something with what a list holds at each of some slots, which come in their order.
+fn each_rotation<T: Send>(list: &mut [T], rotations: &[Slot], work: impl Fn(usize, &mut T) + Send + Sync) {
+    threads::each_part(list, |start, part| {
+        let place = |slot: usize| rotations.partition_point(|&rotation| (rotation as usize) < slot);
+        for &slot in &rotations[place(start)..place(start + part.len())] {
+            work(slot as usize, &mut part[slot as usize - start]);
+        }
+    });
 }
 
 /// The spatial rotation vector that leads from one to the other.
@@ -112,23 +126,26 @@ fn continued(p: Vec3, wound: Vec3, turned: Vec3) -> Vec3 {
 /// whole turn n is no guide: a node that passes it a little aside sees n swing to the other side, and P + 2 pi k n with it.
 /// There the carried one is kept until both come together again; it is ambiguous where they lie far apart.
 pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> {
-    let mut ambiguous = Vec::new();
-    for &slot in rotations {
-        let k = slot as usize;
-        let (p, old, wound) = (state.q[k], before.q[k], before.wound[k]);
+    let State { q, wound: carried, .. } = state;
+    each_rotation(carried, rotations, |k, carried| {
+        let (p, old, wound) = (q[k], before.q[k], before.wound[k]);
         // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away from it.
         let is_near = wound == old && (p - old).norm() < 0.4 * FAR;
-        if is_near && (state.wound[k] == old || state.wound[k] == p) {
-            state.wound[k] = p;
-            continue;
+        if is_near && (*carried == old || *carried == p) {
+            *carried = p;
+            return;
         }
-        let (shortest, tracked) = (rotated(old, p), state.wound[k] - wound);
+        let (shortest, tracked) = (rotated(old, p), *carried - wound);
         let turned = if tracked.norm() > HALF_TURN { unwound(shortest, tracked) } else { shortest };
-        state.wound[k] = continued(p, wound, turned);
-        if (unwound(p, state.wound[k]) - state.wound[k]).norm() >= FAR {
-            ambiguous.push(slot);
-        }
-    }
+        *carried = continued(p, wound, turned);
+    });
+    let is_ambiguous = |&slot: &Slot| {
+        let (p, wound) = (q[slot as usize], carried[slot as usize]);
+        p != wound && (unwound(p, wound) - wound).norm() >= FAR
+    };
+    let mut ambiguous = Vec::new();
+    let in_part = |part: &[Slot]| part.iter().copied().filter(is_ambiguous).collect::<Vec<_>>();
+    threads::in_order(rotations.chunks(PART), in_part, |part| ambiguous.extend(part));
     ambiguous
 }
 
@@ -150,16 +167,13 @@ pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<
         // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
         ((a - b).squared() > 1.0).then(|| log(Rotation::new(a).r.transpose() * Rotation::new(b).r))
     };
-    for (element, ElementInfo { nodes, .. }) in elements.iter().enumerate() {
-        for pair in nodes.windows(2) {
-            let Some(now) = relative(state, pair).filter(|now| now.norm() > COARSE_WARNING) else { continue };
-            let Some(old) = relative(before, pair).filter(|old| old.norm() > COARSE_WARNING) else { continue };
-            if now.dot(old) < 0.0 {
-                return Some((element, 2.0 * PI - now.norm()));
-            }
-        }
-    }
-    None
+    let leap = |element: usize, pair: &[Node]| {
+        let now = relative(state, pair).filter(|now| now.norm() > COARSE_WARNING)?;
+        let old = relative(before, pair).filter(|old| old.norm() > COARSE_WARNING)?;
+        (now.dot(old) < 0.0).then(|| (element, 2.0 * PI - now.norm()))
+    };
+    let leap_in = |element: usize| elements[element].nodes.windows(2).find_map(|pair| leap(element, pair));
+    threads::first(elements.len(), |mut part| part.find_map(leap_in))
 }
 
 /// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle). Of elements that take
@@ -172,21 +186,22 @@ pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(
         let (a, b) = vectors(pair);
         relative_angle(Rotation::new(a).r, Rotation::new(b).r)
     };
-    let mut worst: Option<(usize, f64)> = None;
-    let mut look = |element: usize, angle: f64| {
-        if angle > limit && worst.is_none_or(|(_, w)| angle > w) {
-            worst = Some((element, angle));
+    let angle_in = |ElementInfo { nodes, in_one_chart }: &ElementInfo| {
+        let pairs = nodes.windows(2);
+        match in_one_chart {
+            true if pairs.clone().map(bound).sum::<f64>() >= limit => pairs.map(angle).sum(),
+            true => 0.0,
+            false => pairs.filter(|pair| bound(pair) >= limit).map(angle).fold(0.0, f64::max),
         }
     };
-    for (element, ElementInfo { nodes, in_one_chart }) in elements.iter().enumerate() {
-        let pairs = nodes.windows(2);
-        if *in_one_chart {
-            if pairs.clone().map(bound).sum::<f64>() >= limit {
-                look(element, pairs.map(angle).sum());
-            }
-        } else {
-            pairs.filter(|pair| bound(pair) >= limit).for_each(|pair| look(element, angle(pair)));
-        }
-    }
+    // The first of equal ones.
+    let worse = |worst: Option<(usize, f64)>, (element, angle): (usize, f64)| match worst {
+        Some((_, other)) if angle <= other => worst,
+        _ if angle > limit => Some((element, angle)),
+        _ => worst,
+    };
+    let in_part = |part: Range<usize>| part.map(|element| (element, angle_in(&elements[element]))).fold(None, worse);
+    let mut worst = None;
+    threads::in_order(threads::parts(elements.len()), in_part, |part| worst = part.into_iter().fold(worst, worse));
     worst
 }

@@ -20,6 +20,7 @@ use crate::system::{
     Aspect, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, most_regions,
 };
 use crate::tensor::Vec3;
+use crate::threads;
 use std::sync::Arc;
 
 /// A prescribed rotation may go this far in one step or load increment.
@@ -147,9 +148,14 @@ impl Model {
 
     /// The inner product of two motions, displacements over the length of the scene.
     pub fn inner_product(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
-        let weight = |info: &SlotInfo| (info.arm(self.length) / self.length).powi(2);
-        let slots = self.slots.iter().zip(a.iter().zip(b)).filter(|(info, _)| !info.is_multiplier());
-        slots.map(|(info, (a, b))| a.dot(*b) * weight(info)).sum()
+        threads::sum(a.len().min(b.len()), |part| {
+            let mut sums = [0.0; SlotKind::ALL.len()];
+            let pairs = a[part.clone()].iter().zip(&b[part.clone()]);
+            for (&kind, (a, b)) in self.kinds[part].iter().zip(pairs) {
+                sums[kind as usize] += a.dot(*b);
+            }
+            sums[SlotKind::Rotation as usize] + sums[SlotKind::Displacement as usize] / self.length.powi(2)
+        })
     }
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
@@ -286,9 +292,10 @@ impl Model {
 
     /// The largest displacement of a node from one state to another.
     pub fn farthest(&self, from: &State, to: &State) -> f64 {
-        let nodes = self.slots.iter().zip(from.q.iter().zip(&to.q));
-        let moved = nodes.filter(|(info, _)| info.kind == SlotKind::Displacement).map(|(_, (a, b))| (*b - *a).norm());
-        moved.fold(0.0, f64::max)
+        threads::largest(self.kinds.len(), |part| {
+            let nodes = part.filter(|&slot| self.kinds[slot] == SlotKind::Displacement);
+            nodes.map(|slot| (to.q[slot] - from.q[slot]).norm()).fold(0.0, f64::max)
+        })
     }
 
     /// The rotation of a node shares the tile of its displacement, which it follows.

@@ -5,6 +5,7 @@ use crate::kernel::seam::Conversion;
 use crate::model::Assembly;
 use crate::system::State;
 use crate::tensor::Vec3;
+use crate::threads;
 
 /// What stress is foreseen from.
 #[derive(Default)]
@@ -23,7 +24,7 @@ impl Foresight {
 
     /// The state is going to be corrected: what stress it leads to is looked at when a tangent is formed with it.
     pub fn remember(&mut self, state: &State) {
-        self.q.clone_from(&state.q);
+        threads::copy(&mut self.q, &state.q);
         self.mixed.clone_from(&state.mixed);
         self.is_pending = true;
     }

@@ -12,6 +12,7 @@ use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::time::Instant;
 
 /// Work done, added up over a run.
@@ -229,7 +230,7 @@ impl Newton {
             }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {
-                self.first.clone_from(&self.dq);
+                threads::copy(&mut self.first, &self.dq);
             }
             Self::add(model, state, method, &self.dq);
             // What was a correction before is none in a new chart: it may not end the iteration.

@@ -2,6 +2,7 @@
 
 use crate::model::Model;
 use crate::tensor::Vec3;
+use crate::threads;
 
 /// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
 const FINE: f64 = 1e-8;
@@ -28,7 +29,7 @@ impl Refinement {
         self.aligned = cosine > 0.5;
         self.ratio = if self.before.is_empty() { 0.0 } else { size / self.size };
         (self.size, self.last) = (size, size / unknowns);
-        self.before = if self.last.is_finite() { dq.to_vec() } else { Vec::new() };
+        threads::copy(&mut self.before, if self.last.is_finite() { dq } else { &[] });
         self
     }
 

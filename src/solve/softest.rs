@@ -5,6 +5,8 @@ use crate::kernel::WIDTH;
 use crate::real::Instructions;
 use crate::system::{Equations, System};
 use crate::tensor::Vec3;
+use crate::threads;
+use std::ops::Range;
 
 /// Unknowns that move without any force, as far as the tangent tells.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,22 +53,26 @@ impl LinearSolver {
         if system.pattern.equations.count() == 0 {
             return None;
         }
-        if let Some(empty) = empty_column(system) {
+        let diagonal = diagonal(system);
+        if let Some(empty) = empty_column(system, &diagonal) {
             let mut entries = vec![0.0; system.pattern.equations.count()];
             entries[empty] = 1.0;
             return Some(NullVector { motion: entries.clone(), entries, held: false });
         }
-        let scale = scales(system);
-        let mut x: Vec<f64> = (0..scale.len()).map(|i| 0.5 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
+        let scale = scales(system, &diagonal);
+        let mut x = threads::list(scale.len(), |k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract());
+        let scaled = |x: &mut [f64], by: f64| {
+            threads::each_part(x, |start, x| x.iter_mut().zip(&scale[start..]).for_each(|(x, s)| *x *= s / by));
+        };
         for _ in 0..3 {
-            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+            scaled(&mut x, 1.0);
             if !self.solve_once(system, &mut x) {
                 return self.null_vector_of_shifted(system);
             }
-            let largest = x.iter().zip(&scale).fold(0.0_f64, |m, (x, s)| m.max((x * s).abs()));
-            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / largest);
+            let largest = threads::largest(x.len(), |part| part.fold(0.0, |m: f64, k| m.max((x[k] * scale[k]).abs())));
+            scaled(&mut x, largest);
         }
-        let motion: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x / s).collect();
+        let motion = threads::list(x.len(), |k| x[k] / scale[k]);
         let held = stiffness_of(system, &motion) > NO_STIFFNESS;
         Some(NullVector { entries: x, motion, held })
     }
@@ -74,11 +80,9 @@ impl LinearSolver {
     /// The same where the factorisation broke down: the diagonal is raised by a little first.
     fn null_vector_of_shifted(&mut self, system: &System) -> Option<NullVector> {
         let mut shifted = system.clone();
-        for place in diagonal_places(system).into_iter().flatten() {
-            // Multipliers have no diagonal: they get a little compliance.
-            let value = shifted.values[place];
-            shifted.values[place] = if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
-        }
+        // Multipliers have no diagonal: they get a little compliance.
+        let shift = |value: f64| if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
+        system.pattern.each_diagonal(|_, place| shifted.values[place] = shift(shifted.values[place]));
         if !self.factorise(&shifted) {
             return None;
         }
@@ -94,19 +98,15 @@ impl LinearSolver {
     }
 }
 
-/// Where the diagonal entry of each column is stored.
-fn diagonal_places(system: &System) -> Vec<Option<usize>> {
-    let pattern = &system.pattern;
-    (0..pattern.equations.count()).map(|k| pattern.find(k as u32, k as u32)).collect()
-}
-
 fn diagonal(system: &System) -> Vec<f64> {
-    diagonal_places(system).into_iter().map(|place| place.map_or(0.0, |place| system.values[place])).collect()
+    let mut diagonal = vec![0.0; system.pattern.equations.count()];
+    system.pattern.each_diagonal(|equation, place| diagonal[equation] = system.values[place]);
+    diagonal
 }
 
 /// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column comparable.
-fn scales(system: &System) -> Vec<f64> {
-    let roots: Vec<f64> = diagonal(system).iter().map(|d| d.abs().sqrt()).collect();
+fn scales(system: &System, diagonal: &[f64]) -> Vec<f64> {
+    let roots = threads::list(diagonal.len(), |k| diagonal[k].abs().sqrt());
     let column = |c: usize| {
         let compared = entries(system, c).map(|(row, value)| (value, roots[row]));
         compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
@@ -120,7 +120,7 @@ fn scales(system: &System) -> Vec<f64> {
             _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
         },
     };
-    (0..roots.len()).map(scale).collect()
+    threads::list(roots.len(), scale)
 }
 
 /// Row and value of the entries of a column.
@@ -129,8 +129,9 @@ fn entries(system: &System, column: usize) -> impl Iterator<Item = (usize, f64)>
 }
 
 /// A column without any entry that is not zero.
-fn empty_column(system: &System) -> Option<usize> {
-    (0..system.pattern.equations.count()).find(|&column| entries(system, column).all(|(_, value)| value == 0.0))
+fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
+    let is_empty = |column: usize| entries(system, column).all(|(_, value)| value == 0.0);
+    threads::first(diagonal.len(), |mut part| part.find(|&column| diagonal[column] == 0.0 && is_empty(column)))
 }
 
 /// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated, so that fine meshes of slender beams,
@@ -141,12 +142,26 @@ fn stiffness_of(system: &System, x: &[f64]) -> f64 {
 
 fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
     let parts = system.pattern.apart::<W>(x);
-    // A sum for each row of a tile: they do not wait for each other.
+    let (mut whole, mut squares) = (Compensated::default(), 0.0);
+    let add = |(sums, part): ([Compensated; W], [f64; W])| {
+        sums.iter().flat_map(|sum| [sum.sum, sum.lost]).for_each(|term| whole.add(term));
+        squares += part.iter().sum::<f64>();
+    };
+    threads::in_order(threads::parts(parts.len()), |columns| stiffness_of_columns(system, &parts, columns), add);
+    if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
+}
+
+/// The sums over some columns of tiles, of the terms and of their squares. A sum for each row of a tile: they do not wait for each other.
+fn stiffness_of_columns<const W: usize>(
+    system: &System,
+    parts: &[[f64; W]],
+    columns: Range<usize>,
+) -> ([Compensated; W], [f64; W]) {
     let (mut sums, mut squares) = ([Compensated::default(); W], [0.0; W]);
     Instructions::here().run(
         #[inline(always)]
         || {
-            system.each_tile::<W>(&system.values, |row, column, tile| {
+            system.each_tile::<W>(columns, |row, column, tile| {
                 // What is not kept counts as much.
                 let times = if system.pattern.symmetric && row != column { 2.0 } else { 1.0 };
                 for (line, &x) in tile.iter().zip(&parts[column]) {
@@ -159,13 +174,7 @@ fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
             });
         },
     );
-    let mut whole = Compensated::default();
-    sums.iter().for_each(|part| {
-        whole.add(part.sum);
-        whole.add(part.lost);
-    });
-    let squares: f64 = squares.iter().sum();
-    if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
+    (sums, squares)
 }
 
 /// A sum with what its roundings have lost (Knuth's two-sum, which needs no branch).

@@ -9,6 +9,7 @@ use crate::kernel::ElementSystem;
 use crate::real::{Instructions, Lanes};
 use crate::tensor::Vec3;
 use crate::threads;
+use std::ops::Range;
 
 /// What a force is; the stop test of Newton and the energy account look at them apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,6 +115,11 @@ impl System {
         }
     }
 
+    /// Whether something may add to a category.
+    pub fn has(&self, category: Category) -> bool {
+        self.acting.contains(&(category as usize))
+    }
+
     /// The sum of the forces at a slot.
     #[inline]
     pub fn total(&self, slot: usize) -> Vec3 {
@@ -208,12 +214,12 @@ impl System {
         }
     }
 
-    /// Shows each tile that is kept with the groups of its rows and of its columns.
+    /// Shows each tile that is kept in some columns with the groups of its rows and of its columns.
     #[inline(always)]
-    pub fn each_tile<const W: usize>(&self, values: &[f64], mut show: impl FnMut(usize, usize, &Tile<W>)) {
-        let mut tiles = tiles(values).iter();
-        for column in 0..self.pattern.groups.count() {
-            for (&row, tile) in self.pattern.rows_of(column).iter().zip(&mut tiles) {
+    pub fn each_tile<const W: usize>(&self, columns: Range<usize>, mut show: impl FnMut(usize, usize, &Tile<W>)) {
+        for column in columns {
+            let tiles = &self.tiles()[self.pattern.tiles_of(column)];
+            for (&row, tile) in self.pattern.rows_of(column).iter().zip(tiles) {
                 show(row as usize, column, tile);
             }
         }
@@ -289,7 +295,13 @@ impl System {
         let equations = &self.pattern.equations;
         self.pattern.each_region(out, |region, out| {
             for slot in region.slots.clone() {
-                let local = equations.to_local(slot as Slot, force(region, slot));
+                let force = force(region, slot);
+                if let Some(free) = equations.all_free(slot as Slot).filter(|_| !self.lifts) {
+                    let start = free.start - region.equations.start;
+                    out[start..start + 3].copy_from_slice(&(-force).0);
+                    continue;
+                }
+                let local = equations.to_local(slot as Slot, force);
                 for (k, number) in equations.of(slot as Slot).into_iter().enumerate() {
                     if number != Equations::HELD {
                         let lifted = if self.lifts { self.lifted[number as usize] } else { 0.0 };

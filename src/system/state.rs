@@ -6,6 +6,7 @@ use crate::kernel::seam::Conversion;
 use crate::kernel::turn::Turn;
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
+use crate::threads;
 
 /// The index of a 3-vector of unknowns: a displacement or a rotation vector.
 pub type Slot = u32;
@@ -92,10 +93,10 @@ impl State {
         debug_assert!(self.v == other.v && self.a == other.a && self.algorithmic == other.algorithmic, "rates differ");
         self.time = other.time;
         self.load = other.load;
-        self.q.copy_from_slice(&other.q);
+        threads::copy(&mut self.q, &other.q);
         self.amplitude.copy_from_slice(&other.amplitude);
         self.mixed.copy_from_slice(&other.mixed);
-        self.wound.copy_from_slice(&other.wound);
+        threads::copy(&mut self.wound, &other.wound);
         self.amplitude_rates.copy_from_slice(&other.amplitude_rates);
         self.angles.copy_from_slice(&other.angles);
         self.turns.clone_from(&other.turns);
