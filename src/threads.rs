@@ -93,6 +93,11 @@ pub fn parts(length: usize) -> impl Iterator<Item = Range<usize>> {
     (0..length).step_by(PART).map(move |start| start..length.min(start + PART))
 }
 
+/// A list of equal entries. All threads touch memory for the first time, which takes longer than filling it.
+pub fn filled<T: Copy + Send + Sync>(length: usize, entry: T) -> Vec<T> {
+    list(length, |_| entry)
+}
+
 /// Copies a list over another one, which becomes as long.
 pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
     if to.len() != from.len() {

@@ -110,9 +110,9 @@ impl Way<'_> {
 fn outside(system: &System, slot: usize) -> Vec3 {
     let equations: &Equations = &system.pattern.equations;
     let external = system.force[Category::External as usize][slot];
-    match equations.all_free(slot as Slot) {
-        Some(_) => -external,
-        None => equations.held_part(slot as Slot, system.total(slot)) - external,
+    match equations.is_free(slot as Slot) {
+        true => -external,
+        false => equations.held_part(slot as Slot, system.total(slot)) - external,
     }
 }
 

@@ -14,18 +14,19 @@ pub(super) struct Space {
 
 impl Run<'_> {
     /// The present stage in space, where it is treated in a plane: set up once, by the first look.
-    fn in_space<'s>(&self, space: &'s mut Option<Space>) -> Result<Option<&'s mut Space>, Failure> {
-        if space.is_none() && self.plane.is_some() {
-            *space = Some(self.set_up_in_space()?);
+    fn in_space<'w>(&self, workshop: &'w mut Workshop) -> Result<Option<&'w mut Space>, Failure> {
+        if workshop.space.is_none() && self.plane.is_some() {
+            workshop.space = Some(self.set_up_in_space(workshop)?);
         }
-        Ok(space.as_mut())
+        Ok(workshop.space.as_mut())
     }
 
-    fn set_up_in_space(&self) -> Result<Space, Failure> {
+    fn set_up_in_space(&self, in_plane: &Workshop) -> Result<Space, Failure> {
         let context = self.plan.stages[self.stage].context(self.stage);
         let equations = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
         let assembly = Assembly::new(&context, equations, &self.model);
-        match LinearSolver::new(&assembly.system, &self.model.multipliers) {
+        let (solver, system) = (&in_plane.newton.solver, &in_plane.assembly.system);
+        match LinearSolver::beside(solver, system, &assembly.system, &self.model.multipliers) {
             Some(solver) => Ok(Space { assembly, solver }),
             None => Err(Failure::Limit("not enough memory to look at the tangent in space".into())),
         }
@@ -41,7 +42,7 @@ impl Run<'_> {
         if self.told.unstable == Some(self.stage) {
             return Ok(());
         }
-        let Some(Space { assembly, solver }) = self.in_space(&mut workshop.space)? else { return Ok(()) };
+        let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         self.counters.work.factorisations += 1;
         let in_space = solver.negative_pivots(&assembly.system);
@@ -54,9 +55,8 @@ impl Run<'_> {
     /// Refuses what nothing holds in the plane or out of it, with these weights of stiffness, damping and mass and without
     /// velocities.
     pub(super) fn refuse_loose_in_space(&mut self, workshop: &mut Workshop, weights: Weights) -> Result<(), Failure> {
-        let Some(Space { assembly, solver }) = self.in_space(&mut workshop.space)? else { return Ok(()) };
-        let mut still = self.state.clone();
-        still.stand_still();
+        let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
+        let still = self.state.at_rest();
         assembly.evaluate(&still, weights, None);
         self.counters.work.factorisations += 1;
         solver.factorise(&assembly.system);

@@ -55,6 +55,18 @@ impl LinearSolver {
     /// Analyses the pattern of a system. `None` where memory for it cannot be had.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
         let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern)).flatten();
+        Self::by(blocks, system, multipliers)
+    }
+
+    /// The same beside the solver of another system, whose analysis it takes over where the patterns are alike.
+    pub fn beside(other: &Self, others: &System, system: &System, multipliers: &[Slot]) -> Option<Self> {
+        match other.blocks().filter(|_| system.pattern.is_like(&others.pattern)) {
+            Some(blocks) => Self::by(Some(blocks.of_like(&system.pattern)?), system, multipliers),
+            None => Self::new(system, multipliers),
+        }
+    }
+
+    fn by(blocks: Option<BlockSolver>, system: &System, multipliers: &[Slot]) -> Option<Self> {
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
             trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false },

@@ -121,7 +121,7 @@ impl Newton {
     /// For a stage with these unknowns.
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
         let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
-        let (right_hand_side, dq) = (vec![0.0; equations], vec![Vec3::ZERO; slots]);
+        let (right_hand_side, dq) = (vec![0.0; equations], threads::filled(slots, Vec3::ZERO));
         Self {
             convergence,
             max_iterations,

@@ -7,7 +7,7 @@ use super::sink::{Part, Sink};
 use super::state::Slot;
 use crate::kernel::ElementSystem;
 use crate::real::{Instructions, Lanes};
-use crate::tensor::Vec3;
+use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use std::ops::Range;
 
@@ -72,17 +72,17 @@ impl System {
     pub fn new(pattern: Pattern, slots: usize, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Self {
         let acting_in = acting_in(&pattern, everywhere, of_effects);
         let acts = |category: &usize| acting_in.iter().any(|acting| acting.contains(category));
-        let zero = vec![Vec3::ZERO; slots];
+        let zero = || threads::filled(slots, Vec3::ZERO);
         let (values, equations) = (pattern.values(), pattern.equations.count());
         Self {
             rooms: vec![Vec::new(); 1 + pattern.regions.len()],
             pattern,
-            force: [zero.clone(), zero.clone(), zero.clone(), zero.clone()],
+            force: [zero(), zero(), zero(), zero()],
             acting: (0..Category::ALL.len()).filter(acts).collect(),
             acting_in,
             values: vec![0.0; values],
             revision: 0,
-            lift: zero,
+            lift: Vec::new(),
             lifts: false,
             lifted: vec![0.0; equations],
         }
@@ -111,7 +111,7 @@ impl System {
         }
         self.lifts = lift.is_some();
         if let Some(lift) = lift {
-            self.lift.copy_from_slice(lift);
+            threads::copy(&mut self.lift, lift);
         }
     }
 
@@ -152,6 +152,21 @@ impl System {
     /// The tangent tile by tile, in the order of the pattern; each by its columns. `W` is the width of the pattern.
     pub fn tiles<const W: usize>(&self) -> &[Tile<W>] {
         tiles(&self.values)
+    }
+
+    /// What a slot has of the tangent on its diagonal, in its own directions; zero where one is held.
+    pub fn own_block(&self, slot: Slot) -> Mat3 {
+        let (pattern, numbers) = (&self.pattern, self.pattern.equations.of(slot));
+        let (group, first) = pattern.groups.row(slot);
+        let mut block = Mat3::ZERO;
+        let Some(start) = pattern.tile(group, group) else { return block };
+        let is_free = |k: &usize| numbers[*k] != Equations::HELD;
+        for c in (0..3).filter(is_free) {
+            for r in (0..3).filter(is_free) {
+                block.0[r][c] = self.values[start + pattern.width() * (first + c) + first + r];
+            }
+        }
+        block
     }
 
     /// A x, for a matrix with these values on the pattern of the tangent.
@@ -295,19 +310,17 @@ impl System {
         let equations = &self.pattern.equations;
         self.pattern.each_region(out, |region, out| {
             for slot in region.slots.clone() {
-                let force = force(region, slot);
-                if let Some(free) = equations.all_free(slot as Slot).filter(|_| !self.lifts) {
-                    let start = free.start - region.equations.start;
-                    out[start..start + 3].copy_from_slice(&(-force).0);
-                    continue;
-                }
-                let local = equations.to_local(slot as Slot, force);
-                for (k, number) in equations.of(slot as Slot).into_iter().enumerate() {
-                    if number != Equations::HELD {
-                        let lifted = if self.lifts { self.lifted[number as usize] } else { 0.0 };
-                        out[number as usize - region.equations.start] = -local.0[k] - lifted;
+                let local = equations.to_local(slot as Slot, force(region, slot));
+                for (local, number) in local.0.into_iter().zip(equations.of(slot as Slot)) {
+                    // What is held has the number of no equation.
+                    if let Some(out) = out.get_mut((number as usize).wrapping_sub(region.equations.start)) {
+                        *out = -local;
                     }
                 }
+            }
+            if self.lifts {
+                let lifted = &self.lifted[region.equations.clone()];
+                out.iter_mut().zip(lifted).for_each(|(out, lifted)| *out -= lifted);
             }
         });
     }

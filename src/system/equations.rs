@@ -5,7 +5,6 @@ use super::plane::Plane;
 use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
-use std::ops::Range;
 
 /// Unit vectors whose inner product is nearer to 1 are one axis, nearer to 0 orthogonal: the fewest digits that a deck may give axes with.
 const SAME_AXIS: f64 = 1e-9;
@@ -176,28 +175,20 @@ impl Equations {
     pub fn scatter(&self, solution: &[f64], held: Option<&[Vec3]>, out: &mut [Vec3]) {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
-                if let Some(free) = self.all_free(slot as Slot) {
-                    out.0.copy_from_slice(&solution[free]);
-                    continue;
-                }
-                let mut local = self.to_local(slot as Slot, held.map_or(Vec3::ZERO, |held| held[slot]));
-                for k in 0..3 {
-                    if self.number[slot][k] != Self::HELD {
-                        local.0[k] = solution[self.number[slot][k] as usize];
-                    }
+                let mut local = held.map_or(Vec3::ZERO, |held| self.to_local(slot as Slot, held[slot]));
+                for (local, &number) in local.0.iter_mut().zip(&self.number[slot]) {
+                    // What is held has the number of no equation.
+                    *local = solution.get(number as usize).copied().unwrap_or(*local);
                 }
                 *out = self.axes(slot as Slot).map_or(local, |frame| *frame * local);
             }
         });
     }
 
-    /// The equations of a slot that moves in all directions, along the global axes.
+    /// Whether a slot moves in all directions.
     #[inline]
-    pub fn all_free(&self, slot: Slot) -> Option<Range<usize>> {
-        let slot = slot as usize;
-        let free = self.frame[slot] == GLOBAL && !self.number[slot].contains(&Self::HELD);
-        // They are numbered in a row.
-        free.then(|| self.number[slot][0] as usize..self.number[slot][0] as usize + 3)
+    pub fn is_free(&self, slot: Slot) -> bool {
+        !self.number[slot as usize].contains(&Self::HELD)
     }
 
     /// Whether no direction of a slot is held but those that leave the plane.

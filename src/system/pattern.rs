@@ -289,6 +289,11 @@ impl Pattern {
         Some(self.tile(i, j)? + self.width() * c + r)
     }
 
+    /// Whether the same groups meet as in another pattern, and the same tiles are kept: in space and in a plane of it.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.symmetric == other.symmetric && self.column_starts == other.column_starts && self.rows == other.rows
+    }
+
     /// Shows each equation and where its entry of the diagonal is stored. Tiles on the diagonal are always there.
     pub fn each_diagonal(&self, mut show: impl FnMut(usize, usize)) {
         for group in 0..self.groups.count() {

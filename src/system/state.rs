@@ -7,6 +7,7 @@ use crate::kernel::turn::Turn;
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
+use std::borrow::Cow;
 
 /// The index of a 3-vector of unknowns: a displacement or a rotation vector.
 pub type Slot = u32;
@@ -56,17 +57,17 @@ pub struct State {
 impl State {
     /// At rest in the initial placement.
     pub fn rest(slots: usize, elements: usize, amplitudes: usize, angles: usize) -> Self {
-        let zero = vec![Vec3::ZERO; slots];
+        let zero = || threads::filled(slots, Vec3::ZERO);
         Self {
             time: 0.0,
             load: 0.0,
-            q: zero.clone(),
-            v: zero.clone(),
-            a: zero.clone(),
-            algorithmic: zero.clone(),
+            q: zero(),
+            v: zero(),
+            a: zero(),
+            algorithmic: zero(),
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
-            wound: zero,
+            wound: zero(),
             amplitude_rates: vec![[0.0; 2]; amplitudes],
             angles: vec![0.0; angles],
             turns: Vec::new(),
@@ -78,6 +79,17 @@ impl State {
         self.v.fill(Vec3::ZERO);
         self.a.fill(Vec3::ZERO);
         self.algorithmic.fill(Vec3::ZERO);
+    }
+
+    /// The state itself where it stands still, or else another one without velocities and accelerations.
+    pub fn at_rest(&self) -> Cow<'_, Self> {
+        let moves = |&slot: &usize| [&self.v, &self.a, &self.algorithmic].iter().any(|rate| rate[slot] != Vec3::ZERO);
+        if threads::first(self.v.len(), |mut part| part.find(moves)).is_none() {
+            return Cow::Borrowed(self);
+        }
+        let mut still = self.clone();
+        still.stand_still();
+        Cow::Owned(still)
     }
 
     /// Takes over another state of the same scene without allocating.

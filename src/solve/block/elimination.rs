@@ -78,6 +78,13 @@ impl Elimination {
         Some(out)
     }
 
+    /// The same for a pattern that is [like](Pattern::is_like) its own.
+    pub fn of_like(&self, pattern: &Pattern) -> Self {
+        let mut out = self.clone();
+        out.find_sources(pattern);
+        out
+    }
+
     /// The later neighbours of a row.
     #[inline]
     pub fn neighbours(&self, row: usize) -> Range<usize> {

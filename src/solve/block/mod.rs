@@ -57,6 +57,11 @@ impl BlockSolver {
         Self::by(Arc::new(Elimination::new(pattern)?), pattern, true)
     }
 
+    /// Another one for tangents of a pattern that is [like](Pattern::is_like) its own: in the same order.
+    pub fn of_like(&self, pattern: &Pattern) -> Option<Self> {
+        Self::by(Arc::new(self.elimination.of_like(pattern)), pattern, pattern.symmetric)
+    }
+
     /// Another one for tangents of the same pattern, which are symmetric.
     pub fn symmetric_beside(&self, pattern: &Pattern) -> Option<Self> {
         Self::by(self.elimination.clone(), pattern, true)

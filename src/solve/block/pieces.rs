@@ -64,13 +64,15 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
             |rows: &Range<usize>| elimination.starts[rows.start] as usize..elimination.starts[rows.end] as usize;
         let piece = |rows: &Range<usize>| P::new(rows.clone(), blocks(rows));
         let (trunk, end) = (&elimination.trunk, elimination.trunk.end);
-        Some(Self {
-            branches: elimination.branches.iter().map(piece).collect::<Option<_>>()?,
-            changes: elimination.branches.iter().map(|_| piece(trunk)).collect::<Option<_>>()?,
-            trunk: piece(trunk)?,
-            nothing: piece(&(end..end))?,
-            negative: None,
-        })
+        let (mut branches, mut changes) = (Vec::new(), Vec::new());
+        let both = |rows: &Range<usize>| Some((piece(rows)?, piece(trunk)?));
+        threads::in_order(elimination.branches.iter(), both, |made| {
+            let (branch, change) = made.unzip();
+            branches.extend(branch);
+            changes.extend(change);
+        });
+        (branches.len() == elimination.branches.len()).then_some(())?;
+        Some(Self { branches, changes, trunk: piece(trunk)?, nothing: piece(&(end..end))?, negative: None })
     }
 }
 
