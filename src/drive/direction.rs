@@ -52,6 +52,7 @@ impl Run<'_> {
     /// Loads and motions without a history are linear in it; the step is small, so that no motion goes around.
     pub(super) fn load_derivative(&mut self, workshop: &mut Workshop) -> Vec<Vec3> {
         let Workshop { assembly, lift, .. } = workshop;
+        lift.resize(self.state.q.len(), Vec3::ZERO);
         let (mut here, mut shifted) = (self.state.clone(), self.state.clone());
         let inverse = 1.0 / LOAD_STEP;
         self.model.set_clock(&mut here, self.state.time, self.state.load);

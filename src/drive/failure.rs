@@ -319,5 +319,5 @@ impl fmt::Display for Failure {
 /// The place of a slot, along `direction`.
 pub(super) fn place(model: &Model, slot: usize, direction: Vec3) -> Place {
     let info = &model.slots[slot];
-    Place { node: info.node.clone(), kind: info.kind, direction: direction.normalized().unwrap_or(Vec3::ZERO) }
+    Place { node: info.node.to_string(), kind: info.kind, direction: direction.normalized().unwrap_or(Vec3::ZERO) }
 }

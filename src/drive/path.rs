@@ -288,7 +288,7 @@ impl Path {
         }
         let sizes = self.here.tangent.iter().map(|t| t.norm());
         let largest = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(slot, _)| slot);
-        let node = run.model.slots.get(largest).map_or(String::new(), |info| info.node.clone());
+        let node = run.model.slots.get(largest).map_or(String::new(), |info| info.node.to_string());
         Err(Failure::NonFinite { at: run.moment(), effect: Some("what a unit of load moves"), node })
     }
 

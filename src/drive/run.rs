@@ -295,7 +295,7 @@ pub(super) struct Workshop {
     pub newton: Newton,
     /// Where a static stage is treated in a plane, once it has been looked at in space
     pub space: Option<Space>,
-    /// Increments of prescribed directions in a load step
+    /// Increments of prescribed directions in a load step; known where there are any
     pub lift: Vec<Vec3>,
     pub until: Option<Until>,
     /// Where the unknowns of time steps are increments of rotation
@@ -387,7 +387,6 @@ impl<'o> Run<'o> {
         self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
-        let slots = self.model.slots.len();
         self.plane = equations.plane().copied();
         self.warn_of_space(kind);
         let assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
@@ -396,13 +395,12 @@ impl<'o> Run<'o> {
         };
         let convergence = Convergence { tolerance: stage.tolerance };
         let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
-        let (lift, until) = (vec![Vec3::ZERO; slots], stage.until.clone());
         Ok(Workshop {
             assembly,
             newton,
             space: None,
-            lift,
-            until,
+            lift: Vec::new(),
+            until: stage.until.clone(),
             increments: None,
             trend: Trend::default(),
             massive: Vec::new(),
@@ -515,7 +513,7 @@ impl<'o> Run<'o> {
         Err(Failure::NonFinite {
             at: self.moment(),
             effect: Some("the motion"),
-            node: self.model.slots[slot].node.clone(),
+            node: self.model.slots[slot].node.to_string(),
         })
     }
 
@@ -554,8 +552,8 @@ impl<'o> Run<'o> {
     }
 
     fn name_coarse(&self, element: usize, angle: f64) -> Failure {
-        let nodes = &self.model.charted.elements[element].nodes;
-        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.clone());
+        let nodes = self.model.charted.elements[element].nodes();
+        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.to_string());
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
     }
 
@@ -603,11 +601,11 @@ impl<'o> Run<'o> {
             }
             NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
             NewtonFailure::TurnsTooFar { slot, angle } => {
-                Failure::TurnsTooFar { at, node: self.model.slots[slot].node.clone(), angle }
+                Failure::TurnsTooFar { at, node: self.model.slots[slot].node.to_string(), angle }
             }
             NewtonFailure::LeapsTooFar { element, angle } => self.name_coarse(element, angle),
             NewtonFailure::NotFinite { effect, slot } => {
-                Failure::NonFinite { at, effect, node: self.model.slots[slot].node.clone() }
+                Failure::NonFinite { at, effect, node: self.model.slots[slot].node.to_string() }
             }
         }
     }

@@ -9,6 +9,7 @@ use crate::rotation::Rotation;
 use crate::solve::{Limp, NewtonFailure, mechanism};
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
+use crate::threads;
 use nalgebra::{Matrix3, SymmetricEigen};
 
 /// What a joint may be open by when a dynamic stage begins, in radians or relative to the scene's length.
@@ -152,10 +153,14 @@ fn set_in_motion(state: &mut State, motion: &InitialMotion) {
 /// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
 /// zero. They are the null directions of the diagonal blocks.
 fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f64]) {
-    for slot in (0..model.slots.len()).filter(|&slot| !model.slots[slot].is_multiplier()) {
+    let is_massive = threads::list(model.slots.len(), |slot| {
+        let block = system.own_block(slot as Slot);
+        system.pattern.equations.is_free(slot as Slot) && is_regular(&block)
+    });
+    for slot in (0..model.slots.len()).filter(|&slot| !(is_massive[slot] || model.slots[slot].is_multiplier())) {
         let numbers = system.pattern.equations.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
-        let block = diagonal_block(system, numbers);
+        let block = system.own_block(slot as Slot);
         let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
         let symmetric = Matrix3::from_fn(|i, j| {
             // A held direction is given mass, so that it does not count as massless.
@@ -179,13 +184,18 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
     }
 }
 
+/// Whether a matrix has no eigenvalue that is next to nothing beside its entries: none is larger than three times the largest of these.
+fn is_regular(matrix: &Mat3) -> bool {
+    let [a, b, c] = matrix.0.map(Vec3);
+    a.dot(b.cross(c)).abs() > 1e-9 * matrix.max_abs().powi(3)
+}
+
 impl Run<'_> {
     /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already: round-off would move them. It is
     /// looked at without velocities, whose forces come and go with them.
     fn refuse_loose(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
         let Workshop { assembly, newton, .. } = &mut *workshop;
-        let mut still = self.state.clone();
-        still.stand_still();
+        let still = self.state.at_rest();
         assembly.forget();
         assembly.evaluate(&still, method.weights(), None);
         self.counters.work.factorisations += 1;
@@ -200,11 +210,10 @@ impl Run<'_> {
         let mut touched = |weights: Weights| -> Vec<bool> {
             workshop.assembly.evaluate(&self.state, weights, None);
             let system = &workshop.assembly.system;
-            let has = |slot: usize| {
-                let numbers = system.pattern.equations.of(slot as Slot);
-                !system.pattern.equations.is_plain(slot as Slot) || diagonal_block(system, numbers).max_abs() > 0.0
-            };
-            (0..self.model.slots.len()).map(has).collect()
+            threads::list(self.model.slots.len(), |slot| {
+                let slot = slot as Slot;
+                !system.pattern.equations.is_plain(slot) || system.own_block(slot).max_abs() > 0.0
+            })
         };
         let (massive, damped) = (touched(Weights::MASS), touched(Weights::DAMPING));
         workshop.assembly.evaluate(&self.state, Weights::NONE, None);
@@ -212,11 +221,6 @@ impl Run<'_> {
         workshop.rateless = (0..massive.len()).filter(rateless).collect();
         workshop.massive = massive;
     }
-}
-
-fn diagonal_block(system: &System, numbers: [u32; 3]) -> Mat3 {
-    let entry = |row: u32, column: u32| system.pattern.find(row, column).map_or(0.0, |place| system.values[place]);
-    Mat3(numbers.map(|row| numbers.map(|column| entry(row, column))))
 }
 
 fn add_entry(system: &mut System, row: u32, column: u32, value: f64) {

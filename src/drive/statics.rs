@@ -9,6 +9,7 @@ use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::{Limp, NewtonFailure};
 use crate::tensor::Vec3;
+use crate::threads;
 
 /// Load increments whose length a detour by arc length begins with.
 const DETOUR: (f64, f64) = (0.01, 0.05);
@@ -197,7 +198,7 @@ impl Run<'_> {
         let Workshop { assembly, newton, lift, .. } = workshop;
         let moves = !self.model.motions.is_empty();
         if moves {
-            lift.copy_from_slice(&self.state.q);
+            threads::copy(lift, &self.state.q);
         }
         let time = self.state.time;
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {

@@ -66,7 +66,8 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
 /// Chooses for each element the nodes that are converted into the chart of its first, and counts the mixed elements.
 pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     let mut mixed = 0;
-    for (element, ElementInfo { nodes, .. }) in elements.iter().enumerate().filter(|(_, e)| e.in_one_chart) {
+    for (element, info) in elements.iter().enumerate().filter(|(_, e)| e.in_one_chart) {
+        let nodes = info.nodes();
         let mut p = [Vec3::ZERO; crate::kernel::MAX_NODES];
         for (p, node) in p.iter_mut().zip(nodes) {
             *p = state.q[node.p as usize];
@@ -96,6 +97,7 @@ pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
 
 /// Does something with what a list holds at each of some slots, which come in their order.
 fn each_rotation<T: Send>(list: &mut [T], rotations: &[Slot], work: impl Fn(usize, &mut T) + Send + Sync) {
+    debug_assert!(rotations.is_sorted(), "rotations out of order");
     threads::each_part(list, |start, part| {
         let place = |slot: usize| rotations.partition_point(|&rotation| (rotation as usize) < slot);
         for &slot in &rotations[place(start)..place(start + part.len())] {
@@ -151,7 +153,7 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
 
 /// The largest relative rotation between neighbouring nodes of elements that interpolate total vectors.
 pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
-    let pairs = elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.nodes.windows(2));
+    let pairs = elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.nodes().windows(2));
     let angle = |pair: &[Node]| {
         let [a, b] = [pair[0], pair[1]].map(|node| Rotation::new(state.q[node.p as usize]).r);
         relative_angle(a, b)
@@ -172,7 +174,7 @@ pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<
         let old = relative(before, pair).filter(|old| old.norm() > COARSE_WARNING)?;
         (now.dot(old) < 0.0).then(|| (element, 2.0 * PI - now.norm()))
     };
-    let leap_in = |element: usize| elements[element].nodes.windows(2).find_map(|pair| leap(element, pair));
+    let leap_in = |element: usize| elements[element].nodes().windows(2).find_map(|pair| leap(element, pair));
     threads::first(elements.len(), |mut part| part.find_map(leap_in))
 }
 
@@ -186,9 +188,9 @@ pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(
         let (a, b) = vectors(pair);
         relative_angle(Rotation::new(a).r, Rotation::new(b).r)
     };
-    let angle_in = |ElementInfo { nodes, in_one_chart }: &ElementInfo| {
-        let pairs = nodes.windows(2);
-        match in_one_chart {
+    let angle_in = |element: &ElementInfo| {
+        let pairs = element.nodes().windows(2);
+        match element.in_one_chart {
             true if pairs.clone().map(bound).sum::<f64>() >= limit => pairs.map(angle).sum(),
             true => 0.0,
             false => pairs.filter(|pair| bound(pair) >= limit).map(angle).fold(0.0, f64::max),

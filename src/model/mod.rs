@@ -16,6 +16,7 @@ pub use history::{History, Table};
 pub use share::Share;
 
 use crate::effect::{Effect, Energy, Momentum};
+use crate::kernel::MAX_NODES;
 use crate::system::{
     Aspect, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, most_regions,
 };
@@ -54,7 +55,7 @@ pub struct SlotInfo {
     /// What it holds
     pub kind: SlotKind,
     /// The name of its node, for messages
-    pub node: String,
+    pub node: Arc<str>,
     /// The initial place of its node
     pub place: Vec3,
 }
@@ -62,8 +63,8 @@ pub struct SlotInfo {
 /// A beam element as changes of chart and the judgement of the mesh see it.
 #[derive(Clone, Debug)]
 pub struct ElementInfo {
-    /// Its nodes
-    pub nodes: Vec<Node>,
+    all: [Node; MAX_NODES],
+    count: u8,
     /// Whether it interpolates total rotation vectors, so that all of them must be taken in one chart
     pub in_one_chart: bool,
 }
@@ -82,6 +83,21 @@ impl SlotInfo {
     /// What turns the forces of this slot into forces that compare: a length for moments, 1 for forces.
     pub fn arm(&self, length: f64) -> f64 {
         if self.kind == SlotKind::Rotation { length } else { 1.0 }
+    }
+}
+
+impl ElementInfo {
+    /// An element of these nodes, at most [`MAX_NODES`].
+    pub fn new(nodes: impl ExactSizeIterator<Item = Node>, in_one_chart: bool) -> Self {
+        let (mut all, count) = ([Node { u: 0, p: 0 }; MAX_NODES], nodes.len() as u8);
+        all.iter_mut().zip(nodes).for_each(|(place, node)| *place = node);
+        Self { all, count, in_one_chart }
+    }
+
+    /// Its nodes
+    #[inline]
+    pub fn nodes(&self) -> &[Node] {
+        &self.all[..usize::from(self.count)]
     }
 }
 

@@ -8,6 +8,7 @@ use crate::kernel::{MAX_NODES, shape};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A node of the mesh.
 #[derive(Clone, Debug)]
@@ -17,7 +18,7 @@ pub struct MeshNode {
     /// Its initial place
     pub place: Vec3,
     /// Its name for messages: of the point, or beam and number
-    pub name: String,
+    pub name: Arc<str>,
 }
 
 /// An integration point of an element.
@@ -33,8 +34,8 @@ pub struct Station {
     pub fraction: f64,
     /// The section axes of the interpolated line as columns; the first is its tangent
     pub axes: Mat3,
-    /// The section axes of the exact curve
-    pub exact_axes: Mat3,
+    /// How far along its piece of the curve, from 0 to 1
+    along: f64,
 }
 
 /// An element of the mesh.
@@ -96,8 +97,14 @@ impl BeamElement<'_> {
             weight: gauss_weight * jacobian,
             fraction,
             axes: line.axes(piece, stretch * (1.0 / jacobian), fraction),
-            exact_axes: line.axes(piece, line.pieces[piece].tangent(t), fraction),
+            along: t,
         }
+    }
+
+    /// The section axes of the exact curve at an integration point.
+    pub fn exact_axes(&self, station: &Station) -> Mat3 {
+        let (piece, line) = (self.mesh.elements[self.number].piece, &self.beam.line);
+        line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
 
     /// The places of its nodes, weighed.
@@ -177,14 +184,14 @@ impl Mesh {
     }
 
     /// Adds a node with slots of its own, or one that shares the displacement of another.
-    fn add_node(&mut self, place: Vec3, name: String, shares: Option<usize>) -> usize {
+    fn add_node(&mut self, place: Vec3, name: impl Into<Arc<str>>, shares: Option<usize>) -> usize {
         let mut slot = || {
             self.slots += 1;
             self.slots - 1
         };
         let u = shares.map_or_else(&mut slot, |other| self.nodes[other].node.u);
         let node = Node { u, p: slot() };
-        self.nodes.push(MeshNode { node, place, name });
+        self.nodes.push(MeshNode { node, place, name: name.into() });
         self.nodes.len() - 1
     }
 
@@ -249,7 +256,7 @@ impl Mesh {
     }
 
     fn add_point(&mut self, name: &str, place: Vec3) -> usize {
-        let node = self.add_node(place, name.into(), None);
+        let node = self.add_node(place, name, None);
         self.points.insert(name.into(), node);
         node
     }

@@ -253,9 +253,9 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
 
 /// The rotations of all nodes, and the elements beam by beam.
 fn charted(mesh: &Mesh) -> Charted {
-    let info = |beam: &MeshBeam, number: usize| ElementInfo {
-        nodes: mesh.elements[number].nodes.iter().map(|&n| mesh.nodes[n].node).collect(),
-        in_one_chart: beam.interpolation == deck::InterpolationWord::Total,
+    let info = |beam: &MeshBeam, number: usize| {
+        let nodes = mesh.elements[number].nodes.iter().map(|&n| mesh.nodes[n].node);
+        ElementInfo::new(nodes, beam.interpolation == deck::InterpolationWord::Total)
     };
     let of = |beam: &MeshBeam| beam.elements.clone().map(|number| info(beam, number)).collect::<Vec<_>>();
     Charted {
@@ -266,7 +266,7 @@ fn charted(mesh: &Mesh) -> Charted {
 
 /// What each slot holds, named after its node.
 fn slots(mesh: &Mesh) -> Vec<SlotInfo> {
-    let empty = SlotInfo { kind: SlotKind::Displacement, node: String::new(), place: Vec3::ZERO };
+    let empty = SlotInfo { kind: SlotKind::Displacement, node: "".into(), place: Vec3::ZERO };
     let mut slots = vec![empty; mesh.slots()];
     for node in mesh.nodes.iter().rev() {
         let info = |kind| SlotInfo { kind, node: node.name.clone(), place: node.place };

@@ -15,7 +15,6 @@ use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
 use crate::scene::names;
 use crate::scene::section::MassPerLength;
 use crate::tensor::{Mat3, Vec3};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 impl Composer<'_> {
@@ -155,7 +154,7 @@ impl Composer<'_> {
     /// chart matters there.
     fn each_inertia(&self, mut visit: impl FnMut(&BeamElement, &[Station], &[Inertia])) -> Vec<Body> {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
-        let mut nodal = NodalInertia::default();
+        let mut nodal = NodalInertia::new(self.mesh);
         self.each_element(|element| {
             let (beam, stations) = (element.beam, element.stations(Rule::Volume));
             let relative = beam.interpolation == InterpolationWord::Relative;
@@ -234,17 +233,21 @@ impl Composer<'_> {
 }
 
 /// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the node.
-#[derive(Default)]
 struct NodalInertia {
-    nodes: BTreeMap<usize, (f64, Vec3, Mat3)>,
+    /// By node; none where no element of these beams ends
+    nodes: Vec<(f64, Vec3, Mat3)>,
 }
 
 impl NodalInertia {
+    fn new(mesh: &Mesh) -> Self {
+        Self { nodes: vec![(0.0, Vec3::ZERO, Mat3::ZERO); mesh.nodes.len()] }
+    }
+
     /// Adds what an element brings to its nodes; `pick` may leave parts out.
     fn add(&mut self, element: &BeamElement, pick: impl Fn(Inertia) -> Inertia) {
         for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
             let own = pick(mass_at(element.beam, station).turned(station.axes));
-            let (mass, moment, about) = self.nodes.entry(node).or_insert((0.0, Vec3::ZERO, Mat3::ZERO));
+            let (mass, moment, about) = &mut self.nodes[node];
             *mass += own.mass * station.weight;
             *moment += own.offset * (own.mass * station.weight);
             *about += own.about_node * station.weight;
@@ -259,7 +262,7 @@ impl NodalInertia {
             Body { node: node.node, place: node.place, inertia: Inertia { mass, offset, about_node } }
         };
         let there = |(_, (mass, _, about)): &(usize, (f64, Vec3, Mat3))| *mass != 0.0 || *about != Mat3::ZERO;
-        self.nodes.into_iter().filter(there).map(body).collect()
+        self.nodes.into_iter().enumerate().filter(there).map(body).collect()
     }
 }
 

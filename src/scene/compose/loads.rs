@@ -91,7 +91,7 @@ impl Composer<'_> {
                     continue;
                 }
                 let stations = element.stations(Rule::Volume);
-                push_volume(out, &element, &stations, |k| intensity(load, &stations[k], amplitude));
+                push_volume(out, &element, &stations, |k| intensity(load, &element, &stations[k], amplitude));
             }
         }
         let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
@@ -118,7 +118,7 @@ fn force_kind(load: &deck::Load) -> usize {
 /// A load along an element, taken at its nodes.
 fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &BeamElement, amplitude: usize) {
     for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
-        let Intensity { force, moment, .. } = intensity(load, station, amplitude);
+        let Intensity { force, moment, .. } = intensity(load, element, station, amplitude);
         for (vector, kind) in [(force, force_kind(load)), (moment, force_kind(load) + 1)] {
             if vector != Vec3::ZERO {
                 let vector = vector * station.weight;
@@ -128,8 +128,8 @@ fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &BeamElement
     }
 }
 
-fn intensity(load: &deck::Load, station: &Station, amplitude: usize) -> Intensity {
-    let axes = if load.frame == Frame::Section { station.exact_axes } else { Mat3::IDENTITY };
+fn intensity(load: &deck::Load, element: &BeamElement, station: &Station, amplitude: usize) -> Intensity {
+    let axes = if load.frame == Frame::Section { element.exact_axes(station) } else { Mat3::IDENTITY };
     let at = |vector: Option<LoadVector>| {
         let [start, end] = vector.map_or([[0.0; 3]; 2], |v| [v.start, v.end]).map(Vec3);
         axes * (start + (end - start) * station.fraction)
