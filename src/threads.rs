@@ -118,3 +118,47 @@ pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&m
     }
     parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `work` gives without threads, after a look that it gives the same with some.
+    fn same<R: PartialEq + std::fmt::Debug + Send>(work: impl Fn() -> R + Sync) -> R {
+        let alone = work();
+        assert_eq!(on(3, &work), alone);
+        alone
+    }
+
+    #[test]
+    fn sums_do_not_depend_on_threads() {
+        // Terms of many sizes: another order of additions gives another sum.
+        let term = |k: usize| (k as f64 * 0.618).sin() * 10_f64.powi((k % 13) as i32);
+        let length = 5 * PART + 7;
+        let sum = same(|| sum(length, |part| part.map(term).sum()).to_bits());
+        assert_ne!(f64::from_bits(sum), (0..length).map(term).sum::<f64>(), "the terms tell nothing");
+        assert_eq!(same(|| super::sum(0, |_| 1.0)), 0.0);
+    }
+
+    #[test]
+    fn the_first_find_is_the_first_of_the_list() {
+        for wanted in [0, 1, PART - 1, PART, 3 * PART + 5] {
+            let found = same(|| first(4 * PART, |mut part| part.find(|&k| k >= wanted)));
+            assert_eq!(found, Some(wanted));
+        }
+        assert_eq!(same(|| first(4 * PART, |_| None::<usize>)), None);
+    }
+
+    #[test]
+    fn copies_become_as_long() {
+        let from: Vec<usize> = (0..3 * PART + 1).collect();
+        for length in [0, 5, from.len(), from.len() + 9] {
+            let copied = same(|| {
+                let mut to = filled(length, 1);
+                copy(&mut to, &from);
+                to
+            });
+            assert_eq!(copied, from);
+        }
+    }
+}

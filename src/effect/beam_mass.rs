@@ -133,3 +133,59 @@ impl Effect for BeamMass {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Connection;
+    use crate::kernel::shape;
+    use crate::kernel::volume::VolumePoint;
+    use crate::system::Node;
+
+    const LENGTH: f64 = 3.0;
+    const MASS: f64 = 2.5;
+
+    /// An element along x, from the origin on, with an even mass.
+    fn element<const N: usize>() -> VolumeElement<N, f64> {
+        let point = |g: usize| {
+            let (xi, weight) = shape::gauss(N)[g];
+            VolumePoint { shape: shape::values(xi), weight: weight * 0.5 * LENGTH, quantity: MASS / LENGTH }
+        };
+        let place = |i: usize| Vec3([LENGTH * i as f64 / (N - 1) as f64, 0.0, 0.0]);
+        let nodes = std::array::from_fn(|i| Node { u: 2 * i as Slot, p: 2 * i as Slot + 1 });
+        let connection = Connection { element: 0, nodes, places: std::array::from_fn(place) };
+        VolumeElement { connection, points: std::array::from_fn(point) }
+    }
+
+    /// Spins an element about a pivot beside it, as a rigid body.
+    fn spins<const N: usize>(elements: &VolumeElements<f64>) {
+        let (mass, mut state) = (BeamMass::new(elements), State::rest(2 * N, 1, 0, 0));
+        let (spin, pivot) = (Vec3([0.3, -0.7, 1.1]), Vec3([0.5, -2.0, 0.0]));
+        for i in 0..N {
+            let place = Vec3([LENGTH * i as f64 / (N - 1) as f64, 0.0, 0.0]);
+            state.v[2 * i] = spin.cross(place - pivot);
+        }
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-14 * MASS * 100.0, "{N} nodes: {a} instead of {b}");
+        let centre = Vec3([0.5 * LENGTH, 0.0, 0.0]);
+        let velocity = spin.cross(centre - pivot);
+        // A thin rod: nothing turns about its own line.
+        let about_centre = MASS * LENGTH * LENGTH / 12.0;
+        let across = Vec3([0.0, spin.0[1], spin.0[2]]);
+        near(mass.energy(&state).kinetic, 0.5 * (MASS * velocity.squared() + about_centre * across.squared()));
+        let momentum = mass.momentum(&state);
+        let angular = centre.cross(velocity) * MASS + across * about_centre;
+        near(momentum.mass, MASS);
+        for k in 0..3 {
+            near(momentum.moment.0[k], MASS * centre.0[k]);
+            near(momentum.linear.0[k], MASS * velocity.0[k]);
+            near(momentum.angular.0[k], angular.0[k]);
+        }
+    }
+
+    #[test]
+    fn elements_of_all_orders_spin_like_rods() {
+        spins::<2>(&ByOrder { two: vec![element()], ..ByOrder::default() });
+        spins::<3>(&ByOrder { three: vec![element()], ..ByOrder::default() });
+        spins::<4>(&ByOrder { four: vec![element()], ..ByOrder::default() });
+    }
+}

@@ -367,9 +367,25 @@ fn what_is_called_symmetric_is() {
         let apart = products[0].iter().zip(&products[1]).zip(&sizes);
         assert!(apart.clone().all(|((a, b), size)| (a - b).abs() <= 1e-12 * size), "{}", path.display());
         assert!(half.residual(&products[1], &x, &mut Leftover::default()) < 1e-12, "{}", path.display());
+        [half, &whole].into_iter().for_each(own_blocks_are_entries);
         symmetric += 1;
     }
     assert!(symmetric > 50, "{symmetric}");
+}
+
+/// Blocks and entries on the diagonal are those that a search finds.
+fn own_blocks_are_entries(system: &System) {
+    let entry = |row: u32, column: u32| system.pattern.find(row, column).map_or(0.0, |place| system.values[place]);
+    for slot in 0..system.pattern.groups.slots() as u32 {
+        let numbers = system.pattern.equations.of(slot);
+        let block = numbers.map(|row| numbers.map(|column| entry(row, column)));
+        assert_eq!(system.own_block(slot).0, block, "slot {slot}");
+    }
+    let mut diagonal = vec![f64::NAN; system.pattern.equations.count()];
+    system.pattern.each_diagonal(|equation, place| diagonal[equation] = system.values[place]);
+    for (equation, value) in (0..).zip(diagonal) {
+        assert_eq!(value, entry(equation, equation), "equation {equation}");
+    }
 }
 
 /// What the effects of a stage add to the tangent, on a pattern that keeps both halves.
@@ -387,4 +403,40 @@ fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state
         }
     }
     system
+}
+
+/// In space the nodes of a plane meet as they do in it, and no others: what is known of the order serves both.
+#[test]
+fn space_takes_over_the_order_of_a_plane() {
+    let deck = "[point]\nroot = [0, 0, 0]\ntip = [4, 3, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\n\
+                [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 9000\n\
+                [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 5, 0]\n[[stage]]\nkind = \"static\"\nsteps = 1\n";
+    let Ok((scene, _)) = scene::from_text(deck) else { panic!("the deck is good") };
+    let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+    let state = model.rest();
+    let Ok(equations) = model.begin_stage(0, stage.kind, &state) else { panic!("the stage begins") };
+    let plane = Assembly::new(&stage, equations, &model);
+    let Ok(equations) = model.number(0, None) else { panic!("so it does in space") };
+    let mut space = Assembly::new(&stage, equations, &model);
+    assert!(plane.system.pattern.width() < space.system.pattern.width());
+    assert!(space.system.pattern.is_like(&plane.system.pattern));
+    space.evaluate(&state, Weights::STIFFNESS, None);
+    let own = LinearSolver::new(&plane.system, &[]).unwrap();
+    let mut solver = LinearSolver::beside(&own, &plane.system, &space.system, &[]).unwrap();
+    assert_eq!(solver.negative_pivots(&space.system), Some(0));
+    let b: Vec<f64> = (0..space.system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();
+    let mut x = b.clone();
+    assert!(solver.factorise(&space.system) && solver.solve(&space.system, &mut x));
+    assert!(space.system.residual(&b, &x, &mut Leftover::default()) < 1e-11);
+    // Where others meet nothing is taken over.
+    let Ok((other, _)) = scene::from_text(&deck.replace("elements = 9000", "elements = 7")) else { panic!("as good") };
+    let mut model = other.plan.model;
+    let Ok(equations) = model.begin_stage(0, stage.kind, &model.rest()) else { panic!("it begins") };
+    let other = Assembly::new(&stage, equations, &model);
+    assert!(!space.system.pattern.is_like(&other.system.pattern));
+    let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[]).unwrap();
+    let mut x = vec![1.0; other.system.pattern.equations.count()];
+    let mut other = other;
+    other.evaluate(&model.rest(), Weights::STIFFNESS, None);
+    assert!(solver.factorise(&other.system) && solver.solve(&other.system, &mut x));
 }
