@@ -297,8 +297,8 @@ impl Run<'_> {
 
 /// Beyond half a turn in a step nobody could count the turns of a node.
 fn turns_within(state: &State, rotations: impl Iterator<Item = Slot>, length: f64) -> Result<(), NewtonFailure> {
-    // A spin is no faster than the rotation vector: the tangent T takes no vector longer.
-    let is_quick = |slot: Slot| state.turn(slot).is_some() || state.v[slot as usize].norm() * length > PI;
+    // A spin is no faster than the total rotation vector: the tangent T makes no vector longer.
+    let is_quick = |slot: Slot| state.v[slot as usize].norm() * length > PI;
     let turned = |slot: Slot| (slot as usize, state.spin(slot).omega.norm() * length);
     let mut turned = rotations.filter(|&slot| is_quick(slot)).map(turned);
     match turned.find(|&(_, angle)| angle > PI) {

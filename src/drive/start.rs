@@ -153,20 +153,12 @@ fn set_in_motion(state: &mut State, motion: &InitialMotion) {
 /// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
 /// zero. They are the null directions of the diagonal blocks.
 fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f64]) {
-    let is_massive = threads::list(model.slots.len(), |slot| {
-        let block = system.own_block(slot as Slot);
-        system.pattern.equations.is_free(slot as Slot) && is_regular(&block)
-    });
+    let is_massive = threads::list(model.slots.len(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
     for slot in (0..model.slots.len()).filter(|&slot| !(is_massive[slot] || model.slots[slot].is_multiplier())) {
         let numbers = system.pattern.equations.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
-        let block = system.own_block(slot as Slot);
-        let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
-        let symmetric = Matrix3::from_fn(|i, j| {
-            // A held direction is given mass, so that it does not count as massless.
-            let held = if i == j && !free.contains(&i) { weight } else { 0.0 };
-            0.5 * (block.0[i][j] + block.0[j][i]) + held
-        });
+        let (block, weight) = with_mass_where_held(system, slot as Slot);
+        let symmetric = Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i]));
         let eigen = SymmetricEigen::new(symmetric);
         for k in 0..3 {
             let v = eigen.eigenvectors.column(k);
@@ -182,6 +174,17 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
             }
         }
     }
+}
+
+/// What a slot has of a mass matrix on its diagonal, and the largest entry of that. A held direction is given as much, so that it does
+/// not count as massless.
+fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
+    let (mut block, numbers) = (system.own_block(slot), system.pattern.equations.of(slot));
+    let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
+    for k in (0..3).filter(|&k| numbers[k] == Equations::HELD) {
+        block.0[k][k] += weight;
+    }
+    (block, weight)
 }
 
 /// Whether a matrix has no eigenvalue that is next to nothing beside its entries: none is larger than three times the largest of these.
@@ -227,5 +230,28 @@ fn add_entry(system: &mut System, row: u32, column: u32, value: f64) {
     if let Some(place) = system.pattern.find(row, column) {
         system.values[place] += value;
         system.revision += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_regular_has_no_eigenvalue_next_to_nothing() {
+        let turn = Rotation::new(Vec3([0.3, -1.1, 0.7])).r;
+        let with = |eigenvalues: [f64; 3]| turn * Mat3::diagonal(eigenvalues) * turn.transpose() * 1e5;
+        let smallest = |matrix: &Mat3| {
+            let eigen = SymmetricEigen::new(Matrix3::from_fn(|i, j| matrix.0[i][j])).eigenvalues;
+            eigen.iter().fold(f64::INFINITY, |m: f64, e| m.min(e.abs())) / matrix.max_abs()
+        };
+        for (third, regular) in [(1.0, true), (1e-3, true), (1e-8, true), (1e-11, false), (1e-13, false), (0.0, false)]
+        {
+            let matrix = with([2.0, 1.0, third]);
+            assert_eq!(is_regular(&matrix), regular, "{third}");
+            assert!(!is_regular(&matrix) || smallest(&matrix) > 1e-12, "{third}");
+        }
+        let none = [Mat3::ZERO, with([f64::NAN, 1.0, 1.0]), Mat3::ZERO * f64::NAN];
+        assert!(!none.iter().any(is_regular));
     }
 }

@@ -1,4 +1,4 @@
-//! Elements over which something per length is integrated: shared by the effects of mass, weight and line loads.
+//! Elements over which something per length is integrated: shared by the effects of rotary and eccentric inertia, weight and line loads.
 
 use super::{ByOrder, Connection, for_each_batch, motions, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};

@@ -104,7 +104,7 @@ impl ElementInfo {
 /// The rotation vectors that have charts, and the elements that join them.
 #[derive(Clone, Debug, Default)]
 pub struct Charted {
-    /// The slots of rotation vectors
+    /// The slots of rotation vectors, in their order
     pub rotations: Vec<Slot>,
     /// The beam elements
     pub elements: Vec<ElementInfo>,

@@ -289,9 +289,17 @@ impl Pattern {
         Some(self.tile(i, j)? + self.width() * c + r)
     }
 
-    /// Whether the same groups meet as in another pattern, and the same tiles are kept: in space and in a plane of it.
+    /// Whether the same groups meet as in another pattern, as they do in space and in a plane of it, whatever halves are kept.
     pub fn is_like(&self, other: &Self) -> bool {
-        self.symmetric == other.symmetric && self.column_starts == other.column_starts && self.rows == other.rows
+        // Who meets a group that does not come after it.
+        let lower = |pattern: &Self, column: usize| {
+            let rows = pattern.rows_of(column);
+            pattern.tiles_of(column).start + rows.partition_point(|&row| (row as usize) < column)
+                ..pattern.tiles_of(column).end
+        };
+        let count = self.groups.count();
+        let meet = |column: usize| self.rows[lower(self, column)] == other.rows[lower(other, column)];
+        count == other.groups.count() && (0..count).all(meet)
     }
 
     /// Shows each equation and where its entry of the diagonal is stored. Tiles on the diagonal are always there.

@@ -16,6 +16,7 @@ mod folder;
 mod invariance;
 mod joints;
 mod layers;
+mod masses;
 mod mechanics;
 mod mechanisms;
 mod planar;

@@ -405,38 +405,49 @@ fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state
     system
 }
 
-/// In space the nodes of a plane meet as they do in it, and no others: what is known of the order serves both.
+/// In space the nodes of a plane meet as they do in it, and no others: what is known of the order serves both, whether the tangent is
+/// symmetric in both or, since sections turn out of the plane, in the plane alone.
 #[test]
 fn space_takes_over_the_order_of_a_plane() {
-    let deck = "[point]\nroot = [0, 0, 0]\ntip = [4, 3, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\n\
-                [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 9000\n\
-                [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 5, 0]\n[[stage]]\nkind = \"static\"\nsteps = 1\n";
-    let Ok((scene, _)) = scene::from_text(deck) else { panic!("the deck is good") };
-    let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
-    let state = model.rest();
-    let Ok(equations) = model.begin_stage(0, stage.kind, &state) else { panic!("the stage begins") };
-    let plane = Assembly::new(&stage, equations, &model);
-    let Ok(equations) = model.number(0, None) else { panic!("so it does in space") };
-    let mut space = Assembly::new(&stage, equations, &model);
-    assert!(plane.system.pattern.width() < space.system.pattern.width());
-    assert!(space.system.pattern.is_like(&plane.system.pattern));
-    space.evaluate(&state, Weights::STIFFNESS, None);
-    let own = LinearSolver::new(&plane.system, &[]).unwrap();
-    let mut solver = LinearSolver::beside(&own, &plane.system, &space.system, &[]).unwrap();
-    assert_eq!(solver.negative_pivots(&space.system), Some(0));
-    let b: Vec<f64> = (0..space.system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();
-    let mut x = b.clone();
-    assert!(solver.factorise(&space.system) && solver.solve(&space.system, &mut x));
-    assert!(space.system.residual(&b, &x, &mut Leftover::default()) < 1e-11);
-    // Where others meet nothing is taken over.
-    let Ok((other, _)) = scene::from_text(&deck.replace("elements = 9000", "elements = 7")) else { panic!("as good") };
-    let mut model = other.plan.model;
-    let Ok(equations) = model.begin_stage(0, stage.kind, &model.rest()) else { panic!("it begins") };
-    let other = Assembly::new(&stage, equations, &model);
-    assert!(!space.system.pattern.is_like(&other.system.pattern));
-    let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[]).unwrap();
-    let mut x = vec![1.0; other.system.pattern.equations.count()];
-    let mut other = other;
-    other.evaluate(&model.rest(), Weights::STIFFNESS, None);
-    assert!(solver.factorise(&other.system) && solver.solve(&other.system, &mut x));
+    let planar = |elements: usize, stage: &str| {
+        let deck = format!(
+            "[point]\nroot = [0, 0, 0]\ntip = [4, 3, 0]\n\
+             [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [2, 1, 1]\n\
+             [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = {elements}\n\
+             [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 5, 0]\n[[stage]]\n{stage}\n"
+        );
+        let Ok((scene, _)) = scene::from_text(&deck) else { panic!("the deck is good") };
+        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let Ok(equations) = model.begin_stage(0, stage.kind, &model.rest()) else { panic!("the stage begins") };
+        let plane = Assembly::new(&stage, equations, &model);
+        (model, stage, plane)
+    };
+    for (kind, symmetric) in [("kind = \"static\"\nsteps = 1", true), ("kind = \"dynamic\"\nend = 1\nstep = 1", false)]
+    {
+        let (model, stage, plane) = planar(9000, kind);
+        let Ok(equations) = model.number(0, None) else { panic!("so it does in space") };
+        let mut space = Assembly::new(&stage, equations, &model);
+        assert!(plane.system.pattern.width() < space.system.pattern.width());
+        assert_eq!((plane.system.pattern.symmetric, space.system.pattern.symmetric), (true, symmetric));
+        assert!(space.system.pattern.is_like(&plane.system.pattern));
+        let own = LinearSolver::new(&plane.system, &[]).unwrap();
+        let mut solver = LinearSolver::beside(&own, &plane.system, &space.system, &[]).unwrap();
+        space.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);
+        if symmetric {
+            assert_eq!(solver.negative_pivots(&space.system), Some(0));
+        }
+        let solves = |solver: &mut LinearSolver, system: &System| {
+            let b: Vec<f64> = (0..system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();
+            let mut x = b.clone();
+            assert!(solver.factorise(system) && solver.solve(system, &mut x));
+            assert!(system.residual(&b, &x, &mut Leftover::default()) < 1e-11);
+        };
+        solves(&mut solver, &space.system);
+        // Where others meet nothing is taken over.
+        let (model, _, mut other) = planar(7, kind);
+        assert!(!space.system.pattern.is_like(&other.system.pattern));
+        let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[]).unwrap();
+        other.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);
+        solves(&mut solver, &other.system);
+    }
 }

@@ -1,11 +1,12 @@
 //! Large scenes on several threads: the same results to the last bit, and the same as without regions but for the order of sums.
 
 use crate::random::Random;
-use beamsim::drive::{Failure, Observer, Run, Snapshot};
+use beamsim::drive::{Failure, Ledger, Observer, Run, Snapshot};
 use beamsim::kernel::Weights;
 use beamsim::model::{Assembly, Model};
 use beamsim::scene;
 use beamsim::system::{Memory, State};
+use beamsim::tensor::Vec3;
 use beamsim::threads;
 
 /// Cantilevers side by side, tied at their tips, of enough nodes for several regions; effects of every kind that is cut.
@@ -30,12 +31,13 @@ const DYNAMIC: &str = "[damping]\nmass = 0.1\nstiffness = 1e-4\n[[stage]]\nkind 
 
 const TURNING: &str = "[[stage]]\nkind = \"static\"\nframe = { spin = [0, 0, 0.05], about = [0, 0, 0] }\nsteps = 1";
 
+/// States, and the energies that belong to them.
 #[derive(Default)]
-struct States(Vec<State>);
+struct States(Vec<(State, Ledger)>);
 
 impl Observer for States {
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
-        self.0.push(snapshot.state.clone());
+        self.0.push((snapshot.state.clone(), snapshot.ledger));
         Ok(())
     }
 }
@@ -44,15 +46,23 @@ fn model(text: &str) -> beamsim::scene::Scene {
     scene::from_text(text).unwrap_or_else(|error| panic!("{error:?}\n{text}")).0
 }
 
-/// Displacements and rotation vectors of all rows, and what the run counted.
+/// Displacements, rotation vectors and energies of all rows, and what the run counted.
 fn history(text: &str, count: usize) -> (Vec<[u64; 3]>, String) {
     let scene = model(text);
     threads::on(count, || {
         let mut states = States::default();
-        let (result, counters) = Run::new(scene.plan.clone(), &mut states).finish();
+        let mut plan = scene.plan.clone();
+        plan.energy = true;
+        let (result, counters) = Run::new(plan, &mut states).finish();
         assert_eq!(result, Ok(()));
-        let all = states.0.iter().flat_map(|state| state.q.iter().chain(&state.v).map(|v| v.0.map(f64::to_bits)));
-        (all.collect(), format!("{:?}", counters.evaluations))
+        let of_row = |(state, ledger): &(State, Ledger)| -> Vec<[u64; 3]> {
+            let energies = [ledger.kinetic, ledger.strain, ledger.external, ledger.damped];
+            assert!(ledger.strain == 0.0 || ledger.external != 0.0, "no work was counted");
+            let numbers = energies.map(|energy| Vec3([energy; 3]));
+            let all = state.q.iter().chain(&state.v).chain(&state.wound).chain(&numbers);
+            all.map(|v| v.0.map(f64::to_bits)).collect()
+        };
+        (states.0.iter().flat_map(of_row).collect(), format!("{:?}", counters.evaluations))
     })
 }
 
@@ -66,6 +76,28 @@ fn results_are_the_same_on_any_number_of_threads() {
         assert!(one.0.iter().flatten().any(|&bits| bits != 0));
         assert!(history(&text, 2) == one, "two threads, order {order}, planar {planar}: {stage}");
         assert!(history(&text, 3) == one, "three threads, order {order}, planar {planar}: {stage}");
+    }
+}
+
+/// A cantilever that a moment rolls up by `angle`.
+fn rolled(angle: f64, stage: &str) -> String {
+    let moment = 100.0 * angle;
+    format!(
+        "[point]\nroot = [0, 0, 0]\ntip = [10, 0, 0]\n[section.s]\nEA = 1e4\nGA = 1e4\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [2, 1, 1]\n\
+         [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 2500\n[[support]]\nat = \"root\"\nfix = \"all\"\n\
+         [[load]]\nat = \"tip\"\nmoment = [0, 0, {moment}]\n[[stage]]\nkind = \"static\"\nsteps = 3\n{stage}[effects]\nplanar = false\n"
+    )
+}
+
+/// Nodes pass half a turn and change their charts, in statics and between time steps; how far they are wound goes on.
+#[test]
+fn turns_are_counted_the_same_on_any_number_of_threads() {
+    for stage in ["", "[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01\n"] {
+        let text = rolled(5.0, stage);
+        let one = history(&text, 1);
+        let wound = one.0.iter().flatten().map(|&bits| f64::from_bits(bits));
+        assert!(wound.fold(0.0, f64::max) > 4.9, "not rolled up");
+        assert!(history(&text, 2) == one && history(&text, 3) == one, "{stage}");
     }
 }
 
