@@ -213,12 +213,14 @@ impl Run<'_> {
     /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their motion is prescribed; and those
     /// whose velocities do not, either.
     pub(super) fn find_rates(&self, workshop: &mut Workshop) {
+        let mut moves = vec![false; self.model.slots.len()];
+        self.model.motions.iter().for_each(|motion| moves[motion.slot as usize] = true);
         let mut touched = |weights: Weights| -> Vec<bool> {
             workshop.assembly.evaluate(&self.state, weights, None);
             let system = &workshop.assembly.system;
-            threads::list(self.model.slots.len(), |slot| {
-                let slot = slot as Slot;
-                !system.pattern.equations.is_plain(slot) || system.own_block(slot).max_abs() > 0.0
+            threads::list(moves.len(), |slot| {
+                let moves = moves[slot] && !system.pattern.equations.is_plain(slot as Slot);
+                moves || system.own_block(slot as Slot).max_abs() > 0.0
             })
         };
         let (massive, damped) = (touched(Weights::MASS), touched(Weights::DAMPING));

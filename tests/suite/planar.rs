@@ -388,6 +388,19 @@ fn what_is_prescribed_pushes_as_in_space() {
     }
 }
 
+/// Rotations without inertia have the mean spin of a step and no acceleration, where a support holds others of the same node, too.
+#[test]
+fn what_has_no_inertia_turns_as_in_space() {
+    for interpolation in ["relative", "total"] {
+        let text = frame(false, interpolation, 1).replace("rhoJ = [0.4, 0.3, 0.2]\n", "");
+        let supported = format!(
+            "{text}[[support]]\nat = \"tip\"\nfix = [\"uz\", \"rx\", \"ry\"]\n\
+             [[load]]\nat = \"tip\"\nforce = [3, -8, 0]\n{DYNAMIC}"
+        );
+        agrees_with_space("a supported tip without rotary inertia", &supported);
+    }
+}
+
 #[test]
 fn free_fall_and_spin_act_as_in_space() {
     for tilted in [false, true] {
