@@ -71,11 +71,11 @@ pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Syn
     largest
 }
 
-/// The sum of what parts of a list give: ranges of places, the same ones for any number of threads.
-pub fn sum(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Sync) -> f64 {
-    let mut sum = 0.0;
-    in_order(parts(length), of_part, |part| sum += part);
-    sum
+/// The sums of what parts of a list give: ranges of places, the same ones for any number of threads.
+pub fn sums<const N: usize>(length: usize, of_part: impl Fn(Range<usize>) -> [f64; N] + Send + Sync) -> [f64; N] {
+    let mut sums = [0.0; N];
+    in_order(parts(length), of_part, |part| sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part));
+    sums
 }
 
 /// The first thing that is found in parts of a list: ranges of places.
@@ -135,9 +135,11 @@ mod tests {
         // Terms of many sizes: another order of additions gives another sum.
         let term = |k: usize| (k as f64 * 0.618).sin() * 10_f64.powi((k % 13) as i32);
         let length = 5 * PART + 7;
-        let sum = same(|| sum(length, |part| part.map(term).sum()).to_bits());
-        assert_ne!(f64::from_bits(sum), (0..length).map(term).sum::<f64>(), "the terms tell nothing");
-        assert_eq!(same(|| super::sum(0, |_| 1.0)), 0.0);
+        let of_part = |part: Range<usize>| [part.clone().map(term).sum(), part.len() as f64];
+        let [sum, count] = same(|| sums(length, of_part).map(f64::to_bits)).map(f64::from_bits);
+        assert_ne!(sum, (0..length).map(term).sum::<f64>(), "the terms tell nothing");
+        assert_eq!(count, length as f64);
+        assert_eq!(same(|| sums(0, |_| [1.0])), [0.0]);
     }
 
     #[test]

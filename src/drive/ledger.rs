@@ -110,7 +110,7 @@ impl Way<'_> {
 fn outside(system: &System, slot: usize) -> Vec3 {
     let equations: &Equations = &system.pattern.equations;
     let external = system.force[Category::External as usize][slot];
-    match equations.is_free(slot as Slot) {
+    match equations.is_plain(slot as Slot) {
         true => -external,
         false => equations.held_part(slot as Slot, system.total(slot)) - external,
     }

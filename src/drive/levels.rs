@@ -8,7 +8,6 @@ use crate::rotation::{Rotation, relative_angle};
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads;
-use std::ops::Range;
 
 /// A level is not approached in smaller parts than this.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
@@ -150,7 +149,7 @@ impl Levels {
 /// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
 /// displacements tell.
 fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> bool {
-    let of_part = |part: Range<usize>| {
+    let [along, moved, expected] = threads::sums(first.len(), |part| {
         let [mut along, mut moved, mut expected] = [0.0; 3];
         for slot in part.filter(|&slot| model.kinds[slot] == SlotKind::Displacement) {
             let (step, first) = (to.q[slot] - from.q[slot], first[slot]);
@@ -159,11 +158,7 @@ fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> b
             expected += first.squared();
         }
         [along, moved, expected]
-    };
-    let mut sums = [0.0; 3];
-    let add = |part: [f64; 3]| sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
-    threads::in_order(threads::parts(first.len()), of_part, add);
-    let [along, moved, expected] = sums;
+    });
     let sizes = [moved.sqrt(), expected.sqrt()];
     sizes.iter().all(|&size| size > NO_MOTION * model.length) && along < BACK * sizes[0] * sizes[1]
 }

@@ -121,8 +121,7 @@ impl Run<'_> {
         // Along no axis round-off leaves pivots where the mass matrix is singular: solved with, they give accelerations of 1e16.
         let massless = solver.null_vector(system);
         if !factorised || massless.is_some() || !solver.solve(system, &mut right_hand_side) {
-            let vector = massless.or_else(|| solver.null_vector(system));
-            let named = self.name_mechanism(vector, &workshop.assembly.system);
+            let named = self.name_mechanism(massless, &workshop.assembly.system);
             return if self.is_held(workshop, &named) { Ok(None) } else { Err(named) };
         }
         let mut solved = vec![Vec3::ZERO; self.state.q.len()];

@@ -196,20 +196,17 @@ impl Run<'_> {
     /// state and handed to Newton as increments.
     pub(super) fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
         let Workshop { assembly, newton, lift, .. } = workshop;
-        let moves = !self.model.motions.is_empty();
-        if moves {
-            threads::copy(lift, &self.state.q);
-        }
+        threads::copy(lift, if self.model.motions.is_empty() { &[] } else { &self.state.q });
         let time = self.state.time;
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        for (lift, q) in lift.iter_mut().zip(&mut self.state.q).filter(|_| moves) {
+        for (lift, q) in lift.iter_mut().zip(&mut self.state.q) {
             let before = *lift;
             *lift = *q - before;
             *q = before;
         }
-        let moved = (moves && lift.iter().any(|&v| v != Vec3::ZERO)).then_some(&lift[..]);
+        let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
         let work = &mut self.counters.work;
         newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
         self.refuse_leaps()

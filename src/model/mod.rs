@@ -164,14 +164,15 @@ impl Model {
 
     /// The inner product of two motions, displacements over the length of the scene.
     pub fn inner_product(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
-        threads::sum(a.len().min(b.len()), |part| {
+        let [displacements, rotations, ..] = threads::sums(a.len().min(b.len()), |part| {
             let mut sums = [0.0; SlotKind::ALL.len()];
             let pairs = a[part.clone()].iter().zip(&b[part.clone()]);
             for (&kind, (a, b)) in self.kinds[part].iter().zip(pairs) {
                 sums[kind as usize] += a.dot(*b);
             }
-            sums[SlotKind::Rotation as usize] + sums[SlotKind::Displacement as usize] / self.length.powi(2)
-        })
+            sums
+        });
+        rotations + displacements / self.length.powi(2)
     }
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.

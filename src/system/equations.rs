@@ -185,12 +185,6 @@ impl Equations {
         });
     }
 
-    /// Whether a slot moves in all directions.
-    #[inline]
-    pub fn is_free(&self, slot: Slot) -> bool {
-        !self.number[slot as usize].contains(&Self::HELD)
-    }
-
     /// Whether no direction of a slot is held but those that leave the plane.
     #[inline]
     pub fn is_plain(&self, slot: Slot) -> bool {

@@ -94,9 +94,9 @@ impl State {
 
     /// Takes over another state of the same scene without allocating.
     pub fn copy_from(&mut self, other: &Self) {
-        self.v.copy_from_slice(&other.v);
-        self.a.copy_from_slice(&other.a);
-        self.algorithmic.copy_from_slice(&other.algorithmic);
+        threads::copy(&mut self.v, &other.v);
+        threads::copy(&mut self.a, &other.a);
+        threads::copy(&mut self.algorithmic, &other.algorithmic);
         self.copy_all_but_rates(other);
     }
 
