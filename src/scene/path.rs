@@ -72,6 +72,15 @@ impl Piece {
         }
     }
 
+    /// The unit tangent of an element whose nodes, weighed, give `stretch` of this length. A straight piece has only one: what round-off in
+    /// the places of nodes makes of it would keep neighbours from sharing what they have in common.
+    pub fn direction(&self, stretch: Vec3, length: f64) -> Vec3 {
+        match &self.curve {
+            Curve::Line => self.tangent(0.0),
+            Curve::Arc { .. } => stretch * (1.0 / length),
+        }
+    }
+
     /// The section axes for the unit tangent `e1`, before twist: E3 is the part of axis3 normal to it, E2 = E3 x E1.
     pub fn untwisted_axes(&self, e1: Vec3) -> Mat3 {
         let normal = self.axis3 - e1 * self.axis3.dot(e1);

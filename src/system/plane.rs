@@ -146,26 +146,58 @@ impl Plane {
 #[derive(Default)]
 struct Search {
     origin: Option<Vec3>,
-    /// The longest vector in the plane, places measured from the origin, others as long as the scene
-    longest: Vec3,
-    /// The largest product of it and another
-    product: Vec3,
+    /// Of places, measured from the origin
+    places: Span,
+    /// Of these and of vectors, each as long as the scene
+    vectors: Span,
     axial: Option<Vec3>,
     spatial: Option<&'static str>,
     length: f64,
+}
+
+/// What some vectors span.
+#[derive(Default)]
+struct Span {
+    longest: Vec3,
+    /// The largest product of it and another
+    product: Vec3,
+}
+
+impl Span {
+    fn measure(&mut self, v: Vec3) {
+        if v.norm() > self.longest.norm() {
+            self.longest = v;
+        }
+    }
+
+    fn turn(&mut self, v: Vec3) {
+        let product = self.longest.cross(v);
+        if product.norm() > self.product.norm() {
+            self.product = product;
+        }
+    }
+
+    /// A normal of it, where it is a plane.
+    fn normal(&self) -> Option<Vec3> {
+        let tells = self.product.norm() > NO_PLANE * self.longest.squared().max(f64::MIN_POSITIVE);
+        tells.then_some(self.product)
+    }
 }
 
 impl Search {
     fn through(length: f64, shown: &Shown) -> Self {
         let mut search = Self { length, ..Self::default() };
         shown(&mut |name, aspect| search.look(name, &aspect));
-        shown(&mut |_, aspect| {
-            let product = search.vector(&aspect).map_or(Vec3::ZERO, |v| search.longest.cross(v));
-            if product.norm() > search.product.norm() {
-                search.product = product;
-            }
-        });
+        shown(&mut |_, aspect| search.each_span(&aspect, Span::turn));
         search
+    }
+
+    fn each_span(&mut self, aspect: &Aspect, show: impl Fn(&mut Span, Vec3)) {
+        let Some(v) = self.vector(aspect) else { return };
+        if matches!(aspect, Aspect::Place(_)) {
+            show(&mut self.places, v);
+        }
+        show(&mut self.vectors, v);
     }
 
     fn look(&mut self, name: &'static str, aspect: &Aspect) {
@@ -175,9 +207,7 @@ impl Search {
             Aspect::Spatial if self.spatial.is_none() => self.spatial = Some(name),
             _ => {}
         }
-        if let Some(v) = self.vector(aspect).filter(|v| v.norm() > self.longest.norm()) {
-            self.longest = v;
-        }
+        self.each_span(aspect, Span::measure);
     }
 
     fn vector(&self, aspect: &Aspect) -> Option<Vec3> {
@@ -188,9 +218,9 @@ impl Search {
         }
     }
 
+    /// Places tell before what acts on them: what does not fit is a load then, not the structure.
     fn normal(&self) -> Option<Vec3> {
-        let tells = self.product.norm() > NO_PLANE * self.longest.squared().max(f64::MIN_POSITIVE);
-        self.axial.or(tells.then_some(self.product))
+        self.places.normal().or(self.axial).or(self.vectors.normal())
     }
 }
 
