@@ -104,13 +104,21 @@ pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
         to.clear();
         return to.extend_from_slice(from);
     }
+    put(to, from);
+}
+
+/// Copies a list over another one, which is as long.
+pub fn put<T: Copy + Send + Sync>(to: &mut [T], from: &[T]) {
     each_part(to, |start, to| to.copy_from_slice(&from[start..start + to.len()]));
 }
 
-/// A list in consecutive parts that end there.
+/// A list in consecutive parts that end there; none of an empty one.
 pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
     let mut start = 0;
     let mut parts = Vec::new();
+    if list.is_empty() {
+        return parts;
+    }
     for end in ends {
         let (part, rest) = list.split_at_mut(end - start);
         parts.push(part);

@@ -56,7 +56,7 @@ impl Bookkeeper {
         let way = Way { kinds: &model.kinds, from: (q, wound), to: (&state.q, &state.wound) };
         ledger.external += way.work(force, |slot| outside(system, slot));
         if system.has(Category::Damping) {
-            ledger.damped += way.work(drag, |slot| system.force[Category::Damping as usize][slot]);
+            ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
         }
         let drives = model.drives(state);
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
@@ -109,7 +109,7 @@ impl Way<'_> {
 /// What acts from outside at a slot: loads, and the forces that hold or move constrained directions.
 fn outside(system: &System, slot: usize) -> Vec3 {
     let equations: &Equations = &system.pattern.equations;
-    let external = system.force[Category::External as usize][slot];
+    let external = system.part_of(Category::External, slot);
     match equations.is_plain(slot as Slot) {
         true => -external,
         false => equations.held_part(slot as Slot, system.total(slot)) - external,

@@ -4,7 +4,9 @@ use super::linear::Linear;
 use super::{Model, StageContext};
 use crate::effect::{Effect, Noise, PlanarForm};
 use crate::kernel::Weights;
-use crate::system::{Category, Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, System};
+use crate::system::{
+    Category, Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, Symmetry, System,
+};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -79,15 +81,15 @@ impl Assembly {
         let cliques: Vec<_> = acting.iter().map(|effect| effect.cliques()).collect();
         let acts = |(effect, own): (Arc<dyn Effect>, &Cliques)| Acting::new(effect, equations.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&cliques).map(acts).collect();
-        let symmetric = effects.iter().all(Acting::is_symmetric);
         // What is linear adds its forces by itself.
         let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
         let categories: Vec<Vec<Category>> = effects.iter().map(|acting| acting.categories().collect()).collect();
         let groups = model.groups(equations.layout());
+        let symmetry = Symmetry::of(cliques.iter().zip(effects.iter().map(Acting::is_symmetric)), &groups);
         Self {
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
             system: System::new(
-                Pattern::new(equations, groups, cliques, symmetric),
+                Pattern::new(equations, groups, cliques, symmetry),
                 model.slots.len(),
                 everywhere,
                 &categories,

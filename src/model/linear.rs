@@ -7,7 +7,9 @@
 use super::Model;
 use crate::effect::Effect;
 use crate::kernel::Weights;
-use crate::system::{Category, Cliques, Equations, FrameConflict, Layout, Memory, Pattern, Slot, State, System};
+use crate::system::{
+    Category, Cliques, Equations, FrameConflict, Layout, Memory, Pattern, Slot, State, Symmetry, System,
+};
 use crate::tensor::Vec3;
 
 /// The matrices of a stage.
@@ -37,7 +39,7 @@ impl Linear {
         let effects: Vec<&dyn Effect> = effects.collect();
         let slots = model.slots.len();
         let cliques: Vec<Cliques> = effects.iter().map(|effect| effect.cliques()).collect();
-        let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques, false);
+        let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques, Symmetry::None);
         let mut origin = about.clone();
         origin.stand_still();
         let mut whole = System::new(pattern, slots, &Category::ALL, &[]);
@@ -65,9 +67,9 @@ impl Linear {
     pub fn add_forces(&self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         let displaced: Vec<Vec3> = state.q.iter().zip(&self.about.q).map(|(q, q0)| *q - *q0).collect();
         let parts = [
-            (&self.stiffness, &displaced, Category::Internal),
-            (&self.damping, &state.v, Category::Damping),
-            (&self.mass, &state.a, Category::Inertia),
+            (&self.stiffness, &displaced[..], Category::Internal),
+            (&self.damping, &state.v[..], Category::Damping),
+            (&self.mass, &state.a[..], Category::Inertia),
         ];
         for (values, field, category) in parts {
             // Without held directions the equations are the components of the slots, one after the other.

@@ -2,7 +2,7 @@
 
 use super::{Model, StageContext};
 use crate::effect::Effect;
-use crate::system::{Cliques, Equations, Pattern, Slot};
+use crate::system::{Cliques, Equations, Pattern, Slot, Symmetry};
 use std::sync::Arc;
 
 /// What an effect adds to a system.
@@ -30,7 +30,10 @@ impl Model {
             others.iter().flat_map(Cliques::iter).flatten().for_each(|&slot| touched[slot as usize] = true);
             let free = |slot: usize| equations.of(slot as Slot).iter().filter(|&&n| n != Equations::HELD).count();
             let unknowns = (0..touched.len()).filter(|&slot| touched[slot]).map(free).sum::<usize>();
-            (unknowns, Pattern::new(equations.clone(), self.groups(equations.layout()), others, false).nonzeros())
+            (
+                unknowns,
+                Pattern::new(equations.clone(), self.groups(equations.layout()), others, Symmetry::None).nonzeros(),
+            )
         };
         let (unknowns, entries) = size_without(None);
         let share = |(k, effect): (usize, &Arc<dyn Effect>)| {

@@ -3,7 +3,7 @@
 use super::block::BlockSolver;
 use super::columns::Columns;
 use super::linear::LinearSolver;
-use crate::system::{Equations, Pattern, Slot, System};
+use crate::system::{Equations, Pattern, Slot, Symmetry, System};
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
@@ -119,9 +119,9 @@ impl Entries {
     }
 }
 
-/// Whether each entry is what its mirror image is. Of tangents that are known to be symmetric one half tells nothing of the other.
+/// Whether each entry is what its mirror image is. Of tiles of which one is kept nothing is to be told.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
-    if pattern.symmetric {
+    if pattern.symmetry == Symmetry::Whole {
         return true;
     }
     let width = pattern.width();
@@ -136,7 +136,9 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     let roots: Vec<f64> = (0..width * pattern.groups.count()).map(root).collect();
     let roots: Vec<&[f64]> = roots.chunks_exact(width).collect();
     (0..pattern.groups.count()).all(|column| {
-        let rows = pattern.rows_of(column).iter().map(|&row| row as usize).filter(|&row| row >= column);
+        let own_only = pattern.symmetry.halves();
+        let looked_at = |row: &usize| *row == column || (*row > column && !own_only);
+        let rows = pattern.rows_of(column).iter().map(|&row| row as usize).filter(looked_at);
         let mut pairs = rows.map(|row| (row, pattern.tile(row, column), pattern.tile(column, row)));
         pairs.all(|(row, tile, mirror)| match (tile, mirror) {
             (Some(tile), Some(mirror)) => (0..width * width).all(|k| {

@@ -163,7 +163,7 @@ fn stiffness_of_columns<const W: usize>(
         || {
             system.each_tile::<W>(columns, |row, column, tile| {
                 // What is not kept counts as much.
-                let times = if system.pattern.symmetric && row != column { 2.0 } else { 1.0 };
+                let times = if system.pattern.symmetry.halves() && row != column { 2.0 } else { 1.0 };
                 for (line, &x) in tile.iter().zip(&parts[column]) {
                     for r in 0..W {
                         let term = parts[row][r] * line[r] * x;

@@ -50,9 +50,9 @@ impl Leftover {
 pub struct System {
     /// The pattern of the tangent
     pub pattern: Pattern,
-    /// By category and slot
+    /// By category and slot; nothing where nothing may add to a category
     pub force: [Vec<Vec3>; 4],
-    /// The numbers of those that something may add to, in all and region by region; the others stay zero
+    /// The numbers of those that something may add to, in all and region by region
     acting: Vec<usize>,
     acting_in: Vec<Vec<usize>>,
     /// The values of the tangent, tile by tile: that of the last evaluation with weights
@@ -72,19 +72,23 @@ impl System {
     pub fn new(pattern: Pattern, slots: usize, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Self {
         let acting_in = acting_in(&pattern, everywhere, of_effects);
         let acts = |category: &usize| acting_in.iter().any(|acting| acting.contains(category));
-        let zero = || threads::filled(slots, Vec3::ZERO);
-        let (values, equations) = (pattern.values(), pattern.equations.count());
+        let acting: Vec<usize> = (0..Category::ALL.len()).filter(acts).collect();
+        let force = |category: Category| match acting.contains(&(category as usize)) {
+            true => threads::filled(slots, Vec3::ZERO),
+            false => Vec::new(),
+        };
+        let values = pattern.values();
         Self {
             rooms: vec![Vec::new(); 1 + pattern.regions.len()],
             pattern,
-            force: [zero(), zero(), zero(), zero()],
-            acting: (0..Category::ALL.len()).filter(acts).collect(),
+            force: Category::ALL.map(force),
+            acting,
             acting_in,
             values: vec![0.0; values],
             revision: 0,
             lift: Vec::new(),
             lifts: false,
-            lifted: vec![0.0; equations],
+            lifted: Vec::new(),
         }
     }
 
@@ -107,7 +111,8 @@ impl System {
     pub fn begin(&mut self, with_tangent: bool, lift: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
         if self.lifts || lift.is_some() {
-            self.lifted.fill(0.0);
+            self.lifted.clear();
+            self.lifted.resize(self.pattern.equations.count(), 0.0);
         }
         self.lifts = lift.is_some();
         if let Some(lift) = lift {
@@ -118,6 +123,12 @@ impl System {
     /// Whether something may add to a category.
     pub fn has(&self, category: Category) -> bool {
         self.acting.contains(&(category as usize))
+    }
+
+    /// The force of a category at a slot.
+    #[inline]
+    pub fn part_of(&self, category: Category, slot: usize) -> Vec3 {
+        self.force[category as usize].get(slot).copied().unwrap_or(Vec3::ZERO)
     }
 
     /// The sum of the forces at a slot.
@@ -145,7 +156,7 @@ impl System {
 
     /// Puts a force in the place of all that stand at a slot.
     pub fn replace_force(&mut self, slot: Slot, force: Vec3) {
-        self.force.iter_mut().for_each(|f| f[slot as usize] = Vec3::ZERO);
+        self.acting.iter().for_each(|&category| self.force[category][slot as usize] = Vec3::ZERO);
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
@@ -187,15 +198,15 @@ impl System {
         out
     }
 
-    /// Shows each tile with what belongs to the group of its rows, and the group of its columns: regions at once. Of symmetric tangents
-    /// the tiles that are not kept are shown, too.
+    /// Shows each tile with what belongs to the group of its rows, and the group of its columns: regions at once. Tiles that are not kept
+    /// are shown, too.
     fn each_row<const W: usize, K: Send>(
         &self,
         values: &[f64],
         of_rows: &mut [K],
         show: impl Fn(&mut K, usize, &Tile<W>) + Send + Sync,
     ) {
-        let (regions, tiles, symmetric) = (&self.pattern.regions, tiles::<W>(values), self.pattern.symmetric);
+        let (regions, tiles, halves) = (&self.pattern.regions, tiles::<W>(values), self.pattern.symmetry.halves());
         regions::each(
             regions,
             of_rows,
@@ -211,7 +222,7 @@ impl System {
                                     continue;
                                 };
                                 show(of_row, column, &tiles[tile]);
-                                if symmetric && row != column {
+                                if halves && row != column {
                                     show(&mut part[column - region.groups.start], row, &transposed(&tiles[tile]));
                                 }
                             }
@@ -223,7 +234,7 @@ impl System {
         for &(column, tile) in &self.pattern.between {
             let row = self.pattern.rows[tile] as usize;
             show(&mut of_rows[row], column, &tiles[tile]);
-            if symmetric && row != column {
+            if halves && row != column {
                 show(&mut of_rows[column], row, &transposed(&tiles[tile]));
             }
         }
@@ -338,16 +349,16 @@ impl System {
         let size = pattern.width() * pattern.width();
         let mut forces = force.each_mut().map(|force| threads::split(force, ends(|r| r.slots.end)).into_iter());
         let values = threads::split(values, ends(|r| r.tiles.end).map(|end| size * end));
-        let lifted = threads::split(lifted, ends(|r| r.equations.end));
-        let stretches = values.into_iter().zip(lifted).zip(&mut rooms[1..]).enumerate();
-        let part = |(region, ((values, lifted), room)): (usize, _)| Part {
+        let mut lifted = threads::split(lifted, ends(|r| r.equations.end)).into_iter();
+        let stretches = values.into_iter().zip(&mut rooms[1..]).enumerate();
+        let part = |(region, (values, room)): (usize, _)| Part {
             pattern,
             acting: &acting_in[region],
             region: Some(region),
             force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
             values,
             lift: lifts.then_some(&lift[..]),
-            lifted,
+            lifted: lifted.next().unwrap_or_default(),
             room,
         };
         stretches.map(part).collect()

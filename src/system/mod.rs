@@ -2,6 +2,7 @@
 
 mod assembly;
 mod equations;
+mod field;
 mod groups;
 mod pattern;
 mod plane;
@@ -12,8 +13,9 @@ mod state;
 
 pub use assembly::{Category, Leftover, System};
 pub use equations::{Direction, Equations, FrameConflict};
+pub use field::Field;
 pub use groups::{Groups, Layout};
-pub use pattern::{Cliques, Entry, Pattern, Tile, WIDTH, transposed};
+pub use pattern::{Cliques, Entry, Pattern, Symmetry, Tile, WIDTH, transposed};
 pub use plane::{Aspect, Plane};
 pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};

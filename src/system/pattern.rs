@@ -94,18 +94,48 @@ impl Places {
     }
 }
 
+/// How much of each tangent is the transpose of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Symmetry {
+    /// Perhaps nothing
+    None,
+    /// Tiles of two groups, not those of a group and itself: what sits at single nodes turns as it likes, bodies and moments.
+    BetweenGroups,
+    /// All of it
+    Whole,
+}
+
+impl Symmetry {
+    /// Of what effects add with these cliques, each with whether it is symmetric.
+    pub fn of<'a>(effects: impl IntoIterator<Item = (&'a Cliques, bool)>, groups: &Groups) -> Self {
+        let one = |slots: &[Slot]| slots.windows(2).all(|pair| groups.of(pair[0]).0 == groups.of(pair[1]).0);
+        let of_effect = |(cliques, symmetric): (&Cliques, bool)| match symmetric {
+            true => Self::Whole,
+            false if cliques.iter().all(one) => Self::BetweenGroups,
+            false => Self::None,
+        };
+        effects.into_iter().map(of_effect).min().unwrap_or(Self::Whole)
+    }
+
+    /// Whether of two tiles one tells the other.
+    #[inline]
+    pub fn halves(self) -> bool {
+        self != Self::None
+    }
+}
+
 /// The tangent in compressed columns of tiles, without its values. Tiles of a node and itself are always there.
 ///
-/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero. Of a symmetric tangent
-/// no tiles above the diagonal are kept: they are the transposes of those below it.
+/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero. Where tiles of two groups
+/// are each other's transposes, those above the diagonal are not kept.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     /// The equations that the rows and columns stand for.
     pub equations: Equations,
     /// The slots of tiles
     pub groups: Groups,
-    /// Whether each tangent is symmetric
-    pub symmetric: bool,
+    /// How symmetric each tangent is
+    pub symmetry: Symmetry,
     /// Where each column of tiles starts.
     pub column_starts: Vec<u32>,
     /// The group of the rows of each tile.
@@ -125,7 +155,7 @@ pub struct Pattern {
     pub(super) places: Vec<Places>,
 }
 
-/// A tile above the diagonal of a symmetric tangent.
+/// A tile above the diagonal that is not kept.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mirror {
     /// The group of its rows
@@ -144,10 +174,11 @@ pub struct Entry {
 }
 
 impl Pattern {
-    /// The pattern of several effects, given by the cliques of each; `symmetric` where all their tangents are.
-    pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>, symmetric: bool) -> Self {
-        let (column_starts, rows) = compressed_columns(&groups, &effects, symmetric);
-        let (mirror_starts, mirrors) = if symmetric { mirrors(&column_starts, &rows) } else { Default::default() };
+    /// The pattern of several effects, given by the cliques of each.
+    pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>, symmetry: Symmetry) -> Self {
+        let (column_starts, rows) = compressed_columns(&groups, &effects, symmetry.halves());
+        let (mirror_starts, mirrors) =
+            if symmetry.halves() { mirrors(&column_starts, &rows) } else { Default::default() };
         let (numbers, width) = (numbers(&equations, &groups), groups.width());
         let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
         let idle = idle.map(|k| ((k / width) as u32, (k % width) as u8)).collect();
@@ -156,7 +187,7 @@ impl Pattern {
         let mut pattern = Self {
             equations,
             groups,
-            symmetric,
+            symmetry,
             column_starts,
             rows,
             mirror_starts,
@@ -277,7 +308,7 @@ impl Pattern {
         (0..self.groups.count()).map(column).sum()
     }
 
-    /// Where an entry is stored, that of a symmetric tangent perhaps with its mirror image: `None` for held directions, and for pairs
+    /// Where an entry is stored, perhaps with its mirror image: `None` for held directions, and for pairs
     /// that no effect couples.
     pub fn find(&self, row: u32, column: u32) -> Option<usize> {
         if row == Equations::HELD || column == Equations::HELD {
@@ -323,7 +354,7 @@ impl Pattern {
     /// Whether the tile of two groups is kept where they meet.
     #[inline]
     fn keeps(&self, row: usize, column: usize) -> bool {
-        row >= column || !self.symmetric
+        row >= column || !self.symmetry.halves()
     }
 
     /// The index of the first value of a tile; `None` where the groups do not meet, or it is not kept.
@@ -392,8 +423,8 @@ fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
     out
 }
 
-/// Column by column the groups that a group meets, itself among them; of symmetric tangents those that do not come before it.
-fn compressed_columns(groups: &Groups, effects: &[Cliques], symmetric: bool) -> (Vec<u32>, Vec<u32>) {
+/// Column by column the groups that a group meets, itself among them; where `halves` do those that do not come before it.
+fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Vec<u32>, Vec<u32>) {
     // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
     let mut room = vec![1_u32; groups.count()];
     each_meeting(groups, effects, &mut |met| met.iter().for_each(|&group| room[group as usize] += met.len() as u32));
@@ -416,7 +447,7 @@ fn compressed_columns(groups: &Groups, effects: &[Cliques], symmetric: bool) -> 
         let column = &mut meets[start..end];
         column.sort_unstable();
         let first = rows.len();
-        for &row in column.iter().filter(|&&row| row as usize >= group || !symmetric) {
+        for &row in column.iter().filter(|&&row| row as usize >= group || !halves) {
             if rows.get(first..).and_then(<[u32]>::last) != Some(&row) {
                 rows.push(row);
             }

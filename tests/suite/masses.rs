@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use beamsim::kernel::ElementSystem;
-use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Pattern, Plane, System};
+use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Pattern, Plane, Symmetry, System};
 use beamsim::tensor::{Mat3, Vec3};
 
 const NODES: usize = 6;
@@ -17,7 +17,7 @@ fn held(plane: Option<&Plane>) -> Vec<Direction> {
 }
 
 /// An empty system of elements of two nodes, which couple displacements alone.
-fn system(plane: Option<&Plane>, symmetric: bool) -> System {
+fn system(plane: Option<&Plane>, symmetry: Symmetry) -> System {
     let turns = |slot: u32| slot % 2 == 1;
     let (equations, layout) = match plane {
         None => (Equations::new(2 * NODES, &held(None)).unwrap(), Layout::Spatial),
@@ -26,7 +26,7 @@ fn system(plane: Option<&Plane>, symmetric: bool) -> System {
     let mut cliques = Cliques::default();
     (1..NODES as u32).for_each(|node| cliques.push([2 * node - 2, 2 * node]));
     let groups = Groups::new(2 * NODES, layout, turns);
-    System::new(Pattern::new(equations, groups, vec![cliques], symmetric), 2 * NODES, &[], &[])
+    System::new(Pattern::new(equations, groups, vec![cliques], symmetry), 2 * NODES, &[], &[])
 }
 
 #[test]
@@ -34,7 +34,8 @@ fn masses_are_added_as_elements_are() {
     let mut random = Random::new(5);
     let tilted = Plane::normal_to(Vec3([0.3, -0.5, 0.8])).unwrap();
     let flat = Plane::normal_to(Vec3::UNIT[2]).unwrap();
-    for (plane, symmetric) in [None, Some(&flat), Some(&tilted)].into_iter().flat_map(|p| [(p, false), (p, true)]) {
+    let both = |plane| [Symmetry::None, Symmetry::Whole].map(|symmetry| (plane, symmetry));
+    for (plane, symmetry) in [None, Some(&flat), Some(&tilted)].into_iter().flat_map(both) {
         // Forces and increments that stay in the plane.
         let mut vector = || {
             let vector = random.vector(1.0);
@@ -42,7 +43,7 @@ fn masses_are_added_as_elements_are() {
         };
         let lift: Vec<Vec3> = (0..2 * NODES).map(|_| vector()).collect();
         for lift in [None, Some(&lift[..])] {
-            let (mut as_masses, mut as_elements) = (system(plane, symmetric), system(plane, symmetric));
+            let (mut as_masses, mut as_elements) = (system(plane, symmetry), system(plane, symmetry));
             as_masses.clear(lift);
             as_elements.clear(lift);
             for k in 0..NODES - 1 {
@@ -56,7 +57,7 @@ fn masses_are_added_as_elements_are() {
                 as_masses.sink(0, Category::Internal, true).add_mass(k, &forces, &mass, weight);
                 as_elements.sink(0, Category::Internal, true).add(k, &element);
             }
-            let what = format!("plane {}, symmetric {symmetric}, lift {}", plane.is_some(), lift.is_some());
+            let what = format!("plane {}, symmetry {symmetry:?}, lift {}", plane.is_some(), lift.is_some());
             let sides = [&as_masses, &as_elements].map(|system| {
                 let mut side = vec![0.0; system.pattern.equations.count()];
                 system.right_hand_side(&mut side);

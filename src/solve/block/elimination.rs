@@ -131,7 +131,7 @@ impl Elimination {
                 }
                 let (block, side) = (find(&self.starts, &self.later, i.min(j), i.max(j)), usize::from(i > j));
                 self.sources[block][side] = Source::Tile(tile as u32);
-                if pattern.symmetric {
+                if pattern.symmetry.halves() {
                     self.sources[block][1 - side] = Source::Transpose(tile as u32);
                 }
             }

@@ -44,7 +44,11 @@ where
             for k in elimination.neighbours(row) {
                 let [upper, lower] = elimination.sources[k];
                 tile::take(&mut self.upper[k], tiles, upper.transposed());
-                tile::take(&mut self.lower[k], tiles, lower);
+                // Where one tile is the transpose of the other, both are one here.
+                match lower == upper.transposed() {
+                    true => self.lower[k] = self.upper[k],
+                    false => tile::take(&mut self.lower[k], tiles, lower),
+                }
             }
         }
         for &(row, direction) in elimination.idle(&rows) {

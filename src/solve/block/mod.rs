@@ -12,7 +12,7 @@ mod pieces;
 mod stretch;
 mod tile;
 
-use crate::system::{Pattern, System, WIDTH};
+use crate::system::{Pattern, Symmetry, System, WIDTH};
 use crate::threads;
 use elimination::Elimination;
 use ldl::Ldl;
@@ -49,7 +49,7 @@ trait Factor: Send {
 impl BlockSolver {
     /// For tangents of this pattern. `None` where blocks would fill up, or memory cannot be had.
     pub fn new(pattern: &Pattern) -> Option<Self> {
-        Self::by(Arc::new(Elimination::new(pattern)?), pattern, pattern.symmetric)
+        Self::by(Arc::new(Elimination::new(pattern)?), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
     /// For tangents of this pattern that are symmetric, even where the pattern does not say so.
@@ -59,7 +59,7 @@ impl BlockSolver {
 
     /// Another one for tangents of a pattern that is [like](Pattern::is_like) its own: in the same order.
     pub fn of_like(&self, pattern: &Pattern) -> Option<Self> {
-        Self::by(Arc::new(self.elimination.of_like(pattern)), pattern, pattern.symmetric)
+        Self::by(Arc::new(self.elimination.of_like(pattern)), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
     /// Another one for tangents of the same pattern, which are symmetric.
