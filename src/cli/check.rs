@@ -169,7 +169,7 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     say::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),
-        scene.mesh.elements.len(),
+        scene.mesh.elements,
         3 * slots,
         bytes as f64 / 1e6
     ));

@@ -28,7 +28,7 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         workshop.increments = (scheme.rotations == Rotations::Increments)
             .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.equations));
-        workshop.trend = Trend::new(&self.model, &workshop.assembly.system.pattern.equations);
+        workshop.trend = Trend::new(&self.model);
         self.start_dynamic(workshop, &Step { scheme, length: step })?;
         self.find_rates(workshop);
         let mut before = step;

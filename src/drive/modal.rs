@@ -32,9 +32,7 @@ impl Run<'_> {
         let found = self.find_modes(workshop, &matrices, modes)?;
         self.count_steps();
         // What moved moves on.
-        self.state.v.copy_from_slice(&moving.v);
-        self.state.a.copy_from_slice(&moving.a);
-        self.state.algorithmic.copy_from_slice(&moving.algorithmic);
+        self.state.copy_rates(&moving);
         self.observer.modes(self.stage + 1, &found)
     }
 

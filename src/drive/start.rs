@@ -23,11 +23,10 @@ impl Run<'_> {
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
         }
         let equations = &workshop.assembly.system.pattern.equations;
-        for slot in 0..self.state.v.len() {
-            let held = equations.held_part(slot as Slot, self.state.v[slot]);
-            self.state.v[slot] -= held;
-            self.state.a[slot] = Vec3::ZERO;
+        for (slot, v) in self.state.v.iter_mut().enumerate() {
+            *v -= equations.held_part(slot as Slot, *v);
         }
+        self.state.a.fill(Vec3::ZERO);
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);
         self.change_charts(None);
@@ -38,7 +37,7 @@ impl Run<'_> {
         workshop.space = None;
         self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
-        self.state.algorithmic.copy_from_slice(&self.state.a);
+        self.state.algorithmic.copy_from(&self.state.a);
         if let Some(increments) = &workshop.increments {
             increments.start(&mut self.state);
         }
@@ -96,8 +95,9 @@ impl Run<'_> {
             workshop.assembly.evaluate(&self.state, Weights::NONE, None);
             return Ok(());
         };
+        let (multipliers, accelerations) = (&mut self.state.q[..], &mut self.state.a[..]);
         for (slot, info) in self.model.slots.iter().enumerate() {
-            let field = if info.is_multiplier() { &mut self.state.q } else { &mut self.state.a };
+            let field = if info.is_multiplier() { &mut *multipliers } else { &mut *accelerations };
             field[slot] += solved[slot];
         }
         // The forces of the start, for reactions and the energy account.

@@ -24,19 +24,13 @@ pub struct BeamElasticity<I> {
     pub elements: ElasticElements,
     /// The stress that geometric parts of the tangent are formed with, where that is not the scene's: none
     unstressed: Option<Vec<[f64; 6]>>,
-    /// Point by point
-    rounding: Vec<Rounding>,
     way: PhantomData<I>,
 }
 
 impl<I: Interpolation> BeamElasticity<I> {
     /// Of these elements.
     pub fn new(elements: ElasticElements) -> Self {
-        let mut rounding = Vec::new();
-        for_each_batch!(elements, |_first, batch| {
-            rounding.extend(batch.iter().flat_map(|element| element.points()).map(|point| Rounding::of(&point)));
-        });
-        Self { elements, unstressed: None, rounding, way: PhantomData }
+        Self { elements, unstressed: None, way: PhantomData }
     }
 
     /// Leaves out of the tangent what stress brings to it.
@@ -187,63 +181,22 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
 
     fn noise(&self, at: &State) -> Noise {
         let mut largest = Noise::default();
-        for_each_batch!(self.elements, |first, batch| {
-            let points = &self.rounding[self.points_before(first)..];
-            let parts = batch.chunks(AT_ONCE).zip(points.chunks(AT_ONCE * points_of(batch)));
-            threads::in_order(
-                parts,
-                |(batch, points)| noise_of(batch, points, at),
-                |noise| largest = largest.or(noise),
-            );
+        for_each_batch!(self.elements, |_first, batch| {
+            threads::in_order(batch.chunks(AT_ONCE), |part| noise_of(part, at), |noise| largest = largest.or(noise));
         });
         largest
     }
 }
 
-/// How many points each of these has.
-fn points_of<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> usize {
-    G
-}
-
 /// The largest round-off of the forces of some elements.
-fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], points: &[Rounding], at: &State) -> Noise {
+fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> Noise {
     let mut largest = Noise::default();
-    for (element, points) in batch.iter().zip(points.as_chunks::<G>().0) {
+    for element in batch {
         let nodes = element.connection.nodes.iter();
         let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
-        for point in points {
-            let force = point.at_rest + point.over_displacement * u;
-            largest = largest.or(Noise { force, moment: point.bending + force * point.weight });
-        }
+        element.each_noise(u, |noise| largest = largest.or(noise));
     }
     largest
-}
-
-/// What round-off may leave of the force of a point: displacements u and rotations P carry a relative error of one unit in the last
-/// place; strains divide it by the element's length, and stiff sections multiply it.
-#[derive(Clone, Copy, Debug)]
-struct Rounding {
-    /// Force without displacements
-    at_rest: f64,
-    /// Force over the largest displacement
-    over_displacement: f64,
-    /// Moment without forces
-    bending: f64,
-    /// Its weight
-    weight: f64,
-}
-
-impl Rounding {
-    fn of<const N: usize>(point: &StiffnessPoint<N>) -> Self {
-        let steepest = point.slope.iter().fold(0.0_f64, |s, d| s.max(d.abs()));
-        let at_rest = f64::EPSILON * point.stiffness.cn.max_abs();
-        Self {
-            at_rest,
-            over_displacement: at_rest * steepest,
-            bending: f64::EPSILON * point.stiffness.cm.max_abs() * std::f64::consts::PI * steepest,
-            weight: point.weight,
-        }
-    }
 }
 
 /// Adds the elements of one order, `first` instances after the first one of the effect; `remembered` are the stresses of

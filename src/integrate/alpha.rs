@@ -16,7 +16,7 @@
 use super::Method;
 use crate::kernel::Weights;
 use crate::kernel::turn::StepCoefficients;
-use crate::system::{Slot, State};
+use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 
@@ -99,20 +99,20 @@ impl Step {
     pub fn predict(&self, state: &mut State, before: f64) {
         let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
         let stretch = h / before;
-        for slot in 0..state.q.len() {
-            if let Some(turn) = state.turn(slot as Slot) {
-                let x = turn.guess();
-                let (omega, acceleration) = turn.rates(x);
-                (state.q[slot], state.v[slot], state.a[slot]) = (x, omega, acceleration);
+        let State { q, v, a, algorithmic: filtered, turns, .. } = state;
+        let (rates, accelerations, filtered) = (&mut v[..], &mut a[..], &mut filtered[..]);
+        for slot in 0..q.len() {
+            if let Some(Some(turn)) = turns.get(slot) {
+                q[slot] = turn.guess();
+                (rates[slot], accelerations[slot]) = turn.rates(q[slot]);
                 continue;
             }
-            let (v, a) = (state.v[slot], state.a[slot]);
-            let old =
-                if stretch == 1.0 { state.algorithmic[slot] } else { a + (state.algorithmic[slot] - a) * stretch };
+            let (v, a) = (rates[slot], accelerations[slot]);
+            let old = if stretch == 1.0 { filtered[slot] } else { a + (filtered[slot] - a) * stretch };
             let new = if alpha_m == 0.0 { a } else { (a - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
-            state.q[slot] += v * h + (old * (0.5 - beta) + new * beta) * (h * h);
-            state.v[slot] += (old * (1.0 - gamma) + new * gamma) * h;
-            state.algorithmic[slot] = new;
+            q[slot] += v * h + (old * (0.5 - beta) + new * beta) * (h * h);
+            rates[slot] += (old * (1.0 - gamma) + new * gamma) * h;
+            filtered[slot] = new;
         }
     }
 

@@ -6,11 +6,13 @@
 //! steps: where motion is not smooth, or stiff directions swing from step to step, that is the scheme's own.
 
 use super::{Method, Step};
-use crate::model::Model;
+use crate::model::{Model, SlotKind};
 use crate::system::{Equations, State, System};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::array::from_fn;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// The factors of the last corrections for each way to foresee the next one, the latest first.
 const WAYS: [&[f64]; 4] = [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0]];
@@ -33,8 +35,9 @@ type Factors = [f64; WAYS.len() - 1];
 /// The corrections of the last steps of a stage.
 #[derive(Default)]
 pub struct Trend {
-    /// What forces are compared by, by equation
-    weights: Vec<f64>,
+    /// What forces are compared by: of each slot its kind, and of each kind a factor
+    kinds: Arc<Vec<SlotKind>>,
+    weights: [f64; SlotKind::ALL.len()],
     /// The latest first
     past: VecDeque<Past>,
     /// By way, how much residual it would have left (squares, in the mean of the last steps); `None` where that is not known
@@ -50,18 +53,15 @@ struct Past {
     length: f64,
     /// c
     correction: Vec<f64>,
-    /// J c
+    /// J c, moments over the length of the scene; gaps do not count
     force: Vec<f64>,
 }
 
 impl Trend {
-    /// For a stage with these equations.
-    pub fn new(model: &Model, equations: &Equations) -> Self {
-        let weight = |equation: usize| {
-            let info = &model.slots[equations.origin(equation).0 as usize];
-            if info.is_multiplier() { 0.0 } else { 1.0 / info.arm(model.length) }
-        };
-        Self { weights: (0..equations.count()).map(weight).collect(), ..Self::default() }
+    /// For a stage of a scene.
+    pub fn new(model: &Model) -> Self {
+        let weight = |kind: SlotKind| if kind.is_of_multipliers() { 0.0 } else { 1.0 / kind.arm(model.length) };
+        Self { kinds: model.kinds.clone(), weights: SlotKind::ALL.map(weight), ..Self::default() }
     }
 
     /// Another attempt at a step begins: nothing has been foreseen of it yet.
@@ -76,7 +76,7 @@ impl Trend {
 
     /// Adds what is foreseen to the prediction of a step.
     pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step) {
-        self.predicted.clone_from(&state.q);
+        threads::copy(&mut self.predicted, &state.q);
         let best = self.best();
         let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) else { return };
         self.taken = best;
@@ -92,10 +92,14 @@ impl Trend {
     /// Takes note of a step that has come to its end, with the unknowns that it was predicted in, and its tangent.
     pub fn end(&mut self, state: &State, system: &System, step: &Step) {
         let equations = &system.pattern.equations;
-        let corrected: Vec<_> = state.q.iter().zip(&self.predicted).map(|(q, predicted)| *q - *predicted).collect();
         let mut correction = vec![0.0; equations.count()];
-        equations.gather(&corrected, &mut correction);
-        let force = system.multiply(&system.values, &correction);
+        equations.gather(|slot| state.q[slot] - self.predicted[slot], &mut correction);
+        let mut force = system.multiply(&system.values, &correction);
+        threads::each_part(&mut force, |start, part| {
+            for (equation, force) in (start..).zip(part) {
+                *force *= self.weights[self.kinds[equations.origin(equation).0 as usize] as usize];
+            }
+        });
         self.learn(Past { length: step.length, correction, force });
     }
 
@@ -139,15 +143,15 @@ impl Trend {
         Some(factors)
     }
 
-    /// By way, the sum of squares of what it leaves of a force; moments are taken over the length of the scene, gaps do not count.
+    /// By way, the sum of squares of what it leaves of a force.
     fn rests(&self, force: &[f64], factors: &[Option<Factors>; WAYS.len()]) -> [f64; WAYS.len()] {
         let factors = factors.map(|factors| factors.unwrap_or_default());
         let mut sums = [0.0; WAYS.len()];
-        for (equation, (force, weight)) in force.iter().zip(&self.weights).enumerate() {
+        for (equation, force) in force.iter().enumerate() {
             let past: Factors = from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force[equation]));
             for (sum, factors) in sums.iter_mut().zip(&factors) {
                 let foreseen = past[0] * factors[0] + past[1] * factors[1] + past[2] * factors[2];
-                *sum += ((force - foreseen) * weight).powi(2);
+                *sum += (force - foreseen).powi(2);
             }
         }
         sums
@@ -159,7 +163,7 @@ mod tests {
     use super::*;
 
     fn with(corrections: &[f64]) -> Trend {
-        let mut trend = Trend { weights: vec![1.0], ..Trend::default() };
+        let mut trend = Trend::default();
         for (length, correction) in corrections.iter().map(|c| (1.0, *c)) {
             trend.learn(Past { length, correction: vec![correction], force: vec![correction] });
         }
@@ -184,7 +188,7 @@ mod tests {
 
     #[test]
     fn steps_that_grow_are_foreseen() {
-        let mut trend = Trend { weights: vec![1.0], ..Trend::default() };
+        let mut trend = Trend::default();
         for length in [1.0_f64, 1.8, 3.2, 5.8] {
             trend.learn(Past { length, correction: vec![length.powi(3)], force: vec![length] });
         }

@@ -203,10 +203,10 @@ impl Motion {
         let (slot, n) = (self.slot as usize, self.axis);
         match self.kind {
             MotionKind::Translation => {
-                let replace = |field: &mut Vec3, value: f64| *field += n * (value - field.dot(n));
-                replace(&mut state.q[slot], value);
-                replace(&mut state.v[slot], rate);
-                replace(&mut state.a[slot], rate2);
+                let replaced = |old: Vec3, value: f64| old + n * (value - old.dot(n));
+                state.q[slot] = replaced(state.q[slot], value);
+                state.v.put(slot, replaced(state.v[slot], rate));
+                state.a.put(slot, replaced(state.a[slot], rate2));
                 0.0
             }
             MotionKind::Rotation => {
@@ -217,8 +217,8 @@ impl Motion {
                     let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();
                     n * (value + 2.0 * PI * turns)
                 };
-                state.v[slot] = n * rate;
-                state.a[slot] = n * rate2;
+                state.v.put(slot, n * rate);
+                state.a.put(slot, n * rate2);
                 state.wound[slot] = n * value;
                 turned
             }

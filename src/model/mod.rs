@@ -47,6 +47,16 @@ pub enum SlotKind {
 impl SlotKind {
     /// All of them, in their order
     pub const ALL: [Self; 4] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment];
+
+    /// Whether it is one of multipliers: no unknowns of motion, and what stands in the place of forces are gaps.
+    pub fn is_of_multipliers(self) -> bool {
+        matches!(self, Self::Force | Self::Moment)
+    }
+
+    /// What turns the forces of such a slot into forces that compare: a length for moments, 1 for forces.
+    pub fn arm(self, length: f64) -> f64 {
+        if self == Self::Rotation { length } else { 1.0 }
+    }
 }
 
 /// A slot, and the node that it is named after.
@@ -56,8 +66,6 @@ pub struct SlotInfo {
     pub kind: SlotKind,
     /// The name of its node, for messages
     pub node: Arc<str>,
-    /// The initial place of its node
-    pub place: Vec3,
 }
 
 /// A beam element as changes of chart and the judgement of the mesh see it.
@@ -70,9 +78,9 @@ pub struct ElementInfo {
 }
 
 impl SlotInfo {
-    /// Whether it holds multipliers: no unknowns of motion, and what stands in the place of forces are gaps.
+    /// Whether it holds multipliers, see [`SlotKind::is_of_multipliers`].
     pub fn is_multiplier(&self) -> bool {
-        matches!(self.kind, SlotKind::Force | SlotKind::Moment)
+        self.kind.is_of_multipliers()
     }
 
     /// What its unknowns are compared with: a length for displacements, 1 for rotations.
@@ -80,9 +88,9 @@ impl SlotInfo {
         if self.kind == SlotKind::Displacement { length } else { 1.0 }
     }
 
-    /// What turns the forces of this slot into forces that compare: a length for moments, 1 for forces.
+    /// See [`SlotKind::arm`].
     pub fn arm(&self, length: f64) -> f64 {
-        if self.kind == SlotKind::Rotation { length } else { 1.0 }
+        self.kind.arm(length)
     }
 }
 
@@ -223,11 +231,16 @@ impl Model {
             return;
         }
         let normal = plane.normal();
-        for field in [&mut state.q, &mut state.v, &mut state.a, &mut state.algorithmic] {
-            for (info, value) in self.slots.iter().zip(field) {
+        let flatten = |field: &mut [Vec3]| {
+            for (kind, value) in self.kinds.iter().zip(field) {
                 let aside = normal * value.dot(normal);
-                *value = if info.kind == SlotKind::Rotation { aside } else { *value - aside };
+                *value = if *kind == SlotKind::Rotation { aside } else { *value - aside };
             }
+        };
+        let moves = state.moves();
+        flatten(&mut state.q);
+        if moves {
+            [&mut state.v, &mut state.a, &mut state.algorithmic].into_iter().for_each(|rates| flatten(rates));
         }
     }
 
@@ -239,9 +252,9 @@ impl Model {
             _ => value.dot(normal).abs() / self.length,
         };
         let size = |(info, value): (&SlotInfo, &Vec3)| value.norm() / info.scale(self.length);
-        [&state.q, &state.v, &state.a].iter().all(|field| {
-            let largest = self.slots.iter().zip(*field).map(size).fold(0.0, f64::max);
-            let farthest = self.slots.iter().zip(*field).map(aside).fold(0.0, f64::max);
+        [&state.q[..], &state.v, &state.a].into_iter().all(|field| {
+            let largest = self.slots.iter().zip(field).map(size).fold(0.0, f64::max);
+            let farthest = self.slots.iter().zip(field).map(aside).fold(0.0, f64::max);
             farthest <= OUT_OF_PLANE * largest
         })
     }
@@ -367,7 +380,9 @@ impl Model {
         self.effects.iter().for_each(|effect| effect.remember(state));
         for &slot in &self.multipliers {
             let slot = slot as usize;
-            (state.v[slot], state.a[slot], state.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+            [&mut state.v, &mut state.a, &mut state.algorithmic]
+                .into_iter()
+                .for_each(|rates| rates.put(slot, Vec3::ZERO));
         }
     }
 

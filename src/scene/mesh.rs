@@ -8,6 +8,7 @@ use crate::kernel::{MAX_NODES, shape};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A node of the mesh.
@@ -36,17 +37,6 @@ pub struct Station {
     pub axes: Mat3,
     /// How far along its piece of the curve, from 0 to 1
     along: f64,
-}
-
-/// An element of the mesh.
-#[derive(Clone, Debug)]
-pub struct MeshElement {
-    /// Indices of its nodes
-    pub nodes: Vec<usize>,
-    /// The piece of its beam's centre line
-    piece: usize,
-    /// From where to where on that, from 0 to 1
-    range: [f64; 2],
 }
 
 /// Which points of an element are summed over.
@@ -85,7 +75,7 @@ impl BeamElement<'_> {
     }
 
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
-        let MeshElement { piece, range, .. } = self.mesh.elements[self.number];
+        let (piece, range) = self.beam.stretch(self.number);
         let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
         let stretch = self.between(&slope);
         let jacobian = stretch.norm();
@@ -96,14 +86,14 @@ impl BeamElement<'_> {
             shape,
             weight: gauss_weight * jacobian,
             fraction,
-            axes: line.axes(piece, stretch * (1.0 / jacobian), fraction),
+            axes: line.axes(piece, line.pieces[piece].direction(stretch, jacobian), fraction),
             along: t,
         }
     }
 
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
-        let (piece, line) = (self.mesh.elements[self.number].piece, &self.beam.line);
+        let ((piece, _), line) = (self.beam.stretch(self.number), &self.beam.line);
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
 
@@ -126,7 +116,9 @@ pub struct MeshBeam {
     /// The fraction of the length that each number means, where numbers do not count the nodes
     pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
-    pub elements: std::ops::Range<usize>,
+    pub elements: Range<usize>,
+    /// How many of them lie on each piece of its centre line
+    counts: Vec<usize>,
     /// Nodes of an element, less one
     pub order: usize,
     /// How rotations are interpolated
@@ -139,6 +131,25 @@ pub struct MeshBeam {
     pub section: SectionCourse,
 }
 
+impl MeshBeam {
+    /// Indices of the nodes of an element.
+    pub fn nodes_of(&self, element: usize) -> &[usize] {
+        let first = self.order * (element - self.elements.start);
+        &self.nodes[first..=first + self.order]
+    }
+
+    /// The piece of the centre line that an element lies on, and from where to where on that, from 0 to 1.
+    fn stretch(&self, element: usize) -> (usize, [f64; 2]) {
+        let (mut piece, mut number) = (0, element - self.elements.start);
+        while number >= self.counts[piece] {
+            number -= self.counts[piece];
+            piece += 1;
+        }
+        let count = self.counts[piece] as f64;
+        (piece, [number as f64 / count, (number + 1) as f64 / count])
+    }
+}
+
 /// All nodes, beams and elements.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
@@ -146,8 +157,8 @@ pub struct Mesh {
     pub nodes: Vec<MeshNode>,
     /// The beams
     pub beams: Vec<MeshBeam>,
-    /// The elements, beam after beam
-    pub elements: Vec<MeshElement>,
+    /// The number of elements, beam after beam
+    pub elements: usize,
     /// The node of each named point that is one: the first-named beam's where a joint parts it
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
@@ -326,7 +337,7 @@ impl Mesh {
         let corners: Vec<Option<&str>> = corner_names(&beam.path);
         let between =
             named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
-        let first_element = self.elements.len();
+        let first_element = self.elements;
         let (mut nodes, mut fractions) = (Vec::new(), Vec::new());
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
@@ -344,16 +355,15 @@ impl Mesh {
         }
         let mut first_node = 0;
         for piece in 0..line.pieces.len() {
-            for element in 0..count(piece) {
+            for _ in 0..count(piece) {
                 let own = &nodes[first_node..=first_node + beam.order];
-                let range = [element as f64 / count(piece) as f64, (element + 1) as f64 / count(piece) as f64];
                 if own.iter().enumerate().any(|(i, a)| own[..i].contains(a)) {
                     let message = format!("an element of beam `{}` starts and ends at the same node", beam.name.value);
                     diagnostics
                         .push(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
                     return;
                 }
-                self.elements.push(MeshElement { nodes: own.to_vec(), piece, range });
+                self.elements += 1;
                 first_node += beam.order;
             }
         }
@@ -362,7 +372,8 @@ impl Mesh {
             nodes,
             fractions,
             numbered: beam.numbering.as_ref().map(|numbering| fractions_of(&line, &numbering.value)),
-            elements: first_element..self.elements.len(),
+            elements: first_element..self.elements,
+            counts: (0..line.pieces.len()).map(count).collect(),
             order: beam.order,
             interpolation: beam.interpolation,
             free_strain: beam.free_strain.clone(),
@@ -383,7 +394,7 @@ impl Mesh {
 
     /// The elements of a beam.
     pub fn elements_of<'m>(&'m self, beam: &'m MeshBeam) -> impl Iterator<Item = BeamElement<'m>> {
-        let element = |number: usize| BeamElement { number, beam, nodes: &self.elements[number].nodes, mesh: self };
+        let element = |number: usize| BeamElement { number, beam, nodes: beam.nodes_of(number), mesh: self };
         beam.elements.clone().map(element)
     }
 }

@@ -214,7 +214,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
-        elements: mesh.elements.len(),
+        elements: mesh.elements,
         charted: rotating.clone(),
         rotating,
         effects: composition.effects,
@@ -254,7 +254,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
 /// The rotations of all nodes, and the elements beam by beam.
 fn charted(mesh: &Mesh) -> Charted {
     let info = |beam: &MeshBeam, number: usize| {
-        let nodes = mesh.elements[number].nodes.iter().map(|&n| mesh.nodes[n].node);
+        let nodes = beam.nodes_of(number).iter().map(|&n| mesh.nodes[n].node);
         ElementInfo::new(nodes, beam.interpolation == deck::InterpolationWord::Total)
     };
     let of = |beam: &MeshBeam| beam.elements.clone().map(|number| info(beam, number)).collect::<Vec<_>>();
@@ -266,10 +266,10 @@ fn charted(mesh: &Mesh) -> Charted {
 
 /// What each slot holds, named after its node.
 fn slots(mesh: &Mesh) -> Vec<SlotInfo> {
-    let empty = SlotInfo { kind: SlotKind::Displacement, node: "".into(), place: Vec3::ZERO };
+    let empty = SlotInfo { kind: SlotKind::Displacement, node: "".into() };
     let mut slots = vec![empty; mesh.slots()];
     for node in mesh.nodes.iter().rev() {
-        let info = |kind| SlotInfo { kind, node: node.name.clone(), place: node.place };
+        let info = |kind| SlotInfo { kind, node: node.name.clone() };
         slots[node.node.u as usize] = info(SlotKind::Displacement);
         slots[node.node.p as usize] = info(SlotKind::Rotation);
     }

@@ -152,7 +152,7 @@ impl Mesh {
             }
             Found::Between(beam, fraction) => {
                 let (element, xi) = self.beams[beam].element_at(fraction);
-                let nodes = &self.elements[element].nodes;
+                let nodes = self.beams[beam].nodes_of(element);
                 let (shape, _) = shape_at(nodes.len(), xi);
                 let parts =
                     nodes.iter().zip(shape).map(|(&n, weight)| (self.nodes[n].node, self.nodes[n].place, weight));

@@ -40,8 +40,8 @@ pub struct Equations {
     frame: Vec<u32>,
     /// Local directions as columns
     frames: Vec<Mat3>,
-    /// Slot and local direction of each equation.
-    origin: Vec<(Slot, u8)>,
+    /// Slot and local direction of each equation: three times the one, and the other.
+    origin: Vec<u32>,
     /// The slots in which a direction is held, in planar scenes one that does not leave the plane anyway
     constrained: Vec<bool>,
     plane: Option<Plane>,
@@ -94,14 +94,15 @@ impl Equations {
     fn empty(slots: usize, plane: Option<Plane>) -> Self {
         let (number, frame) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
         let constrained = Vec::with_capacity(slots);
-        Self { number, frame, frames: Vec::new(), origin: Vec::new(), constrained, plane }
+        let origin = Vec::with_capacity(if plane.is_some() { 3 * slots / 2 } else { 3 * slots });
+        Self { number, frame, frames: Vec::new(), origin, constrained, plane }
     }
 
     fn push(&mut self, slot: usize, frame: Option<Mat3>, is_held: [bool; 3], constrained: bool) {
         let mut number = [Self::HELD; 3];
         for k in (0..3).filter(|&k| !is_held[k]) {
             number[k] = self.origin.len() as u32;
-            self.origin.push((slot as Slot, k as u8));
+            self.origin.push((3 * slot + k) as u32);
         }
         self.number.push(number);
         // Slots of one plane all have the same.
@@ -130,7 +131,7 @@ impl Equations {
 
     /// The number of equations of the slots before this one.
     pub fn before(&self, slot: usize) -> usize {
-        self.origin.partition_point(|(other, _)| (*other as usize) < slot)
+        self.origin.partition_point(|&other| (other as usize) < 3 * slot)
     }
 
     /// The equations of a slot, by local direction.
@@ -141,7 +142,8 @@ impl Equations {
 
     /// The slot and the local direction of an equation.
     pub fn origin(&self, equation: usize) -> (Slot, u8) {
-        self.origin[equation]
+        let origin = self.origin[equation];
+        (origin / 3, (origin % 3) as u8)
     }
 
     /// The turned axes of a slot as columns.
@@ -157,16 +159,17 @@ impl Equations {
 
     /// The slot and the direction (global components) of an equation.
     pub fn direction(&self, equation: usize) -> Direction {
-        let (slot, k) = self.origin[equation];
+        let (slot, k) = self.origin(equation);
         let axis = self.frame(slot).map_or(Vec3::UNIT[k as usize], |frame| frame.column(k as usize));
         Direction { slot, axis }
     }
 
-    /// Picks the free entries of a field of slots.
-    pub fn gather(&self, field: &[Vec3], out: &mut [f64]) {
+    /// Picks the free entries of what stands at each slot.
+    pub fn gather(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
         threads::each_part(out, |start, out| {
-            for (out, &(slot, k)) in out.iter_mut().zip(&self.origin[start..]) {
-                *out = self.to_local(slot, field[slot as usize]).0[k as usize];
+            for (equation, out) in (start..).zip(out) {
+                let (slot, k) = self.origin(equation);
+                *out = self.to_local(slot, field(slot as usize)).0[k as usize];
             }
         });
     }
@@ -311,7 +314,7 @@ mod tests {
         equations.scatter(&[2.0, 3.0], Some(&[Vec3([0.6, 0.0, 0.8])]), &mut field);
         assert!((field[0].dot(held[0].axis) - 1.0).abs() < 1e-15);
         let mut again = [0.0; 2];
-        equations.gather(&field, &mut again);
+        equations.gather(|slot| field[slot], &mut again);
         assert!((again[0] - 2.0).abs() < 1e-15 && (again[1] - 3.0).abs() < 1e-15);
     }
 }

@@ -1,5 +1,6 @@
 //! The state of a scene: one 3-vector of unknowns a slot, with its rates.
 
+use super::field::Field;
 use crate::kernel::NodeMotion;
 use crate::kernel::inertia::Spin;
 use crate::kernel::seam::Conversion;
@@ -31,13 +32,13 @@ pub struct State {
     /// Displacements, and rotation vectors each in its present chart (global components).
     pub q: Vec<Vec3>,
     /// dq/dt; zero in static stages.
-    pub v: Vec<Vec3>,
+    pub v: Field,
     /// d2q/dt2; zero in static stages.
-    pub a: Vec<Vec3>,
+    pub a: Field,
     /// The algorithmic acceleration of generalised-alpha methods; equal to `a` where a method has none of its own. Where
     /// the unknowns of steps are increments, that of a rotation is the rate of the momentum that it carries, see [`Turn`];
     /// while a step is iterated, that of its start.
-    pub algorithmic: Vec<Vec3>,
+    pub algorithmic: Field,
     /// The factor of each load, valid at `time` and `load`.
     pub amplitude: Vec<f64>,
     /// For each beam element the nodes that are converted into the chart of the first; frozen while Newton iterates.
@@ -57,14 +58,14 @@ pub struct State {
 impl State {
     /// At rest in the initial placement.
     pub fn rest(slots: usize, elements: usize, amplitudes: usize, angles: usize) -> Self {
-        let zero = || threads::filled(slots, Vec3::ZERO);
+        let (zero, rates) = (|| threads::filled(slots, Vec3::ZERO), Field::zero(slots));
         Self {
             time: 0.0,
             load: 0.0,
             q: zero(),
-            v: zero(),
-            a: zero(),
-            algorithmic: zero(),
+            v: rates.clone(),
+            a: rates.clone(),
+            algorithmic: rates,
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
             wound: zero(),
@@ -76,15 +77,21 @@ impl State {
 
     /// Takes all velocities and accelerations away.
     pub fn stand_still(&mut self) {
-        self.v.fill(Vec3::ZERO);
-        self.a.fill(Vec3::ZERO);
-        self.algorithmic.fill(Vec3::ZERO);
+        if self.moves() {
+            let rest = Field::zero(self.v.len());
+            (self.v, self.a, self.algorithmic) = (rest.clone(), rest.clone(), rest);
+        }
+    }
+
+    /// Whether it has velocities or accelerations.
+    pub fn moves(&self) -> bool {
+        let moves = |&slot: &usize| [&self.v, &self.a, &self.algorithmic].iter().any(|rates| rates[slot] != Vec3::ZERO);
+        threads::first(self.v.len(), |mut part| part.find(moves)).is_some()
     }
 
     /// The state itself where it stands still, or else another one without velocities and accelerations.
     pub fn at_rest(&self) -> Cow<'_, Self> {
-        let moves = |&slot: &usize| [&self.v, &self.a, &self.algorithmic].iter().any(|rate| rate[slot] != Vec3::ZERO);
-        if threads::first(self.v.len(), |mut part| part.find(moves)).is_none() {
+        if !self.moves() {
             return Cow::Borrowed(self);
         }
         let mut still = self.clone();
@@ -94,10 +101,15 @@ impl State {
 
     /// Takes over another state of the same scene without allocating.
     pub fn copy_from(&mut self, other: &Self) {
-        threads::copy(&mut self.v, &other.v);
-        threads::copy(&mut self.a, &other.a);
-        threads::copy(&mut self.algorithmic, &other.algorithmic);
+        self.copy_rates(other);
         self.copy_all_but_rates(other);
+    }
+
+    /// Takes over its velocities and accelerations.
+    pub fn copy_rates(&mut self, other: &Self) {
+        self.v.copy_from(&other.v);
+        self.a.copy_from(&other.a);
+        self.algorithmic.copy_from(&other.algorithmic);
     }
 
     /// The same where both have the same rates, as in statics.

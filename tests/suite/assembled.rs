@@ -121,7 +121,7 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
     // Somewhere, moving, and wound as the rotations are.
     for (field, size) in [(0, 0.4), (1, 1.0), (2, 1.0)] {
         let x = numbers(&mut random, size);
-        let field = [&mut state.q, &mut state.v, &mut state.a][field].as_mut_slice();
+        let field = [&mut state.q[..], &mut state.v[..], &mut state.a[..]].into_iter().nth(field).unwrap();
         scatter(&assembly, &x, field, 1.0);
     }
     for &slot in &model.charted.rotations {

@@ -192,7 +192,7 @@ struct Seen {
 impl Observer for Seen {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
         self.planar = at.system.pattern.equations.plane().is_some();
-        let fields = [&at.state.q, &at.state.v];
+        let fields = [&at.state.q[..], &at.state.v];
         let unknowns = fields.iter().flat_map(|field| field.iter().flat_map(|v| v.0));
         let energy = at.model.energy(at.state);
         self.rows.push(unknowns.chain([energy.strain, energy.kinetic]).collect());
@@ -352,7 +352,7 @@ fn pushes(text: &str, normal: Vec3) -> Vec<f64> {
     };
     let equations = model.begin_stage(0, stage.kind, &state).unwrap();
     let mut lift = state.q.clone();
-    for field in [&mut state.q, &mut state.v, &mut state.a, &mut lift] {
+    for field in [&mut state.q[..], &mut state.v, &mut state.a, &mut lift] {
         field.iter_mut().enumerate().for_each(|(slot, value)| *value = in_plane(slot));
     }
     let mut assembly = Assembly::new(&stage, equations, &model);

@@ -59,7 +59,7 @@ fn history(text: &str, count: usize) -> (Vec<[u64; 3]>, String) {
             let energies = [ledger.kinetic, ledger.strain, ledger.external, ledger.damped];
             assert!(ledger.strain == 0.0 || ledger.external != 0.0, "no work was counted");
             let numbers = energies.map(|energy| Vec3([energy; 3]));
-            let all = state.q.iter().chain(&state.v).chain(&state.wound).chain(&numbers);
+            let all = state.q.iter().chain(&state.v[..]).chain(&state.wound).chain(&numbers);
             all.map(|v| v.0.map(f64::to_bits)).collect()
         };
         (states.0.iter().flat_map(of_row).collect(), format!("{:?}", counters.evaluations))
@@ -103,7 +103,7 @@ fn turns_are_counted_the_same_on_any_number_of_threads() {
 
 fn shaken(model: &Model) -> State {
     let (mut state, mut random) = (model.rest(), Random::new(9));
-    for field in [&mut state.q, &mut state.v, &mut state.a] {
+    for field in [&mut state.q[..], &mut state.v, &mut state.a] {
         field.iter_mut().for_each(|value| *value = random.vector(0.01));
     }
     state.amplitude.fill(0.7);
@@ -125,7 +125,7 @@ fn regions_change_nothing_but_the_order_of_sums() {
         let weights = Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 };
         // Nothing of another state is left.
         let mut other = state.clone();
-        other.q.iter_mut().chain(&mut other.v).for_each(|value| *value = *value * -0.5);
+        other.q.iter_mut().chain(&mut other.v[..]).for_each(|value| *value = *value * -0.5);
         assembly.evaluate(&other, weights, None);
         assembly.evaluate(&state, weights, None);
         let cut = (forces(&assembly), assembly.system.values.clone());

@@ -158,7 +158,7 @@ impl Composer<'_> {
     fn multiplier(&mut self, kind: SlotKind, connection: &FoundJoint) -> u32 {
         let names = connection.nodes.into_iter().flatten().map(|node| &*self.mesh.nodes[node].name);
         let node = format!("joint of {}", names.collect::<Vec<_>>().join(" and "));
-        self.out.multipliers.push(SlotInfo { kind, node: node.into(), place: connection.place });
+        self.out.multipliers.push(SlotInfo { kind, node: node.into() });
         (self.mesh.slots() + self.out.multipliers.len() - 1) as u32
     }
 
