@@ -206,12 +206,12 @@ impl Run<'_> {
             self.counters.work.chart_switches += switched as u64;
             // Forces conjugate to total vectors, for reactions and the energy account.
             assembly.evaluate(&self.state, Weights::NONE, None);
-        } else {
+        } else if !rateless.is_empty() {
             // A rule for accelerations makes velocities that nothing resists swing from step to step, more and more.
-            for &slot in rateless.iter() {
-                self.state.v[slot] = (self.state.q[slot] - self.good.q[slot]) * (1.0 / step.length);
-                (self.state.a[slot], self.state.algorithmic[slot]) = (Vec3::ZERO, Vec3::ZERO);
-            }
+            let State { q, v, a, algorithmic, .. } = &mut self.state;
+            let (v, rates2) = (&mut v[..], [&mut a[..], &mut algorithmic[..]]);
+            rateless.iter().for_each(|&slot| v[slot] = (q[slot] - self.good.q[slot]) * (1.0 / step.length));
+            rates2.into_iter().for_each(|rates| rateless.iter().for_each(|&slot| rates[slot] = Vec3::ZERO));
         }
         let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;

@@ -313,10 +313,10 @@ pub(super) struct Workshop {
 impl<'o> Run<'o> {
     /// A run at its start.
     pub fn new(plan: Plan, observer: &'o mut dyn Observer) -> Self {
-        let model = plan.model.clone();
+        let (model, state) = (plan.model.clone(), plan.model.rest());
         Self {
-            state: model.rest(),
-            good: model.rest(),
+            good: state.clone(),
+            state,
             bookkeeper: Bookkeeper::default(),
             model,
             plan,

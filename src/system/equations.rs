@@ -40,7 +40,7 @@ pub struct Equations {
     frame: Vec<u32>,
     /// Local directions as columns
     frames: Vec<Mat3>,
-    /// Slot and local direction of each equation: three times the one, and the other.
+    /// Slot and local direction of each equation: four times the one, and the other.
     origin: Vec<u32>,
     /// The slots in which a direction is held, in planar scenes one that does not leave the plane anyway
     constrained: Vec<bool>,
@@ -102,7 +102,7 @@ impl Equations {
         let mut number = [Self::HELD; 3];
         for k in (0..3).filter(|&k| !is_held[k]) {
             number[k] = self.origin.len() as u32;
-            self.origin.push((3 * slot + k) as u32);
+            self.origin.push((4 * slot + k) as u32);
         }
         self.number.push(number);
         // Slots of one plane all have the same.
@@ -131,7 +131,7 @@ impl Equations {
 
     /// The number of equations of the slots before this one.
     pub fn before(&self, slot: usize) -> usize {
-        self.origin.partition_point(|&other| (other as usize) < 3 * slot)
+        self.origin.partition_point(|&other| (other as usize) < 4 * slot)
     }
 
     /// The equations of a slot, by local direction.
@@ -141,9 +141,10 @@ impl Equations {
     }
 
     /// The slot and the local direction of an equation.
+    #[inline]
     pub fn origin(&self, equation: usize) -> (Slot, u8) {
         let origin = self.origin[equation];
-        (origin / 3, (origin % 3) as u8)
+        (origin / 4, (origin % 4) as u8)
     }
 
     /// The turned axes of a slot as columns.
