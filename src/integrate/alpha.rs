@@ -15,7 +15,7 @@
 
 use super::Method;
 use crate::kernel::Weights;
-use crate::kernel::turn::StepCoefficients;
+use crate::kernel::turn::{StepCoefficients, Turn};
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
@@ -99,21 +99,20 @@ impl Step {
     pub fn predict(&self, state: &mut State, before: f64) {
         let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
         let stretch = h / before;
-        let State { q, v, a, algorithmic: filtered, turns, .. } = state;
-        let (rates, accelerations, filtered) = (&mut v[..], &mut a[..], &mut filtered[..]);
-        for slot in 0..q.len() {
-            if let Some(Some(turn)) = turns.get(slot) {
-                q[slot] = turn.guess();
-                (rates[slot], accelerations[slot]) = turn.rates(q[slot]);
-                continue;
+        each_part(state, |_, Part { q, v, a, algorithmic, turns }| {
+            for k in 0..q.len() {
+                if let Some(Some(turn)) = turns.get(k) {
+                    q[k] = turn.guess();
+                    (v[k], a[k]) = turn.rates(q[k]);
+                    continue;
+                }
+                let old = if stretch == 1.0 { algorithmic[k] } else { a[k] + (algorithmic[k] - a[k]) * stretch };
+                let new = if alpha_m == 0.0 { a[k] } else { (a[k] - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
+                q[k] += v[k] * h + (old * (0.5 - beta) + new * beta) * (h * h);
+                v[k] += (old * (1.0 - gamma) + new * gamma) * h;
+                algorithmic[k] = new;
             }
-            let (v, a) = (rates[slot], accelerations[slot]);
-            let old = if stretch == 1.0 { filtered[slot] } else { a + (filtered[slot] - a) * stretch };
-            let new = if alpha_m == 0.0 { a } else { (a - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
-            q[slot] += v * h + (old * (0.5 - beta) + new * beta) * (h * h);
-            rates[slot] += (old * (1.0 - gamma) + new * gamma) * h;
-            filtered[slot] = new;
-        }
+        });
     }
 
     /// The coefficients of a rotation over the step.
@@ -132,22 +131,40 @@ impl Method for Step {
 
     fn correct(&self, state: &mut State, dq: &[Vec3]) {
         let Weights { damping, mass, .. } = self.weights();
-        let algorithmic = 1.0 / (self.scheme.beta * self.length * self.length);
+        let filtered = 1.0 / (self.scheme.beta * self.length * self.length);
         // Where a motion is prescribed nothing is corrected, and rates stay as they are prescribed.
-        let State { q, v, a, algorithmic: filtered, turns, .. } = state;
-        let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(filtered.chunks_mut(PART));
-        let parts = q.chunks_mut(PART).zip(rates).zip(dq.chunks(PART)).enumerate();
-        threads::each(parts, |(number, ((q, ((v, a), filtered)), dq))| {
-            for (k, &dq) in dq.iter().enumerate().filter(|(_, dq)| **dq != Vec3::ZERO) {
+        each_part(state, |start, Part { q, v, a, algorithmic, turns }| {
+            let dq = dq[start..].iter().zip(0..q.len()).filter(|(dq, _)| **dq != Vec3::ZERO);
+            for (&dq, k) in dq {
                 q[k] += dq;
-                if let Some(Some(turn)) = turns.get(PART * number + k) {
+                if let Some(Some(turn)) = turns.get(k) {
                     (v[k], a[k]) = turn.rates(q[k]);
                     continue;
                 }
                 v[k] += dq * damping;
                 a[k] += dq * mass;
-                filtered[k] += dq * algorithmic;
+                algorithmic[k] += dq * filtered;
             }
         });
     }
+}
+
+/// Some slots that follow each other, of a state.
+struct Part<'a> {
+    q: &'a mut [Vec3],
+    v: &'a mut [Vec3],
+    a: &'a mut [Vec3],
+    algorithmic: &'a mut [Vec3],
+    /// From the first of them on, where there are any
+    turns: &'a [Option<Turn>],
+}
+
+/// Does something with each part of a state, which begins at a slot: parts at once.
+fn each_part(state: &mut State, work: impl Fn(usize, Part) + Send + Sync) {
+    let State { q, v, a, algorithmic, turns, .. } = state;
+    let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(algorithmic.chunks_mut(PART));
+    threads::each(q.chunks_mut(PART).zip(rates).enumerate(), |(number, (q, ((v, a), algorithmic)))| {
+        let start = PART * number;
+        work(start, Part { q, v, a, algorithmic, turns: turns.get(start..).unwrap_or_default() });
+    });
 }

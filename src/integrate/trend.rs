@@ -81,9 +81,11 @@ impl Trend {
         let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) else { return };
         self.taken = best;
         let mut foreseen = vec![0.0; equations.count()];
-        for (past, factor) in self.past.iter().zip(factors) {
-            foreseen.iter_mut().zip(&past.correction).for_each(|(sum, part)| *sum += part * factor);
-        }
+        threads::each_part(&mut foreseen, |start, sums| {
+            for (past, factor) in self.past.iter().zip(factors) {
+                sums.iter_mut().zip(&past.correction[start..]).for_each(|(sum, part)| *sum += part * factor);
+            }
+        });
         let mut dq = vec![Vec3::ZERO; state.q.len()];
         equations.scatter(&foreseen, None, &mut dq);
         step.correct(state, &dq);
@@ -146,15 +148,17 @@ impl Trend {
     /// By way, the sum of squares of what it leaves of a force.
     fn rests(&self, force: &[f64], factors: &[Option<Factors>; WAYS.len()]) -> [f64; WAYS.len()] {
         let factors = factors.map(|factors| factors.unwrap_or_default());
-        let mut sums = [0.0; WAYS.len()];
-        for (equation, force) in force.iter().enumerate() {
-            let past: Factors = from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force[equation]));
-            for (sum, factors) in sums.iter_mut().zip(&factors) {
-                let foreseen = past[0] * factors[0] + past[1] * factors[1] + past[2] * factors[2];
-                *sum += (force - foreseen).powi(2);
+        threads::sums(force.len(), |equations| {
+            let mut sums = [0.0; WAYS.len()];
+            for equation in equations {
+                let past: Factors = from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force[equation]));
+                for (sum, factors) in sums.iter_mut().zip(&factors) {
+                    let foreseen = past[0] * factors[0] + past[1] * factors[1] + past[2] * factors[2];
+                    *sum += (force[equation] - foreseen).powi(2);
+                }
             }
-        }
-        sums
+            sums
+        })
     }
 }
 

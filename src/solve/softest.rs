@@ -60,6 +60,7 @@ impl LinearSolver {
             return Some(NullVector { motion: entries.clone(), entries, held: false });
         }
         let scale = scales(system, &diagonal);
+        drop(diagonal);
         let mut x = threads::list(scale.len(), |k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract());
         let scaled = |x: &mut [f64], by: f64| {
             threads::each_part(x, |start, x| x.iter_mut().zip(&scale[start..]).for_each(|(x, s)| *x *= s / by));
