@@ -165,11 +165,12 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let assembly = Assembly::new(&context, equations, &model);
     let entries = assembly.system.pattern.nonzeros();
     // The tangent and its factors, the places of its blocks, the state and its copies.
-    let bytes = 2 * 8 * assembly.system.pattern.values() + 24 * 16 * slots;
+    let pattern = &assembly.system.pattern;
+    let bytes = 8 * (pattern.values() + pattern.values_of_factors()) + 24 * 16 * slots;
     say::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),
-        scene.mesh.elements,
+        scene.mesh.element_count,
         3 * slots,
         bytes as f64 / 1e6
     ));

@@ -34,7 +34,7 @@ pub fn check(deck: &Path, scene: &Scene, seconds: Option<f64>) {
         "check",
         json!({
             "deck": deck,
-            "elements": scene.mesh.elements,
+            "elements": scene.mesh.element_count,
             "nodes": scene.mesh.nodes.len(),
             "unknowns": scene.plan.model.slots.len() * 3,
             "effects": effects,

@@ -298,7 +298,7 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
     let planar = scene.reasons.iter().filter(|r| r.active && r.name == "planar").map(|r| r.name);
     let evaluated = counters.evaluations.iter().filter(|(_, count)| *count > 0).map(|(name, _)| *name);
     let acting = planar.chain(evaluated).collect::<Vec<_>>().join(", ");
-    say::line(&format!("  {} elements, {unknowns} unknowns; {acting}", scene.mesh.elements));
+    say::line(&format!("  {} elements, {unknowns} unknowns; {acting}", scene.mesh.element_count));
     say::line(&format!(
         "  {} steps, {} iterations, {} cut-backs, {} chart switches, {} mixed elements in {seconds:.3} s{}",
         counters.steps,

@@ -75,7 +75,7 @@ impl BeamElement<'_> {
     }
 
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
-        let (piece, range) = self.beam.stretch(self.number);
+        let (piece, range) = self.beam.part_of_line(self.number);
         let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
         let stretch = self.between(&slope);
         let jacobian = stretch.norm();
@@ -93,7 +93,7 @@ impl BeamElement<'_> {
 
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
-        let ((piece, _), line) = (self.beam.stretch(self.number), &self.beam.line);
+        let ((piece, _), line) = (self.beam.part_of_line(self.number), &self.beam.line);
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
 
@@ -117,8 +117,8 @@ pub struct MeshBeam {
     pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
     pub elements: Range<usize>,
-    /// How many of them lie on each piece of its centre line
-    counts: Vec<usize>,
+    /// Where those on each piece of its centre line begin, counted from its first, and at last their number
+    piece_starts: Vec<usize>,
     /// Nodes of an element, less one
     pub order: usize,
     /// How rotations are interpolated
@@ -139,13 +139,11 @@ impl MeshBeam {
     }
 
     /// The piece of the centre line that an element lies on, and from where to where on that, from 0 to 1.
-    fn stretch(&self, element: usize) -> (usize, [f64; 2]) {
-        let (mut piece, mut number) = (0, element - self.elements.start);
-        while number >= self.counts[piece] {
-            number -= self.counts[piece];
-            piece += 1;
-        }
-        let count = self.counts[piece] as f64;
+    fn part_of_line(&self, element: usize) -> (usize, [f64; 2]) {
+        let number = element - self.elements.start;
+        let piece = self.piece_starts.partition_point(|&start| start <= number) - 1;
+        let (start, end) = (self.piece_starts[piece], self.piece_starts[piece + 1]);
+        let (number, count) = (number - start, (end - start) as f64);
         (piece, [number as f64 / count, (number + 1) as f64 / count])
     }
 }
@@ -158,7 +156,7 @@ pub struct Mesh {
     /// The beams
     pub beams: Vec<MeshBeam>,
     /// The number of elements, beam after beam
-    pub elements: usize,
+    pub element_count: usize,
     /// The node of each named point that is one: the first-named beam's where a joint parts it
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
@@ -337,7 +335,7 @@ impl Mesh {
         let corners: Vec<Option<&str>> = corner_names(&beam.path);
         let between =
             named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
-        let first_element = self.elements;
+        let first_element = self.element_count;
         let (mut nodes, mut fractions) = (Vec::new(), Vec::new());
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
@@ -353,8 +351,9 @@ impl Mesh {
                 fractions.push(line.fraction(piece, t));
             }
         }
-        let mut first_node = 0;
+        let (mut first_node, mut piece_starts) = (0, vec![0]);
         for piece in 0..line.pieces.len() {
+            piece_starts.push(piece_starts[piece] + count(piece));
             for _ in 0..count(piece) {
                 let own = &nodes[first_node..=first_node + beam.order];
                 if own.iter().enumerate().any(|(i, a)| own[..i].contains(a)) {
@@ -363,7 +362,7 @@ impl Mesh {
                         .push(Diagnostic::error(message, beam.elements.span.clone()).help("use more `elements`"));
                     return;
                 }
-                self.elements += 1;
+                self.element_count += 1;
                 first_node += beam.order;
             }
         }
@@ -372,8 +371,8 @@ impl Mesh {
             nodes,
             fractions,
             numbered: beam.numbering.as_ref().map(|numbering| fractions_of(&line, &numbering.value)),
-            elements: first_element..self.elements,
-            counts: (0..line.pieces.len()).map(count).collect(),
+            elements: first_element..self.element_count,
+            piece_starts,
             order: beam.order,
             interpolation: beam.interpolation,
             free_strain: beam.free_strain.clone(),

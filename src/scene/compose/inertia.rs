@@ -21,8 +21,8 @@ impl Composer<'_> {
     /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
     pub(super) fn beam_inertia(&mut self) {
         let names = ["beam mass", "rotary inertia", "eccentric section inertia", "section inertia at nodes"];
-        if !self.dynamic || self.mesh.elements == 0 {
-            let why = if self.mesh.elements == 0 { "no beams" } else { "no dynamic stage" };
+        if !self.dynamic || self.mesh.element_count == 0 {
+            let why = if self.mesh.element_count == 0 { "no beams" } else { "no dynamic stage" };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
         let wanted = self.deck.effects.allow(EffectWord::RotaryInertia);
@@ -185,7 +185,7 @@ impl Composer<'_> {
             return self.reason("gravity on bodies", false, why);
         };
         let Some(amplitude) = self.amplitude(None, None) else { return };
-        if self.mesh.elements == 0 {
+        if self.mesh.element_count == 0 {
             self.reason("gravity on beams", false, "no beams");
         } else {
             let mut elements = ByOrder::default();

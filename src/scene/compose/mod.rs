@@ -151,7 +151,7 @@ impl Composer<'_> {
 
     /// Parts of the mechanics that [effects] may switch off.
     fn formulation(&mut self) {
-        let beams = self.mesh.elements > 0;
+        let beams = self.mesh.element_count > 0;
         let (large, linear) = ("large rotations", "switched off in [effects]: static and dynamic stages are linear");
         match self.deck.effects.allow(EffectWord::LargeRotations) {
             true => self.reason(large, true, "forces and tangents of the present state"),
@@ -196,7 +196,11 @@ impl Composer<'_> {
         });
         elements.shrink_to_fit();
         if elements.is_empty() {
-            return self.reason(I::NAME, false, if self.mesh.elements == 0 { "no beams" } else { "no such beams" });
+            return self.reason(
+                I::NAME,
+                false,
+                if self.mesh.element_count == 0 { "no beams" } else { "no such beams" },
+            );
         }
         let count = elements.two.len() + elements.three.len() + elements.four.len();
         let effect = BeamElasticity::<I>::new(elements);
