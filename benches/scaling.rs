@@ -1,7 +1,7 @@
 //! Microseconds per element and Newton iteration, split into evaluation, assembly and solve, for chains of 10 to 100,000
 //! elements in statics and dynamics.
 //!
-//! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only.
+//! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only, `-- --elements 10000,1000000` these.
 
 use beamsim::drive::{Failure, Observer, Run, Snapshot};
 use beamsim::effect::Noise;
@@ -149,9 +149,21 @@ fn row(elements: usize, dynamic: bool, interpolation: &str) {
     );
 }
 
+/// The numbers of elements that are asked for.
+fn sizes() -> Vec<usize> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let is_asked = |name: &str| arguments.iter().position(|argument| argument == name);
+    if let Some(list) = is_asked("--elements").and_then(|place| arguments.get(place + 1)) {
+        return list.split(',').map(|size| size.parse().expect("a number of elements")).collect();
+    }
+    match is_asked("--smoke").or(is_asked("--test")) {
+        Some(_) => vec![10, 100],
+        None => vec![10, 100, 1_000, 10_000, 100_000],
+    }
+}
+
 fn main() {
-    let smoke = std::env::args().any(|argument| argument == "--smoke" || argument == "--test");
-    let sizes: &[usize] = if smoke { &[10, 100] } else { &[10, 100, 1_000, 10_000, 100_000] };
+    let sizes = &sizes()[..];
     println!("microseconds per element and iteration");
     println!(
         "{:<8} {:<9} {:>8} {:>11} {:>9} {:>9} {:>9}",
@@ -167,6 +179,6 @@ fn main() {
         .for_each(|name| print!(" {name:>9}"));
     println!();
     for (dynamic, interpolation) in [false, true].into_iter().flat_map(|dynamic| WAYS.map(|way| (dynamic, way))) {
-        sizes.iter().skip(1).for_each(|&elements| parts(elements, dynamic, interpolation));
+        sizes.iter().filter(|&&elements| elements > 10).for_each(|&elements| parts(elements, dynamic, interpolation));
     }
 }

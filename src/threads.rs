@@ -104,11 +104,11 @@ pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
         to.clear();
         return to.extend_from_slice(from);
     }
-    put(to, from);
+    copy_over(to, from);
 }
 
 /// Copies a list over another one, which is as long.
-pub fn put<T: Copy + Send + Sync>(to: &mut [T], from: &[T]) {
+pub fn copy_over<T: Copy + Send + Sync>(to: &mut [T], from: &[T]) {
     each_part(to, |start, to| to.copy_from_slice(&from[start..start + to.len()]));
 }
 

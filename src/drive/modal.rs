@@ -136,7 +136,7 @@ fn softest_ratio(system: &System, matrices: &Matrices) -> Option<f64> {
 fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
     let pattern = &system.pattern;
     let is_multiplier: Vec<bool> = (0..pattern.equations.count())
-        .map(|k| model.slots[pattern.equations.direction(k).slot as usize].is_multiplier())
+        .map(|k| model.kinds[pattern.equations.direction(k).slot as usize].is_multiplier())
         .collect();
     for (column, &own) in is_multiplier.iter().enumerate() {
         for entry in pattern.entries(column as u32).filter(|entry| own || is_multiplier[entry.row as usize]) {

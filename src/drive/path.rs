@@ -556,7 +556,7 @@ fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
 /// The rate of the displacement that the loads do work on; `None` without loads. What stands at multipliers are gaps of motors,
 /// not forces.
 fn work_of_loads(run: &Run, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
-    let acting = || pull.iter().zip(rate).zip(run.model.slots.iter()).filter(|(_, info)| !info.is_multiplier());
+    let acting = || pull.iter().zip(rate).zip(run.model.slots.iter()).filter(|(_, info)| !info.kind.is_multiplier());
     let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
     loaded.then(|| acting().map(|((force, d), _)| -force.dot(*d)).sum())
 }

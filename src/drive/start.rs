@@ -55,8 +55,9 @@ impl Run<'_> {
         self.refuse_open_joints(workshop)?;
         workshop.assembly.system.forget_forces();
         let Some(impulse) = self.solve_with_mass(workshop, &rates)? else { return Ok(()) };
-        for (slot, _) in self.model.slots.iter().enumerate().filter(|(_, info)| !info.is_multiplier()) {
-            self.state.v[slot] += impulse[slot];
+        let moves = self.model.kinds.iter().map(|kind| !kind.is_multiplier());
+        for ((v, impulse), _) in self.state.v.iter_mut().zip(impulse).zip(moves).filter(|(_, moves)| *moves) {
+            *v += impulse;
         }
         Ok(())
     }
@@ -97,7 +98,7 @@ impl Run<'_> {
         };
         let (multipliers, accelerations) = (&mut self.state.q[..], &mut self.state.a[..]);
         for (slot, info) in self.model.slots.iter().enumerate() {
-            let field = if info.is_multiplier() { &mut *multipliers } else { &mut *accelerations };
+            let field = if info.kind.is_multiplier() { &mut *multipliers } else { &mut *accelerations };
             field[slot] += solved[slot];
         }
         // The forces of the start, for reactions and the energy account.
@@ -156,7 +157,7 @@ fn set_in_motion(state: &mut State, motion: &InitialMotion) {
 /// zero. They are the null directions of the diagonal blocks.
 fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f64]) {
     let is_massive = threads::list(model.slots.len(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
-    for slot in (0..model.slots.len()).filter(|&slot| !(is_massive[slot] || model.slots[slot].is_multiplier())) {
+    for slot in (0..model.slots.len()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
         let numbers = system.pattern.equations.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
         let (block, weight) = with_mass_where_held(system, slot as Slot);
@@ -224,7 +225,7 @@ impl Run<'_> {
         };
         let (massive, damped) = (touched(Weights::MASS), touched(Weights::DAMPING));
         workshop.assembly.evaluate(&self.state, Weights::NONE, None);
-        let rateless = |&slot: &usize| !(massive[slot] || damped[slot] || self.model.slots[slot].is_multiplier());
+        let rateless = |&slot: &usize| !(massive[slot] || damped[slot] || self.model.kinds[slot].is_multiplier());
         workshop.rateless = (0..massive.len()).filter(rateless).collect();
         workshop.massive = massive;
     }

@@ -60,7 +60,7 @@ struct Past {
 impl Trend {
     /// For a stage of a scene.
     pub fn new(model: &Model) -> Self {
-        let weight = |kind: SlotKind| if kind.is_of_multipliers() { 0.0 } else { 1.0 / kind.arm(model.length) };
+        let weight = |kind: SlotKind| if kind.is_multiplier() { 0.0 } else { 1.0 / kind.arm(model.length) };
         Self { kinds: model.kinds.clone(), weights: SlotKind::ALL.map(weight), ..Self::default() }
     }
 

@@ -55,8 +55,8 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
                 state.algorithmic[slot] = change.b * state.algorithmic[slot] + change.b_rate * velocity + drift * lag;
             }
             state.q[slot] = change.p;
-            state.v[slot] = change.velocity;
-            state.a[slot] = change.acceleration;
+            state.v.put(slot, change.velocity);
+            state.a.put(slot, change.acceleration);
             switched += 1;
         }
     }

@@ -49,7 +49,7 @@ impl SlotKind {
     pub const ALL: [Self; 4] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment];
 
     /// Whether it is one of multipliers: no unknowns of motion, and what stands in the place of forces are gaps.
-    pub fn is_of_multipliers(self) -> bool {
+    pub fn is_multiplier(self) -> bool {
         matches!(self, Self::Force | Self::Moment)
     }
 
@@ -78,19 +78,9 @@ pub struct ElementInfo {
 }
 
 impl SlotInfo {
-    /// Whether it holds multipliers, see [`SlotKind::is_of_multipliers`].
-    pub fn is_multiplier(&self) -> bool {
-        self.kind.is_of_multipliers()
-    }
-
     /// What its unknowns are compared with: a length for displacements, 1 for rotations.
     pub fn scale(&self, length: f64) -> f64 {
         if self.kind == SlotKind::Displacement { length } else { 1.0 }
-    }
-
-    /// See [`SlotKind::arm`].
-    pub fn arm(&self, length: f64) -> f64 {
-        self.kind.arm(length)
     }
 }
 

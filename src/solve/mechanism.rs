@@ -36,7 +36,7 @@ impl Limp {
         }
         let (largest, motion) = vector.by_slot(&assembly.system.pattern.equations, state.q.len());
         // What moves may be the multiplier of a condition that is said twice: no strain stands in its way.
-        let moves = !model.slots[largest].is_multiplier();
+        let moves = !model.kinds[largest].is_multiplier();
         let size = if moves { size(model, &motion) } else { 0.0 };
         let strains = size > 0.0 && assembly.strain_of(state, &motion, model.length) > NO_STRAIN * size;
         Some(Self { vector, strains, moves })

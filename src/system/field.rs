@@ -12,7 +12,7 @@ pub struct Field(Arc<[Vec3]>);
 impl Field {
     /// Zero at so many slots.
     pub fn zero(slots: usize) -> Self {
-        Self(threads::filled(slots, Vec3::ZERO).into())
+        Self(std::iter::repeat_n(Vec3::ZERO, slots).collect())
     }
 
     /// Puts a value at a slot, where another one stands there.
@@ -29,7 +29,7 @@ impl Field {
             return;
         }
         match Arc::get_mut(&mut self.0) {
-            Some(own) => threads::put(own, &other.0),
+            Some(own) => threads::copy_over(own, &other.0),
             None => self.0 = other.0.clone(),
         }
     }

@@ -224,6 +224,12 @@ impl Pattern {
         self.width() * self.width() * self.tiles()
     }
 
+    /// The number of values of its factors, where they do not fill up: LU keeps both sides.
+    pub fn values_of_factors(&self) -> usize {
+        let tiles = self.groups.count() + if self.symmetry == Symmetry::Whole { 1 } else { 2 } * self.pairs();
+        self.width() * self.width() * tiles
+    }
+
     /// The tiles in a column that are kept.
     #[inline]
     pub fn tiles_of(&self, column: usize) -> std::ops::Range<usize> {

@@ -3,7 +3,7 @@
 use crate::decks::decks;
 use crate::random::Random;
 use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::model::{Assembly, Model, StageContext, StageKind};
+use beamsim::model::{Assembly, Model, SlotKind, StageContext, StageKind, charts};
 use beamsim::scene;
 use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, is_symmetric};
 use beamsim::system::{
@@ -11,6 +11,7 @@ use beamsim::system::{
 };
 use beamsim::tensor::{Mat3, Vec3};
 use nalgebra::DMatrix;
+use std::f64::consts::PI;
 
 const SYMMETRIES: [Symmetry; 3] = [Symmetry::Whole, Symmetry::BetweenGroups, Symmetry::None];
 
@@ -344,6 +345,25 @@ fn nets_are_left_to_faer() {
     assert_eq!(LinearSolver::new(&system, &[]).unwrap().name(), "sparse LU");
 }
 
+/// Of several effects the least symmetric one counts, and of one whether it couples nodes at all.
+#[test]
+fn what_sits_at_single_nodes_leaves_halves() {
+    let groups = Groups::new(6, Layout::Spatial, |slot| slot % 2 == 1);
+    let clique = |slots: &[u32]| {
+        let mut cliques = Cliques::default();
+        cliques.push(slots.iter().copied());
+        cliques
+    };
+    let (own, between, parted) = (clique(&[2, 3]), clique(&[0, 1, 2, 3]), clique(&[2, 5]));
+    let of = |effects: &[(&Cliques, bool)]| Symmetry::of(effects.iter().copied(), &groups);
+    assert_eq!(of(&[]), Symmetry::Whole);
+    assert_eq!(of(&[(&between, true), (&own, true)]), Symmetry::Whole);
+    assert_eq!(of(&[(&between, true), (&own, false)]), Symmetry::BetweenGroups);
+    assert_eq!(of(&[(&between, false), (&own, false)]), Symmetry::None);
+    // Its displacement belongs to another node.
+    assert_eq!(of(&[(&between, true), (&parted, false)]), Symmetry::None);
+}
+
 /// Effects that call their tangent symmetric are taken at their word: one half of it is kept, be it only between nodes.
 #[test]
 fn what_is_called_symmetric_is() {
@@ -364,34 +384,46 @@ fn what_is_called_symmetric_is() {
             continue;
         }
         model.set_clock(&mut state, 0.1, 0.7);
-        let rates = stage.kind == StageKind::Dynamic;
-        for (slot, info) in model.slots.iter().enumerate() {
-            let mut any = || random.vector(0.1 * model.length / info.arm(model.length));
-            state.q[slot] += any();
-            if rates {
-                (state.v[slot], state.a[slot]) = (any(), any());
+        for turned in [false, true] {
+            shake(&model, &stage, turned, &mut state, &mut random);
+            let weights = Weights { stiffness: 1.0, damping: 0.3, mass: 0.2 };
+            assembly.evaluate(&state, weights, None);
+            let (half, whole) = (&assembly.system, whole_tangent(&assembly, &model, &stage, &state, weights));
+            assert!(!whole.pattern.symmetry.halves(), "{}", path.display());
+            if symmetry == Symmetry::Whole {
+                assert!(is_symmetric(&whole.pattern, &whole.values), "{}", path.display());
             }
+            assert_eq!(
+                (half.pattern.nonzeros(), half.pattern.pairs()),
+                (whole.pattern.nonzeros(), whole.pattern.pairs())
+            );
+            let x: Vec<f64> = (0..half.pattern.equations.count()).map(|_| random.range(-1.0, 1.0)).collect();
+            let products = [half, &whole].map(|system| system.multiply(&system.values, &x));
+            let sizes = whole.multiply(&whole.values.iter().map(|v| v.abs()).collect::<Vec<_>>(), &vec![1.0; x.len()]);
+            let apart = products[0].iter().zip(&products[1]).zip(&sizes);
+            // Numbers that small have lost digits of their own.
+            let near = |((a, b), size): ((&f64, &f64), &f64)| (a - b).abs() <= 1e-12 * size.max(1e-280);
+            assert!(apart.clone().all(near), "{}", path.display());
+            assert!(half.residual(&products[1], &x, &mut Leftover::default()) < 1e-12, "{}", path.display());
+            [half, &whole].into_iter().for_each(own_blocks_are_entries);
         }
-        let weights = Weights { stiffness: 1.0, damping: 0.3, mass: 0.2 };
-        assembly.evaluate(&state, weights, None);
-        let (half, whole) = (&assembly.system, whole_tangent(&assembly, &model, &stage, &state, weights));
-        assert!(!whole.pattern.symmetry.halves(), "{}", path.display());
-        if symmetry == Symmetry::Whole {
-            assert!(is_symmetric(&whole.pattern, &whole.values), "{}", path.display());
-        }
-        assert_eq!((half.pattern.nonzeros(), half.pattern.pairs()), (whole.pattern.nonzeros(), whole.pattern.pairs()));
-        let x: Vec<f64> = (0..half.pattern.equations.count()).map(|_| random.range(-1.0, 1.0)).collect();
-        let products = [half, &whole].map(|system| system.multiply(&system.values, &x));
-        let sizes = whole.multiply(&whole.values.iter().map(|v| v.abs()).collect::<Vec<_>>(), &vec![1.0; x.len()]);
-        let apart = products[0].iter().zip(&products[1]).zip(&sizes);
-        // Numbers that small have lost digits of their own.
-        let near = |((a, b), size): ((&f64, &f64), &f64)| (a - b).abs() <= 1e-12 * size.max(1e-280);
-        assert!(apart.clone().all(near), "{}", path.display());
-        assert!(half.residual(&products[1], &x, &mut Leftover::default()) < 1e-12, "{}", path.display());
-        [half, &whole].into_iter().for_each(own_blocks_are_entries);
         *(if symmetry == Symmetry::Whole { &mut symmetric } else { &mut between }) += 1;
     }
     assert!(symmetric > 50 && between > 20, "{symmetric} and {between}");
+}
+
+/// Somewhere, moving where a stage moves; where all is `turned`, half a turn away, so that neighbours sit in different charts.
+fn shake(model: &Model, stage: &StageContext, turned: bool, state: &mut State, random: &mut Random) {
+    let about = random.vector(1.0).normalized().unwrap() * if turned { PI } else { 0.0 };
+    for (slot, info) in model.slots.iter().enumerate() {
+        let mut any = || random.vector(0.1 * model.length / info.kind.arm(model.length));
+        state.q[slot] = any() + if info.kind == SlotKind::Rotation { about } else { Vec3::ZERO };
+        if stage.kind == StageKind::Dynamic {
+            (state.v[slot], state.a[slot]) = (any(), any());
+        }
+    }
+    charts::switch(state, &model.charted.rotations, charts::DYNAMIC_BAND, None);
+    charts::freeze(state, &model.charted.elements);
 }
 
 /// Blocks and entries on the diagonal are those that a search finds.

@@ -27,7 +27,7 @@ fn deck(stage: &str, order: usize, planar: bool) -> String {
 }
 
 const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 2";
-const DYNAMIC: &str = "[damping]\nmass = 0.1\nstiffness = 1e-4\n[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01";
+const DYNAMIC: &str = "[damping]\nmass = 0.1\nstiffness = 1e-4\n[[stage]]\nkind = \"dynamic\"\nend = 0.06\nstep = 0.01";
 
 const TURNING: &str = "[[stage]]\nkind = \"static\"\nframe = { spin = [0, 0, 0.05], about = [0, 0, 0] }\nsteps = 1";
 
