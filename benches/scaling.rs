@@ -152,11 +152,11 @@ fn row(elements: usize, dynamic: bool, interpolation: &str) {
 /// The numbers of elements that are asked for.
 fn sizes() -> Vec<usize> {
     let arguments: Vec<String> = std::env::args().collect();
-    let is_asked = |name: &str| arguments.iter().position(|argument| argument == name);
-    if let Some(list) = is_asked("--elements").and_then(|place| arguments.get(place + 1)) {
+    let place_of = |name: &str| arguments.iter().position(|argument| argument == name);
+    if let Some(list) = place_of("--elements").and_then(|place| arguments.get(place + 1)) {
         return list.split(',').map(|size| size.parse().expect("a number of elements")).collect();
     }
-    match is_asked("--smoke").or(is_asked("--test")) {
+    match place_of("--smoke").or(place_of("--test")) {
         Some(_) => vec![10, 100],
         None => vec![10, 100, 1_000, 10_000, 100_000],
     }
@@ -179,6 +179,7 @@ fn main() {
         .for_each(|name| print!(" {name:>9}"));
     println!();
     for (dynamic, interpolation) in [false, true].into_iter().flat_map(|dynamic| WAYS.map(|way| (dynamic, way))) {
+        // Parts of ten elements are over before a clock ticks often enough.
         sizes.iter().filter(|&&elements| elements > 10).for_each(|&elements| parts(elements, dynamic, interpolation));
     }
 }

@@ -44,9 +44,8 @@ impl Bookkeeper {
     pub fn open(&mut self, model: &Model, state: &State, system: &System) {
         self.drives = model.drives(state);
         self.force = threads::list(state.q.len(), |slot| outside(system, slot));
-        if system.has(Category::Damping) {
-            threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
-        }
+        // Where nothing damps it is empty.
+        threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
         self.take(model, state);
     }
 
@@ -55,9 +54,7 @@ impl Bookkeeper {
         let Self { ledger, q, wound, force, drag, .. } = self;
         let way = Way { kinds: &model.kinds, from: (q, wound), to: (&state.q, &state.wound) };
         ledger.external += way.work(force, |slot| outside(system, slot));
-        if system.has(Category::Damping) {
-            ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
-        }
+        ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
         let drives = model.drives(state);
         for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
             ledger.external += 0.5 * (f0 + f1) * (x1 - x0);

@@ -99,7 +99,7 @@ impl Step {
     pub fn predict(&self, state: &mut State, before: f64) {
         let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
         let stretch = h / before;
-        each_stretch(state, |_, Stretch { q, v, a, algorithmic, turns }| {
+        each_part(state, |_, Slots { q, v, a, algorithmic, turns }| {
             for k in 0..q.len() {
                 if let Some(Some(turn)) = turns.get(k) {
                     q[k] = turn.guess();
@@ -133,9 +133,9 @@ impl Method for Step {
         let Weights { damping, mass, .. } = self.weights();
         let filtered = 1.0 / (self.scheme.beta * self.length * self.length);
         // Where a motion is prescribed nothing is corrected, and rates stay as they are prescribed.
-        each_stretch(state, |start, Stretch { q, v, a, algorithmic, turns }| {
-            let dq = dq[start..].iter().zip(0..q.len()).filter(|(dq, _)| **dq != Vec3::ZERO);
-            for (&dq, k) in dq {
+        each_part(state, |start, Slots { q, v, a, algorithmic, turns }| {
+            let dq = dq[start..start + q.len()].iter().enumerate();
+            for (k, &dq) in dq.filter(|(_, dq)| **dq != Vec3::ZERO) {
                 q[k] += dq;
                 if let Some(Some(turn)) = turns.get(k) {
                     (v[k], a[k]) = turn.rates(q[k]);
@@ -150,7 +150,7 @@ impl Method for Step {
 }
 
 /// Some slots that follow each other, of a state.
-struct Stretch<'a> {
+struct Slots<'a> {
     q: &'a mut [Vec3],
     v: &'a mut [Vec3],
     a: &'a mut [Vec3],
@@ -159,12 +159,12 @@ struct Stretch<'a> {
     turns: &'a [Option<Turn>],
 }
 
-/// Does something with each stretch of a state, which begins at a slot: stretches at once.
-fn each_stretch(state: &mut State, work: impl Fn(usize, Stretch) + Send + Sync) {
+/// Does something with each part of a state, which begins at a slot: parts at once.
+fn each_part(state: &mut State, work: impl Fn(usize, Slots) + Send + Sync) {
     let State { q, v, a, algorithmic, turns, .. } = state;
     let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(algorithmic.chunks_mut(PART));
     threads::each(q.chunks_mut(PART).zip(rates).enumerate(), |(number, (q, ((v, a), algorithmic)))| {
         let start = PART * number;
-        work(start, Stretch { q, v, a, algorithmic, turns: turns.get(start..).unwrap_or_default() });
+        work(start, Slots { q, v, a, algorithmic, turns: turns.get(start..).unwrap_or_default() });
     });
 }

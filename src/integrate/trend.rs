@@ -212,6 +212,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_learnt_does_not_depend_on_threads() {
+        let learnt = || {
+            let mut trend = Trend::default();
+            for step in 1..=6 {
+                let force: Vec<f64> =
+                    (0..5 * threads::PART).map(|k| (k as f64 * f64::from(step * step)).sin()).collect();
+                trend.learn(Past { length: 1.0, correction: force.clone(), force });
+            }
+            trend.missed.map(|missed| missed.map(f64::to_bits))
+        };
+        let alone = learnt();
+        assert!(alone.iter().all(Option::is_some));
+        assert_eq!(threads::on(3, learnt), alone);
+    }
+
+    #[test]
     fn forgotten_steps_are_not_gone_on_with() {
         let mut trend = with(&[1.0, 1.0, 1.0]);
         assert_eq!(trend.best(), 1);

@@ -120,11 +120,6 @@ impl System {
         }
     }
 
-    /// Whether something may add to a category.
-    pub fn has(&self, category: Category) -> bool {
-        self.acting.contains(&(category as usize))
-    }
-
     /// The force of a category at a slot.
     #[inline]
     pub fn part_of(&self, category: Category, slot: usize) -> Vec3 {

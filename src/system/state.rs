@@ -99,7 +99,7 @@ impl State {
         Cow::Owned(still)
     }
 
-    /// Takes over another state of the same scene without allocating.
+    /// Takes over another state of the same scene, into the memory that it has.
     pub fn copy_from(&mut self, other: &Self) {
         self.copy_rates(other);
         self.copy_all_but_rates(other);
