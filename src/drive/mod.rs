@@ -7,6 +7,7 @@ mod dynamics;
 mod failure;
 mod grid;
 mod guard;
+mod handover;
 mod ledger;
 mod levels;
 mod modal;

@@ -362,6 +362,7 @@ impl<'o> Run<'o> {
             self.warn_of_frame();
             self.warn_of_loss(&workshop);
             result?;
+            self.hand_over(&mut workshop);
             self.model.end_stage(&self.state);
         }
         Ok(())

@@ -35,6 +35,10 @@ enum Reached {
     Over,
 }
 
+/// What helps a stage that took over much from a motion.
+const IN_MOTION: &str =
+    " (the stage began in motion, whose forces fade: `[damping]` in the dynamic stage before it leaves less of them)";
+
 impl Run<'_> {
     /// All levels of a static stage.
     pub(super) fn run_static(
@@ -69,6 +73,7 @@ impl Run<'_> {
         self.state.q = held;
         charts::switch(&mut self.state, &self.model.charted.rotations, charts::STATIC_BAND, None);
         charts::freeze(&mut self.state, &self.model.charted.elements);
+        self.take_over(workshop);
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
@@ -163,8 +168,9 @@ impl Run<'_> {
             _ => {}
         }
         let (at, steps) = (self.moment(), self.counters.steps);
+        let motion = if self.state.fading.is_empty() { "" } else { IN_MOTION };
         self.observer
-            .warn(&format!("load control stands still at {at}: the path is followed by arc length from there"));
+            .warn(&format!("load control stands still at {at}: the path is followed by arc length from there{motion}"));
         let arrival = self.detour(workshop, &levels.start, target, levels.level.clamp(DETOUR.0, DETOUR.1));
         let (end, increments) = (self.moment(), self.counters.steps - steps);
         let limit = Failure::LimitPoint { at, goal: target, increments, end };

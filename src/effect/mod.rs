@@ -5,6 +5,7 @@
 pub mod beam_elasticity;
 pub mod beam_mass;
 pub mod elastic_element;
+pub mod fading_inertia;
 pub mod gravity;
 pub mod interpolation;
 pub mod joint;

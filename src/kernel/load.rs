@@ -6,7 +6,7 @@ use super::element::{NodeMotion, Weights};
 use super::inertia::Inertia;
 use super::volume::{Blocks, VolumeForce, VolumeKernel};
 use crate::real::Real;
-use crate::rotation::Rotation;
+use crate::rotation::{Complement, Rotation};
 use crate::tensor::{Mat3, Vec3};
 
 /// A moment that stays fixed in space: M_I = T^T M with M = R^T m; its tangent C2(M) + T^T M~ T is not symmetric, since such
@@ -34,6 +34,12 @@ pub fn material_force<T: Real>(rotation: &Rotation<T>, force: Vec3<T>) -> (Vec3<
 #[inline(always)]
 pub fn offset_force<T: Real>(rotation: &Rotation<T>, offset: Vec3<T>, force: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
     (-rotation.potential_gradient(offset, force), -rotation.potential_hessian(offset, force))
+}
+
+/// A force that is conjugate to the complement of a rotation vector P: f_P = B^T f, and its tangent (88).
+pub fn force_on_complement<T: Real>(p: Vec3<T>, force: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
+    let b = Complement::new(p, Vec3::zero(), Vec3::zero()).b;
+    (b.transpose_mul(force), Complement::geometric(p, force))
 }
 
 /// Force and moment per initial length, and the number of their amplitude.

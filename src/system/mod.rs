@@ -20,4 +20,4 @@ pub use plane::{Aspect, Plane};
 pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};
 pub use stage::{StageContext, StageKind, StageSet};
-pub use state::{Memory, Node, RotationRate, Slot, State};
+pub use state::{Fading, Memory, Node, RotationRate, Slot, State};

@@ -9,6 +9,7 @@ use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// The index of a 3-vector of unknowns: a displacement or a rotation vector.
 pub type Slot = u32;
@@ -20,6 +21,15 @@ pub struct Node {
     pub u: Slot,
     /// The slot of the rotation vector
     pub p: Slot,
+}
+
+/// A force at a slot that fades with the load factor of a static stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fading {
+    /// In full, on the side of the internal forces
+    pub force: Vec3,
+    /// The unknowns that it is conjugate to, as they were when it was found: they tell the chart.
+    pub at: Vec3,
 }
 
 /// Everything that changes in a run. Effects are functions of it.
@@ -48,6 +58,8 @@ pub struct State {
     pub wound: Vec<Vec3>,
     /// First and second derivative over time of each factor of a load.
     pub amplitude_rates: Vec<[f64; 2]>,
+    /// For each slot what inertia and damping did when a motion ended in a static stage; empty where none did.
+    pub fading: Arc<Vec<Fading>>,
     /// The angle of each sprung joint, continued without jumps; valid at the last converged state.
     pub angles: Vec<f64>,
     /// For each rotation slot the step it is in, while a step is iterated whose unknowns are increments. Then `q` holds the
@@ -70,6 +82,7 @@ impl State {
             mixed: vec![0; elements],
             wound: zero(),
             amplitude_rates: vec![[0.0; 2]; amplitudes],
+            fading: Arc::default(),
             angles: vec![0.0; angles],
             turns: Vec::new(),
         }
@@ -122,6 +135,7 @@ impl State {
         self.mixed.copy_from_slice(&other.mixed);
         threads::copy(&mut self.wound, &other.wound);
         self.amplitude_rates.copy_from_slice(&other.amplitude_rates);
+        self.fading.clone_from(&other.fading);
         self.angles.copy_from_slice(&other.angles);
         self.turns.clone_from(&other.turns);
     }

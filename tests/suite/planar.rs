@@ -423,6 +423,19 @@ fn stages_go_on_from_plane_to_space_and_back() {
     assert!(seen.warnings.is_empty(), "{:?}", seen.warnings);
 }
 
+/// What inertia and damping carried fades in the plane as in space, and in the charts that nodes have come to.
+#[test]
+fn motions_come_to_rest_as_in_space() {
+    for tilted in [false, true] {
+        let damped = "[damping]\nmass = 0.5\n";
+        let load = |x, y| format!("[[load]]\nat = \"tip\"\nforce = {}\n", place(tilted, x, y));
+        let (stays, goes) = (load(1.0, 2.0), load(3.0, -8.0));
+        let text = format!("{}{damped}{stays}{goes}stages = [1]\n{DYNAMIC}{STATIC}", frame(tilted, "relative", 1));
+        let seen = agrees_with_space("dynamic, static", &text);
+        assert!(seen.warnings.is_empty(), "{:?}", seen.warnings);
+    }
+}
+
 /// Nodes that turn by more than pi, each through its own changes of chart.
 #[test]
 fn several_turns_act_as_in_space() {

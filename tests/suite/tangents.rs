@@ -8,7 +8,7 @@ use beamsim::effect::spring::rotational;
 use beamsim::kernel::beam::StiffnessPoint;
 use beamsim::kernel::elastic::Stiffness;
 use beamsim::kernel::inertia::{Eccentric, Inertia, Rotary, Spin};
-use beamsim::kernel::load::{material_force, material_moment, offset_force, spatial_moment};
+use beamsim::kernel::load::{force_on_complement, material_force, material_moment, offset_force, spatial_moment};
 use beamsim::kernel::seam::{Conversion, Converted, conversion};
 use beamsim::kernel::volume::VolumePoint;
 use beamsim::kernel::{ElementSystem, NodeMotion, Weights, shape};
@@ -465,6 +465,25 @@ fn rotational_springs_hold_through_whole_turns() {
                 agree(&format!("tangent, {what}"), &entries(tangent), &entries(jacobian(lifted, 0)), 1e-12);
                 symmetric(&what, &entries(tangent), 1e-13);
             }
+        }
+    }
+}
+
+#[test]
+fn forces_on_complements_have_potentials() {
+    let mut random = Random::new(401);
+    for psi in [0.3, 1.0, 3.0, PI, 4.0, 6.1] {
+        for _ in 0..10 {
+            let (force, p) = (random.vector(2.0), random.vector(psi));
+            let moving = variables::<3>(p, 0);
+            let lifted: Vec3<Dual<3>> = Vec3::constant(force);
+            let far = moving * (Dual::<3>::one() - Dual::<3>::constant(2.0 * PI) / moving.norm());
+            let (own, tangent) = force_on_complement(p, force);
+            let what = format!("force on the complement of P = {p:?}, |P| = {psi}");
+            agree(&format!("potential, {what}"), &own.0, &far.dot(lifted).partials, 1e-12);
+            let moved = force_on_complement(moving, lifted).0;
+            agree(&format!("tangent, {what}"), &entries(tangent), &entries(jacobian(moved, 0)), 1e-12);
+            symmetric(&what, &entries(tangent), 1e-13);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Which effects act: for each table that stands in the deck one effect, and for each the reason.
 
 mod connections;
+mod fading;
 mod inertia;
 mod loads;
 mod spins;
@@ -109,6 +110,7 @@ pub fn compose(
     composer.rotating_frames();
     let along = composer.line_loads();
     composer.node_loads(along);
+    composer.fading_inertia();
     composer.never();
     composer.out
 }
