@@ -199,7 +199,7 @@ impl Run<'_> {
         }
         trend.begin(&assembly.system.pattern.equations, &mut self.state, &step);
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
-        trend.end(&self.state, &assembly.system, &step);
+        trend.end(&self.state, &assembly.system, newton.solver.room(), &step);
         self.refuse_massless_turns(massive)?;
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);

@@ -7,7 +7,7 @@
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
-use crate::system::{Equations, State, System};
+use crate::system::{Equations, Leftover, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::array::from_fn;
@@ -29,8 +29,11 @@ const CORRECTION: i32 = 3;
 /// And forces J c, since J has the mass over the square of the length
 const FORCE: i32 = 1;
 
+/// So many steps are remembered.
+const MOST: usize = WAYS.len() - 1;
+
 /// Factors of the last corrections, the latest first
-type Factors = [f64; WAYS.len() - 1];
+type Factors = [f64; MOST];
 
 /// The corrections of the last steps of a stage.
 #[derive(Default)]
@@ -42,8 +45,11 @@ pub struct Trend {
     past: VecDeque<Past>,
     /// By way, how much residual it would have left (squares, in the mean of the last steps); `None` where that is not known
     missed: [Option<f64>; WAYS.len()],
-    /// Where the scheme's own prediction went in the present step
-    predicted: Vec<Vec3>,
+    /// Where the scheme's own prediction went in the present step, by equation: in the memory of the oldest correction, which nobody asks for
+    /// any more
+    predicted: Vec<f64>,
+    /// What is foreseen of a step, and later the memory for its force
+    spare: Vec<f64>,
     /// The way that was taken there
     taken: usize,
 }
@@ -76,27 +82,43 @@ impl Trend {
 
     /// Adds what is foreseen to the prediction of a step.
     pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step) {
-        threads::copy(&mut self.predicted, &state.q);
         let best = self.best();
-        let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) else { return };
-        self.taken = best;
-        let mut foreseen = vec![0.0; equations.count()];
-        threads::each_part(&mut foreseen, |start, sums| {
-            for (past, factor) in self.past.iter().zip(factors) {
+        let factors = self.factors(best, step.length, CORRECTION).filter(|_| best > 0);
+        if let Some(factors) = factors {
+            self.taken = best;
+            self.foresee(&factors, equations.count());
+        }
+        if let Some(oldest) = self.past.get_mut(MOST - 1) {
+            self.predicted = std::mem::take(&mut oldest.correction);
+        }
+        self.predicted.resize(equations.count(), 0.0);
+        equations.gather(|slot| state.q[slot], &mut self.predicted);
+        if factors.is_some() {
+            let mut dq = vec![Vec3::ZERO; state.q.len()];
+            equations.scatter(&self.spare, None, &mut dq);
+            step.correct(state, &dq);
+        }
+    }
+
+    /// The sum of the last corrections with their factors.
+    fn foresee(&mut self, factors: &Factors, equations: usize) {
+        let Self { past, spare, .. } = self;
+        spare.resize(equations, 0.0);
+        threads::each_part(spare, |start, sums| {
+            sums.fill(0.0);
+            for (past, factor) in past.iter().zip(factors) {
                 sums.iter_mut().zip(&past.correction[start..]).for_each(|(sum, part)| *sum += part * factor);
             }
         });
-        let mut dq = vec![Vec3::ZERO; state.q.len()];
-        equations.scatter(&foreseen, None, &mut dq);
-        step.correct(state, &dq);
     }
 
     /// Takes note of a step that has come to its end, with the unknowns that it was predicted in, and its tangent.
-    pub fn end(&mut self, state: &State, system: &System, step: &Step) {
+    pub fn end(&mut self, state: &State, system: &System, room: &mut Leftover, step: &Step) {
         let equations = &system.pattern.equations;
-        let mut correction = vec![0.0; equations.count()];
-        equations.gather(|slot| state.q[slot] - self.predicted[slot], &mut correction);
-        let mut force = system.multiply(&system.values, &correction);
+        let [mut correction, mut force] = [&mut self.predicted, &mut self.spare].map(std::mem::take);
+        equations.gather_change(|slot| state.q[slot], &mut correction);
+        force.resize(equations.count(), 0.0);
+        system.multiply_into(&system.values, &correction, room, &mut force);
         threads::each_part(&mut force, |start, part| {
             for (equation, force) in (start..).zip(part) {
                 *force *= self.weights[self.kinds[equations.origin(equation).0 as usize] as usize];
@@ -111,8 +133,12 @@ impl Trend {
         for (mean, (rest, known)) in self.missed.iter_mut().zip(missed.into_iter().zip(factors)) {
             *mean = known.map(|_| mean.map_or(rest, |mean| mean + NEWS * (rest - mean)));
         }
+        if self.past.len() == MOST
+            && let Some(oldest) = self.past.pop_back()
+        {
+            self.spare = oldest.force;
+        }
         self.past.push_front(last);
-        self.past.truncate(WAYS.len() - 1);
     }
 
     /// The last step is not taken after all.
@@ -134,7 +160,7 @@ impl Trend {
     /// The factors of the last steps by which a way foresees what grows with this power of the length of a step; `None` where too
     /// little is known.
     fn factors(&self, way: usize, length: f64, power: i32) -> Option<Factors> {
-        let mut factors = [0.0; WAYS.len() - 1];
+        let mut factors = [0.0; MOST];
         for (number, factor) in WAYS[way].iter().enumerate() {
             let stretch = length / self.past.get(number)?.length;
             if !(1.0 / ALIKE..=ALIKE).contains(&stretch) {

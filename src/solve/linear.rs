@@ -111,6 +111,11 @@ impl LinearSolver {
         negative.filter(|_| done)
     }
 
+    /// Its room for products with the tangent.
+    pub fn room(&mut self) -> &mut Leftover {
+        &mut self.leftover
+    }
+
     /// How it solves, in a few words.
     pub fn name(&self) -> &'static str {
         self.blocks().filter(|_| self.trust.in_blocks).map_or("sparse LU", BlockSolver::name)

@@ -29,7 +29,8 @@ impl Category {
     pub const ALL: [Self; 4] = [Self::Internal, Self::Inertia, Self::External, Self::Damping];
 }
 
-/// Room to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for again and again.
+/// Room for products with the tangent, and to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for
+/// again and again.
 #[derive(Default)]
 pub struct Leftover {
     parts: Vec<f64>,
@@ -37,9 +38,14 @@ pub struct Leftover {
 }
 
 impl Leftover {
-    fn resize(&mut self, length: usize) {
+    /// Takes a vector in parts, one a group, and makes room for so many numbers of each.
+    fn take<const W: usize>(&mut self, pattern: &Pattern, x: &[f64], numbers: usize) {
+        let length = W * pattern.groups.count();
         self.parts.resize(length, 0.0);
-        self.residuals.resize(2 * length, 0.0);
+        self.residuals.resize(self.residuals.len().max(numbers * length), 0.0);
+        threads::each_part(self.parts.as_chunks_mut::<W>().0, |start, parts| {
+            (start..).zip(parts).for_each(|(group, part)| *part = pattern.part(group, x));
+        });
     }
 }
 
@@ -177,20 +183,32 @@ impl System {
 
     /// A x, for a matrix with these values on the pattern of the tangent.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
-        if self.pattern.width() == WIDTH { self.product::<WIDTH>(values, x) } else { self.product::<3>(values, x) }
+        let mut out = vec![0.0; x.len()];
+        self.multiply_into(values, x, &mut Leftover::default(), &mut out);
+        out
     }
 
-    fn product<const W: usize>(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; x.len()];
-        let mut sums = vec![[0.0; W]; self.pattern.groups.count()];
-        let parts = self.pattern.apart::<W>(x);
-        self.each_row::<W, _>(values, &mut sums, |sum, column, tile| {
+    /// The same into memory that is there.
+    pub fn multiply_into(&self, values: &[f64], x: &[f64], room: &mut Leftover, out: &mut [f64]) {
+        if self.pattern.width() == WIDTH {
+            self.product::<WIDTH>(values, x, room, out);
+        } else {
+            self.product::<3>(values, x, room, out);
+        }
+    }
+
+    fn product<const W: usize>(&self, values: &[f64], x: &[f64], room: &mut Leftover, out: &mut [f64]) {
+        room.take::<W>(&self.pattern, x, 1);
+        let parts = room.parts.as_chunks::<W>().0;
+        let sums = &mut room.residuals.as_chunks_mut::<W>().0[..parts.len()];
+        threads::each_part(sums, |_, sums| sums.fill([0.0; W]));
+        self.each_row::<W, _>(values, sums, |sum, column, tile| {
             for (line, &x) in tile.iter().zip(&parts[column]) {
                 sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * x);
             }
         });
-        self.pattern.join(|group| &sums[group], &mut out);
-        out
+        let sums = &*sums;
+        self.pattern.join(|group| &sums[group], out);
     }
 
     /// Shows each tile with what belongs to the group of its rows, and the group of its columns: regions at once. Tiles that are not kept
@@ -257,12 +275,9 @@ impl System {
 
     fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
         let pattern = &self.pattern;
-        room.resize(W * pattern.groups.count());
-        let (parts, residuals) = (room.parts.as_chunks_mut::<W>().0, room.residuals.as_chunks_mut::<W>().0);
-        let residuals = residuals.as_chunks_mut::<2>().0;
-        threads::each_part(parts, |start, parts| {
-            (start..).zip(parts).for_each(|(group, part)| *part = pattern.part(group, x));
-        });
+        room.take::<W>(pattern, x, 2);
+        let parts = room.parts.as_chunks::<W>().0;
+        let residuals = room.residuals.as_chunks_mut::<W>().0.as_chunks_mut::<2>().0;
         threads::each_part(residuals, |start, residuals| {
             for (group, [residual, size]) in (start..).zip(residuals) {
                 *residual = pattern.part(group, b);

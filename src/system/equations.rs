@@ -168,11 +168,21 @@ impl Equations {
     /// Picks the free entries of what stands at each slot.
     pub fn gather(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
         threads::each_part(out, |start, out| {
-            for (equation, out) in (start..).zip(out) {
-                let (slot, k) = self.origin(equation);
-                *out = self.to_local(slot, field(slot as usize)).0[k as usize];
-            }
+            (start..).zip(out).for_each(|(equation, out)| *out = self.entry(equation, &field));
         });
+    }
+
+    /// The same less what the entries were before.
+    pub fn gather_change(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
+        threads::each_part(out, |start, out| {
+            (start..).zip(out).for_each(|(equation, out)| *out = self.entry(equation, &field) - *out);
+        });
+    }
+
+    #[inline(always)]
+    fn entry(&self, equation: usize, field: impl Fn(usize) -> Vec3) -> f64 {
+        let (slot, k) = self.origin(equation);
+        self.to_local(slot, field(slot as usize)).0[k as usize]
     }
 
     /// Writes the solution into a field of slots; held directions take their part of `held`.
