@@ -159,7 +159,7 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let kind = scene.plan.stages[0].work.kind();
     let begun = model.begin_stage(0, kind, &state);
     let equations = begun.map_err(|error| format!("the first stage cannot begin: {error:?}"))?;
-    let (free, slots) = (equations.count(), model.slots.len());
+    let (free, slots) = (equations.count(), model.slots());
     let context = scene.plan.stages[0].context(0);
     let shares = model.shares(&context, &equations);
     let assembly = Assembly::new(&context, equations, &model);

@@ -36,7 +36,7 @@ pub fn check(deck: &Path, scene: &Scene, seconds: Option<f64>) {
             "deck": deck,
             "elements": scene.mesh.element_count,
             "nodes": scene.mesh.nodes.len(),
-            "unknowns": scene.plan.model.slots.len() * 3,
+            "unknowns": scene.plan.model.slots() * 3,
             "effects": effects,
             "seconds": seconds,
         }),

@@ -294,7 +294,7 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
     if let Some(title) = &scene.title {
         say::line(&format!("{name}: {title}"));
     }
-    let unknowns = scene.plan.model.slots.len() * 3;
+    let unknowns = scene.plan.model.slots() * 3;
     let planar = scene.reasons.iter().filter(|r| r.active && r.name == "planar").map(|r| r.name);
     let evaluated = counters.evaluations.iter().filter(|(_, count)| *count > 0).map(|(name, _)| *name);
     let acting = planar.chain(evaluated).collect::<Vec<_>>().join(", ");

@@ -357,14 +357,19 @@ fn read_dynamic(table: &Table) -> Option<StageBody> {
 }
 
 /// The coefficients that each scheme has.
-const COEFFICIENTS: [(&str, &str); 4] =
-    [("beta", "newmark"), ("gamma", "newmark"), ("alpha", "hht"), ("rho_inf", "generalized_alpha")];
+const COEFFICIENTS: [(&str, &[&str]); 4] = [
+    ("beta", &["newmark"]),
+    ("gamma", &["newmark"]),
+    ("alpha", &["hht"]),
+    ("rho_inf", &["generalized_alpha", "lie_generalized_alpha"]),
+];
 
 fn read_scheme(table: &Table) -> Option<SchemeWord> {
     let context = table.context;
     let scheme = if table.has("scheme") { table.word("scheme", &SCHEMES)?.value } else { "newmark" };
-    for (key, owner) in COEFFICIENTS.into_iter().filter(|(key, owner)| table.has(key) && !scheme.ends_with(owner)) {
-        let message = format!("`{key}` belongs to scheme = \"{owner}\"");
+    for (key, owners) in COEFFICIENTS.into_iter().filter(|(key, owners)| table.has(key) && !owners.contains(&scheme)) {
+        let owners: Vec<String> = owners.iter().map(|owner| format!("\"{owner}\"")).collect();
+        let message = format!("`{key}` belongs to scheme = {}", owners.join(" or "));
         context.report(Diagnostic::error(message, table.key_span(key)));
     }
     let within = |key: &str, default: f64, most: f64| {

@@ -239,9 +239,8 @@ impl Run<'_> {
     /// The critical loads as they look from the present state.
     fn critical_loads(&mut self, workshop: &mut Workshop, modes: usize) -> Result<Vec<f64>, Failure> {
         let Some(Direction { rate: direction, .. }) = self.path_direction(workshop)? else { return Ok(Vec::new()) };
-        let size = direction.iter().zip(self.model.slots.iter()).filter(|(_, info)| !info.kind.is_multiplier());
-        let size =
-            size.map(|(d, info)| d.norm() * info.kind.arm(self.model.length) / self.model.length).fold(0.0, f64::max);
+        let size = direction.iter().zip(self.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+        let size = size.map(|(d, kind)| d.norm() * kind.arm(self.model.length) / self.model.length).fold(0.0, f64::max);
         let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
         let varied = self.varied_tangent(workshop, &direction, reach);
         let Workshop { assembly, newton, .. } = workshop;

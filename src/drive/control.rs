@@ -1,7 +1,7 @@
 //! Steps that adapt to their local error.
 
 use crate::integrate::{Increments, Scheme};
-use crate::model::{Model, SlotInfo, SlotKind};
+use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
 use crate::system::State;
 
@@ -87,12 +87,12 @@ impl Control {
     ) -> (f64, usize) {
         // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps sensible.
         let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs();
-        let of_slot = |(slot, info): (usize, &SlotInfo)| {
+        let of_slot = |(slot, kind): (usize, &SlotKind)| {
             if !self.judged[slot] {
                 return (0.0, slot);
             }
             let e = (end.a[slot] - start.a[slot]) * (factor * length * length);
-            let size = match info.kind {
+            let size = match kind {
                 SlotKind::Displacement => e.norm() / model.length,
                 SlotKind::Rotation if increments.is_none() => (Rotation::new(end.q[slot]).t * e).norm(),
                 SlotKind::Rotation | SlotKind::Force | SlotKind::Moment => 0.0,
@@ -101,7 +101,7 @@ impl Control {
         };
         let turned = increments.into_iter().flat_map(|increments| increments.errors(start, end, length, factor));
         let turned = turned.filter(|&(_, slot)| self.judged[slot]);
-        let all = model.slots.iter().enumerate().map(of_slot).chain(turned);
+        let all = model.kinds.iter().enumerate().map(of_slot).chain(turned);
         all.fold((0.0, 0), |worst, one| if one.0 > worst.0 || one.0.is_nan() { one } else { worst })
     }
 }

@@ -228,8 +228,8 @@ impl Failure {
             }
             Self::MeshTooCoarse { .. } => Some("use more `elements` there"),
             Self::EnergyGrowth { .. } => Some(
-                "the time step does not resolve the motion: damp what it cannot resolve (scheme = \"generalized_alpha\"), or take a \
-                 smaller `step`; where the growth is meant, raise `energy_limit`",
+                "the time step does not resolve the motion: damp what it cannot resolve (scheme = \"generalized_alpha\", or a smaller \
+                 `rho_inf` where it is that already), or take a smaller `step`; where the growth is meant, raise `energy_limit`",
             ),
             Self::NonFinite { .. } => Some("look for values near the limits of floating-point numbers in the deck"),
             Self::Deck(_) | Self::Limit(_) | Self::Io(_) | Self::Interrupted { .. } => None,
@@ -318,6 +318,9 @@ impl fmt::Display for Failure {
 
 /// The place of a slot, along `direction`.
 pub(super) fn place(model: &Model, slot: usize, direction: Vec3) -> Place {
-    let info = &model.slots[slot];
-    Place { node: info.node.to_string(), kind: info.kind, direction: direction.normalized().unwrap_or(Vec3::ZERO) }
+    Place {
+        node: model.node_at(slot),
+        kind: model.kinds[slot],
+        direction: direction.normalized().unwrap_or(Vec3::ZERO),
+    }
 }

@@ -76,7 +76,7 @@ impl Bookkeeper {
     }
 }
 
-/// The way of all slots from one state to the next, by their unknowns and how far they are wound.
+/// The way of all slots from one state to the next, by their unknowns and how far they are wound, where these are no other.
 struct Way<'a> {
     kinds: &'a [SlotKind],
     from: (&'a [Vec3], &'a [Vec3]),
@@ -92,7 +92,7 @@ impl Way<'_> {
             for (slot, before) in (PART * number..).zip(before) {
                 let after = after(slot);
                 let before = replace(before, after);
-                let wound = wound1[slot] - wound0[slot];
+                let wound = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
                 sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), wound);
             }
             sum

@@ -288,14 +288,14 @@ impl Path {
         }
         let sizes = self.here.tangent.iter().map(|t| t.norm());
         let largest = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(slot, _)| slot);
-        let node = run.model.slots.get(largest).map_or(String::new(), |info| info.node.to_string());
+        let node = run.model.node_at(largest);
         Err(Failure::NonFinite { at: run.moment(), effect: Some("what a unit of load moves"), node })
     }
 
     /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to go on in.
     fn with_measure(run: &Run, rate: Vec<Vec3>) -> Self {
         let moved = squared(run, &rate);
-        let rotated = run.model.slots.iter().zip(&rate).filter(|(info, _)| info.kind == SlotKind::Rotation);
+        let rotated = run.model.kinds.iter().zip(&rate).filter(|(kind, _)| **kind == SlotKind::Rotation);
         let turned = rotated.map(|(_, d)| d.norm() * run.model.length).fold(0.0, f64::max);
         // Displacements that are only round-off beside the rotations measure nothing.
         let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
@@ -556,7 +556,7 @@ fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
 /// The rate of the displacement that the loads do work on; `None` without loads. What stands at multipliers are gaps of motors,
 /// not forces.
 fn work_of_loads(run: &Run, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
-    let acting = || pull.iter().zip(rate).zip(run.model.slots.iter()).filter(|(_, info)| !info.kind.is_multiplier());
+    let acting = || pull.iter().zip(rate).zip(run.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
     let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
     loaded.then(|| acting().map(|((force, d), _)| -force.dot(*d)).sum())
 }
@@ -567,6 +567,6 @@ fn squared(run: &Run, field: &[Vec3]) -> f64 {
 }
 
 fn dot(run: &Run, a: &[Vec3], b: &[Vec3]) -> f64 {
-    let slots = run.model.slots.iter().zip(a.iter().zip(b));
-    slots.filter(|(info, _)| info.kind == SlotKind::Displacement).map(|(_, (a, b))| a.dot(*b)).sum()
+    let slots = run.model.kinds.iter().zip(a.iter().zip(b));
+    slots.filter(|(kind, _)| **kind == SlotKind::Displacement).map(|(_, (a, b))| a.dot(*b)).sum()
 }

@@ -511,27 +511,21 @@ impl<'o> Run<'o> {
         let State { q, v, a, .. } = &self.state;
         let is_wrong = |&slot: &usize| !(q[slot].is_finite() && v[slot].is_finite() && a[slot].is_finite());
         let Some(slot) = threads::first(q.len(), |mut part| part.find(is_wrong)) else { return Ok(()) };
-        Err(Failure::NonFinite {
-            at: self.moment(),
-            effect: Some("the motion"),
-            node: self.model.slots[slot].node.to_string(),
-        })
+        Err(Failure::NonFinite { at: self.moment(), effect: Some("the motion"), node: self.model.node_at(slot) })
     }
 
     /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
         if self.is_linear() {
             // Rotations of any size, without charts.
-            for &slot in &self.model.rotating.rotations {
-                self.state.wound[slot as usize] = self.state.q[slot as usize];
-            }
+            self.state.wound.clear();
         }
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
         }
         let Some(slot) = ambiguous.into_iter().find(|slot| self.model.sprung.contains(slot)) else { return Ok(()) };
-        let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
+        let (at, node) = (self.moment(), self.model.node_at(slot as usize));
         Err(Failure::Deck(format!(
             "the rotational spring at node \"{node}\" has been wound by more than a turn and its node left the axis ({at}): how \
              far it is wound is not defined there; hold the other rotations of the node, or use a joint"
@@ -554,7 +548,7 @@ impl<'o> Run<'o> {
 
     fn name_coarse(&self, element: usize, angle: f64) -> Failure {
         let nodes = self.model.charted.elements[element].nodes();
-        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.slots[node.p as usize].node.to_string());
+        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.node_at(node.p as usize));
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
     }
 
@@ -602,11 +596,11 @@ impl<'o> Run<'o> {
             }
             NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
             NewtonFailure::TurnsTooFar { slot, angle } => {
-                Failure::TurnsTooFar { at, node: self.model.slots[slot].node.to_string(), angle }
+                Failure::TurnsTooFar { at, node: self.model.node_at(slot), angle }
             }
             NewtonFailure::LeapsTooFar { element, angle } => self.name_coarse(element, angle),
             NewtonFailure::NotFinite { effect, slot } => {
-                Failure::NonFinite { at, effect, node: self.model.slots[slot].node.to_string() }
+                Failure::NonFinite { at, effect, node: self.model.node_at(slot) }
             }
         }
     }
@@ -615,12 +609,12 @@ impl<'o> Run<'o> {
     pub(super) fn name_mechanism(&self, vector: Option<NullVector>, system: &System) -> Failure {
         let at = self.moment();
         let Some(vector) = vector else { return Failure::Singular { at, place: None } };
-        let (largest, motion) = vector.by_slot(&system.pattern.equations, self.model.slots.len());
+        let (largest, motion) = vector.by_slot(&system.pattern.equations, self.model.slots());
         Failure::Singular { at, place: Some(place(&self.model, largest, motion[largest])) }
     }
 
     pub(super) fn describe(&self, error: StageError) -> Failure {
-        let node = |slot: u32| &self.model.slots[slot as usize].node;
+        let node = |slot: u32| self.model.node_at(slot as usize);
         let stage = self.stage + 1;
         Failure::Deck(match error {
             StageError::Conflict(conflict) => format!(

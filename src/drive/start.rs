@@ -65,14 +65,14 @@ impl Run<'_> {
     /// A dynamic stage never jumps: neither do motors, nor joints that a stage before has left open.
     fn refuse_open_joints(&self, workshop: &Workshop) -> Result<(), Failure> {
         for &slot in &self.model.multipliers {
-            let info = &self.model.slots[slot as usize];
-            let size = if info.kind == SlotKind::Force { self.model.length } else { 1.0 };
+            let kind = self.model.kinds[slot as usize];
+            let size = if kind == SlotKind::Force { self.model.length } else { 1.0 };
             let gap = workshop.assembly.system.total(slot as usize).norm();
             if gap > LARGEST_GAP * size {
                 let at = self.moment();
                 return Err(Failure::Deck(format!(
                     "the {} would have to jump by {gap:.3e} ({at}); give its motor a `history` that starts where the joint is",
-                    info.node
+                    self.model.node_at(slot as usize)
                 )));
             }
         }
@@ -97,8 +97,8 @@ impl Run<'_> {
             return Ok(());
         };
         let (multipliers, accelerations) = (&mut self.state.q[..], &mut self.state.a[..]);
-        for (slot, info) in self.model.slots.iter().enumerate() {
-            let field = if info.kind.is_multiplier() { &mut *multipliers } else { &mut *accelerations };
+        for (slot, kind) in self.model.kinds.iter().enumerate() {
+            let field = if kind.is_multiplier() { &mut *multipliers } else { &mut *accelerations };
             field[slot] += solved[slot];
         }
         // The forces of the start, for reactions and the energy account.
@@ -156,8 +156,8 @@ fn set_in_motion(state: &mut State, motion: &InitialMotion) {
 /// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
 /// zero. They are the null directions of the diagonal blocks.
 fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f64]) {
-    let is_massive = threads::list(model.slots.len(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
-    for slot in (0..model.slots.len()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
+    let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
+    for slot in (0..model.slots()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
         let numbers = system.pattern.equations.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
         let (block, weight) = with_mass_where_held(system, slot as Slot);
@@ -213,7 +213,7 @@ impl Run<'_> {
     /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their motion is prescribed; and those
     /// whose velocities do not, either.
     pub(super) fn find_rates(&self, workshop: &mut Workshop) {
-        let mut moves = vec![false; self.model.slots.len()];
+        let mut moves = vec![false; self.model.slots()];
         self.model.motions.iter().for_each(|motion| moves[motion.slot as usize] = true);
         let mut touched = |weights: Weights| -> Vec<bool> {
             workshop.assembly.evaluate(&self.state, weights, None);

@@ -121,7 +121,7 @@ impl Run<'_> {
     /// A node passed a whole turn aside of its axis.
     pub(super) fn warn_of_lost_axis(&mut self, slot: Slot) {
         if !std::mem::replace(&mut self.told.axis, true) {
-            let (at, node) = (self.moment(), &self.model.slots[slot as usize].node);
+            let (at, node) = (self.moment(), self.model.node_at(slot as usize));
             self.observer.warn(&format!(
                 "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
                  its increments from there on, and depends on the steps (`r` does not)"

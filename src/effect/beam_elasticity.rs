@@ -96,9 +96,9 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        for_each_batch!(self.elements, |_first, batch| for element in batch {
-            element.connection.places.iter().for_each(|&place| show(Aspect::Place(place)));
-            for point in element.points() {
+        // Where they are the mesh shows.
+        for_each_batch!(self.elements, |_first, batch| for alike in batch.chunk_by(ElasticElement::is_like) {
+            for point in alike[0].points() {
                 show(Aspect::Vector(point.tangent));
                 show(Aspect::Tensor(point.stiffness.cn));
                 show(Aspect::Tensor(point.stiffness.cm));
@@ -217,7 +217,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
-        let posture = Posture::side_by_side(each_lane!(|k| &elements[k].connection), at);
+        let posture = Posture::side_by_side(each_lane!(|k| elements[k].member()), at);
         I::View::new(&posture).fill(&sum, stiffness, &mut scratch, &mut systems);
         let count = LANES.min(batch.len() - start);
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
@@ -331,11 +331,10 @@ fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
 ) {
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
-        let connections = each_lane!(|k| &elements[k].connection);
         let sum = Sum::side_by_side(elements, &[], at);
-        let view = I::View::new(&Posture::side_by_side(connections, at));
-        let du: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| connections[k].nodes[i].u)));
-        let dp: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| connections[k].nodes[i].p)));
+        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| elements[k].member()), at));
+        let du: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].u)));
+        let dp: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].p)));
         let stresses = view.extrapolated(&sum.points, sum.free, &du, &dp);
         for g in 0..G {
             let stress = packed(&stresses[g]);
@@ -375,7 +374,7 @@ fn each_energy<I: Interpolation, const N: usize, const G: usize>(
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let sum = Sum::side_by_side(elements, &[], at);
-        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| &elements[k].connection), at));
+        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| elements[k].member()), at));
         let energies = strain_energy(&sum.points, view.nodes(), sum.free);
         for (k, element) in elements.iter().enumerate().take(batch.len() - start) {
             let mixed = at.mixed[element.connection.element as usize] != 0;
@@ -407,18 +406,18 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// Strain and stress at each integration point (material, global components).
     pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
-        let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
+        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
         self.points().map(|point| point.strain_and_stress(view.nodes(), free))
     }
 
     #[inline(never)]
     fn energy<I: Interpolation>(&self, at: &State) -> f64 {
-        strain_energy(&self.points(), I::see(&self.connection, at).nodes(), self.free_amplitude(at))
+        strain_energy(&self.points(), I::see(self.member(), at).nodes(), self.free_amplitude(at))
     }
 
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
-        let (view, change) = (I::see(&self.connection, at), I::variation(&self.connection, at, field));
+        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
         let at_point = |point: &StiffnessPoint<N>| {
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
@@ -438,14 +437,14 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         out: &mut Sink,
     ) {
         let sum = Sum { points: self.points(), stresses, free: self.free_amplitude(at) };
-        I::evaluate(&self.connection, at, stiffness, scratch, system, &sum);
+        I::evaluate(self.member(), at, stiffness, scratch, system, &sum);
         out.add(number, system);
     }
 
     /// The stress that each point is expected to have after the correction `dq`.
     #[inline(never)]
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
-        let (view, free) = (I::see(&self.connection, at), self.free_amplitude(at));
+        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
         let (du, dp) = self.connection.variations_in_one_chart(at, dq);
         let stresses = view.extrapolated(&self.points(), free, &du, &dp);
         out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));

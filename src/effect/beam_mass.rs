@@ -6,6 +6,7 @@ use crate::kernel::Weights;
 use crate::system::{Aspect, Category, Cliques, Memory, Sink, Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
+use std::sync::Arc;
 
 /// All beam elements with mass on their centre line.
 #[derive(Clone, Debug, Default)]
@@ -20,19 +21,21 @@ struct MassElement<const N: usize> {
     u: [Slot; N],
     /// Their initial places
     places: [Vec3; N],
-    /// The sum of w rhoA N_i N_j over its points, the same in all directions
-    mass: [[f64; N]; N],
+    /// The sum of w rhoA N_i N_j over its points, the same in all directions; neighbours that have the same share it.
+    mass: Arc<[[f64; N]; N]>,
 }
 
 impl<const N: usize> MassElement<N> {
-    fn new(element: &VolumeElement<N, f64>) -> Self {
+    fn new(element: &VolumeElement<N, f64>, neighbour: Option<&Self>) -> Self {
         let entry = |i: usize, j: usize| -> f64 {
             element.points.iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
         };
+        let mass = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+        let shared = neighbour.map(|neighbour| &neighbour.mass).filter(|known| ***known == mass);
         Self {
             u: element.connection.nodes.map(|node| node.u),
-            places: element.connection.places,
-            mass: std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))),
+            places: element.places,
+            mass: shared.cloned().unwrap_or_else(|| Arc::new(mass)),
         }
     }
 
@@ -67,18 +70,19 @@ impl BeamMass {
     /// The matrices of elements, by their mass per length.
     pub fn new(elements: &VolumeElements<f64>) -> Self {
         let VolumeElements { two, three, four } = elements;
-        let elements = ByOrder {
-            two: two.iter().map(MassElement::new).collect(),
-            three: three.iter().map(MassElement::new).collect(),
-            four: four.iter().map(MassElement::new).collect(),
-        };
-        Self { elements }
+        Self { elements: ByOrder { two: matrices(two), three: matrices(three), four: matrices(four) } }
     }
 
     /// Whether no element has mass.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
+}
+
+fn matrices<const N: usize>(elements: &[VolumeElement<N, f64>]) -> Vec<MassElement<N>> {
+    let mut out = Vec::with_capacity(elements.len());
+    elements.iter().for_each(|element| out.push(MassElement::new(element, out.last())));
+    out
 }
 
 impl Effect for BeamMass {
@@ -101,7 +105,7 @@ impl Effect for BeamMass {
     }
 
     fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {
-        // On the centre line, which the beams' elasticity shows.
+        // On the centre line, which the mesh shows.
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
@@ -153,8 +157,8 @@ mod tests {
         };
         let place = |i: usize| Vec3([LENGTH * i as f64 / (N - 1) as f64, 0.0, 0.0]);
         let nodes = std::array::from_fn(|i| Node { u: 2 * i as Slot, p: 2 * i as Slot + 1 });
-        let connection = Connection { element: 0, nodes, places: std::array::from_fn(place) };
-        VolumeElement { connection, points: std::array::from_fn(point) }
+        let connection = Connection { element: 0, nodes };
+        VolumeElement { connection, places: std::array::from_fn(place), points: std::array::from_fn(point) }
     }
 
     /// Spins an element about a pivot beside it, as a rigid body.

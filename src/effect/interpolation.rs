@@ -1,6 +1,7 @@
 //! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and carries what the kernel
 //! gives back to the nodes of the scene.
 
+use super::elastic_element::Member;
 use super::{Connection, after_displacement, at_slots};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Stress;
@@ -13,8 +14,8 @@ use crate::tensor::{Mat3, Vec3};
 
 /// Where the nodes of an element are, or those of several elements side by side; rotation vectors all in one chart.
 pub struct Posture<const N: usize, T = f64> {
-    /// Where they started
-    pub places: [Vec3<T>; N],
+    /// Where they started, as seen from the first
+    pub arms: [Vec3<T>; N],
     /// Their displacements
     pub u: [Vec3<T>; N],
     /// Their rotation vectors
@@ -26,20 +27,21 @@ pub struct Posture<const N: usize, T = f64> {
 impl<const N: usize> Posture<N> {
     /// Of an element whose nodes move so.
     #[inline(always)]
-    pub fn new(connection: &Connection<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
+    pub fn new(member: Member<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
         let (u, p) = (nodes.map(|node| node.u), nodes.map(|node| node.p));
-        let base = || std::array::from_fn(|i| base_of(connection, i, at));
-        Self { places: connection.places, u, p, base: (!at.turns.is_empty()).then(base) }
+        let base = || std::array::from_fn(|i| base_of(member.connection, i, at));
+        Self { arms: member.arms, u, p, base: (!at.turns.is_empty()).then(base) }
     }
 }
 
 impl<const N: usize> Posture<N, Lanes> {
     /// Of elements side by side, each node in its own chart.
     #[inline(always)]
-    pub fn side_by_side(connections: [&Connection<N>; LANES], at: &State) -> Self {
-        let mut out = Self { places: [Vec3::zero(); N], u: [Vec3::zero(); N], p: [Vec3::zero(); N], base: None };
+    pub fn side_by_side(members: [Member<N>; LANES], at: &State) -> Self {
+        let connections = each_lane!(|k| members[k].connection);
+        let mut out = Self { arms: [Vec3::zero(); N], u: [Vec3::zero(); N], p: [Vec3::zero(); N], base: None };
         for i in 0..N {
-            out.places[i] = pack!(connections.places[i]);
+            out.arms[i] = pack!(members.arms[i]);
             out.u[i] = at_slots(&at.q, each_lane!(|k| connections[k].nodes[i].u));
             out.p[i] = at_slots(&at.q, each_lane!(|k| connections[k].nodes[i].p));
         }
@@ -182,22 +184,22 @@ pub trait Interpolation: Send + Sync + 'static {
 
     /// An element, its nodes in one chart.
     #[inline(never)]
-    fn see<const N: usize>(connection: &Connection<N>, at: &State) -> Self::View<N, f64> {
-        let nodes = connection.motions_in_one_chart(at);
-        Self::View::new(&Posture::new(connection, &nodes, at))
+    fn see<const N: usize>(member: Member<N>, at: &State) -> Self::View<N, f64> {
+        let nodes = member.connection.motions_in_one_chart(at);
+        Self::View::new(&Posture::new(member, &nodes, at))
     }
 
     /// How the nodes that the kernel sees vary when the unknowns do by `dq`.
     #[inline(never)]
-    fn variation<const N: usize>(connection: &Connection<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
-        let (du, dp) = connection.variations_in_one_chart(at, dq);
-        Self::see(connection, at).variation(&du, &dp)
+    fn variation<const N: usize>(member: Member<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
+        let (du, dp) = member.connection.variations_in_one_chart(at, dq);
+        Self::see(member, at).variation(&du, &dp)
     }
 
     /// The sum over an element's points, carried back to the nodes of the scene and to their charts.
     #[inline(never)]
     fn evaluate<const N: usize, K: PointSum<N, f64>>(
-        connection: &Connection<N>,
+        member: Member<N>,
         at: &State,
         stiffness: f64,
         scratch: &mut Scratch,
@@ -206,8 +208,8 @@ pub trait Interpolation: Send + Sync + 'static {
     ) {
         let weights = Weights { stiffness, ..Weights::NONE };
         let scratch = std::cell::RefCell::new(scratch);
-        connection.evaluate(at, weights, false, after_displacement, out, &|nodes, weights, out| {
-            let view = Self::View::new(&Posture::new(connection, nodes, at));
+        member.connection.evaluate(at, weights, false, after_displacement, out, &|nodes, weights, out| {
+            let view = Self::View::new(&Posture::new(member, nodes, at));
             view.fill(sum, weights.stiffness, &mut scratch.borrow_mut(), out);
         });
     }
@@ -289,7 +291,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
                 rotations[i] = rotations[i].after(base[i]);
             }
         }
-        Self { seen: Relative::new(&posture.places, &posture.u, &rotations), rotations }
+        Self { seen: Relative::new(&posture.arms, &posture.u, &rotations), rotations }
     }
 
     #[inline(always)]

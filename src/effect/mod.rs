@@ -215,8 +215,6 @@ pub struct Connection<const N: usize> {
     pub element: u32,
     /// Its nodes
     pub nodes: [Node; N],
-    /// Their initial places
-    pub places: [Vec3; N],
 }
 
 impl<const N: usize> Connection<N> {

@@ -6,21 +6,21 @@ use super::{
 };
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
-use crate::real::{Instructions, LANES, Real, each_lane, pack};
+use crate::real::{Instructions, LANES, Pack, Real, each_lane};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
 /// A body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Body {
     /// The node it sits at
     pub node: Node,
     /// The node's initial place
     pub place: Vec3,
-    /// Its mass properties about the node
-    pub inertia: Inertia,
+    /// Its mass properties about the node; those that neighbours along a beam have in common stand once.
+    pub inertia: Arc<Inertia>,
 }
 
 /// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at their nodes.
@@ -116,7 +116,7 @@ impl RigidBody {
         let (own, before) = (&self.bodies[out.instances()], out.instances().start);
         for first in (0..own.len()).step_by(LANES) {
             let bodies = side_by_side(own, first);
-            let inertia = pack!(bodies.inertia);
+            let inertia = Inertia::pack(each_lane!(|k| &*bodies[k].inertia));
             let [u, p] = [each_lane!(|k| bodies[k].node.u), each_lane!(|k| bodies[k].node.p)];
             let spin = Spin::new(at_slots(&at.q, p), at_slots(&at.v, p), at_slots(&at.a, p));
             self.put(&inertia, centred, at_slots(&at.a, u), spin, weights, &mut systems);
@@ -172,7 +172,7 @@ fn each_energy(all: &[Body], at: &State, show: &mut dyn FnMut(f64)) {
     for first in (0..all.len()).step_by(LANES) {
         let bodies = side_by_side(all, first);
         let nodes = each_lane!(|k| bodies[k].node);
-        let energies = kinetic(&pack!(bodies.inertia), &motion_of(nodes, at));
+        let energies = kinetic(&Inertia::pack(each_lane!(|k| &*bodies[k].inertia)), &motion_of(nodes, at));
         energies.0.iter().take(all.len() - first).for_each(|energy| show(*energy));
     }
 }

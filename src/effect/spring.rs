@@ -100,7 +100,7 @@ impl Effect for Spring {
     fn energy(&self, at: &State) -> Energy {
         let one = |spring: &Instance| {
             let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
-            let wound = unwound(p, at.wound[spring.node.p as usize]);
+            let wound = unwound(p, at.wound_at(spring.node.p));
             0.5 * at.amplitude[spring.amplitude] * (u.dot(spring.translation * u) + wound.dot(spring.rotation * wound))
         };
         Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
@@ -151,7 +151,7 @@ impl Instance {
 /// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an increment X after which
 /// it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
 fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
-    let wound = at.wound[slot as usize];
+    let wound = at.wound_at(slot);
     if at.turn(slot).is_none() {
         return wound_up(stiffness, at.q[slot as usize], wound);
     }

@@ -12,9 +12,9 @@
 //! its force under a unit stress, and G_k qd the rate of that: a jet along the motion brings both.
 
 use super::beam_elasticity::BeamElasticity;
-use super::elastic_element::ElasticElement;
+use super::elastic_element::{ElasticElement, Member};
 use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
-use super::{Connection, Effect, after_displacement, for_each_batch};
+use super::{Effect, after_displacement, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Point, Stiffness, Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
@@ -67,9 +67,9 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     let room = RefCell::new(Room::new(2 * N));
     let mut system = ElementSystem::new(2 * N);
     for (k, element) in batch.iter().enumerate() {
-        let connection = &element.connection;
-        connection.evaluate(at, weights, true, after_displacement, &mut system, &|nodes, weights, out| {
-            let motion = Motion::new(connection, nodes, at);
+        let member = element.member();
+        member.connection.evaluate(at, weights, true, after_displacement, &mut system, &|nodes, weights, out| {
+            let motion = Motion::new(member, nodes, at);
             motion.add::<I, G>(&element.points(), factor, weights, &mut room.borrow_mut(), out);
         });
         out.add(first + k, &system);
@@ -100,13 +100,13 @@ struct Motion<const N: usize> {
 }
 
 impl<const N: usize> Motion<N> {
-    fn new(connection: &Connection<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
+    fn new(member: Member<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
         let rotation = |i: usize| match at.turns.is_empty() {
             true => RotationRate::of_vector(nodes[i].p_rate),
-            false => at.rotation_rate(connection.nodes[i].p),
+            false => at.rotation_rate(member.connection.nodes[i].p),
         };
         Self {
-            posture: Posture::new(connection, nodes, at),
+            posture: Posture::new(member, nodes, at),
             displacements: nodes.map(|node| node.u_rate),
             rotations: std::array::from_fn(rotation),
         }
@@ -119,9 +119,9 @@ impl<const N: usize> Motion<N> {
 
     /// The posture as a function of time.
     fn jets(&self) -> Posture<N, Jet> {
-        let Posture { places, u, p, base } = &self.posture;
+        let Posture { arms, u, p, base } = &self.posture;
         Posture {
-            places: places.map(Vec3::constant),
+            arms: arms.map(Vec3::constant),
             u: std::array::from_fn(|i| jet(u[i], self.displacements[i])),
             p: std::array::from_fn(|i| jet(p[i], self.rotations[i].rate)),
             base: base.map(|all| all.map(Mat3::constant)),

@@ -12,6 +12,8 @@ use crate::tensor::Vec3;
 pub struct VolumeElement<const N: usize, Q> {
     /// Its place in the scene
     pub connection: Connection<N>,
+    /// The initial places of its nodes
+    pub places: [Vec3; N],
     /// Its integration points
     pub points: [VolumePoint<N, Q>; N],
 }
@@ -56,7 +58,7 @@ impl<Q: Copy> VolumeElements<Q> {
         for_each_batch!(self, |_first, batch| for element in batch {
             let nodes = element.connection.motions_in_one_chart(at);
             for point in &element.points {
-                let place = beam::interpolate(&point.shape, |i| element.connection.places[i]);
+                let place = beam::interpolate(&point.shape, |i| element.places[i]);
                 show(&point.quantity, point.weight, place, &point.motion(&nodes));
             }
         });

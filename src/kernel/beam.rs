@@ -6,7 +6,7 @@ use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
 
 /// An integration point for internal forces.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StiffnessPoint<const N: usize, T = f64> {
     /// Shape functions
     pub shape: [T; N],
@@ -75,6 +75,16 @@ impl<const N: usize> Pack for StiffnessPoint<N> {
 }
 
 impl<const N: usize, T: Real> StiffnessPoint<N, T> {
+    /// Takes the point to an element that is so many times as long.
+    #[inline(always)]
+    pub fn lengthen(&mut self, times: T) {
+        let inverse = T::one() / times;
+        for i in 0..N {
+            self.slope[i] = self.slope[i] * inverse;
+        }
+        self.weight = self.weight * times;
+    }
+
     /// The configuration at this point; x' = E1 + sum N_i' u_i.
     #[inline(always)]
     pub fn configuration(&self, nodes: &[impl Placed<T>; N]) -> Point<T> {

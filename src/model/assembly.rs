@@ -90,7 +90,7 @@ impl Assembly {
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
             system: System::new(
                 Pattern::new(equations, groups, cliques, symmetry),
-                model.slots.len(),
+                model.slots(),
                 everywhere,
                 &categories,
             ),

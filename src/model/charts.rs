@@ -41,6 +41,7 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
     let is_beyond = |p: Vec3| p.squared() > (PI + band) * (PI + band) && p.is_finite();
     let goes_beyond = |part: Range<usize>| rotations[part].iter().find(|&&slot| is_beyond(state.q[slot as usize]));
     let Some(first) = threads::first(rotations.len(), goes_beyond) else { return 0 };
+    state.wound_apart();
     let mut switched = 0;
     for slot in rotations.iter().skip_while(|slot| *slot != first).map(|&slot| slot as usize) {
         for _ in 0..MOST_CHANGES {
@@ -80,8 +81,11 @@ pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
 }
 
 /// Carries the wound rotation vectors along with a correction that the state is about to take. A node may turn further than half
-/// a turn in a load step; how far, only its corrections tell.
+/// a turn in a load step; how far, only its corrections tell. What is not kept apart goes with the unknowns.
 pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
+    if state.wound.is_empty() {
+        return;
+    }
     let State { q, wound, .. } = state;
     each_rotation(wound, rotations, |k, wound| {
         let (old, increment) = (q[k], dq[k]);
@@ -128,9 +132,12 @@ fn continued(p: Vec3, wound: Vec3, turned: Vec3) -> Vec3 {
 /// whole turn n is no guide: a node that passes it a little aside sees n swing to the other side, and P + 2 pi k n with it.
 /// There the carried one is kept until both come together again; it is ambiguous where they lie far apart.
 pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> {
+    if state.wound.is_empty() {
+        return Vec::new();
+    }
     let State { q, wound: carried, .. } = state;
     each_rotation(carried, rotations, |k, carried| {
-        let (p, old, wound) = (q[k], before.q[k], before.wound[k]);
+        let (p, old, wound) = (q[k], before.q[k], before.wound_at(k as Slot));
         // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away from it.
         let is_near = wound == old && (p - old).norm() < 0.4 * FAR;
         if is_near && (*carried == old || *carried == p) {

@@ -140,8 +140,9 @@ impl Motion {
         match self.kind {
             MotionKind::Translation => (state.q[slot].dot(self.axis), 0.0),
             MotionKind::Rotation => {
-                let along = state.wound[slot].dot(self.axis);
-                (along, (state.wound[slot] - self.axis * along).norm())
+                let wound = state.wound_at(self.slot);
+                let along = wound.dot(self.axis);
+                (along, (wound - self.axis * along).norm())
             }
         }
     }
@@ -210,17 +211,19 @@ impl Motion {
                 0.0
             }
             MotionKind::Rotation => {
-                let turned = (value - state.wound[slot].dot(n)).abs();
+                let (turned, end) = (value - state.wound_at(self.slot).dot(n), n * value);
                 state.q[slot] = if state.turn(self.slot).is_some() {
-                    n * (value - state.wound[slot].dot(n))
+                    n * turned
                 } else {
                     let turns = ((state.q[slot].dot(n) - value) / (2.0 * PI)).round();
                     n * (value + 2.0 * PI * turns)
                 };
                 state.v.put(slot, n * rate);
                 state.a.put(slot, n * rate2);
-                state.wound[slot] = n * value;
-                turned
+                if !state.wound.is_empty() || state.q[slot] != end {
+                    state.wound_apart()[slot] = end;
+                }
+                turned.abs()
             }
         }
     }

@@ -37,7 +37,7 @@ impl Linear {
         about: &State,
     ) -> Result<Self, FrameConflict> {
         let effects: Vec<&dyn Effect> = effects.collect();
-        let slots = model.slots.len();
+        let slots = model.slots();
         let cliques: Vec<Cliques> = effects.iter().map(|effect| effect.cliques()).collect();
         let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques, Symmetry::None);
         let mut origin = about.clone();

@@ -6,6 +6,7 @@ pub mod charts;
 mod constraint;
 mod history;
 mod linear;
+mod names;
 mod share;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
@@ -13,6 +14,7 @@ pub use amplitude::Amplitude;
 pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
 pub use history::{History, Table};
+pub use names::Names;
 pub use share::Share;
 
 use crate::effect::{Effect, Energy, Momentum};
@@ -57,15 +59,11 @@ impl SlotKind {
     pub fn arm(self, length: f64) -> f64 {
         if self == Self::Rotation { length } else { 1.0 }
     }
-}
 
-/// A slot, and the node that it is named after.
-#[derive(Clone, Debug)]
-pub struct SlotInfo {
-    /// What it holds
-    pub kind: SlotKind,
-    /// The name of its node, for messages
-    pub node: Arc<str>,
+    /// What the unknowns of such a slot are compared with: a length for displacements, 1 for rotations.
+    pub fn scale(self, length: f64) -> f64 {
+        if self == Self::Displacement { length } else { 1.0 }
+    }
 }
 
 /// A beam element as changes of chart and the judgement of the mesh see it.
@@ -75,13 +73,6 @@ pub struct ElementInfo {
     count: u8,
     /// Whether it interpolates total rotation vectors, so that all of them must be taken in one chart
     pub in_one_chart: bool,
-}
-
-impl SlotInfo {
-    /// What its unknowns are compared with: a length for displacements, 1 for rotations.
-    pub fn scale(&self, length: f64) -> f64 {
-        if self.kind == SlotKind::Displacement { length } else { 1.0 }
-    }
 }
 
 impl ElementInfo {
@@ -111,10 +102,10 @@ pub struct Charted {
 /// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
 #[derive(Clone)]
 pub struct Model {
-    /// All slots
-    pub slots: Arc<Vec<SlotInfo>>,
-    /// What they hold, for who looks at all of them again and again
+    /// What each slot holds
     pub kinds: Arc<Vec<SlotKind>>,
+    /// And the node that it is named after
+    pub names: Arc<Names>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
@@ -155,9 +146,19 @@ pub enum StageError {
 }
 
 impl Model {
+    /// The number of slots.
+    pub fn slots(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// The name of the node of a slot, for messages.
+    pub fn node_at(&self, slot: usize) -> String {
+        self.names.of(slot as Slot)
+    }
+
     /// The state before the first stage.
     pub fn rest(&self) -> State {
-        State::rest(self.slots.len(), self.elements, self.amplitudes.len(), self.angles)
+        State::rest(self.slots(), self.elements, self.amplitudes.len(), self.angles)
     }
 
     /// The inner product of two motions, displacements over the length of the scene.
@@ -197,8 +198,8 @@ impl Model {
 
     /// The unknowns that are free in a stage that has begun, in a plane or in space.
     pub fn number(&self, stage: usize, plane: Option<Plane>) -> Result<Equations, StageError> {
-        let (slots, held) = (self.slots.len(), self.held_directions(stage));
-        let turns = |slot: Slot| self.slots[slot as usize].kind == SlotKind::Rotation;
+        let (slots, held) = (self.slots(), self.held_directions(stage));
+        let turns = |slot: Slot| self.kinds[slot as usize] == SlotKind::Rotation;
         let numbered = match plane {
             None => Equations::new(slots, &held),
             Some(plane) => Equations::planar(slots, &held, plane, turns),
@@ -237,14 +238,14 @@ impl Model {
     /// Whether a state lies in a plane and moves in it, but for round-off.
     fn keeps(&self, state: &State, plane: &Plane) -> bool {
         let normal = plane.normal();
-        let aside = |(info, value): (&SlotInfo, &Vec3)| match info.kind {
+        let aside = |(kind, value): (&SlotKind, &Vec3)| match kind {
             SlotKind::Rotation => (*value - normal * value.dot(normal)).norm(),
             _ => value.dot(normal).abs() / self.length,
         };
-        let size = |(info, value): (&SlotInfo, &Vec3)| value.norm() / info.scale(self.length);
+        let size = |(kind, value): (&SlotKind, &Vec3)| value.norm() / kind.scale(self.length);
         [&state.q[..], &state.v, &state.a].into_iter().all(|field| {
-            let largest = self.slots.iter().zip(field).map(size).fold(0.0, f64::max);
-            let farthest = self.slots.iter().zip(field).map(aside).fold(0.0, f64::max);
+            let largest = self.kinds.iter().zip(field).map(size).fold(0.0, f64::max);
+            let farthest = self.kinds.iter().zip(field).map(aside).fold(0.0, f64::max);
             farthest <= OUT_OF_PLANE * largest
         })
     }
@@ -320,8 +321,8 @@ impl Model {
 
     /// The rotation of a node shares the tile of its displacement, which it follows.
     pub fn groups(&self, layout: Layout) -> Groups {
-        let kind = |slot: Slot| self.slots[slot as usize].kind;
-        Groups::new(self.slots.len(), layout, |slot| {
+        let kind = |slot: Slot| self.kinds[slot as usize];
+        Groups::new(self.slots(), layout, |slot| {
             kind(slot) == SlotKind::Rotation && kind(slot - 1) == SlotKind::Displacement
         })
     }

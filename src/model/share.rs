@@ -26,7 +26,7 @@ impl Model {
         let size_without = |left_out: Option<usize>| {
             let others = cliques.iter().enumerate().filter(|(k, _)| Some(*k) != left_out).map(|(_, own)| own.clone());
             let others: Vec<Cliques> = others.collect();
-            let mut touched = vec![false; self.slots.len()];
+            let mut touched = vec![false; self.slots()];
             others.iter().flat_map(Cliques::iter).flatten().for_each(|&slot| touched[slot as usize] = true);
             let free = |slot: usize| equations.of(slot as Slot).iter().filter(|&&n| n != Equations::HELD).count();
             let unknowns = (0..touched.len()).filter(|&slot| touched[slot]).map(free).sum::<usize>();

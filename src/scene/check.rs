@@ -201,7 +201,7 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held
         springs.iter().filter(|s| s.node.p == slot).for_each(|s| touch(s.rotation));
         held.iter().flat_map(|s| &s.directions).filter(|d| d.slot == slot).for_each(|d| touch(d.axis.outer(d.axis)));
         let moved =
-            |m: &deck::Motion| *m.at.value == *mesh.nodes[node].name && matches!(m.what, MotionWhat::Rotation { .. });
+            |m: &deck::Motion| m.at.value == mesh.name_of(node) && matches!(m.what, MotionWhat::Rotation { .. });
         if on_beams.contains(&node) || jointed.contains(&node) || deck.motions.iter().any(moved) {
             continue;
         }

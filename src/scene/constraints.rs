@@ -235,7 +235,11 @@ fn refuse_clashes(deck: &Deck, mesh: &Mesh, held: &[Held], diagnostics: &mut Vec
             }
             reported.push(pair);
             let slot = b.direction.slot;
-            let node = mesh.nodes.iter().find(|n| n.node.u == slot || n.node.p == slot).map_or("?", |n| &*n.name);
+            let node = mesh
+                .nodes
+                .iter()
+                .find(|n| n.node.u == slot || n.node.p == slot)
+                .map_or("?".into(), |n| mesh.names.of(n.node.p));
             let how = if same { "the same direction" } else { "directions that are neither the same nor orthogonal" };
             let message = format!("this {} and another {} hold {how} of node `{node}`", b.what, a.what);
             diagnostics.push(

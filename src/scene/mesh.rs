@@ -5,11 +5,11 @@ use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
 use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
 use crate::kernel::{MAX_NODES, shape};
+use crate::model::Names;
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// A node of the mesh.
 #[derive(Clone, Debug)]
@@ -18,8 +18,6 @@ pub struct MeshNode {
     pub node: Node,
     /// Its initial place
     pub place: Vec3,
-    /// Its name for messages: of the point, or beam and number
-    pub name: Arc<str>,
 }
 
 /// An integration point of an element.
@@ -75,26 +73,43 @@ impl BeamElement<'_> {
     }
 
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
-        let (piece, range) = self.beam.part_of_line(self.number);
+        let Part { piece, number, count } = self.beam.part_of_line(self.number);
         let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
-        let stretch = self.between(&slope);
-        let jacobian = stretch.norm();
-        let t = range[0] + (range[1] - range[0]) * 0.5 * (xi + 1.0);
+        let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), count);
+        let t = (number as f64 + 0.5 * (xi + 1.0)) / count as f64;
         let fraction = line.fraction(piece, t);
         Station {
             slope: slope.map(|d| d / jacobian),
             shape,
             weight: gauss_weight * jacobian,
             fraction,
-            axes: line.axes(piece, line.pieces[piece].direction(stretch, jacobian), fraction),
+            axes: line.axes(piece, tangent, fraction),
             along: t,
         }
     }
 
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
-        let ((piece, _), line) = (self.beam.part_of_line(self.number), &self.beam.line);
+        let (Part { piece, .. }, line) = (self.beam.part_of_line(self.number), &self.beam.line);
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
+    }
+
+    /// The initial places of its nodes.
+    pub fn places<const N: usize>(&self) -> [Vec3; N] {
+        std::array::from_fn(|i| self.mesh.nodes[self.nodes[i]].place)
+    }
+
+    /// The same as seen from the first.
+    pub fn arms<const N: usize>(&self) -> [Vec3; N] {
+        let Part { piece, count, .. } = self.beam.part_of_line(self.number);
+        self.beam.line.pieces[piece].arms(self.places(), count)
+    }
+
+    /// How much longer it is than others on its piece, by round-off.
+    pub fn rounding(&self) -> f64 {
+        let Part { piece, count, .. } = self.beam.part_of_line(self.number);
+        let place = |node: usize| self.mesh.nodes[node].place;
+        self.beam.line.pieces[piece].rounding(place(self.nodes[self.nodes.len() - 1]) - place(self.nodes[0]), count)
     }
 
     /// The places of its nodes, weighed.
@@ -138,14 +153,21 @@ impl MeshBeam {
         &self.nodes[first..=first + self.order]
     }
 
-    /// The piece of the centre line that an element lies on, and from where to where on that, from 0 to 1.
-    fn part_of_line(&self, element: usize) -> (usize, [f64; 2]) {
+    /// Where on the centre line an element lies.
+    fn part_of_line(&self, element: usize) -> Part {
         let number = element - self.elements.start;
         let piece = self.piece_starts.partition_point(|&start| start <= number) - 1;
         let (start, end) = (self.piece_starts[piece], self.piece_starts[piece + 1]);
-        let (number, count) = (number - start, (end - start) as f64);
-        (piece, [number as f64 / count, (number + 1) as f64 / count])
+        Part { piece, number: number - start, count: end - start }
     }
+}
+
+/// One of some equal parts of a piece of a centre line.
+struct Part {
+    piece: usize,
+    /// From 0
+    number: usize,
+    count: usize,
 }
 
 /// All nodes, beams and elements.
@@ -161,6 +183,8 @@ pub struct Mesh {
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
     pub parted: HashMap<(String, String), usize>,
+    /// What nodes are called: after their points, or by beam and number
+    pub names: Names,
     slots: u32,
 }
 
@@ -169,9 +193,12 @@ impl Mesh {
     pub fn new(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let mut mesh = Self::default();
         mesh.part_joints(deck, diagnostics);
-        if let Err(diagnostic) = refuse_too_many(deck) {
-            diagnostics.push(diagnostic);
-            return mesh;
+        match count_nodes(deck) {
+            Ok(count) => mesh.nodes.reserve_exact(count),
+            Err(diagnostic) => {
+                diagnostics.push(diagnostic);
+                return mesh;
+            }
         }
         for beam in &deck.beams {
             let planned = mesh.plan(beam, deck);
@@ -192,15 +219,20 @@ impl Mesh {
         self.slots as usize
     }
 
-    /// Adds a node with slots of its own, or one that shares the displacement of another.
-    fn add_node(&mut self, place: Vec3, name: impl Into<Arc<str>>, shares: Option<usize>) -> usize {
+    /// The name of a node.
+    pub fn name_of(&self, node: usize) -> String {
+        self.names.of(self.nodes[node].node.p)
+    }
+
+    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name is that of its first slot.
+    fn add_node(&mut self, place: Vec3, shares: Option<usize>) -> usize {
         let mut slot = || {
             self.slots += 1;
             self.slots - 1
         };
         let u = shares.map_or_else(&mut slot, |other| self.nodes[other].node.u);
         let node = Node { u, p: slot() };
-        self.nodes.push(MeshNode { node, place, name: name.into() });
+        self.nodes.push(MeshNode { node, place });
         self.nodes.len() - 1
     }
 
@@ -240,7 +272,8 @@ impl Mesh {
                 // The first beam may have been parted from the point before.
                 let first = beams.first().and_then(|first| self.parted.get(&(first.value.clone(), point.clone())));
                 let shares = (joint.kind != JointKind::Prismatic).then_some(first.copied().unwrap_or(main));
-                let node = self.add_node(place, format!("{point} ({})", second.value), shares);
+                self.names.give(self.slots, &format!("{point} ({})", second.value));
+                let node = self.add_node(place, shares);
                 self.parted.insert(key, node);
             }
         }
@@ -265,7 +298,8 @@ impl Mesh {
     }
 
     fn add_point(&mut self, name: &str, place: Vec3) -> usize {
-        let node = self.add_node(place, name, None);
+        self.names.give(self.slots, name);
+        let node = self.add_node(place, None);
         self.points.insert(name.into(), node);
         node
     }
@@ -336,7 +370,8 @@ impl Mesh {
         let between =
             named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
         let first_element = self.element_count;
-        let (mut nodes, mut fractions) = (Vec::new(), Vec::new());
+        let all = (0..line.pieces.len()).map(count).sum::<usize>() * beam.order + 1;
+        let (mut nodes, mut fractions) = (Vec::with_capacity(all), Vec::with_capacity(all));
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
             for step in usize::from(piece > 0)..=steps {
@@ -383,7 +418,10 @@ impl Mesh {
 
     /// The node at a corner with a name, or a new one.
     fn node_on_beam(&mut self, beam: &str, corner: Option<&str>, place: Vec3, number: usize) -> usize {
-        let Some(point) = corner else { return self.add_node(place, format!("{beam}:{number}"), None) };
+        let Some(point) = corner else {
+            self.names.count(self.slots, beam, number);
+            return self.add_node(place, None);
+        };
         let parted = self.parted.get(&(beam.to_string(), point.to_string())).copied();
         if let Some(node) = parted.or_else(|| self.points.get(point).copied()) {
             return node;
@@ -454,8 +492,8 @@ fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     })
 }
 
-/// Counts nodes before any memory is taken.
-fn refuse_too_many(deck: &Deck) -> Result<(), Diagnostic> {
+/// Counts nodes before any memory is taken: at most so many lie on beams.
+fn count_nodes(deck: &Deck) -> Result<usize, Diagnostic> {
     let mut total = 0_usize;
     for beam in &deck.beams {
         let pieces = match &beam.path {
@@ -470,5 +508,5 @@ fn refuse_too_many(deck: &Deck) -> Result<(), Diagnostic> {
             return Err(Diagnostic::limit(message, beam.elements.span.clone()));
         }
     }
-    Ok(())
+    Ok(total + deck.beams.len())
 }

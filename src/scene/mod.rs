@@ -23,7 +23,7 @@ use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
-use crate::model::{Charted, ElementInfo, Model, SlotInfo, SlotKind};
+use crate::model::{Charted, ElementInfo, Model, SlotKind};
 use crate::probe::{Figure, Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
@@ -207,10 +207,14 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
     let rotating = Arc::new(charted(&mesh));
-    let slots = [slots(&mesh), composition.multipliers].concat();
+    let (mut kinds, mut names) = (kinds(&mesh), mesh.names.clone());
+    for (kind, name) in composition.multipliers {
+        names.give(kinds.len() as u32, &name);
+        kinds.push(kind);
+    }
     let mut model = Model {
-        kinds: Arc::new(slots.iter().map(|info| info.kind).collect()),
-        slots: Arc::new(slots),
+        kinds: Arc::new(kinds),
+        names: Arc::new(names),
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
@@ -226,7 +230,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         length: check::diagonal(&mesh),
     };
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
-    let (plane, planar) = planar::plane(deck, &model, &initial, diagnostics);
+    let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
     Some(Scene {
         title: deck.title.clone(),
@@ -264,16 +268,11 @@ fn charted(mesh: &Mesh) -> Charted {
     }
 }
 
-/// What each slot holds, named after its node.
-fn slots(mesh: &Mesh) -> Vec<SlotInfo> {
-    let empty = SlotInfo { kind: SlotKind::Displacement, node: "".into() };
-    let mut slots = vec![empty; mesh.slots()];
-    for node in mesh.nodes.iter().rev() {
-        let info = |kind| SlotInfo { kind, node: node.name.clone() };
-        slots[node.node.u as usize] = info(SlotKind::Displacement);
-        slots[node.node.p as usize] = info(SlotKind::Rotation);
-    }
-    slots
+/// What each slot of the mesh holds.
+fn kinds(mesh: &Mesh) -> Vec<SlotKind> {
+    let mut kinds = vec![SlotKind::Displacement; mesh.slots()];
+    mesh.nodes.iter().for_each(|node| kinds[node.node.p as usize] = SlotKind::Rotation);
+    kinds
 }
 
 fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Stage> {

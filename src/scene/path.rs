@@ -72,12 +72,30 @@ impl Piece {
         }
     }
 
-    /// The unit tangent of an element whose nodes, weighed, give `stretch` of this length. A straight piece has only one: what round-off in
-    /// the places of nodes makes of it would keep neighbours from sharing what they have in common.
-    pub fn direction(&self, stretch: Vec3, length: f64) -> Vec3 {
+    /// The unit tangent of one of so many equal elements and its length over that of xi, where its nodes, weighed, give `stretch`. On a
+    /// straight piece all elements are one: what round-off in the places of nodes makes of each would keep them from sharing what they have in
+    /// common.
+    pub fn slope(&self, stretch: Vec3, elements: usize) -> (Vec3, f64) {
         match &self.curve {
-            Curve::Line => self.tangent(0.0),
-            Curve::Arc { .. } => stretch * (1.0 / length),
+            Curve::Line => (self.tangent(0.0), 0.5 * self.length / elements as f64),
+            Curve::Arc { .. } => (stretch * (1.0 / stretch.norm()), stretch.norm()),
+        }
+    }
+
+    /// How much longer than that an element with this chord is by the round-off in the places of its nodes.
+    pub fn rounding(&self, chord: Vec3, elements: usize) -> f64 {
+        match &self.curve {
+            Curve::Line => chord.norm() * elements as f64 / self.length,
+            Curve::Arc { .. } => 1.0,
+        }
+    }
+
+    /// The way from the first node of one of so many equal elements to the next ones, where these stand at `places`.
+    pub fn arms<const N: usize>(&self, places: [Vec3; N], elements: usize) -> [Vec3; N] {
+        let straight = |i: usize| (self.end - self.start) * (i as f64 / ((N - 1) * elements) as f64);
+        match &self.curve {
+            Curve::Line => std::array::from_fn(straight),
+            Curve::Arc { .. } => places.map(|place| place - places[0]),
         }
     }
 

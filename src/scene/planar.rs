@@ -1,6 +1,7 @@
 //! Whether a scene is simulated in a plane, and why.
 
 use super::compose::Reason;
+use super::mesh::Mesh;
 use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, StageBody};
 use crate::drive::InitialMotion;
 use crate::model::Model;
@@ -10,13 +11,14 @@ use crate::system::{Aspect, Plane};
 pub fn plane(
     deck: &Deck,
     model: &Model,
+    mesh: &Mesh,
     initial: &[InitialMotion],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> (Option<Plane>, Reason) {
     let wanted = deck.effects.said(EffectWord::Planar);
     let found = match wanted {
         Some(flag) if !flag.value => Err("off by [effects]".to_string()),
-        _ => find(deck, model, initial),
+        _ => find(deck, model, mesh, initial),
     };
     let name = "planar";
     match found {
@@ -43,7 +45,7 @@ pub fn plane(
     }
 }
 
-fn find(deck: &Deck, model: &Model, initial: &[InitialMotion]) -> Result<Plane, String> {
+fn find(deck: &Deck, model: &Model, mesh: &Mesh, initial: &[InitialMotion]) -> Result<Plane, String> {
     if model.linear {
         return Err("large_rotations = false: linear stages are simulated in space".into());
     }
@@ -53,6 +55,8 @@ fn find(deck: &Deck, model: &Model, initial: &[InitialMotion]) -> Result<Plane, 
         return Err("lie_generalized_alpha: no kernel for planes".into());
     }
     Plane::of(model.length, &|show| {
+        let nodes = mesh.beams.iter().flat_map(|beam| &beam.nodes);
+        nodes.for_each(|&node| show("beams", Aspect::Place(mesh.nodes[node].place)));
         model.aspects(show);
         for motion in initial {
             show("initial motion", Aspect::Vector(motion.velocity));

@@ -54,7 +54,8 @@ pub struct State {
     /// For each beam element the nodes that are converted into the chart of the first; frozen while Newton iterates.
     pub mixed: Vec<Conversion>,
     /// For each rotation slot the rotation vector continued without jumps since the start; valid at the last converged
-    /// state. It tells a wound spring, and the columns `rc`, which of the turns they are in.
+    /// state. It tells a wound spring, and the columns `rc`, which of the turns they are in. Empty as long as no chart has changed:
+    /// then `q` itself goes on without jumps.
     pub wound: Vec<Vec3>,
     /// First and second derivative over time of each factor of a load.
     pub amplitude_rates: Vec<[f64; 2]>,
@@ -70,17 +71,17 @@ pub struct State {
 impl State {
     /// At rest in the initial placement.
     pub fn rest(slots: usize, elements: usize, amplitudes: usize, angles: usize) -> Self {
-        let (zero, rates) = (|| threads::filled(slots, Vec3::ZERO), Field::zero(slots));
+        let rates = Field::zero(slots);
         Self {
             time: 0.0,
             load: 0.0,
-            q: zero(),
+            q: threads::filled(slots, Vec3::ZERO),
             v: rates.clone(),
             a: rates.clone(),
             algorithmic: rates,
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
-            wound: zero(),
+            wound: Vec::new(),
             amplitude_rates: vec![[0.0; 2]; amplitudes],
             fading: Arc::default(),
             angles: vec![0.0; angles],
@@ -138,6 +139,20 @@ impl State {
         self.fading.clone_from(&other.fading);
         self.angles.copy_from_slice(&other.angles);
         self.turns.clone_from(&other.turns);
+    }
+
+    /// The wound rotation vector at a slot.
+    #[inline]
+    pub fn wound_at(&self, slot: Slot) -> Vec3 {
+        *self.wound.get(slot as usize).unwrap_or(&self.q[slot as usize])
+    }
+
+    /// All of them, kept apart from `q` from here on.
+    pub fn wound_apart(&mut self) -> &mut [Vec3] {
+        if self.wound.is_empty() {
+            threads::copy(&mut self.wound, &self.q);
+        }
+        &mut self.wound
     }
 
     /// The step that a rotation is in, where its unknown is an increment.

@@ -220,7 +220,7 @@ fn linear_dynamics_goes_through_joints() {
     };
     let tip = |text: &str| {
         let (scene, _) = scene::from_text(text).unwrap();
-        let slot = scene.mesh.nodes.iter().find(|node| &*node.name == "tip").unwrap().node.u as usize;
+        let slot = scene.mesh.nodes[scene.mesh.points["tip"]].node.u as usize;
         struct Row(usize, Vec3);
         impl Observer for Row {
             fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {

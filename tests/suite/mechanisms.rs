@@ -136,7 +136,7 @@ fn mechanism(kind: usize, random: &mut Random) -> Mechanism {
 /// Where a node is: at an end, or along the beam by its name.
 fn place_of(node: &str, deck: &str) -> Vec3 {
     let (scene, _) = beamsim::scene::from_text(deck).unwrap_or_else(|d| panic!("{d:?}\n{deck}"));
-    let node = scene.mesh.nodes.iter().find(|n| &*n.name == node);
+    let node = (0..scene.mesh.nodes.len()).find(|&n| scene.mesh.name_of(n) == node).map(|n| &scene.mesh.nodes[n]);
     node.unwrap_or_else(|| panic!("no such node")).place
 }
 

@@ -404,10 +404,10 @@ fn near_vectors_are_continued_by_themselves() {
         let length = random.range(0.0, 0.62);
         let p = old + random.direction() * length;
         let mut before = State::rest(1, 0, 0, 0);
-        (before.q[0], before.wound[0]) = (old, old);
+        (before.q[0], before.wound) = (old, vec![old]);
         for carried in [old, p, old + aside] {
             let mut state = before.clone();
-            (state.q[0], state.wound[0]) = (p, carried);
+            (state.q[0], state.wound) = (p, vec![carried]);
             assert!(charts::wind(&mut state, &before, &[0]).is_empty());
             assert!((state.wound[0] - p).norm() < 1e-12, "{old:?} to {p:?}");
         }

@@ -143,7 +143,7 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
         charts::freeze(&mut state, &model.charted.elements);
         before = length;
     }
-    let tip = scene.mesh.nodes.iter().find(|node| &*node.name == tip).unwrap().node;
+    let tip = scene.mesh.nodes[scene.mesh.points[tip]].node;
     if state.q[tip.u as usize] == Vec3::ZERO {
         // What does not move tells by its axis.
         return Rotation::new(state.q[tip.p as usize]).r.column(2).0;

@@ -415,9 +415,9 @@ fn what_is_called_symmetric_is() {
 /// Somewhere, moving where a stage moves; where all is `turned`, half a turn away, so that neighbours sit in different charts.
 fn shake(model: &Model, stage: &StageContext, turned: bool, state: &mut State, random: &mut Random) {
     let about = random.vector(1.0).normalized().unwrap() * if turned { PI } else { 0.0 };
-    for (slot, info) in model.slots.iter().enumerate() {
-        let mut any = || random.vector(0.1 * model.length / info.kind.arm(model.length));
-        state.q[slot] = any() + if info.kind == SlotKind::Rotation { about } else { Vec3::ZERO };
+    for (slot, kind) in model.kinds.iter().enumerate() {
+        let mut any = || random.vector(0.1 * model.length / kind.arm(model.length));
+        state.q[slot] = any() + if *kind == SlotKind::Rotation { about } else { Vec3::ZERO };
         if stage.kind == StageKind::Dynamic {
             (state.v[slot], state.a[slot]) = (any(), any());
         }
@@ -447,7 +447,7 @@ fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state
     let (effects, plane) = (model.acting(stage), equations.plane().copied());
     let cliques = effects.iter().map(|effect| effect.cliques()).collect();
     let pattern = Pattern::new(equations.clone(), model.groups(equations.layout()), cliques, Symmetry::None);
-    let mut system = System::new(pattern, model.slots.len(), &Category::ALL, &[]);
+    let mut system = System::new(pattern, model.slots(), &Category::ALL, &[]);
     for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
         let mut sink = system.sink(number, effect.category(), true);
         match plane.and_then(|plane| effect.clone().in_plane(&plane)) {

@@ -198,7 +198,7 @@ impl Film {
 fn supported(scene: &Scene, places: &[(Node, Vec3)]) -> Vec<usize> {
     let model = &scene.plan.model;
     let slots = model.supports.iter().flat_map(|support| &support.directions).map(|direction| direction.slot);
-    let held: HashSet<u32> = slots.filter(|&slot| model.slots[slot as usize].kind == SlotKind::Displacement).collect();
+    let held: HashSet<u32> = slots.filter(|&slot| model.kinds[slot as usize] == SlotKind::Displacement).collect();
     (0..places.len()).filter(|&k| held.contains(&places[k].0.u)).collect()
 }
 

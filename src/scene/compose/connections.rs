@@ -5,7 +5,7 @@ use crate::deck::{self, Diagnostic, JointKind};
 use crate::effect::joint::{self, Joints};
 use crate::effect::link::{self, Links};
 use crate::effect::spring::{self, Spring};
-use crate::model::{Amplitude, SlotInfo, SlotKind, StageSet, Support};
+use crate::model::{Amplitude, SlotKind, StageSet, Support};
 use crate::scene::joints::FoundJoint;
 use crate::system::Direction;
 use crate::tensor::{Mat3, Vec3};
@@ -156,9 +156,9 @@ impl Composer<'_> {
     }
 
     fn multiplier(&mut self, kind: SlotKind, connection: &FoundJoint) -> u32 {
-        let names = connection.nodes.into_iter().flatten().map(|node| &*self.mesh.nodes[node].name);
+        let names = connection.nodes.into_iter().flatten().map(|node| self.mesh.name_of(node));
         let node = format!("joint of {}", names.collect::<Vec<_>>().join(" and "));
-        self.out.multipliers.push(SlotInfo { kind, node: node.into() });
+        self.out.multipliers.push((kind, node));
         (self.mesh.slots() + self.out.multipliers.len() - 1) as u32
     }
 

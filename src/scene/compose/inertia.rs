@@ -93,7 +93,7 @@ impl Composer<'_> {
         }
         let d = Vec3(body.offset);
         let steiner = (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.mass;
-        let inertia = Inertia { mass: body.mass, offset: d, about_node: centre + steiner };
+        let inertia = Arc::new(Inertia { mass: body.mass, offset: d, about_node: centre + steiner });
         let node = &self.mesh.nodes[node];
         Some(Body { node: node.node, place: node.place, inertia })
     }
@@ -256,10 +256,14 @@ impl NodalInertia {
 
     /// The bodies at nodes that have any.
     fn bodies(self, mesh: &Mesh) -> Vec<Body> {
+        let mut last: Option<Arc<Inertia>> = None;
         let body = |(node, (mass, moment, about_node)): (usize, (f64, Vec3, Mat3))| {
             let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
-            let node = &mesh.nodes[node];
-            Body { node: node.node, place: node.place, inertia: Inertia { mass, offset, about_node } }
+            let (node, inertia) = (&mesh.nodes[node], Inertia { mass, offset, about_node });
+            let known = last.take().filter(|known| **known == inertia);
+            let inertia = known.unwrap_or_else(|| Arc::new(inertia));
+            last = Some(inertia.clone());
+            Body { node: node.node, place: node.place, inertia }
         };
         let there = |(_, (mass, _, about)): &(usize, (f64, Vec3, Mat3))| *mass != 0.0 || *about != Mat3::ZERO;
         let mut bodies: Vec<Body> = self.nodes.into_iter().enumerate().filter(there).map(body).collect();

@@ -20,7 +20,7 @@ use crate::effect::{link, spring};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Strain;
 use crate::kernel::volume::VolumePoint;
-use crate::model::{Amplitude, History, SlotInfo, StageSet, Support};
+use crate::model::{Amplitude, History, SlotKind, StageSet, Support};
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -52,8 +52,8 @@ pub struct Composition {
     pub links: Vec<link::Instance>,
     /// Springs to ground
     pub springs: Vec<spring::Instance>,
-    /// Slots of multipliers, behind those of the mesh
-    pub multipliers: Vec<SlotInfo>,
+    /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
+    pub multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
     pub idle_multipliers: Vec<Support>,
     /// Nodes whose rotation a joint takes hold of
@@ -266,11 +266,7 @@ pub fn stage_set(stages: Option<&Vec<usize>>) -> StageSet {
 
 fn connect<const N: usize>(element: &BeamElement) -> Connection<N> {
     let node = |i: usize| &element.mesh.nodes[element.nodes[i]];
-    Connection {
-        element: element.number as u32,
-        nodes: std::array::from_fn(|i| node(i).node),
-        places: std::array::from_fn(|i| node(i).place),
-    }
+    Connection { element: element.number as u32, nodes: std::array::from_fn(|i| node(i).node) }
 }
 
 /// Pushes an element with these volume points into the batch of its order.
@@ -296,7 +292,7 @@ fn volume<const N: usize, Q: Copy>(
         let Station { shape, weight, .. } = &stations[k];
         VolumePoint { shape: std::array::from_fn(|i| shape[i]), weight: *weight, quantity: quantity(k) }
     };
-    VolumeElement { connection: connect(element), points: std::array::from_fn(point) }
+    VolumeElement { connection: connect(element), places: element.places(), points: std::array::from_fn(point) }
 }
 
 fn elastic<const N: usize, const G: usize>(
@@ -316,7 +312,8 @@ fn elastic<const N: usize, const G: usize>(
             free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
         }
     };
-    ElasticElement::new(connect(element), std::array::from_fn(point), free, neighbour)
+    let (arms, points) = (element.arms(), std::array::from_fn(point));
+    ElasticElement::new(connect(element), element.rounding(), arms, points, free, neighbour)
 }
 
 /// From section axes to global components.
