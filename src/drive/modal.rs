@@ -91,9 +91,8 @@ impl Run<'_> {
             if !done || loose.is_some() {
                 return Err(self.name_mechanism(loose, &assembly.system));
             }
-            let system = &mut assembly.system;
-            system.values.copy_from_slice(&matrices.stiffness);
-            let symmetric = !damped && is_symmetric(&system.pattern, &system.values);
+            let system = &assembly.system;
+            let symmetric = !damped && is_symmetric(&system.pattern, &matrices.stiffness);
             let mut operator = Motions { system, matrices, solver: &mut newton.solver, shift, symmetric };
             let wanted = if symmetric { modes } else { 2 * modes + 2 };
             let found_values =

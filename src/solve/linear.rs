@@ -186,7 +186,7 @@ impl LinearSolver {
             return false;
         }
         match (self.blocks_in_use().is_some(), &mut self.blocks, &mut self.general) {
-            (true, Some(blocks), _) => blocks.solve(&system.pattern, right_hand_side),
+            (true, Some(blocks), _) => blocks.solve(system, right_hand_side),
             (false, _, Some(general)) => general.solve(right_hand_side),
             _ => return false,
         }

@@ -224,10 +224,9 @@ impl Pattern {
         self.width() * self.width() * self.tiles()
     }
 
-    /// The number of values of its factors, where they do not fill up: LU keeps both sides.
+    /// The number of values of its factors, where they do not fill up: beside the diagonal they are the tangent's own.
     pub fn values_of_factors(&self) -> usize {
-        let tiles = self.groups.count() + if self.symmetry == Symmetry::Whole { 1 } else { 2 } * self.pairs();
-        self.width() * self.width() * tiles
+        self.width() * self.width() * self.groups.count()
     }
 
     /// The tiles in a column that are kept.

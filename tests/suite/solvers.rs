@@ -157,7 +157,7 @@ fn solve_both_ways(
     broken.values[middle] = f64::NAN;
     assert!(blocks.factorise(&other) && !blocks.factorise(&broken), "{what}");
     assert!(blocks.factorise(&system), "{what}");
-    blocks.solve(&system.pattern, &mut by_blocks);
+    blocks.solve(&system, &mut by_blocks);
     let mut general = GeneralSolver::new(&system).unwrap();
     assert!(general.factorise(&system), "{what}");
     general.solve(&mut by_faer);
@@ -184,7 +184,7 @@ fn rows_with_small_pivots_wait() {
     let mut x = wanted.clone();
     let mut blocks = BlockSolver::new(&system.pattern).unwrap();
     assert!(blocks.factorise(&system));
-    blocks.solve(&system.pattern, &mut x);
+    blocks.solve(&system, &mut x);
     let left = system.residual(&wanted, &x, &mut Leftover::default());
     assert!(left < 1e-11, "{left:e}");
 }

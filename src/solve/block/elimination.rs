@@ -7,25 +7,48 @@ use std::ops::Range;
 /// Elimination makes so many blocks out of one at most; beyond, a supernodal factorisation is faster.
 const MOST_FILL: usize = 8;
 
-/// Where a block comes from.
+/// Where a block stands, in one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// Elimination fills it.
-    Nothing,
+pub struct Source(u32);
+
+/// What a [`Source`] says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stands {
     /// A tile of the tangent
-    Tile(u32),
+    Tile(usize),
     /// The transpose of one
-    Transpose(u32),
+    Transpose(usize),
+    /// Elimination changes it, and keeps it by itself.
+    Own(usize),
+    /// Elimination fills it.
+    Nowhere,
 }
 
 impl Source {
-    /// Where the transpose of the block comes from.
+    const NOWHERE: Self = Self(u32::MAX);
+
+    fn tile(number: usize) -> Self {
+        Self(4 * number as u32)
+    }
+
+    fn own(number: usize) -> Self {
+        Self(4 * number as u32 + 2)
+    }
+
+    /// Where the transpose of a block that stands in the tangent stands.
+    fn transposed(self) -> Self {
+        if self.0 & 2 == 0 { Self(self.0 ^ 1) } else { self }
+    }
+
+    /// Where it is.
     #[inline(always)]
-    pub fn transposed(self) -> Self {
-        match self {
-            Self::Nothing => Self::Nothing,
-            Self::Tile(number) => Self::Transpose(number),
-            Self::Transpose(number) => Self::Tile(number),
+    pub fn stands(self) -> Stands {
+        let number = (self.0 / 4) as usize;
+        match self.0 % 4 {
+            0 => Stands::Tile(number),
+            1 => Stands::Transpose(number),
+            2 => Stands::Own(number),
+            _ => Stands::Nowhere,
         }
     }
 }
@@ -33,7 +56,7 @@ impl Source {
 /// The elimination of block rows one after the other.
 ///
 /// Rows are called by their place in the order. The rows that the elimination of row k changes are its later neighbours;
-/// the blocks right of the diagonal in row k stand in their order.
+/// the blocks right of the diagonal in row k stand in their order. Blocks that no elimination changes are those of the tangent.
 #[derive(Clone, Debug)]
 pub struct Elimination {
     /// The group of each row
@@ -50,13 +73,19 @@ pub struct Elimination {
     pub later: Vec<u32>,
     /// Where the targets of each row begin
     pub target_starts: Vec<u32>,
-    /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a: the block that they
-    /// share right of the diagonal
+    /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a: the number, among those that
+    /// elimination changes, of the block that they share right of the diagonal
     pub targets: Vec<u32>,
+    /// The blocks that elimination changes
+    changed: Vec<u32>,
+    /// What these begin with, as `above` and `below`
+    begin: Vec<[Source; 2]>,
     /// The tile of the tangent on the diagonal of each row
     pub diagonal: Vec<u32>,
-    /// Of each block right of the diagonal, and of its mirror image
-    pub sources: Vec<[Source; 2]>,
+    /// Each block right of the diagonal by rows; empty where they are `below`
+    above: Vec<Source>,
+    /// Their mirror images by columns
+    below: Vec<Source>,
     /// Rows of tiles that are no equations: row, and row of its tile
     idle: Vec<(u32, u8)>,
 }
@@ -68,12 +97,29 @@ impl Elimination {
         let most = MOST_FILL * pattern.pairs();
         let Order { order, branches, neighbours } = order::find(pattern, most)?;
         let (starts, later) = (neighbours.starts, neighbours.later);
-        let (target_starts, targets) = targets(&starts, &later);
+        let (target_starts, mut targets) = targets(&starts, &later);
+        let mut changed = targets.clone();
+        changed.sort_unstable();
+        changed.dedup();
+        targets.iter_mut().for_each(|block| *block = changed.partition_point(|other| other < block) as u32);
         let trunk = branches.last().map_or(0, |branch| branch.end)..order.len();
         let row_of = order::inverse(&order);
-        let (diagonal, sources, idle) = (Vec::new(), Vec::new(), Vec::new());
-        let mut out =
-            Self { row_of, order, branches, trunk, starts, later, target_starts, targets, diagonal, sources, idle };
+        let mut out = Self {
+            row_of,
+            order,
+            branches,
+            trunk,
+            starts,
+            later,
+            target_starts,
+            targets,
+            changed,
+            begin: Vec::new(),
+            diagonal: Vec::new(),
+            above: Vec::new(),
+            below: Vec::new(),
+            idle: Vec::new(),
+        };
         out.find_sources(pattern);
         Some(out)
     }
@@ -89,6 +135,40 @@ impl Elimination {
     #[inline]
     pub fn neighbours(&self, row: usize) -> Range<usize> {
         self.starts[row] as usize..self.starts[row + 1] as usize
+    }
+
+    /// A block right of the diagonal, by rows.
+    #[inline(always)]
+    pub fn above(&self, block: usize) -> Source {
+        *self.above.get(block).unwrap_or(&self.below[block])
+    }
+
+    /// Its mirror image, by columns.
+    #[inline(always)]
+    pub fn below(&self, block: usize) -> Source {
+        self.below[block]
+    }
+
+    /// Whether a block by rows and its mirror image by columns stand at one place and are the same.
+    #[inline(always)]
+    pub fn is_one(&self, block: usize) -> bool {
+        self.above.is_empty() && self.below[block].0 & 2 == 0
+    }
+
+    /// The blocks in these rows that elimination changes, by their numbers among all such.
+    pub fn changed(&self, rows: &Range<usize>) -> Range<usize> {
+        let place = |row: usize| self.changed.partition_point(|&block| block < self.starts[row]);
+        if self.changed.is_empty() { 0..0 } else { place(rows.start)..place(rows.end) }
+    }
+
+    /// What one of these begins with, by rows.
+    pub fn begin_above(&self, number: usize) -> Source {
+        self.begin[number][0]
+    }
+
+    /// And its mirror image, by columns.
+    pub fn begin_below(&self, number: usize) -> Source {
+        self.begin[number][1]
     }
 
     /// The end of these rows and of those before `end` that their elimination changes.
@@ -121,7 +201,8 @@ impl Elimination {
     fn find_sources(&mut self, pattern: &Pattern) {
         let row_of = &self.row_of;
         self.diagonal = vec![0; self.order.len()];
-        self.sources = vec![[Source::Nothing; 2]; self.later.len()];
+        self.below = vec![Source::NOWHERE; self.later.len()];
+        self.above = if pattern.symmetry.halves() { Vec::new() } else { self.below.clone() };
         for column in 0..pattern.groups.count() {
             for tile in pattern.tiles_of(column) {
                 let (i, j) = (row_of[pattern.rows[tile] as usize], row_of[column]);
@@ -129,11 +210,20 @@ impl Elimination {
                     self.diagonal[i as usize] = tile as u32;
                     continue;
                 }
-                let (block, side) = (find(&self.starts, &self.later, i.min(j), i.max(j)), usize::from(i > j));
-                self.sources[block][side] = Source::Tile(tile as u32);
-                if pattern.symmetry.halves() {
-                    self.sources[block][1 - side] = Source::Transpose(tile as u32);
+                // Tiles stand by their columns.
+                let (block, source) = (find(&self.starts, &self.later, i.min(j), i.max(j)), Source::tile(tile));
+                match (i < j, self.above.get_mut(block)) {
+                    (true, Some(above)) => *above = source.transposed(),
+                    (true, None) => self.below[block] = source.transposed(),
+                    (false, _) => self.below[block] = source,
                 }
+            }
+        }
+        self.begin =
+            self.changed.iter().map(|&block| [self.above(block as usize), self.below(block as usize)]).collect();
+        for sources in [&mut self.above, &mut self.below].into_iter().filter(|sources| !sources.is_empty()) {
+            for (number, &block) in self.changed.iter().enumerate() {
+                sources[block as usize] = Source::own(number);
             }
         }
         self.idle = pattern.idle.iter().map(|&(group, direction)| (row_of[group as usize], direction)).collect();

@@ -4,13 +4,16 @@ use super::elimination::Elimination;
 use super::pieces::Piece;
 use super::stretch::Stretch;
 use super::tile::{self, Part, Rows, Tile, Width};
-use crate::system::System;
 use std::ops::Range;
 
-/// With Y = L_kk^-1 A_kj, L_jk = Y^T D_k^-1, whose transpose stands right of the diagonal.
+/// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 A_kj a row
+/// takes Y^T D^-1 Y from what comes later.
 pub struct Ldl<const W: usize> {
     diagonal: Stretch<Tile<W>>,
-    upper: Stretch<Tile<W>>,
+    /// The blocks above the diagonal that are not those of the tangent
+    changed: Stretch<Tile<W>>,
+    /// D^-1 Y of the row that is being eliminated
+    row: Vec<Tile<W>>,
 }
 
 impl<const W: usize> Piece<W> for Ldl<W>
@@ -20,8 +23,9 @@ where
     const NAME: &'static str = "block LDL^T";
     const SYMMETRIC: bool = true;
 
-    fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self> {
-        Some(Self { diagonal: Stretch::new(rows, tile::zero())?, upper: Stretch::new(blocks, tile::zero())? })
+    fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self> {
+        let (diagonal, changed) = (Stretch::new(rows, tile::zero())?, Stretch::new(changed, tile::zero())?);
+        Some(Self { diagonal, changed, row: Vec::new() })
     }
 
     fn rows(&self) -> Range<usize> {
@@ -29,14 +33,14 @@ where
     }
 
     #[inline(always)]
-    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System) {
-        let tiles = system.tiles::<W>();
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &[Tile<W>]) {
         for row in rows.clone() {
-            self.diagonal[row] = tiles[elimination.diagonal[row] as usize];
-            for k in elimination.neighbours(row) {
-                // By columns it is what its mirror image is by rows.
-                tile::take(&mut self.upper[k], tiles, elimination.sources[k][1]);
-            }
+            tile::copy(&mut self.diagonal[row], &tiles[elimination.diagonal[row] as usize]);
+        }
+        for number in elimination.changed(&rows) {
+            // By columns it is what its mirror image is by rows.
+            let block = &mut self.changed[number];
+            tile::with(elimination.begin_below(number), tiles, &Stretch::nothing(), |begin| tile::copy(block, begin));
         }
         for &(row, direction) in elimination.idle(&rows) {
             self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
@@ -45,64 +49,73 @@ where
 
     fn add(&mut self, other: &Self) {
         self.diagonal.add(&other.diagonal);
-        self.upper.add(&other.upper);
+        self.changed.add(&other.changed);
     }
 
     fn clear(&mut self) {
         self.diagonal.fill(|_| tile::zero());
-        self.upper.fill(|_| tile::zero());
+        self.changed.fill(|_| tile::zero());
     }
 
     #[inline(always)]
-    fn eliminate(&mut self, rows: Range<usize>, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
-        let Self { diagonal, upper } = self;
-        let mut negative = 0;
+    fn eliminate(
+        &mut self,
+        rows: Range<usize>,
+        elimination: &Elimination,
+        tiles: &[Tile<W>],
+        beyond: &mut Self,
+    ) -> Option<usize> {
+        let Self { diagonal, changed, row: before } = self;
+        let (mut factor, mut y, mut w, mut negative) = (tile::zero(), tile::zero(), tile::zero(), 0);
         for row in rows {
-            negative += tile::factorise_symmetric(&mut diagonal[row])?;
-            let factor = diagonal[row];
+            tile::copy(&mut factor, &diagonal[row]);
+            negative += tile::factorise_symmetric(&mut factor)?;
             let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
+            before.clear();
             for k in neighbours.clone() {
-                let mut y = upper[k];
-                tile::forward_symmetric(&factor, &mut y);
-                for a in neighbours.start..k {
-                    let w = upper[a];
-                    tile::subtract_product(upper.or(&mut beyond.upper, elimination.targets[target] as usize), &w, &y);
+                let forward = |block: &Tile<W>| tile::forward_symmetric(&factor, block, &mut y);
+                tile::with(elimination.below(k), tiles, changed, forward);
+                for w in &*before {
+                    let shared = elimination.targets[target] as usize;
+                    tile::subtract_product(changed.or(&mut beyond.changed, shared), w, &y);
                     target += 1;
                 }
-                let w = tile::over_pivots(&factor, &y);
-                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
-                tile::subtract_product(changed, &w, &y);
-                upper[k] = w;
+                tile::over_pivots(&factor, &y, &mut w);
+                let later = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
+                tile::subtract_product(later, &w, &y);
+                if k + 1 < neighbours.end {
+                    before.push(w);
+                }
             }
+            tile::invert_symmetric(&factor, &mut diagonal[row]);
         }
         Some(negative)
     }
 
     #[inline(always)]
-    fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+    fn forward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &mut [Part<W>]) {
         let rows = self.rows();
         for row in rows.clone() {
-            let (factor, mut part) = (&self.diagonal[row], x[row - rows.start]);
-            tile::solve_forward_symmetric(factor, &mut part);
+            let part = tile::solve(&self.diagonal[row], &x[row - rows.start]);
             for k in elimination.neighbours(row) {
-                let later = elimination.place(&rows, k);
-                tile::subtract_transposed(later.of_mut(x, beyond), &self.upper[k], &part);
+                let later = elimination.place(&rows, k).of_mut(x, beyond);
+                tile::subtract_transposed_of(later, elimination.below(k), tiles, &self.changed, &part);
             }
-            part.iter_mut().enumerate().for_each(|(r, x)| *x *= factor[r][r]);
             x[row - rows.start] = part;
         }
     }
 
     #[inline(always)]
-    fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
+    fn backward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &[Part<W>]) {
         let rows = self.rows();
         for row in rows.clone().rev() {
-            let mut part = x[row - rows.start];
+            let mut part = [0.0; W];
             for k in elimination.neighbours(row) {
-                tile::subtract_times(&mut part, &self.upper[k], elimination.place(&rows, k).of(x, beyond));
+                let later = elimination.place(&rows, k).of(x, beyond);
+                tile::subtract_times_of(&mut part, elimination.below(k), tiles, &self.changed, later);
             }
-            tile::solve_backward_symmetric(&self.diagonal[row], &mut part);
-            x[row - rows.start] = part;
+            let part = tile::solve(&self.diagonal[row], &part);
+            x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
         }
     }
 }

@@ -4,16 +4,19 @@ use super::elimination::Elimination;
 use super::pieces::Piece;
 use super::stretch::Stretch;
 use super::tile::{self, Part, RowOrder, Rows, Tile, Width};
-use crate::system::System;
 use std::ops::Range;
 
-/// With P A_kk = L U: Y = L^-1 P A_kj right of the diagonal, W = U^-T A_jk^T below it; L_jk = W^T.
+/// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 P A_kj and
+/// W = U^-T A_jk^T a row takes W^T Y from what comes later.
 pub struct Lu<const W: usize> {
     diagonal: Stretch<Tile<W>>,
     orders: Stretch<RowOrder<W>>,
-    upper: Stretch<Tile<W>>,
-    /// Transposed, each beside its mirror image in `upper`
-    lower: Stretch<Tile<W>>,
+    /// The blocks above the diagonal that are not those of the tangent
+    above: Stretch<Tile<W>>,
+    /// Transposed, each beside its mirror image in `above`
+    below: Stretch<Tile<W>>,
+    /// Y and W of the row that is being eliminated
+    row: Vec<[Tile<W>; 2]>,
 }
 
 impl<const W: usize> Piece<W> for Lu<W>
@@ -23,12 +26,13 @@ where
     const NAME: &'static str = "block LU";
     const SYMMETRIC: bool = false;
 
-    fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self> {
+    fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self> {
         Some(Self {
             diagonal: Stretch::new(rows.clone(), tile::zero())?,
             orders: Stretch::new(rows, [0; W])?,
-            upper: Stretch::new(blocks.clone(), tile::zero())?,
-            lower: Stretch::new(blocks, tile::zero())?,
+            above: Stretch::new(changed.clone(), tile::zero())?,
+            below: Stretch::new(changed, tile::zero())?,
+            row: Vec::new(),
         })
     }
 
@@ -37,19 +41,14 @@ where
     }
 
     #[inline(always)]
-    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System) {
-        let tiles = system.tiles::<W>();
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &[Tile<W>]) {
         for row in rows.clone() {
             self.diagonal[row] = tile::transposed(&tiles[elimination.diagonal[row] as usize]);
-            for k in elimination.neighbours(row) {
-                let [upper, lower] = elimination.sources[k];
-                tile::take(&mut self.upper[k], tiles, upper.transposed());
-                // Where one tile is the transpose of the other, both are one here.
-                match lower == upper.transposed() {
-                    true => self.lower[k] = self.upper[k],
-                    false => tile::take(&mut self.lower[k], tiles, lower),
-                }
-            }
+        }
+        for number in elimination.changed(&rows) {
+            let (none, above, below) = (Stretch::nothing(), &mut self.above[number], &mut self.below[number]);
+            tile::with(elimination.begin_above(number), tiles, &none, |begin| tile::copy(above, begin));
+            tile::with(elimination.begin_below(number), tiles, &none, |begin| tile::copy(below, begin));
         }
         for &(row, direction) in elimination.idle(&rows) {
             self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
@@ -58,68 +57,95 @@ where
 
     fn add(&mut self, other: &Self) {
         self.diagonal.add(&other.diagonal);
-        self.upper.add(&other.upper);
-        self.lower.add(&other.lower);
+        self.above.add(&other.above);
+        self.below.add(&other.below);
     }
 
     fn clear(&mut self) {
-        for stretch in [&mut self.diagonal, &mut self.upper, &mut self.lower] {
+        for stretch in [&mut self.diagonal, &mut self.above, &mut self.below] {
             stretch.fill(|_| tile::zero());
         }
     }
 
     #[inline(always)]
-    fn eliminate(&mut self, rows: Range<usize>, elimination: &Elimination, beyond: &mut Self) -> Option<usize> {
-        let Self { diagonal, orders, upper, lower } = self;
+    fn eliminate(
+        &mut self,
+        rows: Range<usize>,
+        elimination: &Elimination,
+        tiles: &[Tile<W>],
+        beyond: &mut Self,
+    ) -> Option<usize> {
+        let Self { diagonal, orders, above, below, row: before } = self;
+        let (mut factor, mut y, mut w) = (tile::zero(), tile::zero(), tile::zero());
         for row in rows {
-            let order = tile::factorise(&mut diagonal[row])?;
+            tile::copy(&mut factor, &diagonal[row]);
+            let order = tile::factorise(&mut factor)?;
             orders[row] = order;
-            let factor = diagonal[row];
             let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
+            before.clear();
             for k in neighbours.clone() {
-                let (mut y, mut w) = (tile::permuted(&order, &upper[k]), lower[k]);
-                tile::forward(&factor, &mut y);
-                tile::forward_upper(&factor, &mut w);
-                for a in neighbours.start..k {
-                    let (other_y, other_w) = (upper[a], lower[a]);
+                let is_one = elimination.is_one(k);
+                let both = |block: &Tile<W>| {
+                    tile::forward_upper(&factor, block, &mut w);
+                    if is_one {
+                        tile::forward(&factor, &order, block, &mut y);
+                    }
+                };
+                tile::with(elimination.below(k), tiles, below, both);
+                if !is_one {
+                    let forward = |block: &Tile<W>| tile::forward(&factor, &order, block, &mut y);
+                    tile::with(elimination.above(k), tiles, above, forward);
+                }
+                for [other_y, other_w] in &*before {
                     let shared = elimination.targets[target] as usize;
-                    tile::subtract_product(upper.or(&mut beyond.upper, shared), &other_w, &y);
-                    tile::subtract_product(lower.or(&mut beyond.lower, shared), &other_y, &w);
+                    tile::subtract_product(above.or(&mut beyond.above, shared), other_w, &y);
+                    tile::subtract_product(below.or(&mut beyond.below, shared), other_y, &w);
                     target += 1;
                 }
-                let changed = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
-                tile::subtract_product(changed, &w, &y);
-                (upper[k], lower[k]) = (y, w);
+                let later = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
+                tile::subtract_product(later, &w, &y);
+                if k + 1 < neighbours.end {
+                    before.push([y, w]);
+                }
             }
+            tile::invert(&factor, &mut diagonal[row]);
         }
         // Signs of pivots tell nothing.
         Some(0)
     }
 
     #[inline(always)]
-    fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+    fn forward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &mut [Part<W>]) {
         let rows = self.rows();
         for row in rows.clone() {
-            let mut part = x[row - rows.start];
-            tile::solve_forward(&self.diagonal[row], &self.orders[row], &mut part);
+            let part = self.solved(row, &x[row - rows.start]);
             for k in elimination.neighbours(row) {
-                let later = elimination.place(&rows, k);
-                tile::subtract_transposed(later.of_mut(x, beyond), &self.lower[k], &part);
+                let later = elimination.place(&rows, k).of_mut(x, beyond);
+                tile::subtract_transposed_of(later, elimination.below(k), tiles, &self.below, &part);
             }
             x[row - rows.start] = part;
         }
     }
 
     #[inline(always)]
-    fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
+    fn backward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &[Part<W>]) {
         let rows = self.rows();
         for row in rows.clone().rev() {
-            let mut part = x[row - rows.start];
+            let mut part = [0.0; W];
             for k in elimination.neighbours(row) {
-                tile::subtract_times(&mut part, &self.upper[k], elimination.place(&rows, k).of(x, beyond));
+                let later = elimination.place(&rows, k).of(x, beyond);
+                tile::subtract_times_of(&mut part, elimination.above(k), tiles, &self.above, later);
             }
-            tile::solve_backward(&self.diagonal[row], &mut part);
-            x[row - rows.start] = part;
+            let part = self.solved(row, &part);
+            x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
         }
+    }
+}
+
+impl<const W: usize> Lu<W> {
+    /// A_kk^-1 x, with A_kk as row k was eliminated
+    #[inline(always)]
+    fn solved(&self, row: usize, x: &Part<W>) -> Part<W> {
+        tile::solve(&self.diagonal[row], &tile::reordered(&self.orders[row], x))
     }
 }

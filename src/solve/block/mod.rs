@@ -42,8 +42,8 @@ trait Factor: Send {
     /// See [`BlockSolver::is_symmetric`].
     fn is_symmetric(&self) -> bool;
 
-    /// Solves with the last factorisation, row by row.
-    fn solve(&self, elimination: &Elimination, x: &mut [f64]);
+    /// Solves with the last factorisation, which is that of `system`, row by row.
+    fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]);
 }
 
 impl BlockSolver {
@@ -109,20 +109,20 @@ impl BlockSolver {
         self.factor.negative()
     }
 
-    /// Solves with the last factorisation; one entry an equation.
-    pub fn solve(&mut self, pattern: &Pattern, x: &mut [f64]) {
-        if pattern.width() == WIDTH { self.solve_by::<WIDTH>(pattern, x) } else { self.solve_by::<3>(pattern, x) }
+    /// Solves with the last factorisation, which is that of `system`; one entry an equation.
+    pub fn solve(&mut self, system: &System, x: &mut [f64]) {
+        if system.pattern.width() == WIDTH { self.solve_by::<WIDTH>(system, x) } else { self.solve_by::<3>(system, x) }
     }
 
-    fn solve_by<const W: usize>(&mut self, pattern: &Pattern, x: &mut [f64]) {
-        let Self { elimination, factor, parts } = self;
+    fn solve_by<const W: usize>(&mut self, system: &System, x: &mut [f64]) {
+        let (Self { elimination, factor, parts }, pattern) = (self, &system.pattern);
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
             for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
                 let numbers = pattern.numbers(group as usize).iter();
                 part.iter_mut().zip(numbers).for_each(|(entry, &k)| *entry = x.get(k as usize).copied().unwrap_or(0.0));
             }
         });
-        factor.solve(elimination, parts);
+        factor.solve(elimination, system, parts);
         let parts = parts.as_chunks::<W>().0;
         pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
     }

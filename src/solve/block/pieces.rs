@@ -2,7 +2,7 @@
 
 use super::Factor;
 use super::elimination::Elimination;
-use super::tile::Part;
+use super::tile::{Part, Tile};
 use crate::real::Instructions;
 use crate::system::System;
 use crate::threads;
@@ -19,14 +19,14 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// Whether it is one of symmetric tangents, whose pivots have signs that count
     const SYMMETRIC: bool;
 
-    /// Of these rows, and blocks right of the diagonal. `None` where memory cannot be had.
-    fn new(rows: Range<usize>, blocks: Range<usize>) -> Option<Self>;
+    /// Of these rows, and blocks right of the diagonal that elimination changes. `None` where memory cannot be had.
+    fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self>;
 
     /// Its rows.
     fn rows(&self) -> Range<usize>;
 
     /// Takes over the tangent in some of its rows: once, before the first elimination that changes them.
-    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, system: &System);
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &[Tile<W>]);
 
     /// Adds what belongs to the same rows.
     fn add(&mut self, other: &Self);
@@ -36,13 +36,19 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
 
     /// Eliminates the next of its rows; what that changes in rows later than its own goes to `beyond`. The number of negative pivots;
     /// `None` where one is zero or no number.
-    fn eliminate(&mut self, rows: Range<usize>, elimination: &Elimination, beyond: &mut Self) -> Option<usize>;
+    fn eliminate(
+        &mut self,
+        rows: Range<usize>,
+        elimination: &Elimination,
+        tiles: &[Tile<W>],
+        beyond: &mut Self,
+    ) -> Option<usize>;
 
     /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to `beyond`.
-    fn forward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &mut [Part<W>]);
+    fn forward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &mut [Part<W>]);
 
     /// Solves with the upper factor for its own part `x`, where all later rows are solved.
-    fn backward(&self, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]);
+    fn backward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &[Part<W>]);
 }
 
 /// Branches and trunk.
@@ -60,9 +66,7 @@ pub struct Pieces<P, const W: usize> {
 impl<P: Piece<W>, const W: usize> Pieces<P, W> {
     /// For an elimination. `None` where memory cannot be had.
     pub fn new(elimination: &Elimination) -> Option<Self> {
-        let blocks =
-            |rows: &Range<usize>| elimination.starts[rows.start] as usize..elimination.starts[rows.end] as usize;
-        let piece = |rows: &Range<usize>| P::new(rows.clone(), blocks(rows));
+        let piece = |rows: &Range<usize>| P::new(rows.clone(), elimination.changed(rows));
         let (trunk, end) = (&elimination.trunk, elimination.trunk.end);
         let (mut branches, mut changes) = (Vec::new(), Vec::new());
         let both = |rows: &Range<usize>| Some((piece(rows)?, piece(trunk)?));
@@ -79,10 +83,11 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
 impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
         let Self { branches, changes, trunk, nothing, negative } = self;
+        let tiles = system.tiles::<W>();
         *negative = None;
         let branch = |(piece, change): (&mut P, &mut P)| {
             change.clear();
-            eliminate(piece, elimination, system, change)
+            eliminate(piece, elimination, tiles, change)
         };
         let mut counted = Some(0);
         let add = |count: Option<usize>| counted = counted.zip(count).map(|(sum, count)| sum + count);
@@ -91,9 +96,9 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
         let last = Instructions::here().run(
             #[inline(always)]
             || {
-                trunk.load(trunk.rows(), elimination, system);
+                trunk.load(trunk.rows(), elimination, tiles);
                 changes.iter().for_each(|change| trunk.add(change));
-                trunk.eliminate(trunk.rows(), elimination, nothing)
+                trunk.eliminate(trunk.rows(), elimination, tiles, nothing)
             },
         );
         *negative = last.map(|last| counted + last);
@@ -112,21 +117,22 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
         P::NAME
     }
 
-    fn solve(&self, elimination: &Elimination, x: &mut [f64]) {
+    fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]) {
+        let tiles = system.tiles::<W>();
         let ends = elimination.pieces().map(|rows| rows.end);
         let mut parts = threads::split(x.as_chunks_mut().0, ends);
         let Some(trunk) = parts.pop() else { return };
         let down = |(piece, x): (&P, &mut &mut [Part<W>])| {
             let mut change = vec![[0.0; W]; elimination.trunk.len()];
-            forward(piece, elimination, x, &mut change);
+            forward(piece, elimination, tiles, x, &mut change);
             change
         };
         threads::in_order(self.branches.iter().zip(&mut parts), down, |change| {
             trunk.as_flattened_mut().iter_mut().zip(change.as_flattened()).for_each(|(x, change)| *x += change);
         });
-        forward(&self.trunk, elimination, trunk, &mut []);
-        backward(&self.trunk, elimination, trunk, &[]);
-        let up = |(piece, x): (&P, &mut [Part<W>])| backward(piece, elimination, x, trunk);
+        forward(&self.trunk, elimination, tiles, trunk, &mut []);
+        backward(&self.trunk, elimination, tiles, trunk, &[]);
+        let up = |(piece, x): (&P, &mut [Part<W>])| backward(piece, elimination, tiles, x, trunk);
         threads::each(self.branches.iter().zip(parts), up);
     }
 }
@@ -135,7 +141,7 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
 fn eliminate<const W: usize, P: Piece<W>>(
     piece: &mut P,
     elimination: &Elimination,
-    system: &System,
+    tiles: &[Tile<W>],
     beyond: &mut P,
 ) -> Option<usize> {
     Instructions::here().run(
@@ -146,8 +152,8 @@ fn eliminate<const W: usize, P: Piece<W>>(
             for start in all.clone().step_by(AT_ONCE) {
                 let rows = start..all.end.min(start + AT_ONCE);
                 let reach = loaded.max(elimination.reach(&rows, all.end));
-                piece.load(std::mem::replace(&mut loaded, reach)..reach, elimination, system);
-                negative += piece.eliminate(rows, elimination, beyond)?;
+                piece.load(std::mem::replace(&mut loaded, reach)..reach, elimination, tiles);
+                negative += piece.eliminate(rows, elimination, tiles, beyond)?;
             }
             Some(negative)
         },
@@ -157,18 +163,25 @@ fn eliminate<const W: usize, P: Piece<W>>(
 fn forward<const W: usize, P: Piece<W>>(
     piece: &P,
     elimination: &Elimination,
+    tiles: &[Tile<W>],
     x: &mut [Part<W>],
     beyond: &mut [Part<W>],
 ) {
     Instructions::here().run(
         #[inline(always)]
-        || piece.forward(elimination, x, beyond),
+        || piece.forward(elimination, tiles, x, beyond),
     );
 }
 
-fn backward<const W: usize, P: Piece<W>>(piece: &P, elimination: &Elimination, x: &mut [Part<W>], beyond: &[Part<W>]) {
+fn backward<const W: usize, P: Piece<W>>(
+    piece: &P,
+    elimination: &Elimination,
+    tiles: &[Tile<W>],
+    x: &mut [Part<W>],
+    beyond: &[Part<W>],
+) {
     Instructions::here().run(
         #[inline(always)]
-        || piece.backward(elimination, x, beyond),
+        || piece.backward(elimination, tiles, x, beyond),
     );
 }

@@ -10,6 +10,11 @@ pub struct Stretch<T> {
 }
 
 impl<T: Clone> Stretch<T> {
+    /// No entries.
+    pub fn nothing() -> Self {
+        Self { start: 0, entries: Vec::new() }
+    }
+
     /// At these places. `None` where memory cannot be had.
     pub fn new(places: Range<usize>, entry: T) -> Option<Self> {
         let mut entries = Vec::new();

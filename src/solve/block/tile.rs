@@ -1,7 +1,8 @@
 //! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 where a scene is planar. Every loop runs along rows, which lie
 //! next to each other.
 
-use super::elimination::Source;
+use super::elimination::{Source, Stands};
+use super::stretch::Stretch;
 use crate::real::Lanes;
 pub use crate::system::{Tile, transposed};
 
@@ -139,15 +140,13 @@ where
 }
 
 #[inline(always)]
-fn parts<const W: usize>(rows: &[<Width<W> as Rows<W>>::Row; W]) -> Tile<W>
+fn store<const W: usize>(rows: &[<Width<W> as Rows<W>>::Row; W], out: &mut Tile<W>)
 where
     Width<W>: Rows<W>,
 {
-    let mut out = zero();
     for r in 0..W {
         out[r] = part::<W>(rows[r]);
     }
-    out
 }
 
 /// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves loops keep numbers out of registers.
@@ -173,13 +172,61 @@ macro_rules! each_row_backwards {
     }};
 }
 
-/// Takes a block over from the tangent.
+/// Does something with a block, wherever it stands: it is not copied, which would cost as much as a solution with it.
 #[inline(always)]
-pub fn take<const W: usize>(block: &mut Tile<W>, tiles: &[Tile<W>], source: Source) {
-    match source {
-        Source::Nothing => *block = zero(),
-        Source::Tile(number) => *block = tiles[number as usize],
-        Source::Transpose(number) => *block = transposed(&tiles[number as usize]),
+pub fn with<const W: usize>(source: Source, tiles: &[Tile<W>], own: &Stretch<Tile<W>>, mut work: impl FnMut(&Tile<W>)) {
+    match source.stands() {
+        Stands::Tile(number) => work(&tiles[number]),
+        Stands::Transpose(number) => work(&transposed(&tiles[number])),
+        Stands::Own(number) => work(&own[number]),
+        Stands::Nowhere => work(&zero()),
+    }
+}
+
+/// Copies a tile row by row: a call for so few numbers costs more.
+#[inline(always)]
+pub fn copy<const W: usize>(to: &mut Tile<W>, from: &Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    each_row!(W, |r| to[r] = part::<W>(row::<W>(&from[r])));
+}
+
+/// part -= b^T x, with the block b wherever it stands.
+#[inline(always)]
+pub fn subtract_transposed_of<const W: usize>(
+    part: &mut Part<W>,
+    source: Source,
+    tiles: &[Tile<W>],
+    own: &Stretch<Tile<W>>,
+    x: &Part<W>,
+) where
+    Width<W>: Rows<W>,
+{
+    match source.stands() {
+        Stands::Tile(number) => subtract_transposed(part, &tiles[number], x),
+        Stands::Transpose(number) => subtract_times(part, &tiles[number], x),
+        Stands::Own(number) => subtract_transposed(part, &own[number], x),
+        Stands::Nowhere => {}
+    }
+}
+
+/// part -= b x, with the block b wherever it stands.
+#[inline(always)]
+pub fn subtract_times_of<const W: usize>(
+    part: &mut Part<W>,
+    source: Source,
+    tiles: &[Tile<W>],
+    own: &Stretch<Tile<W>>,
+    x: &Part<W>,
+) where
+    Width<W>: Rows<W>,
+{
+    match source.stands() {
+        Stands::Tile(number) => subtract_times(part, &tiles[number], x),
+        Stands::Transpose(number) => subtract_transposed(part, &tiles[number], x),
+        Stands::Own(number) => subtract_times(part, &own[number], x),
+        Stands::Nowhere => {}
     }
 }
 
@@ -247,47 +294,29 @@ fn poison_of(pivot: f64, inverse: f64) -> f64 {
     (pivot + inverse) * 0.0
 }
 
-/// y = L^-1 y, for all columns at once.
+/// y = L^-1 b, for all columns at once.
 #[inline(always)]
-pub fn forward_symmetric<const W: usize>(factor: &Tile<W>, y: &mut Tile<W>)
+pub fn forward_symmetric<const W: usize>(factor: &Tile<W>, b: &Tile<W>, y: &mut Tile<W>)
 where
     Width<W>: Rows<W>,
 {
-    let mut lanes = rows::<W>(y);
+    let mut lanes = rows::<W>(b);
     each_row!(W, |r| {
         let pivot = lanes[r];
         each_row!(W, |k| if k > r {
             Width::<W>::subtract(&mut lanes[k], factor[r][k], &pivot);
         });
     });
-    *y = parts::<W>(&lanes);
+    store::<W>(&lanes, y);
 }
 
-/// D^-1 y
+/// w = D^-1 y
 #[inline(always)]
-pub fn over_pivots<const W: usize>(factor: &Tile<W>, y: &Tile<W>) -> Tile<W>
+pub fn over_pivots<const W: usize>(factor: &Tile<W>, y: &Tile<W>, w: &mut Tile<W>)
 where
     Width<W>: Rows<W>,
 {
-    let mut out = zero();
-    each_row!(W, |r| out[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r])));
-    out
-}
-
-/// x = L^-1 x
-#[inline(always)]
-pub fn solve_forward_symmetric<const W: usize>(factor: &Tile<W>, x: &mut Part<W>) {
-    each_row!(W, |r| each_row!(W, |k| if k > r {
-        x[k] -= factor[r][k] * x[r];
-    }));
-}
-
-/// x = L^-T x; what is known last comes last, so that nothing waits for it.
-#[inline(always)]
-pub fn solve_backward_symmetric<const W: usize>(factor: &Tile<W>, x: &mut Part<W>) {
-    each_row_backwards!(W, |r| each_row_backwards!(W, |k| if k > r {
-        x[r] -= factor[r][k] * x[k];
-    }));
+    each_row!(W, |r| w[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r])));
 }
 
 /// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds inverses. Rows stay where they are
@@ -370,37 +399,30 @@ where
     tile[r][r] = inverse;
 }
 
-/// Rows in another order.
+/// y = L^-1 P b, for all columns at once.
 #[inline(always)]
-pub fn permuted<const W: usize>(order: &RowOrder<W>, tile: &Tile<W>) -> Tile<W> {
-    let mut out = zero();
-    each_row!(W, |r| out[r] = tile[order[r] as usize]);
-    out
-}
-
-/// y = L^-1 y, for all columns at once.
-#[inline(always)]
-pub fn forward<const W: usize>(factor: &Tile<W>, y: &mut Tile<W>)
+pub fn forward<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b: &Tile<W>, y: &mut Tile<W>)
 where
     Width<W>: Rows<W>,
 {
-    let mut lanes = rows::<W>(y);
+    let mut lanes = [row::<W>(&b[order[0] as usize]); W];
+    each_row!(W, |r| lanes[r] = row::<W>(&b[order[r] as usize]));
     each_row!(W, |r| {
         let pivot = lanes[r];
         each_row!(W, |k| if k > r {
             Width::<W>::subtract(&mut lanes[k], factor[k][r], &pivot);
         });
     });
-    *y = parts::<W>(&lanes);
+    store::<W>(&lanes, y);
 }
 
-/// w = U^-T w, for all columns at once.
+/// w = U^-T b, for all columns at once.
 #[inline(always)]
-pub fn forward_upper<const W: usize>(factor: &Tile<W>, w: &mut Tile<W>)
+pub fn forward_upper<const W: usize>(factor: &Tile<W>, b: &Tile<W>, w: &mut Tile<W>)
 where
     Width<W>: Rows<W>,
 {
-    let mut lanes = rows::<W>(w);
+    let mut lanes = rows::<W>(b);
     each_row!(W, |r| {
         lanes[r] = Width::<W>::scaled(lanes[r], factor[r][r]);
         let pivot = lanes[r];
@@ -408,26 +430,95 @@ where
             Width::<W>::subtract(&mut lanes[k], factor[r][k], &pivot);
         });
     });
-    *w = parts::<W>(&lanes);
+    store::<W>(&lanes, w);
 }
 
-/// x = L^-1 P x
+/// Of a [`factorise_symmetric`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal, L^-T D^-1 from there on.
 #[inline(always)]
-pub fn solve_forward<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, x: &mut Part<W>) {
-    let before = *x;
-    each_row!(W, |r| x[r] = before[order[r] as usize]);
-    each_row!(W, |r| each_row!(W, |k| if k > r {
-        x[k] -= factor[k][r] * x[r];
+pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut below = [row::<W>(&[0.0; W]); W];
+    each_row!(W, |r| {
+        below[r] = unit::<W>(r);
+        each_row!(W, |k| if k < r {
+            let line = below[k];
+            Width::<W>::subtract(&mut below[r], factor[k][r], &line);
+        });
+    });
+    store::<W>(&below, out);
+    each_row!(W, |r| each_row!(W, |k| if k <= r {
+        out[k][r] = out[r][k] * factor[r][r];
     }));
 }
 
-/// x = U^-1 x, as [`solve_backward_symmetric`].
+/// Of a [`factorise`]d tile the same: L^-1 (its diagonal is one) below the diagonal, U^-1 from there on.
 #[inline(always)]
-pub fn solve_backward<const W: usize>(factor: &Tile<W>, x: &mut Part<W>) {
+pub fn invert<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut lines = [row::<W>(&[0.0; W]); W];
     each_row_backwards!(W, |r| {
-        each_row_backwards!(W, |k| if k > r {
-            x[r] -= factor[r][k] * x[k];
+        lines[r] = unit::<W>(r);
+        each_row!(W, |k| if k > r {
+            let line = lines[k];
+            Width::<W>::subtract(&mut lines[r], factor[r][k], &line);
         });
-        x[r] *= factor[r][r];
+        lines[r] = Width::<W>::scaled(lines[r], factor[r][r]);
     });
+    store::<W>(&lines, out);
+    each_row!(W, |r| {
+        lines[r] = unit::<W>(r);
+        each_row!(W, |k| if k < r {
+            let line = lines[k];
+            Width::<W>::subtract(&mut lines[r], factor[r][k], &line);
+        });
+        let below = part::<W>(lines[r]);
+        each_row!(W, |k| if k < r {
+            out[r][k] = below[k];
+        });
+    });
+}
+
+/// A row of the unit matrix.
+#[inline(always)]
+fn unit<const W: usize>(r: usize) -> <Width<W> as Rows<W>>::Row
+where
+    Width<W>: Rows<W>,
+{
+    let mut out = [0.0; W];
+    out[r] = 1.0;
+    row::<W>(&out)
+}
+
+/// Solves with what a factorisation has left of a tile, its triangles inverted: two products take a half of the time of two
+/// substitutions, each of whose numbers waits for the one before.
+#[inline(always)]
+pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
+    let (mut y, mut z) = ([0.0; W], [0.0; W]);
+    each_row!(W, |r| {
+        let mut sums = [x[r], 0.0];
+        each_row!(W, |k| if k < r {
+            sums[k % 2] += inverses[r][k] * x[k];
+        });
+        y[r] = sums[0] + sums[1];
+    });
+    each_row!(W, |r| {
+        let mut sums = [0.0; 2];
+        each_row!(W, |k| if k >= r {
+            sums[k % 2] += inverses[r][k] * y[k];
+        });
+        z[r] = sums[0] + sums[1];
+    });
+    z
+}
+
+/// A part in another order.
+#[inline(always)]
+pub fn reordered<const W: usize>(order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
+    let mut out = [0.0; W];
+    each_row!(W, |r| out[r] = x[order[r] as usize]);
+    out
 }
