@@ -152,7 +152,7 @@ impl Elimination {
     /// Whether a block by rows and its mirror image by columns stand at one place and are the same.
     #[inline(always)]
     pub fn is_one(&self, block: usize) -> bool {
-        self.above.is_empty() && self.below[block].0 & 2 == 0
+        self.above.is_empty() && !matches!(self.below[block].stands(), Stands::Own(_))
     }
 
     /// The blocks in these rows that elimination changes, by their numbers among all such.
