@@ -169,12 +169,9 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
                 continue;
             }
             let along: f64 = free.iter().map(|&i| v[i] * right_hand_side[numbers[i] as usize]).sum();
-            for &i in &free {
-                right_hand_side[numbers[i] as usize] -= along * v[i];
-                for &j in &free {
-                    add_entry(system, numbers[i], numbers[j], weight * v[i] * v[j]);
-                }
-            }
+            free.iter().for_each(|&i| right_hand_side[numbers[i] as usize] -= along * v[i]);
+            let direction = Vec3([v[0], v[1], v[2]]);
+            system.add_to_own_block(slot as Slot, &direction.outer(direction).scale(weight));
         }
     }
 }
@@ -228,13 +225,6 @@ impl Run<'_> {
         let rateless = |&slot: &usize| !(massive[slot] || damped[slot] || self.model.kinds[slot].is_multiplier());
         workshop.rateless = (0..massive.len()).filter(rateless).collect();
         workshop.massive = massive;
-    }
-}
-
-fn add_entry(system: &mut System, row: u32, column: u32, value: f64) {
-    if let Some(place) = system.pattern.find(row, column) {
-        system.values[place] += value;
-        system.revision += 1;
     }
 }
 

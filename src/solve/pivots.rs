@@ -136,9 +136,9 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     let roots: Vec<f64> = (0..width * pattern.groups.count()).map(root).collect();
     let roots: Vec<&[f64]> = roots.chunks_exact(width).collect();
     (0..pattern.groups.count()).all(|column| {
-        let own_only = pattern.symmetry.halves();
-        let looked_at = |row: &usize| *row == column || (*row > column && !own_only);
-        let rows = pattern.rows_of(column).iter().map(|&row| row as usize).filter(looked_at);
+        let beside = pattern.rows_of(column).iter().map(|&row| row as usize);
+        let beside = beside.filter(|&row| row > column && !pattern.symmetry.halves());
+        let rows = std::iter::once(column).chain(beside);
         let mut pairs = rows.map(|row| (row, pattern.tile(row, column), pattern.tile(column, row)));
         pairs.all(|(row, tile, mirror)| match (tile, mirror) {
             (Some(tile), Some(mirror)) => (0..width * width).all(|k| {

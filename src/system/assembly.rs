@@ -1,10 +1,10 @@
 //! Forces and tangent of the whole scene.
 
-use super::equations::Equations;
-use super::pattern::{Pattern, Tile, WIDTH, transposed};
+use super::pattern::{Pattern, Symmetry, Tile, WIDTH, transposed};
 use super::regions::{self, Region};
 use super::sink::{Part, Sink};
 use super::state::Slot;
+use super::storage::{Tiles, Values};
 use crate::kernel::ElementSystem;
 use crate::real::{Instructions, Lanes};
 use crate::tensor::{Mat3, Vec3};
@@ -161,24 +161,26 @@ impl System {
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
-    /// The tangent tile by tile, in the order of the pattern; each by its columns. `W` is the width of the pattern.
-    pub fn tiles<const W: usize>(&self) -> &[Tile<W>] {
-        tiles(&self.values)
+    /// The tangent tile by tile, each by its columns. `W` is the width of the pattern.
+    pub fn tiles<const W: usize>(&self) -> Tiles<'_, W> {
+        self.pattern.storage.tiles(&self.values)
     }
 
     /// What a slot has of the tangent on its diagonal, in its own directions; zero where one is held.
     pub fn own_block(&self, slot: Slot) -> Mat3 {
-        let (pattern, numbers) = (&self.pattern, self.pattern.equations.of(slot));
-        let (group, first) = pattern.groups.row(slot);
         let mut block = Mat3::ZERO;
-        let Some(start) = pattern.tile(group, group) else { return block };
-        let is_free = |k: &usize| numbers[*k] != Equations::HELD;
-        for c in (0..3).filter(is_free) {
-            for r in (0..3).filter(is_free) {
-                block.0[r][c] = self.values[start + pattern.width() * (first + c) + first + r];
-            }
-        }
+        self.pattern.own_entries(slot).for_each(|([r, c], place)| block.0[r][c] = self.values[place]);
         block
+    }
+
+    /// Adds a symmetric block to that, in the directions that are not held.
+    pub fn add_to_own_block(&mut self, slot: Slot, block: &Mat3) {
+        // Where one half is kept, entries share their place with their mirror images.
+        let once = self.pattern.symmetry == Symmetry::Whole;
+        for ([r, c], place) in self.pattern.own_entries(slot).filter(|([r, c], _)| r <= c || !once) {
+            self.values[place] += block.0[r][c];
+        }
+        self.revision += 1;
     }
 
     /// A x, for a matrix with these values on the pattern of the tangent.
@@ -219,7 +221,8 @@ impl System {
         of_rows: &mut [K],
         show: impl Fn(&mut K, usize, &Tile<W>) + Send + Sync,
     ) {
-        let (regions, tiles, halves) = (&self.pattern.regions, tiles::<W>(values), self.pattern.symmetry.halves());
+        let Pattern { regions, storage, symmetry, .. } = &self.pattern;
+        let (tiles, halves) = (storage.tiles::<W>(values), symmetry.halves());
         regions::each(
             regions,
             of_rows,
@@ -229,14 +232,16 @@ impl System {
                     #[inline(always)]
                     || {
                         for column in region.groups.clone() {
+                            let own = column - region.groups.start;
+                            tiles.own.with(column, |tile| show(&mut part[own], column, tile));
                             for tile in self.pattern.tiles_of(column) {
                                 let row = self.pattern.rows[tile] as usize;
                                 let Some(of_row) = part.get_mut(row.wrapping_sub(region.groups.start)) else {
                                     continue;
                                 };
-                                show(of_row, column, &tiles[tile]);
-                                if halves && row != column {
-                                    show(&mut part[column - region.groups.start], row, &transposed(&tiles[tile]));
+                                show(of_row, column, &tiles.beside[tile]);
+                                if halves {
+                                    show(&mut part[own], row, &transposed(&tiles.beside[tile]));
                                 }
                             }
                         }
@@ -246,9 +251,9 @@ impl System {
         );
         for &(column, tile) in &self.pattern.between {
             let row = self.pattern.rows[tile] as usize;
-            show(&mut of_rows[row], column, &tiles[tile]);
-            if halves && row != column {
-                show(&mut of_rows[column], row, &transposed(&tiles[tile]));
+            show(&mut of_rows[row], column, &tiles.beside[tile]);
+            if halves {
+                show(&mut of_rows[column], row, &transposed(&tiles.beside[tile]));
             }
         }
     }
@@ -256,9 +261,11 @@ impl System {
     /// Shows each tile that is kept in some columns with the groups of its rows and of its columns.
     #[inline(always)]
     pub fn each_tile<const W: usize>(&self, columns: Range<usize>, mut show: impl FnMut(usize, usize, &Tile<W>)) {
+        let tiles = self.tiles();
         for column in columns {
-            let tiles = &self.tiles()[self.pattern.tiles_of(column)];
-            for (&row, tile) in self.pattern.rows_of(column).iter().zip(tiles) {
+            tiles.own.with(column, |tile| show(column, column, tile));
+            let beside = &tiles.beside[self.pattern.tiles_of(column)];
+            for (&row, tile) in self.pattern.rows_of(column).iter().zip(beside) {
                 show(row as usize, column, tile);
             }
         }
@@ -356,11 +363,18 @@ impl System {
         let Self { pattern, acting_in, force, values, lift, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
-        let size = pattern.width() * pattern.width();
+        let storage = pattern.storage;
+        let places = |region: &Region| [storage.on_diagonal(&region.groups), storage.beside(&region.tiles)];
         let mut forces = force.each_mut().map(|force| threads::split(force, ends(|r| r.slots.end)).into_iter());
-        let values = threads::split(values, ends(|r| r.tiles.end).map(|end| size * end));
+        let (own, beside) = values.split_at_mut(storage.boundary());
+        let own = threads::split(own, regions.iter().map(|region| places(region)[0].end));
+        let beside = threads::split(beside, regions.iter().map(|region| places(region)[1].end - storage.boundary()));
+        let values = regions
+            .iter()
+            .zip(own.into_iter().zip(beside))
+            .map(|(region, (own, beside))| Values::part(storage, own, beside, places(region).map(|range| range.start)));
         let mut lifted = threads::split(lifted, ends(|r| r.equations.end)).into_iter();
-        let stretches = values.into_iter().zip(&mut rooms[1..]).enumerate();
+        let stretches = values.zip(&mut rooms[1..]).enumerate();
         let part = |(region, (values, room)): (usize, _)| Part {
             pattern,
             acting: &acting_in[region],
@@ -381,7 +395,7 @@ impl System {
             acting: &self.acting,
             region: None,
             force: self.force.each_mut().map(|force| &mut force[..]),
-            values: &mut self.values,
+            values: Values::all(self.pattern.storage, &mut self.values),
             lift: self.lifts.then_some(&self.lift[..]),
             lifted: &mut self.lifted,
             room: &mut self.rooms[0],
@@ -406,9 +420,4 @@ fn acting_in(pattern: &Pattern, everywhere: &[Category], of_effects: &[Vec<Categ
         }
     }
     acts.iter().map(|acts| (0..acts.len()).filter(|&category| acts[category]).collect()).collect()
-}
-
-/// Values as tiles.
-fn tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
-    values.as_chunks::<W>().0.as_chunks::<W>().0
 }

@@ -10,6 +10,7 @@ mod regions;
 mod sink;
 mod stage;
 mod state;
+mod storage;
 
 pub use assembly::{Category, Leftover, System};
 pub use equations::{Direction, Equations, FrameConflict};
@@ -21,3 +22,4 @@ pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};
 pub use stage::{StageContext, StageKind, StageSet};
 pub use state::{Fading, Memory, Node, RotationRate, Slot, State};
+pub use storage::{Own, Tiles, upper_entry, upper_start};

@@ -4,6 +4,7 @@ use super::equations::Equations;
 use super::groups::{Groups, SLOTS};
 use super::regions::{self, Region, Shares};
 use super::state::Slot;
+use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
 use crate::threads;
 
@@ -69,17 +70,14 @@ impl Cliques {
     }
 }
 
-/// The place of a block that is not kept: that of its transpose is.
-pub(super) const NOT_KEPT: u32 = u32::MAX;
-
 /// Where the blocks of one effect's instances go.
 #[derive(Clone, Debug)]
 pub(super) struct Places {
     pub cliques: Cliques,
     /// Whether each instance couples whole nodes, whose tiles it adds to in one go
     pub whole: bool,
-    /// By instance and then by rows of blocks: the index of the block's first value, or [`NOT_KEPT`]. Blocks are those of whole nodes,
-    /// or else those of slots.
+    /// By instance and then by rows of blocks: where the tile begins that a block is in, or [`NOT_KEPT`]. Blocks are those of whole
+    /// nodes, or else those of slots.
     pub values: Vec<u32>,
     starts: Vec<u32>,
     /// Instances that touch a held direction or turned axes.
@@ -124,7 +122,7 @@ impl Symmetry {
     }
 }
 
-/// The tangent in compressed columns of tiles, without its values. Tiles of a node and itself are always there.
+/// The tangent without its values: a tile for each group and itself, and those beside the diagonal in compressed columns.
 ///
 /// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero. Where tiles of two groups
 /// are each other's transposes, those above the diagonal are not kept.
@@ -136,9 +134,11 @@ pub struct Pattern {
     pub groups: Groups,
     /// How symmetric each tangent is
     pub symmetry: Symmetry,
-    /// Where each column of tiles starts.
+    /// Where the values stand
+    pub storage: Storage,
+    /// Where the tiles of each column start that stand beside the diagonal.
     pub column_starts: Vec<u32>,
-    /// The group of the rows of each tile.
+    /// The group of the rows of each of these.
     pub rows: Vec<u32>,
     /// Where the tiles of each column begin that are not kept
     mirror_starts: Vec<u32>,
@@ -183,11 +183,13 @@ impl Pattern {
         let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
         let idle = idle.map(|k| ((k / width) as u32, (k % width) as u8)).collect();
         let regions = regions::cut(&groups, &equations, &column_starts);
+        let storage = Storage::new(width, groups.count(), symmetry == Symmetry::Whole);
         let (between, places) = (Vec::new(), Vec::new());
         let mut pattern = Self {
             equations,
             groups,
             symmetry,
+            storage,
             column_starts,
             rows,
             mirror_starts,
@@ -203,14 +205,9 @@ impl Pattern {
         pattern
     }
 
-    /// The number of tiles that are kept.
-    pub fn tiles(&self) -> usize {
-        self.rows.len()
-    }
-
     /// The number of pairs of groups that meet.
     pub fn pairs(&self) -> usize {
-        (self.rows.len() + self.mirrors.len() - self.groups.count()) / 2
+        (self.rows.len() + self.mirrors.len()) / 2
     }
 
     /// The rows of a tile.
@@ -221,15 +218,15 @@ impl Pattern {
 
     /// The number of values: those of all tiles that are kept.
     pub fn values(&self) -> usize {
-        self.width() * self.width() * self.tiles()
+        self.storage.other(self.rows.len())
     }
 
     /// The number of values of its factors, where they do not fill up: beside the diagonal they are the tangent's own.
     pub fn values_of_factors(&self) -> usize {
-        self.width() * self.width() * self.groups.count()
+        self.storage.boundary()
     }
 
-    /// The tiles in a column that are kept.
+    /// The tiles in a column that are kept beside the diagonal.
     #[inline]
     pub fn tiles_of(&self, column: usize) -> std::ops::Range<usize> {
         self.column_starts[column] as usize..self.column_starts[column + 1] as usize
@@ -250,7 +247,7 @@ impl Pattern {
         }
     }
 
-    /// The groups that a group meets, itself among them, in their order.
+    /// The other groups that a group meets, in their order.
     pub fn met_by(&self, group: usize) -> impl Iterator<Item = u32> {
         self.mirrors_of(group).iter().map(|mirror| mirror.row).chain(self.rows_of(group).iter().copied())
     }
@@ -294,23 +291,39 @@ impl Pattern {
         regions::each(&self.regions, out, |region| region.equations.end, work);
     }
 
-    /// The entries of an equation's column, by rows.
+    /// The entries of an equation's column, tile by tile.
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
-        let ((group, c), width) = (self.row_of(column), self.width());
-        let entries = move |row: u32, place: usize, apart: usize| {
-            let free = self.numbers(row as usize).iter().enumerate().filter(|&(_, &row)| row != Equations::HELD);
-            free.map(move |(r, &row)| Entry { row, place: place + r * apart })
+        let ((group, c), storage) = (self.row_of(column), &self.storage);
+        let free = |group: usize| {
+            let numbers = self.numbers(group).iter().enumerate();
+            numbers.filter(|&(_, &row)| row != Equations::HELD).map(|(r, &row)| (row, r))
         };
-        let mirrored = move |mirror: &Mirror| entries(mirror.row, width * width * mirror.tile as usize + c, width);
-        let kept = move |tile: usize| entries(self.rows[tile], width * (width * tile + c), 1);
-        self.mirrors_of(group).iter().flat_map(mirrored).chain(self.tiles_of(group).flat_map(kept))
+        let in_tile = move |row: usize, tile: usize| {
+            free(row).map(move |(row, r)| Entry { row, place: storage.entry(tile, r, c) })
+        };
+        let mirrored = move |mirror: &Mirror| {
+            let tile = storage.other(mirror.tile as usize);
+            free(mirror.row as usize).map(move |(row, r)| Entry { row, place: storage.entry(tile, c, r) })
+        };
+        let kept = self.tiles_of(group).flat_map(move |tile| in_tile(self.rows[tile] as usize, storage.other(tile)));
+        self.mirrors_of(group).iter().flat_map(mirrored).chain(in_tile(group, storage.own(group))).chain(kept)
     }
 
     /// The number of entries between equations.
     pub fn nonzeros(&self) -> usize {
         let free = |group: usize| self.numbers(group).iter().filter(|&&n| n != Equations::HELD).count();
-        let column = |c: usize| free(c) * self.met_by(c).map(|row| free(row as usize)).sum::<usize>();
+        let column = |c: usize| free(c) * (free(c) + self.met_by(c).map(|row| free(row as usize)).sum::<usize>());
         (0..self.groups.count()).map(column).sum()
+    }
+
+    /// The entries of a slot and itself in the directions that are not held: row and column in its own directions, and where they are.
+    pub fn own_entries(&self, slot: Slot) -> impl Iterator<Item = ([usize; 2], usize)> {
+        let ((group, first), storage) = (self.groups.row(slot), &self.storage);
+        let numbers = self.equations.of(slot);
+        let free = move || (0..3).filter(move |&k| numbers[k] != Equations::HELD);
+        let column =
+            move |c: usize| free().map(move |r| ([r, c], storage.entry(storage.own(group), first + r, first + c)));
+        free().flat_map(column)
     }
 
     /// Where an entry is stored, perhaps with its mirror image: `None` for held directions, and for pairs
@@ -322,7 +335,7 @@ impl Pattern {
         let (row, column) = (self.row_of(row), self.row_of(column));
         let kept = self.keeps(row.0, column.0);
         let ((i, r), (j, c)) = if kept { (row, column) } else { (column, row) };
-        Some(self.tile(i, j)? + self.width() * c + r)
+        Some(self.storage.entry(self.tile(i, j)?, r, c))
     }
 
     /// Whether the same groups meet as in another pattern, as they do in space and in a plane of it, whatever halves are kept.
@@ -338,13 +351,12 @@ impl Pattern {
         count == other.groups.count() && (0..count).all(meet)
     }
 
-    /// Shows each equation and where its entry of the diagonal is stored. Tiles on the diagonal are always there.
+    /// Shows each equation and where its entry of the diagonal is stored.
     pub fn each_diagonal(&self, mut show: impl FnMut(usize, usize)) {
         for group in 0..self.groups.count() {
-            let Some(start) = self.tile(group, group) else { continue };
             for (r, &number) in self.numbers(group).iter().enumerate().filter(|(_, number)| **number != Equations::HELD)
             {
-                show(number as usize, start + (self.width() + 1) * r);
+                show(number as usize, self.storage.entry(self.storage.own(group), r, r));
             }
         }
     }
@@ -364,8 +376,11 @@ impl Pattern {
 
     /// The index of the first value of a tile; `None` where the groups do not meet, or it is not kept.
     pub fn tile(&self, row: usize, column: usize) -> Option<usize> {
+        if row == column {
+            return Some(self.storage.own(row));
+        }
         let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
-        Some(self.width() * self.width() * (self.column_starts[column] as usize + found))
+        Some(self.storage.other(self.column_starts[column] as usize + found))
     }
 
     fn between(&self) -> Vec<(usize, usize)> {
@@ -391,14 +406,14 @@ impl Pattern {
         };
         for slots in cliques.iter() {
             places.starts.push(places.values.len() as u32);
-            let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.row(slot));
-            for (i, r) in corners() {
-                let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
+            let met = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.of(slot).0);
+            for i in met() {
+                let place = |j: usize| match self.keeps(i, j) {
                     // Cliques are what the pattern was made of.
-                    true => self.tile(i, j).map(|tile| (tile + self.width() * c + r) as u32),
+                    true => self.tile(i, j).map(|tile| tile as u32),
                     false => Some(NOT_KEPT),
                 };
-                places.values.extend(corners().filter_map(place));
+                places.values.extend(met().filter_map(place));
             }
             places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
         }
@@ -428,16 +443,16 @@ fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
     out
 }
 
-/// Column by column the groups that a group meets, itself among them; where `halves` do those that do not come before it.
+/// Column by column the other groups that a group meets; where `halves` do those that come after it.
 fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Vec<u32>, Vec<u32>) {
     // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
-    let mut room = vec![1_u32; groups.count()];
+    let mut room = vec![0_u32; groups.count()];
     each_meeting(groups, effects, &mut |met| met.iter().for_each(|&group| room[group as usize] += met.len() as u32));
     let mut ends = Vec::with_capacity(groups.count());
     let mut meets = Vec::new();
-    for (group, room) in room.iter().enumerate() {
-        ends.push(meets.len() + 1);
-        meets.resize(meets.len() + *room as usize, group as u32);
+    for room in room {
+        ends.push(meets.len());
+        meets.resize(meets.len() + room as usize, 0);
     }
     each_meeting(groups, effects, &mut |met| {
         for &column in met {
@@ -452,7 +467,7 @@ fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Ve
         let column = &mut meets[start..end];
         column.sort_unstable();
         let first = rows.len();
-        for &row in column.iter().filter(|&&row| row as usize >= group || !halves) {
+        for &row in column.iter().filter(|&&row| row as usize > group || (row as usize != group && !halves)) {
             if rows.get(first..).and_then(<[u32]>::last) != Some(&row) {
                 rows.push(row);
             }
@@ -468,8 +483,7 @@ fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
     let columns = column_starts.len() - 1;
     let below = || {
         let of = |column: usize| column_starts[column] as usize..column_starts[column + 1] as usize;
-        let tiles = (0..columns).flat_map(move |column| of(column).map(move |tile| (column, tile)));
-        tiles.filter(|&(column, tile)| rows[tile] as usize > column)
+        (0..columns).flat_map(move |column| of(column).map(move |tile| (column, tile)))
     };
     let mut starts = vec![0_u32; columns + 1];
     below().for_each(|(_, tile)| starts[rows[tile] as usize + 1] += 1);

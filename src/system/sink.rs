@@ -2,9 +2,11 @@
 
 use super::assembly::Category;
 use super::equations::Equations;
-use super::pattern::{NOT_KEPT, Pattern, Places, TILE, WIDTH};
+use super::groups::Groups;
+use super::pattern::{Pattern, Places, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
+use super::storage::{TileMut, Values, upper_entry};
 use crate::kernel::{ElementSystem, PlanarSystem};
 use crate::real::{LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
@@ -20,7 +22,7 @@ pub struct Part<'a> {
     /// Of its slots, by category
     pub(super) force: [&'a mut [Vec3]; 4],
     /// Of its tiles
-    pub(super) values: &'a mut [f64],
+    pub(super) values: Values<'a>,
     /// Of all slots, where increments are prescribed
     pub(super) lift: Option<&'a [Vec3]>,
     /// Of its equations
@@ -33,7 +35,7 @@ impl<'a> Part<'a> {
     pub fn clear(&mut self, with_tangent: bool) {
         self.acting.iter().for_each(|&category| self.force[category].fill(Vec3::ZERO));
         if with_tangent {
-            self.values.fill(0.0);
+            self.values.clear();
         }
     }
 
@@ -46,6 +48,7 @@ impl<'a> Part<'a> {
     pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool, instances: Range<usize>) -> Sink<'_> {
         let Part { pattern, acting, region, force, values, lift, lifted, room } = self;
         let force = force.each_mut().map(|force| &mut force[..]);
+        let values = values.reborrow();
         let part = Part { pattern, acting, region: *region, force, values, lift: *lift, lifted, room };
         part.into_sink(effect, category, with_tangent, instances)
     }
@@ -71,9 +74,9 @@ impl<'a> Part<'a> {
         Sink {
             places: &pattern.places[effect],
             equations: &pattern.equations,
+            groups: &pattern.groups,
             instances,
             first_slot: start.map_or(0, |region| region.slots.start),
-            first_value: start.map_or(0, |region| region.tiles.start * pattern.width() * pattern.width()),
             first_equation: start.map_or(0, |region| region.equations.start),
             force,
             damping,
@@ -89,26 +92,50 @@ impl<'a> Part<'a> {
 
 /// Adds one lane of a tile to its place.
 #[inline(always)]
-fn add_lane(place: &mut [f64], tile: &[Lanes; TILE], lane: usize) {
-    for (sums, lanes) in place.as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
-        *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
+fn add_lane(place: TileMut, tile: &[Lanes; TILE], lane: usize) {
+    match place {
+        TileMut::Whole(place) => {
+            for (sums, lanes) in place.as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
+                *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
+            }
+        }
+        TileMut::Upper(place) => {
+            for (sum, &entry) in place.iter_mut().zip(&UPPER) {
+                *sum += tile[entry].0[lane];
+            }
+        }
+        TileMut::Nowhere => {}
     }
 }
+
+/// Where a tile has what its upper half has, which is symmetric.
+const UPPER: [usize; WIDTH * (WIDTH + 1) / 2] = {
+    let mut places = [0; WIDTH * (WIDTH + 1) / 2];
+    let mut entry = 0;
+    while entry < TILE {
+        let (row, column) = (entry / WIDTH, entry % WIDTH);
+        if row <= column {
+            places[upper_entry(WIDTH, row, column)] = entry;
+        }
+        entry += 1;
+    }
+    places
+};
 
 /// Through this an effect adds the force and tangent of its instances.
 pub struct Sink<'a> {
     places: &'a Places,
     equations: &'a Equations,
+    groups: &'a Groups,
     instances: Range<usize>,
     /// What stretches begin with
     first_slot: usize,
-    first_value: usize,
     first_equation: usize,
     /// Forces of its own category
     force: &'a mut [Vec3],
     /// And those that damp, where these are not the same
     damping: Option<&'a mut [Vec3]>,
-    values: &'a mut [f64],
+    values: Values<'a>,
     lift: Option<&'a [Vec3]>,
     lifted: &'a mut [f64],
     room: &'a mut Vec<ElementSystem<Lanes>>,
@@ -216,9 +243,7 @@ impl Sink<'_> {
     fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
         for lane in lanes {
             for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
-                if let Some(values) = self.values_from(place, TILE) {
-                    add_lane(values, tile, lane);
-                }
+                add_lane(self.values.tile(place), tile, lane);
             }
         }
     }
@@ -253,9 +278,7 @@ impl Sink<'_> {
                 continue;
             }
             for (tile, &place) in elements.tangent.as_flattened().iter().zip(self.places.of(first + lane)) {
-                if let Some(values) = self.values_from(place, tile.len()) {
-                    values.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value.0[lane]);
-                }
+                self.values.tile(place).add_tile::<3>(|entry| tile[entry].0[lane]);
             }
         }
     }
@@ -271,17 +294,24 @@ impl Sink<'_> {
         match self.equations.plane() {
             _ if !self.with_tangent || weight == 0.0 => {}
             _ if self.places.special[k] => self.add_constrained_mass(k, N, mass.as_flattened(), weight),
-            None => self.add_free_mass::<{ 2 * WIDTH + 3 }>(k, WIDTH + 1, mass.as_flattened(), weight),
-            Some(_) => self.add_free_mass::<5>(k, 4, mass.as_flattened(), weight),
+            None => self.add_free_mass::<N, WIDTH, 3>(k, mass, weight),
+            Some(_) => self.add_free_mass::<N, 3, 2>(k, mass, weight),
         }
     }
 
-    /// The same where all directions are free: their entries stand `step` apart in SPAN values.
+    /// The same where all directions are free, of tiles W wide.
     #[inline(always)]
-    fn add_free_mass<const SPAN: usize>(&mut self, k: usize, step: usize, mass: &[f64], weight: f64) {
-        for (entry, &place) in mass.iter().zip(self.places.of(k)) {
-            if let Some(values) = self.values_from(place, SPAN) {
-                values.iter_mut().step_by(step).for_each(|value| *value += entry * weight);
+    fn add_free_mass<const N: usize, const W: usize, const DIRECTIONS: usize>(
+        &mut self,
+        k: usize,
+        mass: &[[f64; N]; N],
+        weight: f64,
+    ) {
+        for i in 0..N {
+            for j in 0..N {
+                let (place, row, column) = self.place_of(k, i, j);
+                let mut tile = self.values.tile(place);
+                (0..DIRECTIONS).for_each(|d| tile.add(W, row + d, column + d, mass[i][j] * weight));
             }
         }
     }
@@ -292,7 +322,8 @@ impl Sink<'_> {
         let slots = self.places.cliques.get(k);
         let (width, directions) = self.equations.plane().map_or((WIDTH, 3), |_| (3, 2));
         let frame = |slot: Slot| self.equations.frame(slot).unwrap_or(Mat3::IDENTITY);
-        for (number, (entry, &place)) in mass.iter().zip(self.places.of(k)).enumerate() {
+        for (number, entry) in mass.iter().enumerate() {
+            let (place, row, column) = self.place_of(k, number / nodes, number % nodes);
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
             let (rows, columns) = (self.equations.of(i), self.equations.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
@@ -305,7 +336,7 @@ impl Sink<'_> {
                         (Equations::HELD, Some(lift)) => {
                             self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c];
                         }
-                        _ => self.add_entry(place, width * c + r, value),
+                        _ => self.values.tile(place).add(width, row + r, column + c, value),
                     }
                 }
             }
@@ -341,26 +372,9 @@ impl Sink<'_> {
                         continue;
                     }
                     let place = if self.places.whole { places[N * i + j] } else { places[2 * N * row + column] };
-                    self.add_entry(place, entry, value.0[lane]);
+                    self.values.tile(place).add(3, entry % 3, entry / 3, value.0[lane]);
                 }
             }
-        }
-    }
-
-    /// So many values of the tangent from a place on, where they are kept.
-    #[inline(always)]
-    fn values_from(&mut self, place: u32, count: usize) -> Option<&mut [f64]> {
-        (place != NOT_KEPT).then(|| {
-            let start = place as usize - self.first_value;
-            &mut self.values[start..start + count]
-        })
-    }
-
-    /// Adds to the value that stands so far after a place, where it is kept.
-    #[inline(always)]
-    fn add_entry(&mut self, place: u32, after: usize, value: f64) {
-        if place != NOT_KEPT {
-            self.values[place as usize - self.first_value + after] += value;
         }
     }
 
@@ -370,9 +384,7 @@ impl Sink<'_> {
             return self.add_blocks(k, element.blocks(), element.tiles(), |value| *value);
         }
         for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
-            if let Some(values) = self.values_from(place, TILE) {
-                values.iter_mut().zip(tile).for_each(|(sum, value)| *sum += value);
-            }
+            self.values.tile(place).add_tile::<WIDTH>(|entry| tile[entry]);
         }
     }
 
@@ -380,7 +392,7 @@ impl Sink<'_> {
     /// that are prescribed instead. `pick` takes the instance's number from each entry.
     #[inline(always)]
     fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let slots = self.places.cliques.get(k);
+        let (slots, width) = (self.places.cliques.get(k), self.groups.width());
         let across = slots.len().div_ceil(2);
         for (column, &j) in slots.iter().enumerate() {
             let (columns, turn) = (self.equations.of(j), self.equations.frame(j));
@@ -400,17 +412,7 @@ impl Sink<'_> {
                     block = block * frame;
                 }
                 let rows = self.equations.of(i);
-                let (place, start, width) = self.place_of(k, row, column);
-                if ![rows, columns].as_flattened().contains(&Equations::HELD) {
-                    if let Some(values) = self.values_from(place, start + 2 * width + 3) {
-                        for c in 0..3 {
-                            for r in 0..3 {
-                                values[start + c * width + r] += block.0[r][c];
-                            }
-                        }
-                    }
-                    continue;
-                }
+                let (place, first_row, first_column) = self.place_of(k, row, column);
                 for c in 0..3 {
                     for r in (0..3).filter(|&r| rows[r] != Equations::HELD) {
                         match (columns[c], lift) {
@@ -418,7 +420,7 @@ impl Sink<'_> {
                             (Equations::HELD, Some(lift)) => {
                                 self.lifted[rows[r] as usize - self.first_equation] += block.0[r][c] * lift.0[c];
                             }
-                            _ => self.add_entry(place, start + c * width + r, block.0[r][c]),
+                            _ => self.values.tile(place).add(width, first_row + r, first_column + c, block.0[r][c]),
                         }
                     }
                 }
@@ -426,32 +428,28 @@ impl Sink<'_> {
         }
     }
 
-    /// Where the block of two slots of an instance is kept, how far after that it begins, and how far its columns are apart. In a plane
-    /// slots of a node share a tile, each with the directions that it moves in.
+    /// The place of the tile that two slots of an instance meet in, and where in it their block begins.
     #[inline(always)]
     fn place_of(&self, k: usize, row: usize, column: usize) -> (u32, usize, usize) {
-        let (places, count) = (self.places.of(k), self.places.cliques.get(k).len());
+        let (places, slots) = (self.places.of(k), self.places.cliques.get(k));
         let place = match self.places.whole {
-            true => places[row / 2 * count.div_ceil(2) + column / 2],
-            false => places[row * count + column],
+            true => places[row / 2 * slots.len().div_ceil(2) + column / 2],
+            false => places[row * slots.len() + column],
         };
-        match self.equations.plane() {
-            Some(_) => (place, 0, 3),
-            None if self.places.whole => (place, column % 2 * 3 * WIDTH + row % 2 * 3, WIDTH),
-            None => (place, 0, WIDTH),
-        }
+        (place, self.groups.row(slots[row]).1, self.groups.row(slots[column]).1)
     }
 
     /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
     #[inline(always)]
     fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        for (number, &place) in self.places.of(k).iter().enumerate() {
+        for number in 0..blocks * blocks {
             let (row, column) = (number / blocks, number % blocks);
-            let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
+            let (place, first_row, first_column) = self.place_of(k, row, column);
+            let (tile, mut to) = (&tiles[row / 2 * blocks.div_ceil(2) + column / 2], self.values.tile(place));
             for c in 0..3 {
                 let from = (column % 2 * 3 + c) * WIDTH + row % 2 * 3;
                 for r in 0..3 {
-                    self.add_entry(place, c * WIDTH + r, pick(&tile[from + r]));
+                    to.add(WIDTH, first_row + r, first_column + c, pick(&tile[from + r]));
                 }
             }
         }

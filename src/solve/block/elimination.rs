@@ -14,7 +14,7 @@ pub struct Source(u32);
 /// What a [`Source`] says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stands {
-    /// A tile of the tangent
+    /// A tile of the tangent beside its diagonal
     Tile(usize),
     /// The transpose of one
     Transpose(usize),
@@ -80,8 +80,6 @@ pub struct Elimination {
     changed: Vec<u32>,
     /// What these begin with, as `above` and `below`
     begin: Vec<[Source; 2]>,
-    /// The tile of the tangent on the diagonal of each row
-    pub diagonal: Vec<u32>,
     /// Each block right of the diagonal by rows; empty where they are `below`
     above: Vec<Source>,
     /// Their mirror images by columns
@@ -115,7 +113,6 @@ impl Elimination {
             targets,
             changed,
             begin: Vec::new(),
-            diagonal: Vec::new(),
             above: Vec::new(),
             below: Vec::new(),
             idle: Vec::new(),
@@ -200,16 +197,11 @@ impl Elimination {
 
     fn find_sources(&mut self, pattern: &Pattern) {
         let row_of = &self.row_of;
-        self.diagonal = vec![0; self.order.len()];
         self.below = vec![Source::NOWHERE; self.later.len()];
         self.above = if pattern.symmetry.halves() { Vec::new() } else { self.below.clone() };
         for column in 0..pattern.groups.count() {
             for tile in pattern.tiles_of(column) {
                 let (i, j) = (row_of[pattern.rows[tile] as usize], row_of[column]);
-                if i == j {
-                    self.diagonal[i as usize] = tile as u32;
-                    continue;
-                }
                 // Tiles stand by their columns.
                 let (block, source) = (find(&self.starts, &self.later, i.min(j), i.max(j)), Source::tile(tile));
                 match (i < j, self.above.get_mut(block)) {

@@ -3,13 +3,17 @@
 use super::elimination::Elimination;
 use super::pieces::Piece;
 use super::stretch::Stretch;
-use super::tile::{self, Part, Rows, Tile, Width};
+use super::tile::{self, Part, Rows, Tile, Tiles, Upper, Width};
+use crate::system::upper_entry;
 use std::ops::Range;
 
 /// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 A_kj a row
 /// takes Y^T D^-1 Y from what comes later.
-pub struct Ldl<const W: usize> {
-    diagonal: Stretch<Tile<W>>,
+pub struct Ldl<const W: usize>
+where
+    Width<W>: Rows<W>,
+{
+    diagonal: Stretch<Upper<W>>,
     /// The blocks above the diagonal that are not those of the tangent
     changed: Stretch<Tile<W>>,
     /// D^-1 Y of the row that is being eliminated
@@ -24,7 +28,7 @@ where
     const SYMMETRIC: bool = true;
 
     fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self> {
-        let (diagonal, changed) = (Stretch::new(rows, tile::zero())?, Stretch::new(changed, tile::zero())?);
+        let (diagonal, changed) = (Stretch::new(rows, Width::NOTHING)?, Stretch::new(changed, tile::zero())?);
         Some(Self { diagonal, changed, row: Vec::new() })
     }
 
@@ -33,9 +37,9 @@ where
     }
 
     #[inline(always)]
-    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &[Tile<W>]) {
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &Tiles<W>) {
         for row in rows.clone() {
-            tile::copy(&mut self.diagonal[row], &tiles[elimination.diagonal[row] as usize]);
+            tiles.own.copy_upper(elimination.order[row] as usize, self.diagonal[row].as_mut());
         }
         for number in elimination.changed(&rows) {
             // By columns it is what its mirror image is by rows.
@@ -43,17 +47,17 @@ where
             tile::with(elimination.begin_below(number), tiles, &Stretch::nothing(), |begin| tile::copy(block, begin));
         }
         for &(row, direction) in elimination.idle(&rows) {
-            self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
+            self.diagonal[row as usize].as_mut()[upper_entry(W, direction as usize, direction as usize)] = 1.0;
         }
     }
 
     fn add(&mut self, other: &Self) {
         self.diagonal.add(&other.diagonal);
-        self.changed.add(&other.changed);
+        self.changed.add_tiles(&other.changed);
     }
 
     fn clear(&mut self) {
-        self.diagonal.fill(|_| tile::zero());
+        self.diagonal.fill(|_| Width::NOTHING);
         self.changed.fill(|_| tile::zero());
     }
 
@@ -62,13 +66,13 @@ where
         &mut self,
         rows: Range<usize>,
         elimination: &Elimination,
-        tiles: &[Tile<W>],
+        tiles: &Tiles<W>,
         beyond: &mut Self,
     ) -> Option<usize> {
         let Self { diagonal, changed, row: before } = self;
         let (mut factor, mut y, mut w, mut negative) = (tile::zero(), tile::zero(), tile::zero(), 0);
         for row in rows {
-            tile::copy(&mut factor, &diagonal[row]);
+            tile::spread(&diagonal[row], &mut factor);
             negative += tile::factorise_symmetric(&mut factor)?;
             let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
             before.clear();
@@ -82,7 +86,7 @@ where
                 }
                 tile::over_pivots(&factor, &y, &mut w);
                 let later = diagonal.or(&mut beyond.diagonal, elimination.later[k] as usize);
-                tile::subtract_product(later, &w, &y);
+                tile::subtract_symmetric_product(later, &w, &y);
                 if k + 1 < neighbours.end {
                     before.push(w);
                 }
@@ -93,10 +97,10 @@ where
     }
 
     #[inline(always)]
-    fn forward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+    fn forward(&self, elimination: &Elimination, tiles: &Tiles<W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
         let rows = self.rows();
         for row in rows.clone() {
-            let part = tile::solve(&self.diagonal[row], &x[row - rows.start]);
+            let part = tile::solve_symmetric(&self.diagonal[row], &x[row - rows.start]);
             for k in elimination.neighbours(row) {
                 let later = elimination.place(&rows, k).of_mut(x, beyond);
                 tile::subtract_transposed_of(later, elimination.below(k), tiles, &self.changed, &part);
@@ -106,7 +110,7 @@ where
     }
 
     #[inline(always)]
-    fn backward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &[Part<W>]) {
+    fn backward(&self, elimination: &Elimination, tiles: &Tiles<W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
         let rows = self.rows();
         for row in rows.clone().rev() {
             let mut part = [0.0; W];
@@ -114,7 +118,7 @@ where
                 let later = elimination.place(&rows, k).of(x, beyond);
                 tile::subtract_times_of(&mut part, elimination.below(k), tiles, &self.changed, later);
             }
-            let part = tile::solve(&self.diagonal[row], &part);
+            let part = tile::solve_symmetric(&self.diagonal[row], &part);
             x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
         }
     }

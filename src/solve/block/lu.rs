@@ -3,7 +3,7 @@
 use super::elimination::Elimination;
 use super::pieces::Piece;
 use super::stretch::Stretch;
-use super::tile::{self, Part, RowOrder, Rows, Tile, Width};
+use super::tile::{self, Part, RowOrder, Rows, Tile, Tiles, Width};
 use std::ops::Range;
 
 /// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 P A_kj and
@@ -41,9 +41,10 @@ where
     }
 
     #[inline(always)]
-    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &[Tile<W>]) {
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &Tiles<W>) {
         for row in rows.clone() {
-            self.diagonal[row] = tile::transposed(&tiles[elimination.diagonal[row] as usize]);
+            let group = elimination.order[row] as usize;
+            tiles.own.with(group, |own| self.diagonal[row] = tile::transposed(own));
         }
         for number in elimination.changed(&rows) {
             let (none, above, below) = (Stretch::nothing(), &mut self.above[number], &mut self.below[number]);
@@ -56,9 +57,9 @@ where
     }
 
     fn add(&mut self, other: &Self) {
-        self.diagonal.add(&other.diagonal);
-        self.above.add(&other.above);
-        self.below.add(&other.below);
+        self.diagonal.add_tiles(&other.diagonal);
+        self.above.add_tiles(&other.above);
+        self.below.add_tiles(&other.below);
     }
 
     fn clear(&mut self) {
@@ -72,7 +73,7 @@ where
         &mut self,
         rows: Range<usize>,
         elimination: &Elimination,
-        tiles: &[Tile<W>],
+        tiles: &Tiles<W>,
         beyond: &mut Self,
     ) -> Option<usize> {
         let Self { diagonal, orders, above, below, row: before } = self;
@@ -115,7 +116,7 @@ where
     }
 
     #[inline(always)]
-    fn forward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+    fn forward(&self, elimination: &Elimination, tiles: &Tiles<W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
         let rows = self.rows();
         for row in rows.clone() {
             let part = self.solved(row, &x[row - rows.start]);
@@ -128,7 +129,7 @@ where
     }
 
     #[inline(always)]
-    fn backward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &[Part<W>]) {
+    fn backward(&self, elimination: &Elimination, tiles: &Tiles<W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
         let rows = self.rows();
         for row in rows.clone().rev() {
             let mut part = [0.0; W];

@@ -143,7 +143,7 @@ fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
 fn minimum_degree(pattern: &Pattern) -> Option<Vec<u32>> {
     let n = pattern.groups.count();
     let structure = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
-    let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, pattern.tiles())).ok()?;
+    let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, pattern.rows.len())).ok()?;
     let (mut order, mut row_of) = (vec![0_u32; n], vec![0_u32; n]);
     amd::order(&mut order, &mut row_of, structure, Default::default(), MemStack::new(&mut memory)).ok()?;
     Some(order)

@@ -2,7 +2,7 @@
 
 use super::Factor;
 use super::elimination::Elimination;
-use super::tile::{Part, Tile};
+use super::tile::{Part, Tiles};
 use crate::real::Instructions;
 use crate::system::System;
 use crate::threads;
@@ -26,7 +26,7 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     fn rows(&self) -> Range<usize>;
 
     /// Takes over the tangent in some of its rows: once, before the first elimination that changes them.
-    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &[Tile<W>]);
+    fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &Tiles<W>);
 
     /// Adds what belongs to the same rows.
     fn add(&mut self, other: &Self);
@@ -40,15 +40,15 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
         &mut self,
         rows: Range<usize>,
         elimination: &Elimination,
-        tiles: &[Tile<W>],
+        tiles: &Tiles<W>,
         beyond: &mut Self,
     ) -> Option<usize>;
 
     /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to `beyond`.
-    fn forward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &mut [Part<W>]);
+    fn forward(&self, elimination: &Elimination, tiles: &Tiles<W>, x: &mut [Part<W>], beyond: &mut [Part<W>]);
 
     /// Solves with the upper factor for its own part `x`, where all later rows are solved.
-    fn backward(&self, elimination: &Elimination, tiles: &[Tile<W>], x: &mut [Part<W>], beyond: &[Part<W>]);
+    fn backward(&self, elimination: &Elimination, tiles: &Tiles<W>, x: &mut [Part<W>], beyond: &[Part<W>]);
 }
 
 /// Branches and trunk.
@@ -83,7 +83,7 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
 impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
         let Self { branches, changes, trunk, nothing, negative } = self;
-        let tiles = system.tiles::<W>();
+        let tiles = &system.tiles::<W>();
         *negative = None;
         let branch = |(piece, change): (&mut P, &mut P)| {
             change.clear();
@@ -118,7 +118,7 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     }
 
     fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]) {
-        let tiles = system.tiles::<W>();
+        let tiles = &system.tiles::<W>();
         let ends = elimination.pieces().map(|rows| rows.end);
         let mut parts = threads::split(x.as_chunks_mut().0, ends);
         let Some(trunk) = parts.pop() else { return };
@@ -141,7 +141,7 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
 fn eliminate<const W: usize, P: Piece<W>>(
     piece: &mut P,
     elimination: &Elimination,
-    tiles: &[Tile<W>],
+    tiles: &Tiles<W>,
     beyond: &mut P,
 ) -> Option<usize> {
     Instructions::here().run(
@@ -163,7 +163,7 @@ fn eliminate<const W: usize, P: Piece<W>>(
 fn forward<const W: usize, P: Piece<W>>(
     piece: &P,
     elimination: &Elimination,
-    tiles: &[Tile<W>],
+    tiles: &Tiles<W>,
     x: &mut [Part<W>],
     beyond: &mut [Part<W>],
 ) {
@@ -176,7 +176,7 @@ fn forward<const W: usize, P: Piece<W>>(
 fn backward<const W: usize, P: Piece<W>>(
     piece: &P,
     elimination: &Elimination,
-    tiles: &[Tile<W>],
+    tiles: &Tiles<W>,
     x: &mut [Part<W>],
     beyond: &[Part<W>],
 ) {

@@ -46,11 +46,21 @@ impl<T: Clone> Stretch<T> {
 }
 
 impl<const W: usize> Stretch<Tile<W>> {
-    /// Adds another one at the same places.
-    pub fn add(&mut self, other: &Self) {
-        let numbers = self.entries.as_flattened_mut().as_flattened_mut().iter_mut();
-        numbers.zip(other.entries.as_flattened().as_flattened()).for_each(|(sum, other)| *sum += other);
+    /// Adds tiles at the same places.
+    pub fn add_tiles(&mut self, other: &Self) {
+        add(self.entries.as_flattened_mut().as_flattened_mut(), other.entries.as_flattened().as_flattened());
     }
+}
+
+impl<T: AsRef<[f64]> + AsMut<[f64]>> Stretch<T> {
+    /// Adds numbers at the same places.
+    pub fn add(&mut self, other: &Self) {
+        self.entries.iter_mut().zip(&other.entries).for_each(|(sum, other)| add(sum.as_mut(), other.as_ref()));
+    }
+}
+
+fn add(sums: &mut [f64], others: &[f64]) {
+    sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += other);
 }
 
 impl<T> Index<usize> for Stretch<T> {

@@ -3,8 +3,9 @@
 
 use super::elimination::{Source, Stands};
 use super::stretch::Stretch;
-use crate::real::Lanes;
-pub use crate::system::{Tile, transposed};
+use crate::real::{LANES, Lanes};
+pub use crate::system::{Tile, Tiles, transposed};
+use crate::system::{upper_entry, upper_start};
 
 /// A part of a vector that belongs to one tile row.
 pub type Part<const W: usize> = [f64; W];
@@ -24,6 +25,12 @@ pub trait Rows<const W: usize> {
     /// The registers
     type Row: Copy;
 
+    /// The numbers of the upper half of a symmetric tile, row by row
+    type Upper: Copy + Send + Sync + AsRef<[f64]> + AsMut<[f64]>;
+
+    /// Nothing
+    const NOTHING: Self::Upper;
+
     /// Into registers
     fn row(part: &Part<W>) -> Self::Row;
 
@@ -38,10 +45,22 @@ pub trait Rows<const W: usize> {
 
     /// a.b
     fn dot(a: &Part<W>, b: &Part<W>) -> f64;
+
+    /// Row r of an upper half, with anything left of the diagonal
+    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row;
+
+    /// Puts it there, and anything where the rows before it end: later rows come first.
+    fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row);
 }
+
+/// The upper half of a symmetric tile.
+pub type Upper<const W: usize> = <Width<W> as Rows<W>>::Upper;
 
 impl Rows<6> for Width<6> {
     type Row = [Lanes; 2];
+    type Upper = [f64; 21];
+
+    const NOTHING: Self::Upper = [0.0; 21];
 
     #[inline(always)]
     fn row(part: &Part<6>) -> Self::Row {
@@ -73,10 +92,28 @@ impl Rows<6> for Width<6> {
     fn dot(a: &Part<6>, b: &Part<6>) -> f64 {
         (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
     }
+
+    #[inline(always)]
+    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row {
+        let row = &upper[upper_start(6, r)..][..6];
+        [Lanes([row[0], row[1], row[2], row[3]]), Lanes([row[4], row[5], 0.0, 0.0])]
+    }
+
+    #[inline(always)]
+    fn set_upper_row(upper: &mut Self::Upper, r: usize, [left, right]: Self::Row) {
+        let row = &mut upper[upper_start(6, r)..][..6];
+        if r < LANES {
+            row[..LANES].copy_from_slice(&left.0);
+        }
+        row[LANES..].copy_from_slice(&right.0[..2]);
+    }
 }
 
 impl Rows<3> for Width<3> {
     type Row = [f64; 3];
+    type Upper = [f64; 6];
+
+    const NOTHING: Self::Upper = [0.0; 6];
 
     #[inline(always)]
     fn row(part: &Part<3>) -> Self::Row {
@@ -103,6 +140,17 @@ impl Rows<3> for Width<3> {
     #[inline(always)]
     fn dot(a: &Part<3>, b: &Part<3>) -> f64 {
         (a[0] * b[0] + a[2] * b[2]) + a[1] * b[1]
+    }
+
+    #[inline(always)]
+    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row {
+        let row = &upper[upper_start(3, r)..][..3];
+        [row[0], row[1], row[2]]
+    }
+
+    #[inline(always)]
+    fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row) {
+        upper[upper_start(3, r)..][..3].copy_from_slice(&row);
     }
 }
 
@@ -174,10 +222,10 @@ macro_rules! each_row_backwards {
 
 /// Does something with a block, wherever it stands: it is not copied, which would cost as much as a solution with it.
 #[inline(always)]
-pub fn with<const W: usize>(source: Source, tiles: &[Tile<W>], own: &Stretch<Tile<W>>, mut work: impl FnMut(&Tile<W>)) {
+pub fn with<const W: usize>(source: Source, tiles: &Tiles<W>, own: &Stretch<Tile<W>>, mut work: impl FnMut(&Tile<W>)) {
     match source.stands() {
-        Stands::Tile(number) => work(&tiles[number]),
-        Stands::Transpose(number) => work(&transposed(&tiles[number])),
+        Stands::Tile(number) => work(&tiles.beside[number]),
+        Stands::Transpose(number) => work(&transposed(&tiles.beside[number])),
         Stands::Own(number) => work(&own[number]),
         Stands::Nowhere => work(&zero()),
     }
@@ -197,15 +245,15 @@ where
 pub fn subtract_transposed_of<const W: usize>(
     part: &mut Part<W>,
     source: Source,
-    tiles: &[Tile<W>],
+    tiles: &Tiles<W>,
     own: &Stretch<Tile<W>>,
     x: &Part<W>,
 ) where
     Width<W>: Rows<W>,
 {
     match source.stands() {
-        Stands::Tile(number) => subtract_transposed(part, &tiles[number], x),
-        Stands::Transpose(number) => subtract_times(part, &tiles[number], x),
+        Stands::Tile(number) => subtract_transposed(part, &tiles.beside[number], x),
+        Stands::Transpose(number) => subtract_times(part, &tiles.beside[number], x),
         Stands::Own(number) => subtract_transposed(part, &own[number], x),
         Stands::Nowhere => {}
     }
@@ -216,15 +264,15 @@ pub fn subtract_transposed_of<const W: usize>(
 pub fn subtract_times_of<const W: usize>(
     part: &mut Part<W>,
     source: Source,
-    tiles: &[Tile<W>],
+    tiles: &Tiles<W>,
     own: &Stretch<Tile<W>>,
     x: &Part<W>,
 ) where
     Width<W>: Rows<W>,
 {
     match source.stands() {
-        Stands::Tile(number) => subtract_times(part, &tiles[number], x),
-        Stands::Transpose(number) => subtract_transposed(part, &tiles[number], x),
+        Stands::Tile(number) => subtract_times(part, &tiles.beside[number], x),
+        Stands::Transpose(number) => subtract_transposed(part, &tiles.beside[number], x),
         Stands::Own(number) => subtract_times(part, &own[number], x),
         Stands::Nowhere => {}
     }
@@ -242,6 +290,38 @@ where
         each_row!(W, |d| Width::<W>::subtract(&mut sum, w[d][r], &y[d]));
         target[r] = part::<W>(sum);
     });
+}
+
+/// The same for a product that is symmetric, of which one half is kept.
+#[inline(always)]
+pub fn subtract_symmetric_product<const W: usize>(target: &mut Upper<W>, w: &Tile<W>, y: &Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let y = rows::<W>(y);
+    let mut sums = upper_rows::<W>(target);
+    each_row!(W, |r| each_row!(W, |d| Width::<W>::subtract(&mut sums[r], w[d][r], &y[d])));
+    each_row_backwards!(W, |r| Width::<W>::set_upper_row(target, r, sums[r]));
+}
+
+/// The rows of an upper half, with anything left of the diagonal.
+#[inline(always)]
+fn upper_rows<const W: usize>(upper: &Upper<W>) -> [<Width<W> as Rows<W>>::Row; W]
+where
+    Width<W>: Rows<W>,
+{
+    let mut out = [Width::<W>::upper_row(upper, 0); W];
+    each_row!(W, |r| out[r] = Width::<W>::upper_row(upper, r));
+    out
+}
+
+/// A tile with these rows; left of the diagonal there is anything.
+#[inline(always)]
+pub fn spread<const W: usize>(upper: &Upper<W>, out: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    store::<W>(&upper_rows::<W>(upper), out);
 }
 
 /// part -= w^T x
@@ -433,27 +513,29 @@ where
     store::<W>(&lanes, w);
 }
 
-/// Of a [`factorise_symmetric`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal, L^-T D^-1 from there on.
+/// Of a [`factorise_symmetric`]d tile what [`solve_symmetric`] takes: L^-T (its diagonal is one) above the diagonal, D^-1 on it.
 #[inline(always)]
-pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
+pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Upper<W>)
 where
     Width<W>: Rows<W>,
 {
     let mut below = [row::<W>(&[0.0; W]); W];
+    let out = out.as_mut();
     each_row!(W, |r| {
         below[r] = unit::<W>(r);
         each_row!(W, |k| if k < r {
             let line = below[k];
             Width::<W>::subtract(&mut below[r], factor[k][r], &line);
         });
+        let column = part::<W>(below[r]);
+        each_row!(W, |k| if k < r {
+            out[upper_entry(W, k, r)] = column[k];
+        });
+        out[upper_entry(W, r, r)] = factor[r][r];
     });
-    store::<W>(&below, out);
-    each_row!(W, |r| each_row!(W, |k| if k <= r {
-        out[k][r] = out[r][k] * factor[r][r];
-    }));
 }
 
-/// Of a [`factorise`]d tile the same: L^-1 (its diagonal is one) below the diagonal, U^-1 from there on.
+/// Of a [`factorise`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal, U^-1 from there on.
 #[inline(always)]
 pub fn invert<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
 where
@@ -509,6 +591,32 @@ pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
         let mut sums = [0.0; 2];
         each_row!(W, |k| if k >= r {
             sums[k % 2] += inverses[r][k] * y[k];
+        });
+        z[r] = sums[0] + sums[1];
+    });
+    z
+}
+
+/// The same for a symmetric tile.
+#[inline(always)]
+pub fn solve_symmetric<const W: usize>(inverses: &Upper<W>, x: &Part<W>) -> Part<W>
+where
+    Width<W>: Rows<W>,
+{
+    let inverses = inverses.as_ref();
+    let (mut y, mut z) = ([0.0; W], [0.0; W]);
+    each_row!(W, |r| {
+        let mut sums = [x[r], 0.0];
+        each_row!(W, |k| if k < r {
+            sums[k % 2] += inverses[upper_entry(W, k, r)] * x[k];
+        });
+        y[r] = (sums[0] + sums[1]) * inverses[upper_entry(W, r, r)];
+    });
+    each_row!(W, |r| {
+        let mut sums = [0.0; 2];
+        sums[r % 2] = y[r];
+        each_row!(W, |k| if k > r {
+            sums[k % 2] += inverses[upper_entry(W, r, k)] * y[k];
         });
         z[r] = sums[0] + sums[1];
     });
