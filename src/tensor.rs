@@ -31,6 +31,16 @@ fn largest(components: &[f64]) -> f64 {
     components.iter().fold(0.0, |largest, c| if c.abs() > largest || c.is_nan() { c.abs() } else { largest })
 }
 
+/// So many vectors of zeros, in memory that comes from the system as zeros: what nobody writes to takes none.
+pub fn zeros(count: usize) -> Vec<Vec3> {
+    vec![[0.0; 3]; count].into_iter().map(Vec3).collect()
+}
+
+/// A copy of vectors, which takes no memory while all of them are zero.
+pub fn copied(vectors: &[Vec3]) -> Vec<Vec3> {
+    if vectors.iter().all(|vector| *vector == Vec3::ZERO) { zeros(vectors.len()) } else { vectors.to_vec() }
+}
+
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vec3<T = f64>(pub [T; 3]);

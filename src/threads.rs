@@ -93,11 +93,6 @@ pub fn parts(length: usize) -> impl Iterator<Item = Range<usize>> {
     (0..length).step_by(PART).map(move |start| start..length.min(start + PART))
 }
 
-/// A list of equal entries. All threads touch memory for the first time, which takes longer than filling it.
-pub fn filled<T: Copy + Send + Sync>(length: usize, entry: T) -> Vec<T> {
-    list(length, |_| entry)
-}
-
 /// Copies a list over another one, which becomes as long.
 pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
     if to.len() != from.len() {
@@ -164,7 +159,7 @@ mod tests {
         let from: Vec<usize> = (0..3 * PART + 1).collect();
         for length in [0, 5, from.len(), from.len() + 9] {
             let copied = same(|| {
-                let mut to = filled(length, 1);
+                let mut to = vec![1; length];
                 copy(&mut to, &from);
                 to
             });

@@ -197,9 +197,9 @@ impl Run<'_> {
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        trend.begin(&assembly.system.pattern.equations, &mut self.state, &step);
+        trend.begin(&assembly.system.pattern.equations, &mut self.state, &step, newton.scratch());
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
-        trend.end(&self.state, &assembly.system, newton.solver.room(), &step);
+        trend.end(&self.state, &assembly.system, &step, newton.scratch());
         self.refuse_massless_turns(massive)?;
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);

@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
+use crate::real::Rough;
 use crate::rotation::{Rotation, relative_angle};
 use crate::system::State;
 use crate::tensor::Vec3;
@@ -95,7 +96,7 @@ pub(super) struct Levels {
 impl Levels {
     /// From the run's state on.
     pub fn new(run: &mut Run, workshop: &mut Workshop, steps: usize, approach: Approach) -> Self {
-        let (start, level) = (run.state.clone(), 1.0 / steps as f64);
+        let (start, level) = (run.state.kept(), 1.0 / steps as f64);
         Self { start, level, approach, stability: Stability::new(run, workshop), increment: level }
     }
 
@@ -130,7 +131,13 @@ impl Levels {
 
     /// Whether a step may have gone to another branch: it went back against the `first` correction, or it changed the number of
     /// negative pivots and is not small, or the state has moved further than on a path that goes on.
-    pub fn may_have_jumped(&self, model: &Model, states: [&State; 2], first: &[Vec3], negative: Option<usize>) -> bool {
+    pub fn may_have_jumped(
+        &self,
+        model: &Model,
+        states: [&State; 2],
+        first: &Rough<3>,
+        negative: Option<usize>,
+    ) -> bool {
         let [from, to] = states;
         if self.approach == Approach::Straight {
             return false;
@@ -148,11 +155,11 @@ impl Levels {
 
 /// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
 /// displacements tell.
-fn has_turned_back(model: &Model, from: &State, to: &State, first: &[Vec3]) -> bool {
+fn has_turned_back(model: &Model, from: &State, to: &State, first: &Rough<3>) -> bool {
     let [along, moved, expected] = threads::sums(first.len(), |part| {
         let [mut along, mut moved, mut expected] = [0.0; 3];
         for slot in part.filter(|&slot| model.kinds[slot] == SlotKind::Displacement) {
-            let (step, first) = (to.q[slot] - from.q[slot], first[slot]);
+            let (step, first) = (to.q[slot] - from.q[slot], Vec3(first.get(slot)));
             along += step.dot(first);
             moved += step.squared();
             expected += first.squared();

@@ -547,8 +547,8 @@ impl<'o> Run<'o> {
     }
 
     fn name_coarse(&self, element: usize, angle: f64) -> Failure {
-        let nodes = self.model.charted.elements[element].nodes();
-        let names = [nodes[0], nodes[nodes.len() - 1]].map(|node| self.model.node_at(node.p as usize));
+        let rotations = self.model.charted.elements[element].rotations();
+        let names = [rotations[0], rotations[rotations.len() - 1]].map(|slot| self.model.node_at(slot as usize));
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
     }
 

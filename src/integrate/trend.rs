@@ -7,8 +7,8 @@
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
-use crate::system::{Equations, Leftover, State, System};
-use crate::tensor::Vec3;
+use crate::real::Rough;
+use crate::system::{Equations, Scratch, State, System};
 use crate::threads;
 use std::array::from_fn;
 use std::collections::VecDeque;
@@ -45,22 +45,20 @@ pub struct Trend {
     past: VecDeque<Past>,
     /// By way, how much residual it would have left (squares, in the mean of the last steps); `None` where that is not known
     missed: [Option<f64>; WAYS.len()],
-    /// Where the scheme's own prediction went in the present step, by equation: in the memory of the oldest correction, which nobody asks for
-    /// any more
+    /// Where the scheme's own prediction went in the present step, by equation
     predicted: Vec<f64>,
-    /// What is foreseen of a step, and later the memory for its force
-    spare: Vec<f64>,
     /// The way that was taken there
     taken: usize,
 }
 
-/// A step that has come to its end, by equation: what is held is not corrected.
+/// A step that has come to its end, by equation: what is held is not corrected. A guess needs few digits.
+#[derive(Default)]
 struct Past {
     length: f64,
     /// c
-    correction: Vec<f64>,
+    correction: Rough<1>,
     /// J c, moments over the length of the scene; gaps do not count
-    force: Vec<f64>,
+    force: Rough<1>,
 }
 
 impl Trend {
@@ -81,63 +79,52 @@ impl Trend {
     }
 
     /// Adds what is foreseen to the prediction of a step.
-    pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step) {
-        let best = self.best();
-        let factors = self.factors(best, step.length, CORRECTION).filter(|_| best > 0);
-        if let Some(factors) = factors {
-            self.taken = best;
-            self.foresee(&factors, equations.count());
-        }
-        if let Some(oldest) = self.past.get_mut(MOST - 1) {
-            self.predicted = std::mem::take(&mut oldest.correction);
-        }
+    pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step, scratch: Scratch) {
         self.predicted.resize(equations.count(), 0.0);
         equations.gather(|slot| state.q[slot], &mut self.predicted);
-        if factors.is_some() {
-            let mut dq = vec![Vec3::ZERO; state.q.len()];
-            equations.scatter(&self.spare, None, &mut dq);
-            step.correct(state, &dq);
+        let best = self.best();
+        if let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) {
+            self.taken = best;
+            self.foresee(&factors, scratch.numbers);
+            equations.scatter(scratch.numbers, None, scratch.vectors);
+            step.correct(state, scratch.vectors);
         }
     }
 
     /// The sum of the last corrections with their factors.
-    fn foresee(&mut self, factors: &Factors, equations: usize) {
-        let Self { past, spare, .. } = self;
-        spare.resize(equations, 0.0);
-        threads::each_part(spare, |start, sums| {
+    fn foresee(&self, factors: &Factors, sums: &mut [f64]) {
+        threads::each_part(sums, |start, sums| {
             sums.fill(0.0);
-            for (past, factor) in past.iter().zip(factors) {
-                sums.iter_mut().zip(&past.correction[start..]).for_each(|(sum, part)| *sum += part * factor);
+            for (past, factor) in self.past.iter().zip(factors) {
+                let corrections = (start..).map(|equation| past.correction.get(equation)[0]);
+                sums.iter_mut().zip(corrections).for_each(|(sum, part)| *sum += part * factor);
             }
         });
     }
 
     /// Takes note of a step that has come to its end, with the unknowns that it was predicted in, and its tangent.
-    pub fn end(&mut self, state: &State, system: &System, room: &mut Leftover, step: &Step) {
-        let equations = &system.pattern.equations;
-        let [mut correction, mut force] = [&mut self.predicted, &mut self.spare].map(std::mem::take);
+    pub fn end(&mut self, state: &State, system: &System, step: &Step, scratch: Scratch) {
+        let (equations, force) = (&system.pattern.equations, scratch.numbers);
+        let mut correction = std::mem::take(&mut self.predicted);
         equations.gather_change(|slot| state.q[slot], &mut correction);
-        force.resize(equations.count(), 0.0);
-        system.multiply_into(&system.values, &correction, room, &mut force);
-        threads::each_part(&mut force, |start, part| {
-            for (equation, force) in (start..).zip(part) {
-                *force *= self.weights[self.kinds[equations.origin(equation).0 as usize] as usize];
-            }
-        });
-        self.learn(Past { length: step.length, correction, force });
+        system.multiply_into(&system.values, &correction, scratch.room, force);
+        equations.scale(|slot| self.weights[self.kinds[slot] as usize], force);
+        self.learn(step.length, &correction, force);
+        self.predicted = correction;
     }
 
-    fn learn(&mut self, last: Past) {
-        let factors = from_fn(|way| self.factors(way, last.length, FORCE));
-        let missed = self.rests(&last.force, &factors);
+    /// Learns from a step of this length, with its correction and its force.
+    fn learn(&mut self, length: f64, correction: &[f64], force: &[f64]) {
+        let factors = from_fn(|way| self.factors(way, length, FORCE));
+        let missed = self.rests(force, &factors);
         for (mean, (rest, known)) in self.missed.iter_mut().zip(missed.into_iter().zip(factors)) {
             *mean = known.map(|_| mean.map_or(rest, |mean| mean + NEWS * (rest - mean)));
         }
-        if self.past.len() == MOST
-            && let Some(oldest) = self.past.pop_back()
-        {
-            self.spare = oldest.force;
-        }
+        // Into the memory of the oldest, which nobody asks for any more.
+        let oldest = if self.past.len() == MOST { self.past.pop_back() } else { None };
+        let mut last = Past { length, ..oldest.unwrap_or_default() };
+        last.correction.take(correction.len(), |equation| [correction[equation]]);
+        last.force.take(force.len(), |equation| [force[equation]]);
         self.past.push_front(last);
     }
 
@@ -177,7 +164,8 @@ impl Trend {
         threads::sums(force.len(), |equations| {
             let mut sums = [0.0; WAYS.len()];
             for equation in equations {
-                let past: Factors = from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force[equation]));
+                let past: Factors =
+                    from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force.get(equation)[0]));
                 for (sum, factors) in sums.iter_mut().zip(&factors) {
                     let foreseen = past[0] * factors[0] + past[1] * factors[1] + past[2] * factors[2];
                     *sum += (force[equation] - foreseen).powi(2);
@@ -195,14 +183,14 @@ mod tests {
     fn with(corrections: &[f64]) -> Trend {
         let mut trend = Trend::default();
         for (length, correction) in corrections.iter().map(|c| (1.0, *c)) {
-            trend.learn(Past { length, correction: vec![correction], force: vec![correction] });
+            trend.learn(length, &[correction], &[correction]);
         }
         trend
     }
 
     fn foreseen(trend: &Trend, way: usize, length: f64) -> f64 {
         let factors = trend.factors(way, length, CORRECTION).unwrap();
-        trend.past.iter().zip(factors).map(|(past, factor)| past.correction[0] * factor).sum()
+        trend.past.iter().zip(factors).map(|(past, factor)| past.correction.get(0)[0] * factor).sum()
     }
 
     #[test]
@@ -220,14 +208,14 @@ mod tests {
     fn steps_that_grow_are_foreseen() {
         let mut trend = Trend::default();
         for length in [1.0_f64, 1.8, 3.2, 5.8] {
-            trend.learn(Past { length, correction: vec![length.powi(3)], force: vec![length] });
+            trend.learn(length, &[length.powi(3)], &[length]);
         }
         assert_eq!(trend.best(), 1);
-        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-9);
+        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
         // A step that is not taken has nothing to say.
-        trend.learn(Past { length: 5.8, correction: vec![7.0], force: vec![1.0] });
+        trend.learn(5.8, &[7.0], &[1.0]);
         trend.withdraw();
-        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-9);
+        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
     }
 
     #[test]
@@ -244,7 +232,7 @@ mod tests {
             for step in 1..=6 {
                 let force: Vec<f64> =
                     (0..5 * threads::PART).map(|k| (k as f64 * f64::from(step * step)).sin()).collect();
-                trend.learn(Past { length: 1.0, correction: force.clone(), force });
+                trend.learn(1.0, &force, &force);
             }
             trend.missed.map(|missed| missed.map(f64::to_bits))
         };

@@ -3,7 +3,7 @@
 use super::ElementInfo;
 use crate::kernel::seam;
 use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
-use crate::system::{Node, Slot, State};
+use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 use std::f64::consts::PI;
@@ -68,12 +68,12 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
 pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     let mut mixed = 0;
     for (element, info) in elements.iter().enumerate().filter(|(_, e)| e.in_one_chart) {
-        let nodes = info.nodes();
+        let rotations = info.rotations();
         let mut p = [Vec3::ZERO; crate::kernel::MAX_NODES];
-        for (p, node) in p.iter_mut().zip(nodes) {
-            *p = state.q[node.p as usize];
+        for (p, &slot) in p.iter_mut().zip(rotations) {
+            *p = state.q[slot as usize];
         }
-        let mask = seam::conversion(&p[..nodes.len()]);
+        let mask = seam::conversion(&p[..rotations.len()]);
         state.mixed[element] = mask;
         mixed += usize::from(mask != 0);
     }
@@ -160,9 +160,10 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
 
 /// The largest relative rotation between neighbouring nodes of elements that interpolate total vectors.
 pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
-    let pairs = elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.nodes().windows(2));
-    let angle = |pair: &[Node]| {
-        let [a, b] = [pair[0], pair[1]].map(|node| Rotation::new(state.q[node.p as usize]).r);
+    let pairs =
+        elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.rotations().windows(2));
+    let angle = |pair: &[Slot]| {
+        let [a, b] = [pair[0], pair[1]].map(|slot| Rotation::new(state.q[slot as usize]).r);
         relative_angle(a, b)
     };
     pairs.map(angle).fold(0.0, f64::max)
@@ -171,32 +172,32 @@ pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
 /// Neighbours that turned from more than a right angle one way to more than that the other way have leapt over pi: their
 /// relative rotation (element, angle) is what it was and what it has changed by since the state `before`.
 pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<(usize, f64)> {
-    let relative = |state: &State, pair: &[Node]| {
-        let [a, b] = [pair[0], pair[1]].map(|node| state.q[node.p as usize]);
+    let relative = |state: &State, pair: &[Slot]| {
+        let [a, b] = [pair[0], pair[1]].map(|slot| state.q[slot as usize]);
         // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
         ((a - b).squared() > 1.0).then(|| log(Rotation::new(a).r.transpose() * Rotation::new(b).r))
     };
-    let leap = |element: usize, pair: &[Node]| {
+    let leap = |element: usize, pair: &[Slot]| {
         let now = relative(state, pair).filter(|now| now.norm() > COARSE_WARNING)?;
         let old = relative(before, pair).filter(|old| old.norm() > COARSE_WARNING)?;
         (now.dot(old) < 0.0).then(|| (element, 2.0 * PI - now.norm()))
     };
-    let leap_in = |element: usize| elements[element].nodes().windows(2).find_map(|pair| leap(element, pair));
+    let leap_in = |element: usize| elements[element].rotations().windows(2).find_map(|pair| leap(element, pair));
     threads::first(elements.len(), |mut part| part.find_map(leap_in))
 }
 
 /// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle). Of elements that take
 /// all their nodes in the chart of the first it is the sum from the first node to the last: beyond pi that chart may be the wrong one.
 pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(usize, f64)> {
-    let vectors = |pair: &[Node]| (state.q[pair[0].p as usize], state.q[pair[1].p as usize]);
+    let vectors = |pair: &[Slot]| (state.q[pair[0] as usize], state.q[pair[1] as usize]);
     // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
-    let bound = |pair: &[Node]| (vectors(pair).0 - vectors(pair).1).norm();
-    let angle = |pair: &[Node]| {
+    let bound = |pair: &[Slot]| (vectors(pair).0 - vectors(pair).1).norm();
+    let angle = |pair: &[Slot]| {
         let (a, b) = vectors(pair);
         relative_angle(Rotation::new(a).r, Rotation::new(b).r)
     };
     let angle_in = |element: &ElementInfo| {
-        let pairs = element.nodes().windows(2);
+        let pairs = element.rotations().windows(2);
         match element.in_one_chart {
             true if pairs.clone().map(bound).sum::<f64>() >= limit => pairs.map(angle).sum(),
             true => 0.0,

@@ -69,23 +69,23 @@ impl SlotKind {
 /// A beam element as changes of chart and the judgement of the mesh see it.
 #[derive(Clone, Debug)]
 pub struct ElementInfo {
-    all: [Node; MAX_NODES],
+    all: [Slot; MAX_NODES],
     count: u8,
     /// Whether it interpolates total rotation vectors, so that all of them must be taken in one chart
     pub in_one_chart: bool,
 }
 
 impl ElementInfo {
-    /// An element of these nodes, at most [`MAX_NODES`].
-    pub fn new(nodes: impl ExactSizeIterator<Item = Node>, in_one_chart: bool) -> Self {
-        let (mut all, count) = ([Node { u: 0, p: 0 }; MAX_NODES], nodes.len() as u8);
-        all.iter_mut().zip(nodes).for_each(|(place, node)| *place = node);
+    /// An element of nodes with these rotation vectors, at most [`MAX_NODES`].
+    pub fn new(rotations: impl ExactSizeIterator<Item = Slot>, in_one_chart: bool) -> Self {
+        let (mut all, count) = ([0; MAX_NODES], rotations.len() as u8);
+        all.iter_mut().zip(rotations).for_each(|(place, slot)| *place = slot);
         Self { all, count, in_one_chart }
     }
 
-    /// Its nodes
+    /// The rotation vectors of its nodes
     #[inline]
-    pub fn nodes(&self) -> &[Node] {
+    pub fn rotations(&self) -> &[Slot] {
         &self.all[..usize::from(self.count)]
     }
 }
@@ -162,12 +162,16 @@ impl Model {
     }
 
     /// The inner product of two motions, displacements over the length of the scene.
-    pub fn inner_product(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
-        let [displacements, rotations, ..] = threads::sums(a.len().min(b.len()), |part| {
+    pub fn inner_product(
+        &self,
+        slots: usize,
+        a: impl Fn(usize) -> Vec3 + Send + Sync,
+        b: impl Fn(usize) -> Vec3 + Send + Sync,
+    ) -> f64 {
+        let [displacements, rotations, ..] = threads::sums(slots, |part| {
             let mut sums = [0.0; SlotKind::ALL.len()];
-            let pairs = a[part.clone()].iter().zip(&b[part.clone()]);
-            for (&kind, (a, b)) in self.kinds[part].iter().zip(pairs) {
-                sums[kind as usize] += a.dot(*b);
+            for slot in part {
+                sums[self.kinds[slot] as usize] += a(slot).dot(b(slot));
             }
             sums
         });

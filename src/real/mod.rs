@@ -3,10 +3,12 @@
 
 mod jet;
 mod lanes;
+mod rough;
 
 pub use jet::Jet;
 pub use lanes::{Instructions, LANES, Lanes, Pack};
 pub(crate) use lanes::{each_lane, pack};
+pub use rough::Rough;
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

@@ -258,8 +258,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
 /// The rotations of all nodes, and the elements beam by beam.
 fn charted(mesh: &Mesh) -> Charted {
     let info = |beam: &MeshBeam, number: usize| {
-        let nodes = beam.nodes_of(number).iter().map(|&n| mesh.nodes[n].node);
-        ElementInfo::new(nodes, beam.interpolation == deck::InterpolationWord::Total)
+        let rotations = beam.nodes_of(number).iter().map(|&n| mesh.nodes[n].node.p);
+        ElementInfo::new(rotations, beam.interpolation == deck::InterpolationWord::Total)
     };
     let of = |beam: &MeshBeam| beam.elements.clone().map(|number| info(beam, number)).collect::<Vec<_>>();
     Charted {

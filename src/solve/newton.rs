@@ -10,9 +10,9 @@ use super::softest::NullVector;
 use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
-use crate::system::{State, System};
-use crate::tensor::Vec3;
-use crate::threads;
+use crate::real::Rough;
+use crate::system::{Scratch, State, System};
+use crate::tensor::{Vec3, zeros};
 use std::time::Instant;
 
 /// Work done, added up over a run.
@@ -107,7 +107,7 @@ pub struct Newton {
     /// The size of the last correction of a solution: `None` before the first, infinite after a change of chart
     last: Option<f64>,
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
-    pub first: Vec<Vec3>,
+    pub first: Rough<3>,
     reuse: Reuse,
     foresight: Foresight,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
@@ -121,7 +121,7 @@ impl Newton {
     /// For a stage with these unknowns.
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
         let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
-        let (right_hand_side, dq) = (vec![0.0; equations], threads::filled(slots, Vec3::ZERO));
+        let (right_hand_side, dq) = (vec![0.0; equations], zeros(slots));
         Self {
             convergence,
             max_iterations,
@@ -129,7 +129,7 @@ impl Newton {
             right_hand_side,
             dq,
             last: None,
-            first: Vec::new(),
+            first: Rough::default(),
             reuse: Reuse::new(),
             foresight: Foresight::default(),
             given: None,
@@ -142,6 +142,11 @@ impl Newton {
         let negative = self.solver.negative_pivots(system);
         work.factorisations += u64::from(!known && self.solver.has_factorised(system));
         negative
+    }
+
+    /// Memory that nobody needs between solutions.
+    pub fn scratch(&mut self) -> Scratch<'_> {
+        Scratch { room: self.solver.room(), numbers: &mut self.right_hand_side, vectors: &mut self.dq }
     }
 
     /// The tangent of the system is that of the state that the next solution begins with, but for the loads.
@@ -230,7 +235,7 @@ impl Newton {
             }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {
-                threads::copy(&mut self.first, &self.dq);
+                self.first.take(self.dq.len(), |slot| self.dq[slot].0);
             }
             Self::add(model, state, method, &self.dq);
             // What was a correction before is none in a new chart: it may not end the iteration.

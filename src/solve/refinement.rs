@@ -1,8 +1,8 @@
 //! Corrections of a solution whose residual is round-off.
 
 use crate::model::Model;
+use crate::real::Rough;
 use crate::tensor::Vec3;
-use crate::threads;
 
 /// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
 const FINE: f64 = 1e-8;
@@ -10,7 +10,7 @@ const FINE: f64 = 1e-8;
 /// Follows corrections that refine a solution whose residual is round-off.
 #[derive(Default)]
 pub(super) struct Refinement {
-    before: Vec<Vec3>,
+    before: Rough<3>,
     /// Its size
     size: f64,
     /// The last correction over the unknowns; after a change of chart there is none.
@@ -24,12 +24,18 @@ pub(super) struct Refinement {
 impl Refinement {
     /// Looks at a correction of this size; the unknowns have a size, too.
     pub fn look(&mut self, model: &Model, dq: &[Vec3], size: f64, unknowns: f64) -> &Self {
-        let dot = |a: &[Vec3], b: &[Vec3]| model.inner_product(a, b);
-        let cosine = dot(dq, &self.before) / (dot(dq, dq) * dot(&self.before, &self.before)).sqrt();
+        let (now, before) = (|slot: usize| dq[slot], |slot: usize| Vec3(self.before.get(slot)));
+        let count = self.before.len();
+        let [along, own, others] = [
+            model.inner_product(count, now, before),
+            model.inner_product(count, now, now),
+            model.inner_product(count, before, before),
+        ];
+        let cosine = along / (own * others).sqrt();
         self.aligned = cosine > 0.5;
         self.ratio = if self.before.is_empty() { 0.0 } else { size / self.size };
         (self.size, self.last) = (size, size / unknowns);
-        threads::copy(&mut self.before, if self.last.is_finite() { dq } else { &[] });
+        self.before.take(if self.last.is_finite() { dq.len() } else { 0 }, |slot| dq[slot].0);
         self
     }
 

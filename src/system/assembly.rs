@@ -7,7 +7,7 @@ use super::state::Slot;
 use super::storage::{Tiles, Values};
 use crate::kernel::ElementSystem;
 use crate::real::{Instructions, Lanes};
-use crate::tensor::{Mat3, Vec3};
+use crate::tensor::{Mat3, Vec3, zeros};
 use crate::threads;
 use std::ops::Range;
 
@@ -33,20 +33,26 @@ impl Category {
 /// again and again.
 #[derive(Default)]
 pub struct Leftover {
-    parts: Vec<f64>,
     residuals: Vec<f64>,
 }
 
 impl Leftover {
-    /// Takes a vector in parts, one a group, and makes room for so many numbers of each.
-    fn take<const W: usize>(&mut self, pattern: &Pattern, x: &[f64], numbers: usize) {
-        let length = W * pattern.groups.count();
-        self.parts.resize(length, 0.0);
-        self.residuals.resize(self.residuals.len().max(numbers * length), 0.0);
-        threads::each_part(self.parts.as_chunks_mut::<W>().0, |start, parts| {
-            (start..).zip(parts).for_each(|(group, part)| *part = pattern.part(group, x));
-        });
+    /// Room for so many numbers of each row of a group's tile.
+    fn take<const W: usize>(&mut self, pattern: &Pattern, numbers: usize) -> &mut [[f64; W]] {
+        let length = numbers * W * pattern.groups.count();
+        self.residuals.resize(self.residuals.len().max(length), 0.0);
+        self.residuals[..length].as_chunks_mut::<W>().0
     }
+}
+
+/// Memory that somebody else does not need just now.
+pub struct Scratch<'a> {
+    /// For products with the tangent
+    pub room: &'a mut Leftover,
+    /// One an equation
+    pub numbers: &'a mut [f64],
+    /// One a slot
+    pub vectors: &'a mut [Vec3],
 }
 
 /// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
@@ -80,7 +86,7 @@ impl System {
         let acts = |category: &usize| acting_in.iter().any(|acting| acting.contains(category));
         let acting: Vec<usize> = (0..Category::ALL.len()).filter(acts).collect();
         let force = |category: Category| match acting.contains(&(category as usize)) {
-            true => threads::filled(slots, Vec3::ZERO),
+            true => zeros(slots),
             false => Vec::new(),
         };
         let values = pattern.values();
@@ -200,26 +206,31 @@ impl System {
     }
 
     fn product<const W: usize>(&self, values: &[f64], x: &[f64], room: &mut Leftover, out: &mut [f64]) {
-        room.take::<W>(&self.pattern, x, 1);
-        let parts = room.parts.as_chunks::<W>().0;
-        let sums = &mut room.residuals.as_chunks_mut::<W>().0[..parts.len()];
+        let sums = room.take::<W>(&self.pattern, 1);
         threads::each_part(sums, |_, sums| sums.fill([0.0; W]));
-        self.each_row::<W, _>(values, sums, |sum, column, tile| {
-            for (line, &x) in tile.iter().zip(&parts[column]) {
-                sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * x);
-            }
-        });
+        self.each_product::<W, _>(
+            values,
+            x,
+            sums,
+            #[inline(always)]
+            |sum: &mut [f64; W], tile: &Tile<W>, x: &[f64; W]| {
+                for (line, x) in tile.iter().zip(x) {
+                    sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * x);
+                }
+            },
+        );
         let sums = &*sums;
         self.pattern.join(|group| &sums[group], out);
     }
 
-    /// Shows each tile with what belongs to the group of its rows, and the group of its columns: regions at once. Tiles that are not kept
-    /// are shown, too.
-    fn each_row<const W: usize, K: Send>(
+    /// Shows each tile with what belongs to the group of its rows, and the part of x that its columns take: regions at once. Tiles that
+    /// are not kept are shown, too.
+    fn each_product<const W: usize, K: Send>(
         &self,
         values: &[f64],
+        x: &[f64],
         of_rows: &mut [K],
-        show: impl Fn(&mut K, usize, &Tile<W>) + Send + Sync,
+        show: impl Fn(&mut K, &Tile<W>, &[f64; W]) + Send + Sync,
     ) {
         let Pattern { regions, storage, symmetry, .. } = &self.pattern;
         let (tiles, halves) = (storage.tiles::<W>(values), symmetry.halves());
@@ -232,16 +243,21 @@ impl System {
                     #[inline(always)]
                     || {
                         for column in region.groups.clone() {
-                            let own = column - region.groups.start;
-                            tiles.own.with(column, |tile| show(&mut part[own], column, tile));
+                            let (own, x_own) = (column - region.groups.start, self.pattern.part::<W>(column, x));
+                            tiles.own.with(
+                                column,
+                                #[inline(always)]
+                                |tile| show(&mut part[own], tile, &x_own),
+                            );
                             for tile in self.pattern.tiles_of(column) {
                                 let row = self.pattern.rows[tile] as usize;
                                 let Some(of_row) = part.get_mut(row.wrapping_sub(region.groups.start)) else {
                                     continue;
                                 };
-                                show(of_row, column, &tiles.beside[tile]);
+                                show(of_row, &tiles.beside[tile], &x_own);
                                 if halves {
-                                    show(&mut part[own], row, &transposed(&tiles.beside[tile]));
+                                    let x_row = self.pattern.part::<W>(row, x);
+                                    show(&mut part[own], &transposed(&tiles.beside[tile]), &x_row);
                                 }
                             }
                         }
@@ -251,9 +267,9 @@ impl System {
         );
         for &(column, tile) in &self.pattern.between {
             let row = self.pattern.rows[tile] as usize;
-            show(&mut of_rows[row], column, &tiles.beside[tile]);
+            show(&mut of_rows[row], &tiles.beside[tile], &self.pattern.part::<W>(column, x));
             if halves {
-                show(&mut of_rows[column], row, &transposed(&tiles.beside[tile]));
+                show(&mut of_rows[column], &transposed(&tiles.beside[tile]), &self.pattern.part::<W>(row, x));
             }
         }
     }
@@ -263,7 +279,11 @@ impl System {
     pub fn each_tile<const W: usize>(&self, columns: Range<usize>, mut show: impl FnMut(usize, usize, &Tile<W>)) {
         let tiles = self.tiles();
         for column in columns {
-            tiles.own.with(column, |tile| show(column, column, tile));
+            tiles.own.with(
+                column,
+                #[inline(always)]
+                |tile| show(column, column, tile),
+            );
             let beside = &tiles.beside[self.pattern.tiles_of(column)];
             for (&row, tile) in self.pattern.rows_of(column).iter().zip(beside) {
                 show(row as usize, column, tile);
@@ -282,24 +302,28 @@ impl System {
 
     fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
         let pattern = &self.pattern;
-        room.take::<W>(pattern, x, 2);
-        let parts = room.parts.as_chunks::<W>().0;
-        let residuals = room.residuals.as_chunks_mut::<W>().0.as_chunks_mut::<2>().0;
+        let residuals = room.take::<W>(pattern, 2).as_chunks_mut::<2>().0;
         threads::each_part(residuals, |start, residuals| {
             for (group, [residual, size]) in (start..).zip(residuals) {
                 *residual = pattern.part(group, b);
                 *size = residual.map(f64::abs);
             }
         });
-        self.each_row::<W, _>(&self.values, residuals, |[residual, size], column, tile| {
-            for (line, &x) in tile.iter().zip(&parts[column]) {
-                for r in 0..W {
-                    let term = line[r] * x;
-                    residual[r] -= term;
-                    size[r] += term.abs();
+        self.each_product::<W, _>(
+            &self.values,
+            x,
+            residuals,
+            #[inline(always)]
+            |[residual, size]: &mut [[f64; W]; 2], tile: &Tile<W>, x: &[f64; W]| {
+                for (line, x) in tile.iter().zip(x) {
+                    for r in 0..W {
+                        let term = line[r] * x;
+                        residual[r] -= term;
+                        size[r] += term.abs();
+                    }
                 }
-            }
-        });
+            },
+        );
         // Numbers that small have lost digits of their own.
         let ratio = |(r, size): (&f64, &f64)| r.abs() / size.max(1e-280);
         let of_part = |[part, sizes]: &[[f64; W]; 2]| part.iter().zip(sizes).map(ratio).fold(0.0, f64::max);
@@ -363,7 +387,7 @@ impl System {
         let Self { pattern, acting_in, force, values, lift, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
-        let storage = pattern.storage;
+        let storage = &pattern.storage;
         let places = |region: &Region| [storage.on_diagonal(&region.groups), storage.beside(&region.tiles)];
         let mut forces = force.each_mut().map(|force| threads::split(force, ends(|r| r.slots.end)).into_iter());
         let (own, beside) = values.split_at_mut(storage.boundary());
@@ -395,7 +419,7 @@ impl System {
             acting: &self.acting,
             region: None,
             force: self.force.each_mut().map(|force| &mut force[..]),
-            values: Values::all(self.pattern.storage, &mut self.values),
+            values: Values::all(&self.pattern.storage, &mut self.values),
             lift: self.lifts.then_some(&self.lift[..]),
             lifted: &mut self.lifted,
             room: &mut self.rooms[0],

@@ -31,20 +31,49 @@ pub struct FrameConflict {
 /// The number of no frame.
 const GLOBAL: u32 = u32::MAX;
 
-/// The numbers of the free equations.
+/// The numbers of the free equations, slot by slot.
 #[derive(Clone, Debug)]
 pub struct Equations {
-    /// For each slot and local direction the equation, or [`Equations::HELD`].
-    number: Vec<[u32; 3]>,
-    /// For each slot the number of its frame, or `GLOBAL` where its local directions are the global ones
+    /// The number of the first equation of each slot, and behind the last slot that of all
+    first: Vec<u32>,
+    /// What is free at each slot
+    freedom: Vec<Freedom>,
+    /// For each slot the number of its frame, or `GLOBAL` where its local directions are the global ones; nothing where no slot has one
     frame: Vec<u32>,
     /// Local directions as columns
     frames: Vec<Mat3>,
-    /// Slot and local direction of each equation: four times the one, and the other.
-    origin: Vec<u32>,
-    /// The slots in which a direction is held, in planar scenes one that does not leave the plane anyway
-    constrained: Vec<bool>,
     plane: Option<Plane>,
+}
+
+/// The local directions of a slot that are free, a bit each, and a fourth where one is held that does not leave the plane anyway.
+#[derive(Clone, Copy, Debug)]
+struct Freedom(u8);
+
+impl Freedom {
+    fn new(is_held: [bool; 3], constrained: bool) -> Self {
+        let [a, b, c] = is_held.map(|held| u8::from(!held));
+        Self(a | b << 1 | c << 2 | u8::from(constrained) << 3)
+    }
+
+    /// Whether a direction is free, as a number.
+    #[inline(always)]
+    fn of(self, k: u32) -> u32 {
+        u32::from(self.0 >> k) & 1
+    }
+
+    /// Whether all directions are free.
+    #[inline(always)]
+    fn is_whole(self) -> bool {
+        self.0 == 0b111
+    }
+
+    fn count(self) -> u32 {
+        self.of(0) + self.of(1) + self.of(2)
+    }
+
+    fn is_constrained(self) -> bool {
+        self.0 >> 3 != 0
+    }
 }
 
 impl Equations {
@@ -92,25 +121,23 @@ impl Equations {
     }
 
     fn empty(slots: usize, plane: Option<Plane>) -> Self {
-        let (number, frame) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
-        let constrained = Vec::with_capacity(slots);
-        let origin = Vec::with_capacity(if plane.is_some() { 3 * slots / 2 } else { 3 * slots });
-        Self { number, frame, frames: Vec::new(), origin, constrained, plane }
+        let (mut first, freedom) = (Vec::with_capacity(slots + 1), Vec::with_capacity(slots));
+        first.push(0);
+        Self { first, freedom, frame: Vec::new(), frames: Vec::new(), plane }
     }
 
     fn push(&mut self, slot: usize, frame: Option<Mat3>, is_held: [bool; 3], constrained: bool) {
-        let mut number = [Self::HELD; 3];
-        for k in (0..3).filter(|&k| !is_held[k]) {
-            number[k] = self.origin.len() as u32;
-            self.origin.push((4 * slot + k) as u32);
-        }
-        self.number.push(number);
+        let freedom = Freedom::new(is_held, constrained);
+        self.first.push(self.first[slot] + freedom.count());
+        self.freedom.push(freedom);
         // Slots of one plane all have the same.
         if let Some(frame) = frame.filter(|frame| self.frames.last() != Some(frame)) {
             self.frames.push(frame);
         }
-        self.frame.push(frame.map_or(GLOBAL, |_| self.frames.len() as u32 - 1));
-        self.constrained.push(constrained);
+        if !self.frames.is_empty() {
+            self.frame.resize(slot, GLOBAL);
+            self.frame.push(frame.map_or(GLOBAL, |_| self.frames.len() as u32 - 1));
+        }
     }
 
     /// Which rows of a tile they are.
@@ -126,25 +153,36 @@ impl Equations {
 
     /// The number of equations.
     pub fn count(&self) -> usize {
-        self.origin.len()
+        self.before(self.freedom.len())
     }
 
     /// The number of equations of the slots before this one.
+    #[inline(always)]
     pub fn before(&self, slot: usize) -> usize {
-        self.origin.partition_point(|&other| (other as usize) < 4 * slot)
+        self.first[slot] as usize
     }
 
     /// The equations of a slot, by local direction.
     #[inline]
     pub fn of(&self, slot: Slot) -> [u32; 3] {
-        self.number[slot as usize]
+        let (first, freedom) = (self.first[slot as usize], self.freedom[slot as usize]);
+        if freedom.is_whole() {
+            return [first, first + 1, first + 2];
+        }
+        let number = |k: u32, before: u32| if freedom.of(k) == 1 { first + before } else { Self::HELD };
+        [number(0, 0), number(1, freedom.of(0)), number(2, freedom.of(0) + freedom.of(1))]
+    }
+
+    /// The slot of an equation.
+    fn slot_of(&self, equation: usize) -> usize {
+        self.first.partition_point(|&first| first as usize <= equation) - 1
     }
 
     /// The slot and the local direction of an equation.
-    #[inline]
     pub fn origin(&self, equation: usize) -> (Slot, u8) {
-        let origin = self.origin[equation];
-        (origin / 4, (origin % 4) as u8)
+        let slot = self.slot_of(equation);
+        let directions = self.of(slot as Slot).into_iter().take_while(|&number| number as usize != equation);
+        (slot as Slot, directions.count() as u8)
     }
 
     /// The turned axes of a slot as columns.
@@ -155,7 +193,7 @@ impl Equations {
 
     #[inline]
     fn axes(&self, slot: Slot) -> Option<&Mat3> {
-        self.frames.get(self.frame[slot as usize] as usize)
+        self.frames.get(*self.frame.get(slot as usize)? as usize)
     }
 
     /// The slot and the direction (global components) of an equation.
@@ -167,22 +205,48 @@ impl Equations {
 
     /// Picks the free entries of what stands at each slot.
     pub fn gather(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
-        threads::each_part(out, |start, out| {
-            (start..).zip(out).for_each(|(equation, out)| *out = self.entry(equation, &field));
-        });
+        self.each_entry(field, out, |_, out, entry| *out = entry);
     }
 
     /// The same less what the entries were before.
     pub fn gather_change(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
-        threads::each_part(out, |start, out| {
-            (start..).zip(out).for_each(|(equation, out)| *out = self.entry(equation, &field) - *out);
-        });
+        self.each_entry(field, out, |_, out, entry| *out = entry - *out);
     }
 
+    /// Multiplies each entry with a factor of its slot.
+    pub fn scale(&self, factor: impl Fn(usize) -> f64 + Send + Sync, out: &mut [f64]) {
+        self.each_entry(|_| Vec3::ZERO, out, |slot, out, _| *out *= factor(slot));
+    }
+
+    /// Shows for each equation its slot, what is kept for it, and the entry of what stands at the slot.
     #[inline(always)]
-    fn entry(&self, equation: usize, field: impl Fn(usize) -> Vec3) -> f64 {
-        let (slot, k) = self.origin(equation);
-        self.to_local(slot, field(slot as usize)).0[k as usize]
+    fn each_entry<T: Send>(
+        &self,
+        field: impl Fn(usize) -> Vec3 + Send + Sync,
+        list: &mut [T],
+        show: impl Fn(usize, &mut T, f64) + Send + Sync,
+    ) {
+        threads::each_part(list, |start, part| {
+            let end = start + part.len();
+            for slot in self.slot_of(start)..self.freedom.len() {
+                if self.before(slot) >= end {
+                    break;
+                }
+                let local = self.to_local(slot as Slot, field(slot));
+                let own = self.before(slot)..self.before(slot + 1);
+                if own.len() == 3 && own.start >= start && own.end <= end {
+                    let kept = &mut part[own.start - start..own.end - start];
+                    kept.iter_mut().zip(local.0).for_each(|(kept, entry)| show(slot, kept, entry));
+                    continue;
+                }
+                for (number, entry) in self.of(slot as Slot).into_iter().zip(local.0) {
+                    // What is held has the number of no equation.
+                    if let Some(kept) = part.get_mut((number as usize).wrapping_sub(start)) {
+                        show(slot, kept, entry);
+                    }
+                }
+            }
+        });
     }
 
     /// Writes the solution into a field of slots; held directions take their part of `held`.
@@ -190,7 +254,7 @@ impl Equations {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
                 let mut local = held.map_or(Vec3::ZERO, |held| self.to_local(slot as Slot, held[slot]));
-                for (local, &number) in local.0.iter_mut().zip(&self.number[slot]) {
+                for (local, number) in local.0.iter_mut().zip(self.of(slot as Slot)) {
                     // What is held has the number of no equation.
                     *local = solution.get(number as usize).copied().unwrap_or(*local);
                 }
@@ -202,15 +266,15 @@ impl Equations {
     /// Whether no direction of a slot is held but those that leave the plane.
     #[inline]
     pub fn is_plain(&self, slot: Slot) -> bool {
-        !self.constrained[slot as usize]
+        !self.freedom[slot as usize].is_constrained()
     }
 
     /// The held part of a value at a slot.
     pub fn held_part(&self, slot: Slot, value: Vec3) -> Vec3 {
         let mut local = self.to_local(slot, value);
-        for k in 0..3 {
-            if self.number[slot as usize][k] != Self::HELD {
-                local.0[k] = 0.0;
+        for (local, number) in local.0.iter_mut().zip(self.of(slot)) {
+            if number != Self::HELD {
+                *local = 0.0;
             }
         }
         self.frame(slot).map_or(local, |frame| frame * local)
@@ -285,6 +349,9 @@ mod tests {
         let equations = Equations::new(3, &held).unwrap();
         assert_eq!(equations.count(), 7);
         assert_eq!(equations.of(0), [0, Equations::HELD, 1]);
+        let origins: Vec<_> = (0..7).map(|equation| equations.origin(equation)).collect();
+        assert_eq!(origins, [(0, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)]);
+        assert_eq!([0, 1, 2, 3].map(|slot| equations.before(slot)), [0, 2, 4, 7]);
         assert!(equations.frame(0).is_none());
         let frame = equations.frame(1).unwrap();
         assert!((frame.transpose_matmul(frame) - Mat3::IDENTITY).max_abs() < 1e-15);

@@ -1,18 +1,18 @@
 //! One 3-vector a slot, kept once by all states that have the same.
 
-use crate::tensor::Vec3;
+use crate::tensor::{Vec3, zeros};
 use crate::threads;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 /// A vector a slot. Clones are one until one of them is changed: where nothing moves, all rates of all states are one list of zeros.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Field(Arc<[Vec3]>);
+pub struct Field(Arc<Vec<Vec3>>);
 
 impl Field {
     /// Zero at so many slots.
     pub fn zero(slots: usize) -> Self {
-        Self(std::iter::repeat_n(Vec3::ZERO, slots).collect())
+        Self(Arc::new(zeros(slots)))
     }
 
     /// Puts a value at a slot, where another one stands there.
@@ -48,7 +48,7 @@ impl DerefMut for Field {
     /// Looks whether others have it, too: who changes many slots asks once.
     #[inline]
     fn deref_mut(&mut self) -> &mut [Vec3] {
-        Arc::make_mut(&mut self.0)
+        Arc::make_mut(&mut self.0).as_mut_slice()
     }
 }
 

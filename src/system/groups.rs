@@ -1,6 +1,7 @@
 //! Which slots share a tile of the tangent, the displacement and the rotation of a node, and which rows of it are theirs.
 
 use super::state::Slot;
+use std::ops::Range;
 
 /// Slots in a tile.
 pub const SLOTS: usize = 2;
@@ -8,10 +9,10 @@ pub const SLOTS: usize = 2;
 /// The slots of a scene in groups of one or two.
 #[derive(Clone, Debug)]
 pub struct Groups {
-    /// For each slot its group, and its place in it
-    places: Vec<(u32, u8)>,
-    /// The slots of each group
-    members: Vec<[Option<Slot>; SLOTS]>,
+    /// For each slot its group, twice, and its place in it
+    places: Vec<u32>,
+    /// The first slot of each group, and behind the last group the number of all
+    starts: Vec<Slot>,
     layout: Layout,
 }
 
@@ -27,25 +28,23 @@ pub enum Layout {
 impl Groups {
     /// Of so many slots; `joins` tells which of them share the group of the one before.
     pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
-        let mut out = Self { places: Vec::with_capacity(slots), members: Vec::new(), layout };
+        let (mut places, mut starts) = (Vec::with_capacity(slots), Vec::with_capacity(slots / SLOTS + 1));
         for slot in 0..slots as Slot {
-            match out.members.last_mut() {
-                Some([Some(_), second @ None]) if joins(slot) => {
-                    *second = Some(slot);
-                    out.places.push((out.members.len() as u32 - 1, 1));
-                }
-                _ => {
-                    out.places.push((out.members.len() as u32, 0));
-                    out.members.push([Some(slot), None]);
-                }
+            let joined = starts.last().filter(|&&first| slot - first < SLOTS as Slot && joins(slot)).copied();
+            if joined.is_none() {
+                starts.push(slot);
             }
+            let place = joined.map_or(0, |first| slot - first);
+            places.push(SLOTS as u32 * (starts.len() as u32 - 1) + place);
         }
-        out
+        starts.push(slots as Slot);
+        starts.shrink_to_fit();
+        Self { places, starts, layout }
     }
 
     /// The number of groups.
     pub fn count(&self) -> usize {
-        self.members.len()
+        self.starts.len() - 1
     }
 
     /// The number of slots.
@@ -53,9 +52,9 @@ impl Groups {
         self.places.len()
     }
 
-    /// The first slot of a group; those of its others and of later groups follow.
+    /// The first slot of a group; those of its others and of later groups follow. Behind the last group the number of all.
     pub fn first_slot(&self, group: usize) -> usize {
-        self.members[group].into_iter().flatten().next().map_or(0, |slot| slot as usize)
+        self.starts[group] as usize
     }
 
     /// The rows of a tile.
@@ -79,12 +78,28 @@ impl Groups {
     /// The group of a slot, and its place in it.
     #[inline]
     pub fn of(&self, slot: Slot) -> (usize, usize) {
-        let (group, place) = self.places[slot as usize];
-        (group as usize, place as usize)
+        let place = self.places[slot as usize] as usize;
+        (place / SLOTS, place % SLOTS)
     }
 
     /// The slots of a group.
-    pub fn members(&self, group: usize) -> [Option<Slot>; SLOTS] {
-        self.members[group]
+    #[inline]
+    pub fn members(&self, group: usize) -> Range<Slot> {
+        self.starts[group]..self.starts[group + 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_that_join_share_a_group() {
+        let groups = Groups::new(6, Layout::Spatial, |slot| [1, 2, 5].contains(&slot));
+        let members: Vec<_> = (0..groups.count()).map(|group| groups.members(group)).collect();
+        assert_eq!(members, [0..2, 2..3, 3..4, 4..6]);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| groups.of(slot)), [(0, 0), (0, 1), (1, 0), (2, 0), (3, 0), (3, 1)]);
+        assert_eq!((groups.row(1), groups.first_slot(4), groups.slots()), ((0, 3), 6, 6));
+        assert_eq!(Groups::new(0, Layout::Planar, |_| true).count(), 0);
     }
 }

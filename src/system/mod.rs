@@ -12,7 +12,7 @@ mod stage;
 mod state;
 mod storage;
 
-pub use assembly::{Category, Leftover, System};
+pub use assembly::{Category, Leftover, Scratch, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use field::Field;
 pub use groups::{Groups, Layout};

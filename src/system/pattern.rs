@@ -7,6 +7,7 @@ use super::state::Slot;
 use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
 use crate::threads;
+use std::ops::Range;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
@@ -45,6 +46,11 @@ impl Cliques {
     pub fn push(&mut self, slots: impl IntoIterator<Item = Slot>) {
         self.slots.extend(slots);
         self.ends.push(self.slots.len() as u32);
+    }
+
+    fn shrink(&mut self) {
+        self.slots.shrink_to_fit();
+        self.ends.shrink_to_fit();
     }
 
     /// The number of instances.
@@ -144,8 +150,6 @@ pub struct Pattern {
     mirror_starts: Vec<u32>,
     /// These, column by column
     mirrors: Vec<Mirror>,
-    /// The equation of each row, [`Equations::HELD`] for those without
-    numbers: Vec<u32>,
     /// Rows without an equation: group, and row of its tile
     pub idle: Vec<(u32, u8)>,
     /// What is evaluated at once
@@ -179,12 +183,9 @@ impl Pattern {
         let (column_starts, rows) = compressed_columns(&groups, &effects, symmetry.halves());
         let (mirror_starts, mirrors) =
             if symmetry.halves() { mirrors(&column_starts, &rows) } else { Default::default() };
-        let (numbers, width) = (numbers(&equations, &groups), groups.width());
-        let idle = (0..numbers.len()).filter(|&k| numbers[k] == Equations::HELD);
-        let idle = idle.map(|k| ((k / width) as u32, (k % width) as u8)).collect();
         let regions = regions::cut(&groups, &equations, &column_starts);
-        let storage = Storage::new(width, groups.count(), symmetry == Symmetry::Whole);
-        let (between, places) = (Vec::new(), Vec::new());
+        let storage = Storage::new(groups.width(), groups.count(), symmetry == Symmetry::Whole);
+        let (idle, between, places) = (Vec::new(), Vec::new(), Vec::new());
         let mut pattern = Self {
             equations,
             groups,
@@ -194,12 +195,12 @@ impl Pattern {
             rows,
             mirror_starts,
             mirrors,
-            numbers,
             idle,
             regions,
             between,
             places,
         };
+        pattern.idle = pattern.idle();
         pattern.between = pattern.between();
         pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
         pattern
@@ -228,7 +229,7 @@ impl Pattern {
 
     /// The tiles in a column that are kept beside the diagonal.
     #[inline]
-    pub fn tiles_of(&self, column: usize) -> std::ops::Range<usize> {
+    pub fn tiles_of(&self, column: usize) -> Range<usize> {
         self.column_starts[column] as usize..self.column_starts[column + 1] as usize
     }
 
@@ -252,10 +253,18 @@ impl Pattern {
         self.mirrors_of(group).iter().map(|mirror| mirror.row).chain(self.rows_of(group).iter().copied())
     }
 
-    /// The equations of a group's rows.
+    /// The equations of a group's rows, [`Equations::HELD`] for those without.
     #[inline]
-    pub fn numbers(&self, group: usize) -> &[u32] {
-        &self.numbers[self.width() * group..self.width() * (group + 1)]
+    pub fn numbers(&self, group: usize) -> impl Iterator<Item = u32> {
+        let mut numbers = [Equations::HELD; WIDTH];
+        for slot in self.groups.members(group) {
+            let (_, first) = self.groups.row(slot);
+            // In a plane slots share rows, each of which is free in one of them at most.
+            for (row, number) in numbers[first..].iter_mut().zip(self.equations.of(slot)) {
+                *row = number.min(*row);
+            }
+        }
+        numbers.into_iter().take(self.width())
     }
 
     /// One number an equation as one part a group; zero where a row has no equation.
@@ -264,22 +273,39 @@ impl Pattern {
     }
 
     /// The part of a group.
-    #[inline]
+    #[inline(always)]
     pub fn part<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
-        let mut part = [0.0; W];
-        for (entry, &number) in part.iter_mut().zip(self.numbers(group)) {
-            *entry = x.get(number as usize).copied().unwrap_or(0.0);
+        let own = x.get(self.equations_of(group)).and_then(|own| own.first_chunk::<W>());
+        match own {
+            Some(own) => *own,
+            None => self.part_by_rows(group, x),
         }
-        part
+    }
+
+    /// The same row by row.
+    #[cold]
+    fn part_by_rows<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
+        let mut numbers = self.numbers(group);
+        std::array::from_fn(|_| numbers.next().and_then(|k| x.get(k as usize)).copied().unwrap_or(0.0))
+    }
+
+    /// The equations of a group; where they are as many as a tile is wide, those of its rows in their order.
+    #[inline(always)]
+    fn equations_of(&self, group: usize) -> Range<usize> {
+        self.equations.before(self.groups.first_slot(group))..self.equations.before(self.groups.first_slot(group + 1))
     }
 
     /// The reverse of [`Pattern::apart`], for parts that are found by their groups.
     pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
         self.each_region(out, |region, out| {
             for group in region.groups.clone() {
-                for (&number, &value) in self.numbers(group).iter().zip(part(group)) {
-                    if let Some(out) = out.get_mut((number as usize).wrapping_sub(region.equations.start)) {
-                        *out = value;
+                let (equations, part, start) = (self.equations_of(group), part(group), region.equations.start);
+                let out = &mut out[equations.start - start..equations.end - start];
+                match out.first_chunk_mut::<W>() {
+                    Some(out) => *out = *part,
+                    None => {
+                        let free = self.numbers(group).zip(part).filter(|(number, _)| *number != Equations::HELD);
+                        out.iter_mut().zip(free).for_each(|(out, (_, &value))| *out = value);
                     }
                 }
             }
@@ -295,8 +321,8 @@ impl Pattern {
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
         let ((group, c), storage) = (self.row_of(column), &self.storage);
         let free = |group: usize| {
-            let numbers = self.numbers(group).iter().enumerate();
-            numbers.filter(|&(_, &row)| row != Equations::HELD).map(|(r, &row)| (row, r))
+            let numbers = self.numbers(group).enumerate();
+            numbers.filter(|&(_, row)| row != Equations::HELD).map(|(r, row)| (row, r))
         };
         let in_tile = move |row: usize, tile: usize| {
             free(row).map(move |(row, r)| Entry { row, place: storage.entry(tile, r, c) })
@@ -311,7 +337,7 @@ impl Pattern {
 
     /// The number of entries between equations.
     pub fn nonzeros(&self) -> usize {
-        let free = |group: usize| self.numbers(group).iter().filter(|&&n| n != Equations::HELD).count();
+        let free = |group: usize| self.numbers(group).filter(|&n| n != Equations::HELD).count();
         let column = |c: usize| free(c) * (free(c) + self.met_by(c).map(|row| free(row as usize)).sum::<usize>());
         (0..self.groups.count()).map(column).sum()
     }
@@ -354,8 +380,7 @@ impl Pattern {
     /// Shows each equation and where its entry of the diagonal is stored.
     pub fn each_diagonal(&self, mut show: impl FnMut(usize, usize)) {
         for group in 0..self.groups.count() {
-            for (r, &number) in self.numbers(group).iter().enumerate().filter(|(_, number)| **number != Equations::HELD)
-            {
+            for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != Equations::HELD) {
                 show(number as usize, self.storage.entry(self.storage.own(group), r, r));
             }
         }
@@ -381,6 +406,12 @@ impl Pattern {
         }
         let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
         Some(self.storage.other(self.column_starts[column] as usize + found))
+    }
+
+    fn idle(&self) -> Vec<(u32, u8)> {
+        let rows = |group: usize| (0..).zip(self.numbers(group)).map(move |(r, number)| (group as u32, r, number));
+        let held = (0..self.groups.count()).flat_map(rows).filter(|&(.., number)| number == Equations::HELD);
+        held.map(|(group, r, _)| (group, r)).collect()
     }
 
     fn between(&self) -> Vec<(usize, usize)> {
@@ -418,29 +449,20 @@ impl Pattern {
             places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
         }
         places.starts.push(places.values.len() as u32);
+        places.values.shrink_to_fit();
         places.cliques = cliques;
+        places.cliques.shrink();
         places
     }
 
     /// Whether these slots are those of nodes, each after the other.
     fn is_whole(&self, slots: &[Slot]) -> bool {
         let pair = |pair: &[Slot]| match *pair {
-            [u, p] => self.groups.members(self.groups.of(u).0) == [Some(u), Some(p)],
+            [u, p] => self.groups.members(self.groups.of(u).0).eq([u, p]),
             _ => false,
         };
         slots.chunks(SLOTS).all(pair)
     }
-}
-
-/// The equations of the rows of all groups.
-fn numbers(equations: &Equations, groups: &Groups) -> Vec<u32> {
-    let mut out = vec![Equations::HELD; groups.width() * groups.count()];
-    for equation in 0..equations.count() {
-        let (slot, k) = equations.origin(equation);
-        let (group, first) = groups.row(slot);
-        out[groups.width() * group + first + k as usize] = equation as u32;
-    }
-    out
 }
 
 /// Column by column the other groups that a group meets; where `halves` do those that come after it.
@@ -475,6 +497,8 @@ fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Ve
         column_starts.push(rows.len() as u32);
         start = end;
     }
+    rows.shrink_to_fit();
+    column_starts.shrink_to_fit();
     (column_starts, rows)
 }
 

@@ -110,14 +110,13 @@ pub fn most(nodes: usize) -> usize {
 }
 
 /// Cuts a scene; all of it is one region where it is not large.
-pub fn cut(groups: &Groups, equations: &Equations, column_starts: &[u32]) -> Vec<Region> {
-    let all = groups.count();
+pub fn cut(all_groups: &Groups, equations: &Equations, column_starts: &[u32]) -> Vec<Region> {
+    let all = all_groups.count();
     let count = most(all);
     let length = all.div_ceil(count).max(1);
-    let slot = |group: usize| if group == all { groups.slots() } else { groups.first_slot(group) };
     let region = |number: usize| {
         let groups = (length * number).min(all)..(length * (number + 1)).min(all);
-        let slots = slot(groups.start)..slot(groups.end);
+        let slots = all_groups.first_slot(groups.start)..all_groups.first_slot(groups.end);
         let equations = equations.before(slots.start)..equations.before(slots.end);
         let tiles = column_starts[groups.start] as usize..column_starts[groups.end] as usize;
         Region { number, groups, slots, equations, tiles }

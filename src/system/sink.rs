@@ -2,7 +2,6 @@
 
 use super::assembly::Category;
 use super::equations::Equations;
-use super::groups::Groups;
 use super::pattern::{Pattern, Places, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
@@ -73,8 +72,7 @@ impl<'a> Part<'a> {
         };
         Sink {
             places: &pattern.places[effect],
-            equations: &pattern.equations,
-            groups: &pattern.groups,
+            pattern,
             instances,
             first_slot: start.map_or(0, |region| region.slots.start),
             first_equation: start.map_or(0, |region| region.equations.start),
@@ -125,8 +123,7 @@ const UPPER: [usize; WIDTH * (WIDTH + 1) / 2] = {
 /// Through this an effect adds the force and tangent of its instances.
 pub struct Sink<'a> {
     places: &'a Places,
-    equations: &'a Equations,
-    groups: &'a Groups,
+    pattern: &'a Pattern,
     instances: Range<usize>,
     /// What stretches begin with
     first_slot: usize,
@@ -210,7 +207,7 @@ impl Sink<'_> {
     /// Whether the tangent of an instance has entries to leave out, or to turn. In a plane all have.
     #[inline(always)]
     fn is_constrained(&self, k: usize) -> bool {
-        self.with_tangent && (self.places.special[k] || self.equations.plane().is_some())
+        self.with_tangent && (self.places.special[k] || self.pattern.equations.plane().is_some())
     }
 
     #[inline(always)]
@@ -291,7 +288,7 @@ impl Sink<'_> {
         for (force, &slot) in forces.iter().zip(self.places.cliques.get(k)) {
             all[slot as usize - first_slot] += *force;
         }
-        match self.equations.plane() {
+        match self.pattern.equations.plane() {
             _ if !self.with_tangent || weight == 0.0 => {}
             _ if self.places.special[k] => self.add_constrained_mass(k, N, mass.as_flattened(), weight),
             None => self.add_free_mass::<N, WIDTH, 3>(k, mass, weight),
@@ -307,12 +304,11 @@ impl Sink<'_> {
         mass: &[[f64; N]; N],
         weight: f64,
     ) {
-        for i in 0..N {
-            for j in 0..N {
-                let (place, row, column) = self.place_of(k, i, j);
-                let mut tile = self.values.tile(place);
-                (0..DIRECTIONS).for_each(|d| tile.add(W, row + d, column + d, mass[i][j] * weight));
-            }
+        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
+        let rows: [usize; N] = std::array::from_fn(|i| self.pattern.groups.row(slots[i]).1);
+        for (number, (entry, &place)) in mass.as_flattened().iter().zip(places).enumerate() {
+            let (row, column) = (rows[number / N], rows[number % N]);
+            self.values.tile(place).add_along_diagonal::<W, DIRECTIONS>(row, column, entry * weight);
         }
     }
 
@@ -320,14 +316,14 @@ impl Sink<'_> {
     #[cold]
     fn add_constrained_mass(&mut self, k: usize, nodes: usize, mass: &[f64], weight: f64) {
         let slots = self.places.cliques.get(k);
-        let (width, directions) = self.equations.plane().map_or((WIDTH, 3), |_| (3, 2));
-        let frame = |slot: Slot| self.equations.frame(slot).unwrap_or(Mat3::IDENTITY);
+        let (width, directions) = self.pattern.equations.plane().map_or((WIDTH, 3), |_| (3, 2));
+        let frame = |slot: Slot| self.pattern.equations.frame(slot).unwrap_or(Mat3::IDENTITY);
         for (number, entry) in mass.iter().enumerate() {
             let (place, row, column) = self.place_of(k, number / nodes, number % nodes);
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
-            let (rows, columns) = (self.equations.of(i), self.equations.of(j));
+            let (rows, columns) = (self.pattern.equations.of(i), self.pattern.equations.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
-            let lift = self.lift.map(|lift| self.equations.to_local(j, lift[j as usize]));
+            let lift = self.lift.map(|lift| self.pattern.equations.to_local(j, lift[j as usize]));
             for c in 0..directions {
                 for r in (0..directions).filter(|&r| rows[r] != Equations::HELD) {
                     let value = cosines.0[r][c] * entry * weight;
@@ -345,7 +341,7 @@ impl Sink<'_> {
 
     /// Whether some slot of an instance has other axes than the plane.
     fn has_turned_axes(&self, plane: &Plane, k: usize) -> bool {
-        let is_turned = |&slot: &Slot| self.equations.frame(slot).is_some_and(|frame| frame != *plane.axes());
+        let is_turned = |&slot: &Slot| self.pattern.equations.frame(slot).is_some_and(|frame| frame != *plane.axes());
         self.places.cliques.get(k).iter().any(is_turned)
     }
 
@@ -355,7 +351,7 @@ impl Sink<'_> {
         let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
         let unknown = |node: usize, direction: usize| {
             let (number, slot) = (2 * node + direction / 2, slots[2 * node + direction / 2]);
-            (number, slot, self.equations.of(slot)[direction])
+            (number, slot, self.pattern.equations.of(slot)[direction])
         };
         for (i, tiles) in elements.tangent.iter().enumerate() {
             for (j, tile) in tiles.iter().enumerate() {
@@ -366,7 +362,7 @@ impl Sink<'_> {
                     }
                     if from == Equations::HELD {
                         if let Some(lift) = self.lift {
-                            let increment = self.equations.to_local(slot, lift[slot as usize]).0[entry / 3];
+                            let increment = self.pattern.equations.to_local(slot, lift[slot as usize]).0[entry / 3];
                             self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
                         }
                         continue;
@@ -392,11 +388,11 @@ impl Sink<'_> {
     /// that are prescribed instead. `pick` takes the instance's number from each entry.
     #[inline(always)]
     fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let (slots, width) = (self.places.cliques.get(k), self.groups.width());
+        let (slots, width) = (self.places.cliques.get(k), self.pattern.groups.width());
         let across = slots.len().div_ceil(2);
         for (column, &j) in slots.iter().enumerate() {
-            let (columns, turn) = (self.equations.of(j), self.equations.frame(j));
-            let lift = self.lift.map(|lift| self.equations.to_local(j, lift[j as usize]));
+            let (columns, turn) = (self.pattern.equations.of(j), self.pattern.equations.frame(j));
+            let lift = self.lift.map(|lift| self.pattern.equations.to_local(j, lift[j as usize]));
             for (row, &i) in slots.iter().enumerate() {
                 let tile = &tiles[row / 2 * across + column / 2];
                 let mut block = Mat3::ZERO;
@@ -405,13 +401,13 @@ impl Sink<'_> {
                         block.0[r][c] = pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
                     }
                 }
-                if let Some(frame) = self.equations.frame(i) {
+                if let Some(frame) = self.pattern.equations.frame(i) {
                     block = frame.transpose_matmul(block);
                 }
                 if let Some(frame) = turn {
                     block = block * frame;
                 }
-                let rows = self.equations.of(i);
+                let rows = self.pattern.equations.of(i);
                 let (place, first_row, first_column) = self.place_of(k, row, column);
                 for c in 0..3 {
                     for r in (0..3).filter(|&r| rows[r] != Equations::HELD) {
@@ -436,7 +432,7 @@ impl Sink<'_> {
             true => places[row / 2 * slots.len().div_ceil(2) + column / 2],
             false => places[row * slots.len() + column],
         };
-        (place, self.groups.row(slots[row]).1, self.groups.row(slots[column]).1)
+        (place, self.pattern.groups.row(slots[row]).1, self.pattern.groups.row(slots[column]).1)
     }
 
     /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
@@ -445,13 +441,11 @@ impl Sink<'_> {
         for number in 0..blocks * blocks {
             let (row, column) = (number / blocks, number % blocks);
             let (place, first_row, first_column) = self.place_of(k, row, column);
-            let (tile, mut to) = (&tiles[row / 2 * blocks.div_ceil(2) + column / 2], self.values.tile(place));
-            for c in 0..3 {
-                let from = (column % 2 * 3 + c) * WIDTH + row % 2 * 3;
-                for r in 0..3 {
-                    to.add(WIDTH, first_row + r, first_column + c, pick(&tile[from + r]));
-                }
-            }
+            let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
+            let from = column % 2 * 3 * WIDTH + row % 2 * 3;
+            self.values
+                .tile(place)
+                .add_block::<WIDTH>(first_row, first_column, |r, c| pick(&tile[from + WIDTH * c + r]));
         }
     }
 

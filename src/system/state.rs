@@ -6,7 +6,7 @@ use crate::kernel::inertia::Spin;
 use crate::kernel::seam::Conversion;
 use crate::kernel::turn::Turn;
 use crate::rotation::Rotation;
-use crate::tensor::{Mat3, Vec3};
+use crate::tensor::{Mat3, Vec3, copied, zeros};
 use crate::threads;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -75,7 +75,7 @@ impl State {
         Self {
             time: 0.0,
             load: 0.0,
-            q: threads::filled(slots, Vec3::ZERO),
+            q: zeros(slots),
             v: rates.clone(),
             a: rates.clone(),
             algorithmic: rates,
@@ -87,6 +87,14 @@ impl State {
             angles: vec![0.0; angles],
             turns: Vec::new(),
         }
+    }
+
+    /// A copy to come back to. Of unknowns that are zero, as at the start of a run, it takes no memory.
+    pub fn kept(&mut self) -> Self {
+        let q = std::mem::take(&mut self.q);
+        let kept = Self { q: copied(&q), ..self.clone() };
+        self.q = q;
+        kept
     }
 
     /// Takes all velocities and accelerations away.

@@ -13,14 +13,20 @@ pub(super) const NOT_KEPT: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug)]
 pub struct Storage {
     width: usize,
-    groups: usize,
+    /// Whether tiles on the diagonal keep one half
     halves: bool,
+    /// The numbers of a tile on the diagonal, and of one beside it
+    lengths: [usize; 2],
+    /// Where the tiles beside the diagonal begin
+    boundary: usize,
 }
 
 impl Storage {
     /// Of tiles so wide; `halves` where those on the diagonal are symmetric.
     pub(super) fn new(width: usize, groups: usize, halves: bool) -> Self {
-        Self { width, groups, halves }
+        let whole = width * width;
+        let own = if halves { upper_length(width) } else { whole };
+        Self { width, halves, lengths: [own, whole], boundary: own * groups }
     }
 
     /// The rows of a tile.
@@ -29,39 +35,32 @@ impl Storage {
         self.width
     }
 
-    /// The numbers of a tile on the diagonal.
-    #[inline(always)]
-    fn own_length(&self) -> usize {
-        if self.halves { upper_length(self.width) } else { self.width * self.width }
-    }
-
     /// The numbers of these tiles on the diagonal.
     pub(super) fn on_diagonal(&self, groups: &Range<usize>) -> Range<usize> {
-        self.own_length() * groups.start..self.own_length() * groups.end
+        self.own(groups.start)..self.own(groups.end)
     }
 
     /// The numbers of these tiles beside it.
     pub(super) fn beside(&self, tiles: &Range<usize>) -> Range<usize> {
-        let number = |tile: usize| self.boundary() + self.width * self.width * tile;
-        number(tiles.start)..number(tiles.end)
+        self.other(tiles.start)..self.other(tiles.end)
     }
 
     /// Where the tiles beside the diagonal begin.
     #[inline(always)]
     pub(super) fn boundary(&self) -> usize {
-        self.own_length() * self.groups
+        self.boundary
     }
 
     /// Where the tile of a group and itself begins.
     #[inline(always)]
     pub(super) fn own(&self, group: usize) -> usize {
-        self.own_length() * group
+        self.lengths[0] * group
     }
 
     /// Where a tile beside the diagonal begins.
     #[inline(always)]
     pub(super) fn other(&self, tile: usize) -> usize {
-        self.boundary() + self.width * self.width * tile
+        self.boundary + self.lengths[1] * tile
     }
 
     /// Where an entry of the tile stands that begins at a place; in one half, perhaps with its mirror image.
@@ -76,12 +75,12 @@ impl Storage {
     /// Whether one half is kept of the tile at a place.
     #[inline(always)]
     fn is_half(&self, place: usize) -> bool {
-        self.halves && place < self.boundary()
+        self.halves && place < self.boundary
     }
 
     /// The tiles of a list of values.
     pub(super) fn tiles<'a, const W: usize>(&self, values: &'a [f64]) -> Tiles<'a, W> {
-        let (own, beside) = values.split_at(self.boundary());
+        let (own, beside) = values.split_at(self.boundary);
         let own = if self.halves { Own::Halves(own) } else { Own::Whole(as_tiles(own)) };
         Tiles { own, beside: as_tiles(beside) }
     }
@@ -169,7 +168,7 @@ fn as_tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
 
 /// The values of a stretch of the tangent, to add to.
 pub struct Values<'a> {
-    storage: Storage,
+    storage: &'a Storage,
     own: &'a mut [f64],
     beside: &'a mut [f64],
     /// What both begin with
@@ -188,13 +187,13 @@ pub enum TileMut<'a> {
 
 impl<'a> Values<'a> {
     /// Those of all tiles.
-    pub(super) fn all(storage: Storage, values: &'a mut [f64]) -> Self {
-        let (own, beside) = values.split_at_mut(storage.boundary());
-        Self { storage, own, beside, first: [0, storage.boundary()] }
+    pub(super) fn all(storage: &'a Storage, values: &'a mut [f64]) -> Self {
+        let (own, beside) = values.split_at_mut(storage.boundary);
+        Self { storage, own, beside, first: [0, storage.boundary] }
     }
 
     /// Those of some tiles on the diagonal, and beside it, that stand at these places.
-    pub(super) fn part(storage: Storage, own: &'a mut [f64], beside: &'a mut [f64], first: [usize; 2]) -> Self {
+    pub(super) fn part(storage: &'a Storage, own: &'a mut [f64], beside: &'a mut [f64], first: [usize; 2]) -> Self {
         Self { storage, own, beside, first }
     }
 
@@ -213,14 +212,14 @@ impl<'a> Values<'a> {
     /// The tile that begins at a place.
     #[inline(always)]
     pub(super) fn tile(&mut self, place: u32) -> TileMut<'_> {
-        let (at, storage) = (place as usize, &self.storage);
+        let (at, storage) = (place as usize, self.storage);
         match () {
             () if place == NOT_KEPT => TileMut::Nowhere,
-            () if at >= storage.boundary() => {
-                TileMut::Whole(&mut self.beside[at - self.first[1]..][..storage.width * storage.width])
+            () if at >= storage.boundary => {
+                TileMut::Whole(&mut self.beside[at - self.first[1]..][..storage.lengths[1]])
             }
             () => {
-                let numbers = &mut self.own[at - self.first[0]..][..storage.own_length()];
+                let numbers = &mut self.own[at - self.first[0]..][..storage.lengths[0]];
                 if storage.halves { TileMut::Upper(numbers) } else { TileMut::Whole(numbers) }
             }
         }
@@ -235,6 +234,38 @@ impl TileMut<'_> {
             Self::Whole(values) => values[width * column + row] += value,
             Self::Upper(values) if row <= column => values[upper_entry(width, row, column)] += value,
             Self::Upper(_) | Self::Nowhere => {}
+        }
+    }
+
+    /// Adds the same to D entries of a tile so wide that go down from one of them along a diagonal.
+    #[inline(always)]
+    pub fn add_along_diagonal<const W: usize, const D: usize>(&mut self, row: usize, column: usize, value: f64) {
+        match self {
+            Self::Whole(values) => {
+                let values = &mut values[W * column + row..][..(W + 1) * (D - 1) + 1];
+                values.iter_mut().step_by(W + 1).for_each(|sum| *sum += value);
+            }
+            Self::Upper(_) => (0..D).for_each(|d| self.add(W, row + d, column + d, value)),
+            Self::Nowhere => {}
+        }
+    }
+
+    /// Adds a block of two slots of a tile so wide, by row and column.
+    #[inline(always)]
+    pub fn add_block<const W: usize>(&mut self, row: usize, column: usize, value: impl Fn(usize, usize) -> f64) {
+        match self {
+            Self::Whole(values) => {
+                let values = &mut values[W * column + row..][..2 * W + 3];
+                for c in 0..3 {
+                    for r in 0..3 {
+                        values[W * c + r] += value(r, c);
+                    }
+                }
+            }
+            Self::Upper(_) => {
+                (0..3).for_each(|c| (0..3).for_each(|r| self.add(W, row + r, column + c, value(r, c))));
+            }
+            Self::Nowhere => {}
         }
     }
 
@@ -271,14 +302,15 @@ mod tests {
         let storage = Storage::new(3, 2, true);
         let mut values = vec![0.0; storage.other(1)];
         let mut add = |place: usize| {
-            let mut all = Values::all(storage, &mut values);
+            let mut all = Values::all(&storage, &mut values);
             all.tile(place as u32).add_tile::<3>(|k| [1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0][k]);
             let mut tile = all.tile(place as u32);
             (0..3).for_each(|c| (0..3).for_each(|r| tile.add(3, r, c, f64::from(u8::from(r != c)))));
+            tile.add_along_diagonal::<3, 2>(1, 1, 10.0);
         };
         add(storage.own(1));
         add(storage.other(0));
-        let expected = [[1.0, 3.0, 4.0], [3.0, 4.0, 6.0], [4.0, 6.0, 6.0]];
+        let expected = [[1.0, 3.0, 4.0], [3.0, 14.0, 6.0], [4.0, 6.0, 16.0]];
         for place in [storage.own(1), storage.other(0)] {
             let entry = |r: usize, c: usize| values[storage.entry(place, r, c)];
             assert!((0..9).all(|k| entry(k / 3, k % 3) == expected[k / 3][k % 3]));
@@ -289,6 +321,6 @@ mod tests {
         let (mut half, mut whole) = ([0.0; 6], [0.0; 6]);
         tiles.own.copy_upper(1, &mut half);
         Own::Whole(tiles.beside).copy_upper(0, &mut whole);
-        assert_eq!((half, half), (whole, [1.0, 3.0, 4.0, 4.0, 6.0, 6.0]));
+        assert_eq!((half, half), (whole, [1.0, 3.0, 4.0, 14.0, 6.0, 16.0]));
     }
 }

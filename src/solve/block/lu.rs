@@ -44,7 +44,11 @@ where
     fn load(&mut self, rows: Range<usize>, elimination: &Elimination, tiles: &Tiles<W>) {
         for row in rows.clone() {
             let group = elimination.order[row] as usize;
-            tiles.own.with(group, |own| self.diagonal[row] = tile::transposed(own));
+            tiles.own.with(
+                group,
+                #[inline(always)]
+                |own| self.diagonal[row] = tile::transposed(own),
+            );
         }
         for number in elimination.changed(&rows) {
             let (none, above, below) = (Stretch::nothing(), &mut self.above[number], &mut self.below[number]);

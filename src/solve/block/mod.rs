@@ -118,8 +118,7 @@ impl BlockSolver {
         let (Self { elimination, factor, parts }, pattern) = (self, &system.pattern);
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
             for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
-                let numbers = pattern.numbers(group as usize).iter();
-                part.iter_mut().zip(numbers).for_each(|(entry, &k)| *entry = x.get(k as usize).copied().unwrap_or(0.0));
+                *part = pattern.part(group as usize, x);
             }
         });
         factor.solve(elimination, system, parts);
