@@ -6,6 +6,7 @@ use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
+use crate::system::StageKind;
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use std::path::PathBuf;
@@ -152,6 +153,12 @@ fn tell_mass(scene: &Scene) {
     say::line(&format!("inertia about the centre {:?}", inertia.0));
 }
 
+/// States, forces, mesh, elements and the places of their blocks: as much as so many vectors a slot, as measured for chains of a million elements.
+const VECTORS: usize = 15;
+
+/// The same with rates, masses and what is learnt from steps
+const VECTORS_IN_DYNAMICS: usize = 33;
+
 /// Unknowns, entries of the tangent, memory, and what each effect adds to them; and whether the first stage can begin.
 fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let mut model = scene.plan.model.clone();
@@ -164,9 +171,10 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let shares = model.shares(&context, &equations);
     let assembly = Assembly::new(&context, equations, &model);
     let entries = assembly.system.pattern.nonzeros();
-    // The tangent and its factors, the places of its blocks, the state and its copies.
+    // The tangent and its factors, and what stands once a slot.
     let pattern = &assembly.system.pattern;
-    let bytes = 8 * (pattern.values() + pattern.values_of_factors()) + 24 * 16 * slots;
+    let vectors = if kind == StageKind::Dynamic { VECTORS_IN_DYNAMICS } else { VECTORS };
+    let bytes = 8 * (pattern.values() + pattern.values_of_factors()) + 24 * vectors * slots;
     say::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),

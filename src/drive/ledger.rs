@@ -4,9 +4,8 @@ use crate::model::charts::HALF_TURN;
 use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, log, unwound};
 use crate::system::{Category, Equations, Slot, State, System};
-use crate::tensor::Vec3;
+use crate::tensor::{Vec3, zeros};
 use crate::threads::{self, PART};
-use std::mem::replace;
 
 /// Energies of one state and the work of loads, gravity and motions so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,7 +42,12 @@ impl Bookkeeper {
     /// Opens a stage: energies are taken, no work is added.
     pub fn open(&mut self, model: &Model, state: &State, system: &System) {
         self.drives = model.drives(state);
-        self.force = threads::list(state.q.len(), |slot| outside(system, slot));
+        self.force = zeros(state.q.len());
+        threads::each_part(&mut self.force, |start, part| {
+            for (slot, force) in (start..).zip(part) {
+                put(force, outside(system, slot));
+            }
+        });
         // Where nothing damps it is empty.
         threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
         self.take(model, state);
@@ -91,7 +95,7 @@ impl Way<'_> {
             let mut sum = 0.0;
             for (slot, before) in (PART * number..).zip(before) {
                 let after = after(slot);
-                let before = replace(before, after);
+                let before = put(before, after);
                 let wound = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
                 sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), wound);
             }
@@ -101,6 +105,16 @@ impl Way<'_> {
         threads::in_order(before.chunks_mut(PART).enumerate(), of_part, |part: f64| sum += part);
         sum
     }
+}
+
+/// Puts a force in the place of another one, which it gives back. Most are zero and stay so, in memory that nobody writes to.
+#[inline(always)]
+fn put(place: &mut Vec3, force: Vec3) -> Vec3 {
+    let before = *place;
+    if before != force {
+        *place = force;
+    }
+    before
 }
 
 /// What acts from outside at a slot: loads, and the forces that hold or move constrained directions.

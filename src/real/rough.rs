@@ -41,7 +41,8 @@ impl<const N: usize> Rough<N> {
     }
 }
 
-/// The upper 32 bits. What is cut off makes a number smaller by a millionth at most; infinities, and what is no number, stay what they are.
+/// The upper 32 bits. What is cut off makes a number smaller by a millionth of it at most, of numbers below 1e-307 by 2e-314; infinities stay
+/// what they are, and what arithmetic gives instead of a number stays none.
 #[inline(always)]
 fn upper_half(number: f64) -> u32 {
     (number.to_bits() >> 32) as u32

@@ -18,7 +18,7 @@ impl Columns {
         let mut starts = vec![0];
         for column in 0..pattern.equations.count() as u32 {
             let mut entries: Vec<_> = pattern.entries(column).collect();
-            // Tiles of a node that shares its displacement with another are not in the order of equations.
+            // The tile on the diagonal comes between the others, and nodes that share displacements are not in the order of equations.
             entries.sort_unstable_by_key(|entry| entry.row);
             rows.extend(entries.iter().map(|entry| entry.row));
             places.extend(entries.iter().map(|entry| entry.place as u32));

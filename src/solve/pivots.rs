@@ -126,9 +126,8 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     }
     let width = pattern.width();
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    let root = |k: usize| match pattern
-        .tile(k / width, k / width)
-        .map_or(0.0, |tile| values[tile + (width + 1) * (k % width)])
+    let entry = |tile: usize, r: usize, c: usize| values[pattern.storage.entry(tile, r, c)];
+    let root = |k: usize| match pattern.tile(k / width, k / width).map_or(0.0, |tile| entry(tile, k % width, k % width))
     {
         0.0 => largest.sqrt(),
         diagonal => diagonal.abs().sqrt(),
@@ -143,7 +142,7 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
         pairs.all(|(row, tile, mirror)| match (tile, mirror) {
             (Some(tile), Some(mirror)) => (0..width * width).all(|k| {
                 let (c, r) = (k / width, k % width);
-                let difference = values[tile + k] - values[mirror + width * r + c];
+                let difference = entry(tile, r, c) - entry(mirror, c, r);
                 difference.abs() <= SYMMETRY * roots[column][c] * roots[row][r]
             }),
             // Whom a node meets meets it.

@@ -363,12 +363,7 @@ impl System {
         self.pattern.each_region(out, |region, out| {
             for slot in region.slots.clone() {
                 let local = equations.to_local(slot as Slot, force(region, slot));
-                for (local, number) in local.0.into_iter().zip(equations.of(slot as Slot)) {
-                    // What is held has the number of no equation.
-                    if let Some(out) = out.get_mut((number as usize).wrapping_sub(region.equations.start)) {
-                        *out = -local;
-                    }
-                }
+                equations.each_of(slot, local, region.equations.start, out, |out, entry| *out = -entry);
             }
             if self.lifts {
                 let lifted = &self.lifted[region.equations.clone()];
@@ -393,10 +388,12 @@ impl System {
         let (own, beside) = values.split_at_mut(storage.boundary());
         let own = threads::split(own, regions.iter().map(|region| places(region)[0].end));
         let beside = threads::split(beside, regions.iter().map(|region| places(region)[1].end - storage.boundary()));
-        let values = regions
-            .iter()
-            .zip(own.into_iter().zip(beside))
-            .map(|(region, (own, beside))| Values::part(storage, own, beside, places(region).map(|range| range.start)));
+        // Where nothing connects nodes nothing stands beside the diagonal.
+        let (mut own, mut beside) = (own.into_iter(), beside.into_iter());
+        let values = regions.iter().map(|region| {
+            let lists = [&mut own, &mut beside].map(|list| list.next().unwrap_or_default());
+            Values::part(storage, lists, places(region).map(|range| range.start))
+        });
         let mut lifted = threads::split(lifted, ends(|r| r.equations.end)).into_iter();
         let stretches = values.zip(&mut rooms[1..]).enumerate();
         let part = |(region, (values, room)): (usize, _)| Part {

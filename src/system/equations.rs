@@ -205,12 +205,12 @@ impl Equations {
 
     /// Picks the free entries of what stands at each slot.
     pub fn gather(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
-        self.each_entry(field, out, |_, out, entry| *out = entry);
+        self.each_entry(|slot| self.to_local(slot as Slot, field(slot)), out, |_, out, entry| *out = entry);
     }
 
     /// The same less what the entries were before.
     pub fn gather_change(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
-        self.each_entry(field, out, |_, out, entry| *out = entry - *out);
+        self.each_entry(|slot| self.to_local(slot as Slot, field(slot)), out, |_, out, entry| *out = entry - *out);
     }
 
     /// Multiplies each entry with a factor of its slot.
@@ -218,11 +218,11 @@ impl Equations {
         self.each_entry(|_| Vec3::ZERO, out, |slot, out, _| *out *= factor(slot));
     }
 
-    /// Shows for each equation its slot, what is kept for it, and the entry of what stands at the slot.
+    /// Shows for each equation its slot, what is kept for it, and its entry of what stands at the slot in local directions.
     #[inline(always)]
     fn each_entry<T: Send>(
         &self,
-        field: impl Fn(usize) -> Vec3 + Send + Sync,
+        local: impl Fn(usize) -> Vec3 + Send + Sync,
         list: &mut [T],
         show: impl Fn(usize, &mut T, f64) + Send + Sync,
     ) {
@@ -232,21 +232,31 @@ impl Equations {
                 if self.before(slot) >= end {
                     break;
                 }
-                let local = self.to_local(slot as Slot, field(slot));
-                let own = self.before(slot)..self.before(slot + 1);
-                if own.len() == 3 && own.start >= start && own.end <= end {
-                    let kept = &mut part[own.start - start..own.end - start];
-                    kept.iter_mut().zip(local.0).for_each(|(kept, entry)| show(slot, kept, entry));
-                    continue;
-                }
-                for (number, entry) in self.of(slot as Slot).into_iter().zip(local.0) {
-                    // What is held has the number of no equation.
-                    if let Some(kept) = part.get_mut((number as usize).wrapping_sub(start)) {
-                        show(slot, kept, entry);
-                    }
-                }
+                self.each_of(slot, local(slot), start, part, |kept, entry| show(slot, kept, entry));
             }
         });
+    }
+
+    /// The same for one slot, with what is kept for the equations from `start` on.
+    #[inline(always)]
+    pub fn each_of<T>(
+        &self,
+        slot: usize,
+        local: Vec3,
+        start: usize,
+        list: &mut [T],
+        mut show: impl FnMut(&mut T, f64),
+    ) {
+        let own = self.before(slot).wrapping_sub(start)..self.before(slot + 1).wrapping_sub(start);
+        if let Some([x, y, z]) = list.get_mut(own) {
+            return [x, y, z].into_iter().zip(local.0).for_each(|(kept, entry)| show(kept, entry));
+        }
+        for (number, entry) in self.of(slot as Slot).into_iter().zip(local.0) {
+            // What is held has the number of no equation.
+            if let Some(kept) = list.get_mut((number as usize).wrapping_sub(start)) {
+                show(kept, entry);
+            }
+        }
     }
 
     /// Writes the solution into a field of slots; held directions take their part of `held`.
@@ -254,9 +264,14 @@ impl Equations {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
                 let mut local = held.map_or(Vec3::ZERO, |held| self.to_local(slot as Slot, held[slot]));
-                for (local, number) in local.0.iter_mut().zip(self.of(slot as Slot)) {
-                    // What is held has the number of no equation.
-                    *local = solution.get(number as usize).copied().unwrap_or(*local);
+                match solution.get(self.before(slot)..self.before(slot + 1)) {
+                    Some(&[x, y, z]) => local = Vec3([x, y, z]),
+                    _ => {
+                        for (local, number) in local.0.iter_mut().zip(self.of(slot as Slot)) {
+                            // What is held has the number of no equation.
+                            *local = solution.get(number as usize).copied().unwrap_or(*local);
+                        }
+                    }
                 }
                 *out = self.axes(slot as Slot).map_or(local, |frame| *frame * local);
             }

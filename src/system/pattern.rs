@@ -82,8 +82,8 @@ pub(super) struct Places {
     pub cliques: Cliques,
     /// Whether each instance couples whole nodes, whose tiles it adds to in one go
     pub whole: bool,
-    /// By instance and then by rows of blocks: where the tile begins that a block is in, or [`NOT_KEPT`]. Blocks are those of whole
-    /// nodes, or else those of slots.
+    /// By instance and then by rows of blocks: where a block is added to, or [`NOT_KEPT`]. Blocks are those of whole nodes, or else
+    /// those of slots.
     pub values: Vec<u32>,
     starts: Vec<u32>,
     /// Instances that touch a held direction or turned axes.
@@ -200,6 +200,7 @@ impl Pattern {
             between,
             places,
         };
+        debug_assert!((0..pattern.groups.count()).all(|group| pattern.is_ascending(group)), "rows out of order");
         pattern.idle = pattern.idle();
         pattern.between = pattern.between();
         pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
@@ -287,6 +288,11 @@ impl Pattern {
     fn part_by_rows<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
         let mut numbers = self.numbers(group);
         std::array::from_fn(|_| numbers.next().and_then(|k| x.get(k as usize)).copied().unwrap_or(0.0))
+    }
+
+    /// Whether the equations of a group are in the order of its rows.
+    fn is_ascending(&self, group: usize) -> bool {
+        self.numbers(group).filter(|&number| number != Equations::HELD).is_sorted()
     }
 
     /// The equations of a group; where they are as many as a tile is wide, those of its rows in their order.
@@ -437,14 +443,14 @@ impl Pattern {
         };
         for slots in cliques.iter() {
             places.starts.push(places.values.len() as u32);
-            let met = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.of(slot).0);
-            for i in met() {
-                let place = |j: usize| match self.keeps(i, j) {
+            let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.row(slot));
+            for (i, r) in corners() {
+                let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
                     // Cliques are what the pattern was made of.
-                    true => self.tile(i, j).map(|tile| tile as u32),
+                    true => self.tile(i, j).map(|tile| self.storage.target(tile, r, c) as u32),
                     false => Some(NOT_KEPT),
                 };
-                places.values.extend(met().filter_map(place));
+                places.values.extend(corners().filter_map(place));
             }
             places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
         }

@@ -24,7 +24,7 @@ pub struct Region {
     pub slots: Range<usize>,
     /// Their equations
     pub equations: Range<usize>,
-    /// The tiles in these columns
+    /// The tiles in these columns beside the diagonal
     pub tiles: Range<usize>,
 }
 

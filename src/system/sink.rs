@@ -2,10 +2,11 @@
 
 use super::assembly::Category;
 use super::equations::Equations;
+use super::groups::Groups;
 use super::pattern::{Pattern, Places, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
-use super::storage::{TileMut, Values, upper_entry};
+use super::storage::{BlockMut, Values};
 use crate::kernel::{ElementSystem, PlanarSystem};
 use crate::real::{LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
@@ -88,37 +89,24 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Adds one lane of a tile to its place.
+/// Adds one lane of a tile to its place: four numbers at once where they are next to each other.
 #[inline(always)]
-fn add_lane(place: TileMut, tile: &[Lanes; TILE], lane: usize) {
-    match place {
-        TileMut::Whole(place) => {
-            for (sums, lanes) in place.as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
+fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
+    match &mut place {
+        BlockMut::Whole(values) => {
+            for (sums, lanes) in values[..TILE].as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
                 *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
             }
         }
-        TileMut::Upper(place) => {
-            for (sum, &entry) in place.iter_mut().zip(&UPPER) {
-                *sum += tile[entry].0[lane];
-            }
-        }
-        TileMut::Nowhere => {}
+        _ => place.add_tile::<WIDTH>(|entry| tile[entry].0[lane]),
     }
 }
 
-/// Where a tile has what its upper half has, which is symmetric.
-const UPPER: [usize; WIDTH * (WIDTH + 1) / 2] = {
-    let mut places = [0; WIDTH * (WIDTH + 1) / 2];
-    let mut entry = 0;
-    while entry < TILE {
-        let (row, column) = (entry / WIDTH, entry % WIDTH);
-        if row <= column {
-            places[upper_entry(WIDTH, row, column)] = entry;
-        }
-        entry += 1;
-    }
-    places
-};
+/// Row and column that the block of two slots of an instance begins with in its tile.
+#[inline(always)]
+fn corner(groups: &Groups, slots: &[Slot], pair: [usize; 2]) -> [usize; 2] {
+    pair.map(|number| groups.row(slots[number]).1)
+}
 
 /// Through this an effect adds the force and tangent of its instances.
 pub struct Sink<'a> {
@@ -304,11 +292,10 @@ impl Sink<'_> {
         mass: &[[f64; N]; N],
         weight: f64,
     ) {
-        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
-        let rows: [usize; N] = std::array::from_fn(|i| self.pattern.groups.row(slots[i]).1);
-        for (number, (entry, &place)) in mass.as_flattened().iter().zip(places).enumerate() {
-            let (row, column) = (rows[number / N], rows[number % N]);
-            self.values.tile(place).add_along_diagonal::<W, DIRECTIONS>(row, column, entry * weight);
+        let (slots, groups) = (self.places.cliques.get(k), &self.pattern.groups);
+        for (number, (entry, &place)) in mass.as_flattened().iter().zip(self.places.of(k)).enumerate() {
+            let corner = || corner(groups, slots, [number / N, number % N]);
+            self.values.block(place, corner).add_along_diagonal::<W, DIRECTIONS>(entry * weight);
         }
     }
 
@@ -319,7 +306,6 @@ impl Sink<'_> {
         let (width, directions) = self.pattern.equations.plane().map_or((WIDTH, 3), |_| (3, 2));
         let frame = |slot: Slot| self.pattern.equations.frame(slot).unwrap_or(Mat3::IDENTITY);
         for (number, entry) in mass.iter().enumerate() {
-            let (place, row, column) = self.place_of(k, number / nodes, number % nodes);
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
             let (rows, columns) = (self.pattern.equations.of(i), self.pattern.equations.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
@@ -332,7 +318,7 @@ impl Sink<'_> {
                         (Equations::HELD, Some(lift)) => {
                             self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c];
                         }
-                        _ => self.values.tile(place).add(width, row + r, column + c, value),
+                        _ => self.block(k, number / nodes, number % nodes).add(width, r, c, value),
                     }
                 }
             }
@@ -408,7 +394,6 @@ impl Sink<'_> {
                     block = block * frame;
                 }
                 let rows = self.pattern.equations.of(i);
-                let (place, first_row, first_column) = self.place_of(k, row, column);
                 for c in 0..3 {
                     for r in (0..3).filter(|&r| rows[r] != Equations::HELD) {
                         match (columns[c], lift) {
@@ -416,7 +401,7 @@ impl Sink<'_> {
                             (Equations::HELD, Some(lift)) => {
                                 self.lifted[rows[r] as usize - self.first_equation] += block.0[r][c] * lift.0[c];
                             }
-                            _ => self.values.tile(place).add(width, first_row + r, first_column + c, block.0[r][c]),
+                            _ => self.block(k, row, column).add(width, r, c, block.0[r][c]),
                         }
                     }
                 }
@@ -424,28 +409,30 @@ impl Sink<'_> {
         }
     }
 
-    /// The place of the tile that two slots of an instance meet in, and where in it their block begins.
+    /// What is kept of the block of two slots of an instance.
     #[inline(always)]
-    fn place_of(&self, k: usize, row: usize, column: usize) -> (u32, usize, usize) {
-        let (places, slots) = (self.places.of(k), self.places.cliques.get(k));
-        let place = match self.places.whole {
-            true => places[row / 2 * slots.len().div_ceil(2) + column / 2],
-            false => places[row * slots.len() + column],
-        };
-        (place, self.pattern.groups.row(slots[row]).1, self.pattern.groups.row(slots[column]).1)
+    fn block(&mut self, k: usize, row: usize, column: usize) -> BlockMut<'_> {
+        let (places, slots, groups) = (self.places.of(k), self.places.cliques.get(k), &self.pattern.groups);
+        let corner = || corner(groups, slots, [row, column]);
+        match self.places.whole {
+            false => self.values.block(places[row * slots.len() + column], corner),
+            true => {
+                let place = places[row / 2 * slots.len().div_ceil(2) + column / 2];
+                self.values.tile(place).within(groups.width(), corner())
+            }
+        }
     }
 
     /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
     #[inline(always)]
     fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        for number in 0..blocks * blocks {
+        let (slots, groups) = (self.places.cliques.get(k), &self.pattern.groups);
+        for (number, &place) in self.places.of(k).iter().enumerate() {
             let (row, column) = (number / blocks, number % blocks);
-            let (place, first_row, first_column) = self.place_of(k, row, column);
             let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
-            let from = column % 2 * 3 * WIDTH + row % 2 * 3;
-            self.values
-                .tile(place)
-                .add_block::<WIDTH>(first_row, first_column, |r, c| pick(&tile[from + WIDTH * c + r]));
+            let block = &tile[column % 2 * 3 * WIDTH + row % 2 * 3..][..2 * WIDTH + 3];
+            let corner = || corner(groups, slots, [row, column]);
+            self.values.block(place, corner).add_block::<WIDTH>(|r, c| pick(&block[WIDTH * c + r]));
         }
     }
 

@@ -90,11 +90,22 @@ impl State {
     }
 
     /// A copy to come back to. Of unknowns that are zero, as at the start of a run, it takes no memory.
-    pub fn kept(&mut self) -> Self {
-        let q = std::mem::take(&mut self.q);
-        let kept = Self { q: copied(&q), ..self.clone() };
-        self.q = q;
-        kept
+    pub fn kept(&self) -> Self {
+        Self {
+            time: self.time,
+            load: self.load,
+            q: copied(&self.q),
+            v: self.v.clone(),
+            a: self.a.clone(),
+            algorithmic: self.algorithmic.clone(),
+            amplitude: self.amplitude.clone(),
+            mixed: self.mixed.clone(),
+            wound: self.wound.clone(),
+            amplitude_rates: self.amplitude_rates.clone(),
+            fading: self.fading.clone(),
+            angles: self.angles.clone(),
+            turns: self.turns.clone(),
+        }
     }
 
     /// Takes all velocities and accelerations away.

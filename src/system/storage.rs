@@ -29,12 +29,6 @@ impl Storage {
         Self { width, halves, lengths: [own, whole], boundary: own * groups }
     }
 
-    /// The rows of a tile.
-    #[inline(always)]
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
     /// The numbers of these tiles on the diagonal.
     pub(super) fn on_diagonal(&self, groups: &Range<usize>) -> Range<usize> {
         self.own(groups.start)..self.own(groups.end)
@@ -63,9 +57,14 @@ impl Storage {
         self.boundary + self.lengths[1] * tile
     }
 
+    /// Where the block is added to that begins at an entry of a tile: see [`Values::block`].
+    pub(super) fn target(&self, place: usize, row: usize, column: usize) -> usize {
+        if self.is_half(place) { place } else { self.entry(place, row, column) }
+    }
+
     /// Where an entry of the tile stands that begins at a place; in one half, perhaps with its mirror image.
     #[inline]
-    pub(super) fn entry(&self, place: usize, row: usize, column: usize) -> usize {
+    pub fn entry(&self, place: usize, row: usize, column: usize) -> usize {
         match self.is_half(place) {
             true => place + upper_entry(self.width, row.min(column), row.max(column)),
             false => place + self.width * column + row,
@@ -175,12 +174,12 @@ pub struct Values<'a> {
     first: [usize; 2],
 }
 
-/// A tile to add to.
-pub enum TileMut<'a> {
-    /// As it is
+/// A tile, or a block of two slots in it, to add to.
+pub enum BlockMut<'a> {
+    /// As it is, from its first entry on
     Whole(&'a mut [f64]),
-    /// Its upper half, row by row
-    Upper(&'a mut [f64]),
+    /// The upper half of the tile, row by row, and row and column of the tile that the block begins with
+    Upper(&'a mut [f64], [usize; 2]),
     /// It is not kept.
     Nowhere,
 }
@@ -193,7 +192,7 @@ impl<'a> Values<'a> {
     }
 
     /// Those of some tiles on the diagonal, and beside it, that stand at these places.
-    pub(super) fn part(storage: &'a Storage, own: &'a mut [f64], beside: &'a mut [f64], first: [usize; 2]) -> Self {
+    pub(super) fn part(storage: &'a Storage, [own, beside]: [&'a mut [f64]; 2], first: [usize; 2]) -> Self {
         Self { storage, own, beside, first }
     }
 
@@ -209,72 +208,92 @@ impl<'a> Values<'a> {
         self.beside.fill(0.0);
     }
 
-    /// The tile that begins at a place.
+    /// The block at a place, which is that of its first entry; in a tile of which one half is kept that of the tile, and `corner` tells
+    /// row and column of the first entry.
     #[inline(always)]
-    pub(super) fn tile(&mut self, place: u32) -> TileMut<'_> {
-        let (at, storage) = (place as usize, self.storage);
+    pub(super) fn block(&mut self, place: u32, corner: impl FnOnce() -> [usize; 2]) -> BlockMut<'_> {
+        let at = place as usize;
         match () {
-            () if place == NOT_KEPT => TileMut::Nowhere,
-            () if at >= storage.boundary => {
-                TileMut::Whole(&mut self.beside[at - self.first[1]..][..storage.lengths[1]])
-            }
-            () => {
-                let numbers = &mut self.own[at - self.first[0]..][..storage.lengths[0]];
-                if storage.halves { TileMut::Upper(numbers) } else { TileMut::Whole(numbers) }
-            }
+            () if place == NOT_KEPT => BlockMut::Nowhere,
+            () if at >= self.storage.boundary => BlockMut::Whole(&mut self.beside[at - self.first[1]..]),
+            () if self.storage.halves => BlockMut::Upper(&mut self.own[at - self.first[0]..], corner()),
+            () => BlockMut::Whole(&mut self.own[at - self.first[0]..]),
         }
+    }
+
+    /// The tile at a place.
+    #[inline(always)]
+    pub(super) fn tile(&mut self, place: u32) -> BlockMut<'_> {
+        self.block(place, || [0, 0])
     }
 }
 
-impl TileMut<'_> {
-    /// Adds to an entry of a tile so wide; what is below the diagonal of one half goes without saying.
+impl<'a> BlockMut<'a> {
+    /// The block of a tile so wide that begins at this row and column.
     #[inline(always)]
-    pub fn add(&mut self, width: usize, row: usize, column: usize, value: f64) {
+    pub fn within(self, width: usize, [row, column]: [usize; 2]) -> Self {
         match self {
-            Self::Whole(values) => values[width * column + row] += value,
-            Self::Upper(values) if row <= column => values[upper_entry(width, row, column)] += value,
-            Self::Upper(_) | Self::Nowhere => {}
+            Self::Whole(values) => Self::Whole(&mut values[width * column + row..]),
+            Self::Upper(values, _) => Self::Upper(values, [row, column]),
+            Self::Nowhere => Self::Nowhere,
         }
     }
 
-    /// Adds the same to D entries of a tile so wide that go down from one of them along a diagonal.
+    /// Adds to an entry, in a tile so wide; what is below the diagonal of one half goes without saying.
     #[inline(always)]
-    pub fn add_along_diagonal<const W: usize, const D: usize>(&mut self, row: usize, column: usize, value: f64) {
+    pub fn add(&mut self, width: usize, row: usize, column: usize, value: f64) {
         match self {
             Self::Whole(values) => {
-                let values = &mut values[W * column + row..][..(W + 1) * (D - 1) + 1];
-                values.iter_mut().step_by(W + 1).for_each(|sum| *sum += value);
+                debug_assert!(row < width && column < width, "another tile");
+                values[width * column + row] += value;
             }
-            Self::Upper(_) => (0..D).for_each(|d| self.add(W, row + d, column + d, value)),
+            Self::Upper(values, [first_row, first_column]) => {
+                let (row, column) = (*first_row + row, *first_column + column);
+                if row <= column {
+                    values[upper_entry(width, row, column)] += value;
+                }
+            }
             Self::Nowhere => {}
         }
     }
 
-    /// Adds a block of two slots of a tile so wide, by row and column.
+    /// Adds the same to the first D entries of its diagonal, in a tile W wide.
     #[inline(always)]
-    pub fn add_block<const W: usize>(&mut self, row: usize, column: usize, value: impl Fn(usize, usize) -> f64) {
+    pub fn add_along_diagonal<const W: usize, const D: usize>(&mut self, value: f64) {
         match self {
             Self::Whole(values) => {
-                let values = &mut values[W * column + row..][..2 * W + 3];
+                values[..(W + 1) * (D - 1) + 1].iter_mut().step_by(W + 1).for_each(|sum| *sum += value);
+            }
+            Self::Upper(..) => (0..D).for_each(|d| self.add(W, d, d, value)),
+            Self::Nowhere => {}
+        }
+    }
+
+    /// Adds 3 x 3 entries, by row and column, in a tile W wide.
+    #[inline(always)]
+    pub fn add_block<const W: usize>(&mut self, value: impl Fn(usize, usize) -> f64) {
+        match self {
+            Self::Whole(values) => {
+                let values = &mut values[..2 * W + 3];
                 for c in 0..3 {
                     for r in 0..3 {
                         values[W * c + r] += value(r, c);
                     }
                 }
             }
-            Self::Upper(_) => {
-                (0..3).for_each(|c| (0..3).for_each(|r| self.add(W, row + r, column + c, value(r, c))));
-            }
+            Self::Upper(..) => (0..3).for_each(|c| (0..3).for_each(|r| self.add(W, r, c, value(r, c)))),
             Self::Nowhere => {}
         }
     }
 
-    /// Adds a tile so wide, which stands by its columns.
+    /// Adds all of a tile W wide, which stands by its columns.
     #[inline(always)]
     pub fn add_tile<const W: usize>(&mut self, value: impl Fn(usize) -> f64) {
         match self {
-            Self::Whole(values) => (0..W * W).zip(values.iter_mut()).for_each(|(k, sum)| *sum += value(k)),
-            Self::Upper(values) => {
+            Self::Whole(values) => {
+                values[..W * W].iter_mut().enumerate().for_each(|(k, sum)| *sum += value(k));
+            }
+            Self::Upper(values, _) => {
                 for r in 0..W {
                     let row = &mut values[upper_entry(W, r, r)..][..W - r];
                     (W * r + r..).zip(row).for_each(|(k, sum)| *sum += value(k));
@@ -306,11 +325,12 @@ mod tests {
             all.tile(place as u32).add_tile::<3>(|k| [1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0][k]);
             let mut tile = all.tile(place as u32);
             (0..3).for_each(|c| (0..3).for_each(|r| tile.add(3, r, c, f64::from(u8::from(r != c)))));
-            tile.add_along_diagonal::<3, 2>(1, 1, 10.0);
+            tile.within(3, [1, 1]).add_along_diagonal::<3, 2>(10.0);
+            all.tile(place as u32).add_block::<3>(|r, c| f64::from(u8::from(r + c == 0)));
         };
         add(storage.own(1));
         add(storage.other(0));
-        let expected = [[1.0, 3.0, 4.0], [3.0, 14.0, 6.0], [4.0, 6.0, 16.0]];
+        let expected = [[2.0, 3.0, 4.0], [3.0, 14.0, 6.0], [4.0, 6.0, 16.0]];
         for place in [storage.own(1), storage.other(0)] {
             let entry = |r: usize, c: usize| values[storage.entry(place, r, c)];
             assert!((0..9).all(|k| entry(k / 3, k % 3) == expected[k / 3][k % 3]));
@@ -321,6 +341,6 @@ mod tests {
         let (mut half, mut whole) = ([0.0; 6], [0.0; 6]);
         tiles.own.copy_upper(1, &mut half);
         Own::Whole(tiles.beside).copy_upper(0, &mut whole);
-        assert_eq!((half, half), (whole, [1.0, 3.0, 4.0, 14.0, 6.0, 16.0]));
+        assert_eq!((half, half), (whole, [2.0, 3.0, 4.0, 14.0, 6.0, 16.0]));
     }
 }

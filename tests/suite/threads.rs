@@ -115,7 +115,9 @@ fn shaken(model: &Model) -> State {
 fn regions_change_nothing_but_the_order_of_sums() {
     let scenes =
         [(DYNAMIC, 1), (DYNAMIC, 2), (DYNAMIC, 3), (TURNING, 1), (TURNING, 2), (STATIC, 1), (STATIC, 2), (STATIC, 3)];
-    for text in scenes.map(|(text, order)| deck(text, order, false)).into_iter().chain([loaded_at_a_node()]) {
+    for text in
+        scenes.map(|(text, order)| deck(text, order, false)).into_iter().chain([loaded_at_a_node(), bodies_alone()])
+    {
         let plan = model(&text).plan;
         let (mut model, stage) = (plan.model, plan.stages[0].context(0));
         let state = shaken(&model);
@@ -148,6 +150,17 @@ fn loaded_at_a_node() -> String {
      [[support]]\nat = \"a\"\nfix = \"all\"\n[[load]]\nat = \"b\"\nforce = [0, 5, 1]\n\
      [[spring]]\nbetween = [\"b\", \"c\"]\nstiffness = 3\ndamping = 2\n[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01\n"
         .into()
+}
+
+/// Bodies that nothing connects: no tile stands beside the diagonal.
+fn bodies_alone() -> String {
+    let of_all = |one: fn(usize) -> String| (0..2100).map(one).collect::<String>();
+    let points = of_all(|k| format!("p{k} = [{k}, 0, 0]\n"));
+    let bodies =
+        of_all(|k| format!("[[body]]\nat = \"p{k}\"\nmass = {}\ninertia = [1, 2, 2.5]\noffset = [0, 0, 0.1]\n", k + 1));
+    format!(
+        "gravity = [0, 0, -9.81]\n[point]\n{points}{bodies}[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01\n"
+    )
 }
 
 fn forces(assembly: &Assembly) -> Vec<f64> {
