@@ -6,7 +6,7 @@ use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use crate::system::StageKind;
+use crate::system::{Pattern, StageKind};
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use std::path::PathBuf;
@@ -153,6 +153,11 @@ fn tell_mass(scene: &Scene) {
     say::line(&format!("inertia about the centre {:?}", inertia.0));
 }
 
+/// Of a tangent and its factors.
+fn numbers(pattern: &Pattern) -> usize {
+    pattern.values() + pattern.values_of_factors()
+}
+
 /// States, forces, mesh, elements and the places of their blocks: as much as so many vectors a slot, as measured for chains of a million elements.
 const VECTORS: usize = 15;
 
@@ -169,12 +174,13 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let (free, slots) = (equations.count(), model.slots());
     let context = scene.plan.stages[0].context(0);
     let shares = model.shares(&context, &equations);
+    // A planar scene is kept in space, too, for the looks out of the plane.
+    let in_space = equations.plane().and_then(|_| model.number(0, None).ok());
+    let in_space = in_space.map_or(0, |equations| numbers(&Assembly::new(&context, equations, &model).system.pattern));
     let assembly = Assembly::new(&context, equations, &model);
     let entries = assembly.system.pattern.nonzeros();
-    // The tangent and its factors, and what stands once a slot.
-    let pattern = &assembly.system.pattern;
     let vectors = if kind == StageKind::Dynamic { VECTORS_IN_DYNAMICS } else { VECTORS };
-    let bytes = 8 * (pattern.values() + pattern.values_of_factors()) + 24 * vectors * slots;
+    let bytes = 8 * (numbers(&assembly.system.pattern) + in_space) + 24 * vectors * slots;
     say::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),

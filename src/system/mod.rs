@@ -11,6 +11,7 @@ mod sink;
 mod stage;
 mod state;
 mod storage;
+mod values;
 
 pub use assembly::{Category, Leftover, Scratch, System};
 pub use equations::{Direction, Equations, FrameConflict};

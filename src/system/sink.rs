@@ -6,7 +6,7 @@ use super::groups::Groups;
 use super::pattern::{Pattern, Places, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
-use super::storage::{BlockMut, Values};
+use super::values::{BlockMut, Values};
 use crate::kernel::{ElementSystem, PlanarSystem};
 use crate::real::{LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
