@@ -30,8 +30,9 @@ impl EnergyGuard {
         Self { limit, floor, round_off, start: None, largest: 0.0, running: 0, lost: 0.0 }
     }
 
-    /// The account where the stage begins.
-    pub fn open(&mut self, ledger: Ledger) {
+    /// The account where the stage begins; `round_off` is the work of the forces there on the way that places are rounded by.
+    pub fn open(&mut self, ledger: Ledger, round_off: f64) {
+        self.floor += round_off;
         self.start = Some(ledger.total());
         self.largest = size(ledger);
     }
@@ -69,7 +70,7 @@ mod tests {
     #[test]
     fn growth_that_lasts_three_steps_is_told() {
         let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
-        guard.open(ledger(1.0));
+        guard.open(ledger(1.0), 0.0);
         assert!(guard.judge(ledger(1.2), 0.0).is_none());
         assert!(guard.judge(ledger(1.3), 0.0).is_none());
         assert!(guard.judge(ledger(1.1), 0.0).is_none());
@@ -83,16 +84,24 @@ mod tests {
     #[test]
     fn forces_of_round_off_do_work_on_the_way() {
         let mut guard = EnergyGuard::new(0.2, 0.0, 1e-3);
-        guard.open(ledger(0.0));
+        guard.open(ledger(0.0), 0.0);
         assert!((1..10).all(|k| guard.judge(ledger(5e-4 * f64::from(k)), 1.0).is_none()));
         let mut still = guard.clone();
         assert!((10..14).any(|k| still.judge(ledger(5e-3 * f64::from(k)), 0.0).is_some()));
     }
 
     #[test]
+    fn what_places_are_rounded_by_is_no_growth() {
+        let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
+        guard.open(ledger(0.0), 1e-15);
+        assert!((1..10).all(|k| guard.judge(ledger(1e-16 * f64::from(k)), 0.0).is_none()));
+        assert!((10..14).any(|k| guard.judge(ledger(1e-15 * f64::from(k)), 0.0).is_some()));
+    }
+
+    #[test]
     fn what_is_lost_is_told_beyond_the_limit() {
         let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
-        guard.open(ledger(1.0));
+        guard.open(ledger(1.0), 0.0);
         assert!(guard.judge(ledger(0.9), 0.0).is_none() && guard.loss().is_none());
         assert!(guard.judge(ledger(0.5), 0.0).is_none());
         assert_eq!(guard.loss(), Some(0.5));

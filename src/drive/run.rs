@@ -445,7 +445,8 @@ impl<'o> Run<'o> {
             self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
         }
         if let Some(guard) = &mut workshop.guard {
-            guard.open(self.bookkeeper.ledger());
+            let force = self.model.largest_force(&workshop.assembly.system);
+            guard.open(self.bookkeeper.ledger(), f64::EPSILON * force * self.model.length);
         }
         if std::mem::replace(&mut self.started, true) {
             return Ok(());

@@ -9,7 +9,7 @@ mod linear;
 mod names;
 mod share;
 
-pub use crate::system::{StageContext, StageKind, StageSet};
+pub use crate::system::{Category, StageContext, StageKind, StageSet, System};
 pub use amplitude::Amplitude;
 pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
@@ -320,6 +320,15 @@ impl Model {
         threads::largest(self.kinds.len(), |part| {
             let nodes = part.filter(|&slot| self.kinds[slot] == SlotKind::Displacement);
             nodes.map(|slot| (to.q[slot] - from.q[slot]).norm()).fold(0.0, f64::max)
+        })
+    }
+
+    /// The largest force of a category at a node, without moments.
+    pub fn largest_force(&self, system: &System) -> f64 {
+        threads::largest(self.kinds.len(), |part| {
+            let nodes = part.filter(|&slot| self.kinds[slot] == SlotKind::Displacement);
+            let forces = nodes.flat_map(|slot| Category::ALL.map(|category| system.part_of(category, slot).norm()));
+            forces.fold(0.0, f64::max)
         })
     }
 

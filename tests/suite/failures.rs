@@ -141,3 +141,16 @@ fn forces_near_the_limits_of_floating_point_end_in_a_name() {
         assert!(["not_converged", "non_finite", "mesh_too_coarse"].contains(&failure.name()), "{force}: {failure}");
     }
 }
+
+/// A pendulum that hangs at rest, in axes in which it does so but for round-off: what it gains is that.
+#[test]
+fn round_off_is_no_growth_of_energy() {
+    let text = "gravity = [6.570175082125996, 6.7714052935322195, -2.6864418365068885]\n[point]\na = [0, 0, 0]\n\
+        b = [0.6697426179537203, 0.690255381603692, -0.2738472820088571]\n\
+        [[body]]\nat = \"a\"\nmass = 2\ninertia = [0.1, 0.1, 0.1]\n[[body]]\nat = \"b\"\nmass = 3\ninertia = [0.2, 0.2, 0.2]\n\
+        [[support]]\nat = \"a\"\nfix = \"all\"\n[[joint]]\nkind = \"revolute\"\nnodes = [\"a\", \"b\"]\nat = \"a\"\n\
+        axis = [-0.6159387362363827, 0.7223533725327984, 0.31436456287886516]\n\
+        [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\nscheme = \"generalized_alpha\"\n";
+    let ended = attempt(text).result;
+    assert!(ended.is_ok(), "{ended:?}");
+}
