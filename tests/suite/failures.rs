@@ -1,7 +1,8 @@
 //! Runs that must end in a named failure, with the right node and direction.
 
 use crate::scenes::attempt;
-use beamsim::drive::Failure;
+use beamsim::drive::{Failure, Mode, Observer, Run, Snapshot};
+use beamsim::scene;
 
 const ARM: &str = r#"
 [point]
@@ -153,4 +154,37 @@ fn round_off_is_no_growth_of_energy() {
         [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.01\nscheme = \"generalized_alpha\"\n";
     let ended = attempt(text).result;
     assert!(ended.is_ok(), "{ended:?}");
+}
+
+/// The frequencies of the modes of a run.
+#[derive(Default)]
+struct Frequencies(Vec<f64>);
+
+impl Observer for Frequencies {
+    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
+        self.0.extend(modes.iter().map(|mode| mode.omega));
+        Ok(())
+    }
+}
+
+/// Where few modes are asked for, they are all rigid: a second look about a part of the lowest elastic one has none to go by.
+#[test]
+fn rigid_motions_alone_are_modes() {
+    for (modes, stiff) in [(1, false), (3, false), (6, false), (8, true)] {
+        let text = format!(
+            "[point]\na = [0, 0, 0]\nb = [1, 0.5, 0]\n[section.s]\nEA = 1e5\nGA = 4e4\nGJ = 8\nEI = 10\nrhoA = 1\n\
+             rhoJ = [3e-3, 1e-3, 2e-3]\n[[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 1\n\
+             [[stage]]\nkind = \"modal\"\nmodes = {modes}\n"
+        );
+        let mut found = Frequencies::default();
+        let plan = scene::from_text(&text).unwrap_or_else(|error| panic!("{error:?}")).0.plan;
+        assert_eq!(Run::new(plan, &mut found).finish().0, Ok(()));
+        assert_eq!(found.0.len(), modes);
+        assert!(found.0.iter().take(6).all(|omega| *omega < 1e-3), "{:?}", found.0);
+        assert_eq!(found.0.iter().any(|omega| *omega > 1.0), stiff, "{:?}", found.0);
+    }
 }
