@@ -89,7 +89,7 @@ impl Run<'_> {
             let done = newton.solver.factorise_surely(&assembly.system);
             let loose = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
             if !done || loose.is_some() {
-                // Where rigid motions are all that the first look found, or more of round-off than it tells from them, it stands.
+                // Rigid motions are no zeros but round-off: a shift by a part of that leaves nothing to solve with, and the first look stands.
                 if look > 0 {
                     break;
                 }

@@ -211,6 +211,7 @@ mod tests {
             trend.learn(length, &[length.powi(3)], &[length]);
         }
         assert_eq!(trend.best(), 1);
+        // Of six digits the last may be off.
         assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
         // A step that is not taken has nothing to say.
         trend.learn(5.8, &[7.0], &[1.0]);

@@ -9,7 +9,7 @@ mod linear;
 mod names;
 mod share;
 
-pub use crate::system::{Category, StageContext, StageKind, StageSet, System};
+pub use crate::system::{StageContext, StageKind, StageSet};
 pub use amplitude::Amplitude;
 pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
@@ -20,7 +20,8 @@ pub use share::Share;
 use crate::effect::{Effect, Energy, Momentum};
 use crate::kernel::MAX_NODES;
 use crate::system::{
-    Aspect, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, most_regions,
+    Aspect, Category, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, System,
+    most_regions,
 };
 use crate::tensor::Vec3;
 use crate::threads;

@@ -14,7 +14,7 @@ pub(super) const NOT_KEPT: u32 = u32::MAX;
 pub struct Storage {
     width: usize,
     /// Whether tiles on the diagonal keep one half
-    halves: bool,
+    keeps_upper: bool,
     /// The numbers of a tile on the diagonal, and of one beside it
     lengths: [usize; 2],
     /// Where the tiles beside the diagonal begin
@@ -22,11 +22,11 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// Of tiles so wide; `halves` where those on the diagonal are symmetric.
-    pub(super) fn new(width: usize, groups: usize, halves: bool) -> Self {
+    /// Of tiles so wide; `keeps_upper` where those on the diagonal are symmetric, and only that half is kept.
+    pub(super) fn new(width: usize, groups: usize, keeps_upper: bool) -> Self {
         let whole = width * width;
-        let own = if halves { upper_length(width) } else { whole };
-        Self { width, halves, lengths: [own, whole], boundary: own * groups }
+        let own = if keeps_upper { upper_length(width) } else { whole };
+        Self { width, keeps_upper, lengths: [own, whole], boundary: own * groups }
     }
 
     /// The numbers of these tiles on the diagonal.
@@ -41,8 +41,8 @@ impl Storage {
 
     /// Whether tiles on the diagonal keep one half.
     #[inline(always)]
-    pub(super) fn halves(&self) -> bool {
-        self.halves
+    pub(super) fn keeps_upper(&self) -> bool {
+        self.keeps_upper
     }
 
     /// Where the tiles beside the diagonal begin.
@@ -80,13 +80,13 @@ impl Storage {
     /// Whether one half is kept of the tile at a place.
     #[inline(always)]
     fn is_half(&self, place: usize) -> bool {
-        self.halves && place < self.boundary
+        self.keeps_upper && place < self.boundary
     }
 
     /// The tiles of a list of values.
     pub(super) fn tiles<'a, const W: usize>(&self, values: &'a [f64]) -> Tiles<'a, W> {
         let (own, beside) = values.split_at(self.boundary);
-        let own = if self.halves { Own::Halves(own) } else { Own::Whole(as_tiles(own)) };
+        let own = if self.keeps_upper { Own::Halves(own) } else { Own::Whole(as_tiles(own)) };
         Tiles { own, beside: as_tiles(beside) }
     }
 }

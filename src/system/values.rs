@@ -53,7 +53,7 @@ impl<'a> Values<'a> {
         match () {
             () if place == NOT_KEPT => BlockMut::Nowhere,
             () if at >= self.storage.boundary() => BlockMut::Whole(&mut self.beside[at - self.first[1]..]),
-            () if self.storage.halves() => BlockMut::Upper(&mut self.own[at - self.first[0]..], corner()),
+            () if self.storage.keeps_upper() => BlockMut::Upper(&mut self.own[at - self.first[0]..], corner()),
             () => BlockMut::Whole(&mut self.own[at - self.first[0]..]),
         }
     }

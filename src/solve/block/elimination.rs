@@ -158,14 +158,9 @@ impl Elimination {
         if self.changed.is_empty() { 0..0 } else { place(rows.start)..place(rows.end) }
     }
 
-    /// What one of these begins with, by rows.
-    pub fn begin_above(&self, number: usize) -> Source {
-        self.begin[number][0]
-    }
-
-    /// And its mirror image, by columns.
-    pub fn begin_below(&self, number: usize) -> Source {
-        self.begin[number][1]
+    /// What one of these begins with, by rows, and its mirror image, by columns.
+    pub fn begin(&self, number: usize) -> [Source; 2] {
+        self.begin[number]
     }
 
     /// The end of these rows and of those before `end` that their elimination changes.

@@ -3,7 +3,7 @@
 use super::elimination::Elimination;
 use super::pieces::Piece;
 use super::stretch::Stretch;
-use super::tile::{self, Part, Rows, Tile, Tiles, Upper, Width};
+use super::tile::{self, Block, Part, Rows, Tile, Tiles, Upper, Width};
 use crate::system::upper_entry;
 use std::ops::Range;
 
@@ -43,8 +43,8 @@ where
         }
         for number in elimination.changed(&rows) {
             // By columns it is what its mirror image is by rows.
-            let block = &mut self.changed[number];
-            tile::with(elimination.begin_below(number), tiles, &Stretch::nothing(), |begin| tile::copy(block, begin));
+            let ([_, below], none, block) = (elimination.begin(number), Stretch::nothing(), &mut self.changed[number]);
+            Block::find(below, tiles, &none).with(|begin| tile::copy(block, begin));
         }
         for &(row, direction) in elimination.idle(&rows) {
             self.diagonal[row as usize].as_mut()[upper_entry(W, direction as usize, direction as usize)] = 1.0;
@@ -78,7 +78,7 @@ where
             before.clear();
             for k in neighbours.clone() {
                 let forward = |block: &Tile<W>| tile::forward_symmetric(&factor, block, &mut y);
-                tile::with(elimination.below(k), tiles, changed, forward);
+                Block::find(elimination.below(k), tiles, changed).with(forward);
                 for w in &*before {
                     let shared = elimination.targets[target] as usize;
                     tile::subtract_product(changed.or(&mut beyond.changed, shared), w, &y);
@@ -103,7 +103,7 @@ where
             let part = tile::solve_symmetric(&self.diagonal[row], &x[row - rows.start]);
             for k in elimination.neighbours(row) {
                 let later = elimination.place(&rows, k).of_mut(x, beyond);
-                tile::subtract_transposed_of(later, elimination.below(k), tiles, &self.changed, &part);
+                Block::find(elimination.below(k), tiles, &self.changed).transposed().subtract_times(later, &part);
             }
             x[row - rows.start] = part;
         }
@@ -116,7 +116,7 @@ where
             let mut part = [0.0; W];
             for k in elimination.neighbours(row) {
                 let later = elimination.place(&rows, k).of(x, beyond);
-                tile::subtract_times_of(&mut part, elimination.below(k), tiles, &self.changed, later);
+                Block::find(elimination.below(k), tiles, &self.changed).subtract_times(&mut part, later);
             }
             let part = tile::solve_symmetric(&self.diagonal[row], &part);
             x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);

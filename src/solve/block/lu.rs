@@ -3,7 +3,7 @@
 use super::elimination::Elimination;
 use super::pieces::Piece;
 use super::stretch::Stretch;
-use super::tile::{self, Part, RowOrder, Rows, Tile, Tiles, Width};
+use super::tile::{self, Block, Part, RowOrder, Rows, Tile, Tiles, Width};
 use std::ops::Range;
 
 /// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 P A_kj and
@@ -52,8 +52,9 @@ where
         }
         for number in elimination.changed(&rows) {
             let (none, above, below) = (Stretch::nothing(), &mut self.above[number], &mut self.below[number]);
-            tile::with(elimination.begin_above(number), tiles, &none, |begin| tile::copy(above, begin));
-            tile::with(elimination.begin_below(number), tiles, &none, |begin| tile::copy(below, begin));
+            for (own, source) in [above, below].into_iter().zip(elimination.begin(number)) {
+                Block::find(source, tiles, &none).with(|begin| tile::copy(own, begin));
+            }
         }
         for &(row, direction) in elimination.idle(&rows) {
             self.diagonal[row as usize][direction as usize][direction as usize] = 1.0;
@@ -96,10 +97,10 @@ where
                         tile::forward(&factor, &order, block, &mut y);
                     }
                 };
-                tile::with(elimination.below(k), tiles, below, both);
+                Block::find(elimination.below(k), tiles, below).with(both);
                 if !is_one {
                     let forward = |block: &Tile<W>| tile::forward(&factor, &order, block, &mut y);
-                    tile::with(elimination.above(k), tiles, above, forward);
+                    Block::find(elimination.above(k), tiles, above).with(forward);
                 }
                 for [other_y, other_w] in &*before {
                     let shared = elimination.targets[target] as usize;
@@ -126,7 +127,7 @@ where
             let part = self.solved(row, &x[row - rows.start]);
             for k in elimination.neighbours(row) {
                 let later = elimination.place(&rows, k).of_mut(x, beyond);
-                tile::subtract_transposed_of(later, elimination.below(k), tiles, &self.below, &part);
+                Block::find(elimination.below(k), tiles, &self.below).transposed().subtract_times(later, &part);
             }
             x[row - rows.start] = part;
         }
@@ -139,7 +140,7 @@ where
             let mut part = [0.0; W];
             for k in elimination.neighbours(row) {
                 let later = elimination.place(&rows, k).of(x, beyond);
-                tile::subtract_times_of(&mut part, elimination.above(k), tiles, &self.above, later);
+                Block::find(elimination.above(k), tiles, &self.above).subtract_times(&mut part, later);
             }
             let part = self.solved(row, &part);
             x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);

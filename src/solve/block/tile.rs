@@ -220,14 +220,60 @@ macro_rules! each_row_backwards {
     }};
 }
 
-/// Does something with a block, wherever it stands: it is not copied, which would cost as much as a solution with it.
-#[inline(always)]
-pub fn with<const W: usize>(source: Source, tiles: &Tiles<W>, own: &Stretch<Tile<W>>, mut work: impl FnMut(&Tile<W>)) {
-    match source.stands() {
-        Stands::Tile(number) => work(&tiles.beside[number]),
-        Stands::Transpose(number) => work(&transposed(&tiles.beside[number])),
-        Stands::Own(number) => work(&own[number]),
-        Stands::Nowhere => work(&zero()),
+/// A block, wherever it stands.
+#[derive(Clone, Copy)]
+pub enum Block<'a, const W: usize> {
+    /// As it is
+    Tile(&'a Tile<W>),
+    /// Its transpose
+    Transpose(&'a Tile<W>),
+    /// Zero
+    Nothing,
+}
+
+impl<'a, const W: usize> Block<'a, W> {
+    /// In the tangent, or with its own.
+    #[inline(always)]
+    pub fn find(source: Source, tiles: &Tiles<'a, W>, own: &'a Stretch<Tile<W>>) -> Self {
+        match source.stands() {
+            Stands::Tile(number) => Self::Tile(&tiles.beside[number]),
+            Stands::Transpose(number) => Self::Transpose(&tiles.beside[number]),
+            Stands::Own(number) => Self::Tile(&own[number]),
+            Stands::Nowhere => Self::Nothing,
+        }
+    }
+
+    /// Its transpose.
+    #[inline(always)]
+    pub fn transposed(self) -> Self {
+        match self {
+            Self::Tile(tile) => Self::Transpose(tile),
+            Self::Transpose(tile) => Self::Tile(tile),
+            Self::Nothing => Self::Nothing,
+        }
+    }
+
+    /// Does something with it: it is not copied, which would cost as much as a solution with it.
+    #[inline(always)]
+    pub fn with(self, mut work: impl FnMut(&Tile<W>)) {
+        match self {
+            Self::Tile(tile) => work(tile),
+            Self::Transpose(tile) => work(&transposed(tile)),
+            Self::Nothing => work(&zero()),
+        }
+    }
+
+    /// part -= b x
+    #[inline(always)]
+    pub fn subtract_times(self, part: &mut Part<W>, x: &Part<W>)
+    where
+        Width<W>: Rows<W>,
+    {
+        match self {
+            Self::Tile(tile) => subtract_times(part, tile, x),
+            Self::Transpose(tile) => subtract_transposed(part, tile, x),
+            Self::Nothing => {}
+        }
     }
 }
 
@@ -238,44 +284,6 @@ where
     Width<W>: Rows<W>,
 {
     each_row!(W, |r| to[r] = part::<W>(row::<W>(&from[r])));
-}
-
-/// part -= b^T x, with the block b wherever it stands.
-#[inline(always)]
-pub fn subtract_transposed_of<const W: usize>(
-    part: &mut Part<W>,
-    source: Source,
-    tiles: &Tiles<W>,
-    own: &Stretch<Tile<W>>,
-    x: &Part<W>,
-) where
-    Width<W>: Rows<W>,
-{
-    match source.stands() {
-        Stands::Tile(number) => subtract_transposed(part, &tiles.beside[number], x),
-        Stands::Transpose(number) => subtract_times(part, &tiles.beside[number], x),
-        Stands::Own(number) => subtract_transposed(part, &own[number], x),
-        Stands::Nowhere => {}
-    }
-}
-
-/// part -= b x, with the block b wherever it stands.
-#[inline(always)]
-pub fn subtract_times_of<const W: usize>(
-    part: &mut Part<W>,
-    source: Source,
-    tiles: &Tiles<W>,
-    own: &Stretch<Tile<W>>,
-    x: &Part<W>,
-) where
-    Width<W>: Rows<W>,
-{
-    match source.stands() {
-        Stands::Tile(number) => subtract_times(part, &tiles.beside[number], x),
-        Stands::Transpose(number) => subtract_transposed(part, &tiles.beside[number], x),
-        Stands::Own(number) => subtract_times(part, &own[number], x),
-        Stands::Nowhere => {}
-    }
 }
 
 /// target -= w^T y
@@ -326,7 +334,7 @@ where
 
 /// part -= w^T x
 #[inline(always)]
-pub fn subtract_transposed<const W: usize>(part: &mut Part<W>, w: &Tile<W>, x: &Part<W>)
+fn subtract_transposed<const W: usize>(part: &mut Part<W>, w: &Tile<W>, x: &Part<W>)
 where
     Width<W>: Rows<W>,
 {
@@ -337,7 +345,7 @@ where
 
 /// part -= y x
 #[inline(always)]
-pub fn subtract_times<const W: usize>(part: &mut Part<W>, y: &Tile<W>, x: &Part<W>)
+fn subtract_times<const W: usize>(part: &mut Part<W>, y: &Tile<W>, x: &Part<W>)
 where
     Width<W>: Rows<W>,
 {
