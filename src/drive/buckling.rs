@@ -10,7 +10,7 @@ use super::levels::{NO_MOTION, distance};
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{LinearSolver, Operator, is_symmetric, largest_eigenvalues, mechanism};
+use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
 use nalgebra::Complex;
@@ -196,7 +196,7 @@ impl Run<'_> {
         let Workshop { assembly, newton, .. } = workshop;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        newton.solver.negative_pivots(&assembly.system)
+        newton.solver.negative_pivots(&mut Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS))
     }
 
     /// Goes along the path to a load factor in steps that shrink where they must.
@@ -245,14 +245,16 @@ impl Run<'_> {
         let varied = self.varied_tangent(workshop, &direction, reach);
         let Workshop { assembly, newton, .. } = workshop;
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        let system = &assembly.system;
         self.counters.work.factorisations += 1;
-        if !newton.solver.factorise_surely(system) {
-            let vector = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
+        let done = newton.solver.factorise_surely(&assembly.system);
+        let mut tangent = Tangent::that_stays(assembly, &self.state);
+        if !done {
+            let vector = mechanism(&mut newton.solver, &mut tangent, &self.model);
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
         // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.
-        let stable = newton.solver.negative_pivots(system) == Some(0);
+        let stable = newton.solver.negative_pivots(&mut tangent) == Some(0);
+        let system = &assembly.system;
         let symmetric = stable && self.model.multipliers.is_empty();
         let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
         let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };

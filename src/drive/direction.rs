@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
-use crate::solve::mechanism;
+use crate::solve::{Tangent, mechanism};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -40,7 +40,7 @@ impl Run<'_> {
         system.right_hand_side_of(&pull, &mut solution);
         self.counters.work.factorisations += 1;
         if !(newton.solver.factorise(system) && newton.solver.solve(system, &mut solution)) {
-            let vector = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
+            let vector = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, &self.state), &self.model);
             return Err(self.name_mechanism(vector, &workshop.assembly.system));
         }
         let mut rate = vec![Vec3::ZERO; pull.len()];

@@ -6,6 +6,7 @@ use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::real::Rough;
 use crate::rotation::{Rotation, relative_angle};
+use crate::solve::Tangent;
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads;
@@ -51,8 +52,9 @@ impl Stability {
     pub fn new(run: &mut Run, workshop: &mut Workshop) -> Self {
         // The start was assembled with its stiffness.
         let Workshop { assembly, newton, .. } = workshop;
+        let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
+        let negative = newton.count_pivots(&mut tangent, &mut run.counters.work);
         newton.begin_with(&assembly.system);
-        let negative = newton.count_pivots(&assembly.system, &mut run.counters.work);
         // What is linear keeps its tangent.
         Self { counts: !run.is_linear(), negative }
     }
@@ -65,7 +67,8 @@ impl Stability {
         workshop.assembly.forget();
         workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = workshop;
-        let negative = newton.count_pivots(&assembly.system, &mut run.counters.work);
+        let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
+        let negative = newton.count_pivots(&mut tangent, &mut run.counters.work);
         // What is not symmetric will not be so next.
         self.counts = negative.is_some();
         negative

@@ -4,7 +4,9 @@ use super::failure::Failure;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Model;
-use crate::solve::{Convergence, LinearSolver, Operator, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed};
+use crate::solve::{
+    Convergence, LinearSolver, Operator, Tangent, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed,
+};
 use crate::system::System;
 use nalgebra::Complex;
 
@@ -87,7 +89,7 @@ impl Run<'_> {
             matrices.combine(shift, &mut assembly.system.values);
             self.counters.work.factorisations += 1;
             let done = newton.solver.factorise_surely(&assembly.system);
-            let loose = mechanism(&mut newton.solver, assembly, &self.model, &self.state);
+            let loose = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, &self.state), &self.model);
             if !done || loose.is_some() {
                 // Rigid motions are no zeros but round-off: a shift by a part of that leaves nothing to solve with, and the first look stands.
                 if look > 0 {

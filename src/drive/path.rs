@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
-use crate::solve::{self, NewtonFailure, Verdict, mechanism, timed};
+use crate::solve::{self, NewtonFailure, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -329,7 +329,9 @@ impl Path {
         let slots = run.state.q.len();
         let Direction { rate, pull } = run.path_direction(workshop)?.unwrap_or_else(|| Direction::none(slots));
         // The tangent of the last evaluation tells the pivots.
-        let negative = workshop.newton.solver.negative_pivots(&workshop.assembly.system);
+        let Workshop { assembly, newton, .. } = workshop;
+        let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
+        let negative = newton.solver.negative_pivots(&mut tangent);
         let along = dot(run, &rate, &before.tangent) * self.scale + before.load_rate;
         let size = (squared(run, &rate) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
@@ -475,7 +477,11 @@ impl Path {
             solver.factorise(system) && solver.solve(system, &mut back) && solver.solve(system, &mut along)
         });
         if !solved {
-            return Err(NewtonFailure::Singular(mechanism(solver, assembly, &run.model, &run.state)));
+            return Err(NewtonFailure::Singular(mechanism(
+                solver,
+                &mut Tangent::that_stays(assembly, &run.state),
+                &run.model,
+            )));
         }
         let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
         system.pattern.equations.scatter(&back, None, &mut a);

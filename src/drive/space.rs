@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Assembly;
-use crate::solve::{LinearSolver, mechanism};
+use crate::solve::{LinearSolver, Tangent, mechanism};
 
 /// A stage that is treated in a plane, as it is in space.
 pub(super) struct Space {
@@ -45,7 +45,8 @@ impl Run<'_> {
         let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         self.counters.work.factorisations += 1;
-        let in_space = solver.negative_pivots(&assembly.system);
+        let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
+        let in_space = solver.negative_pivots(&mut tangent);
         if let Some(more) = in_space.and_then(|in_space| in_space.checked_sub(in_plane)).filter(|&more| more > 0) {
             self.warn_out_of_plane(more);
         }
@@ -59,8 +60,7 @@ impl Run<'_> {
         let still = self.state.at_rest();
         assembly.evaluate(&still, weights, None);
         self.counters.work.factorisations += 1;
-        solver.factorise(&assembly.system);
-        let loose = mechanism(solver, assembly, &self.model, &still);
+        let loose = mechanism(solver, &mut Tangent::that_may_go(assembly, &still, weights), &self.model);
         loose.map_or(Ok(()), |vector| Err(self.name_mechanism(Some(vector), &assembly.system)))
     }
 }

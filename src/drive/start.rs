@@ -6,7 +6,7 @@ use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
-use crate::solve::{Limp, NewtonFailure, mechanism};
+use crate::solve::{Limp, NewtonFailure, Tangent, mechanism};
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
@@ -116,12 +116,15 @@ impl Run<'_> {
         }
         let mut right_hand_side = vec![0.0; system.pattern.equations.count()];
         system.right_hand_side(&mut right_hand_side);
-        ignore_massless(system, &self.model, &mut right_hand_side);
+        let additions = massless_blocks(system, &self.model, &mut right_hand_side);
+        additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
         self.counters.work.factorisations += 1;
-        let factorised = solver.factorise(system);
+        let mut mass = Tangent::that_may_go(assembly, &self.state, Weights::MASS).with(&additions);
         // Along no axis round-off leaves pivots where the mass matrix is singular: solved with, they give accelerations of 1e16.
-        let massless = solver.null_vector(system);
-        if !factorised || massless.is_some() || !solver.solve(system, &mut right_hand_side) {
+        let massless = solver.null_vector(&mut mass);
+        let factorised = massless.is_none() && solver.factorise_new(&mut mass).0;
+        let system = mass.system();
+        if !factorised || !solver.solve(system, &mut right_hand_side) {
             let named = self.name_mechanism(massless, &workshop.assembly.system);
             return if self.is_held(workshop, &named) { Ok(None) } else { Err(named) };
         }
@@ -137,9 +140,9 @@ impl Run<'_> {
         }
         let Workshop { assembly, newton, .. } = workshop;
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        newton.solver.factorise(&assembly.system)
-            && Limp::find(&mut newton.solver, assembly, &self.model, &self.state, false)
-                .is_none_or(|limp| !limp.is_loose())
+        let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
+        let limp = Limp::find(&mut newton.solver, &mut tangent, &self.model, false);
+        limp.is_none_or(|limp| !limp.vector.broke_down && !limp.is_loose())
     }
 }
 
@@ -154,13 +157,15 @@ fn set_in_motion(state: &mut State, motion: &InitialMotion) {
 }
 
 /// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
-/// zero. They are the null directions of the diagonal blocks.
-fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f64]) {
+/// zero. They are the null directions of the diagonal blocks; what is to be added to these.
+fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Vec<(Slot, Mat3)> {
+    let mut additions = Vec::new();
     let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
     for slot in (0..model.slots()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
         let numbers = system.pattern.equations.of(slot as Slot);
         let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
         let (block, weight) = with_mass_where_held(system, slot as Slot);
+        let mut addition = Mat3::ZERO;
         let symmetric = Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i]));
         let eigen = SymmetricEigen::new(symmetric);
         for k in 0..3 {
@@ -171,9 +176,11 @@ fn ignore_massless(system: &mut System, model: &Model, right_hand_side: &mut [f6
             let along: f64 = free.iter().map(|&i| v[i] * right_hand_side[numbers[i] as usize]).sum();
             free.iter().for_each(|&i| right_hand_side[numbers[i] as usize] -= along * v[i]);
             let direction = Vec3([v[0], v[1], v[2]]);
-            system.add_to_own_block(slot as Slot, &direction.outer(direction).scale(weight));
+            addition += direction.outer(direction).scale(weight);
         }
+        additions.push((slot as Slot, addition));
     }
+    additions
 }
 
 /// What a slot has of a mass matrix on its diagonal, and the largest entry of that. A held direction is given as much, so that it does
@@ -202,8 +209,8 @@ impl Run<'_> {
         assembly.forget();
         assembly.evaluate(&still, method.weights(), None);
         self.counters.work.factorisations += 1;
-        newton.solver.factorise(&assembly.system);
-        let loose = mechanism(&mut newton.solver, assembly, &self.model, &still);
+        let mut tangent = Tangent::that_may_go(assembly, &still, method.weights());
+        let loose = mechanism(&mut newton.solver, &mut tangent, &self.model);
         loose.map_or(Ok(()), |vector| Err(self.name_mechanism(Some(vector), &workshop.assembly.system)))
     }
 

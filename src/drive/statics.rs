@@ -7,7 +7,7 @@ use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Limp, NewtonFailure};
+use crate::solve::{Limp, NewtonFailure, Tangent};
 use crate::tensor::Vec3;
 use crate::threads;
 
@@ -77,11 +77,16 @@ impl Run<'_> {
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = &mut *workshop;
-        let (factorised, new) = newton.solver.factorise_new(&assembly.system);
-        self.counters.work.factorisations += u64::from(new);
-        if factorised
-            && let Some(limp) = Limp::find(&mut newton.solver, assembly, &self.model, &self.state, self.stage > 0)
-        {
+        let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
+        self.counters.work.factorisations += 1;
+        if self.is_linear() {
+            // What is linear is factorised once.
+            tangent = Tangent::that_stays(assembly, &self.state);
+            newton.solver.factorise_new(&mut tangent);
+        }
+        let limp = Limp::find(&mut newton.solver, &mut tangent, &self.model, self.stage > 0);
+        // What cannot be factorised as long as nothing is loaded may be held by what the first step brings.
+        if let Some(limp) = limp.filter(|limp| !limp.vector.broke_down) {
             if limp.is_loose() {
                 return Err(self.name_mechanism(Some(limp.vector), &assembly.system));
             }

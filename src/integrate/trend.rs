@@ -8,7 +8,7 @@
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
 use crate::real::Rough;
-use crate::system::{Equations, Scratch, State, System};
+use crate::system::{Equations, Scratch, State};
 use crate::threads;
 use std::array::from_fn;
 use std::collections::VecDeque;
@@ -102,12 +102,20 @@ impl Trend {
         });
     }
 
-    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in, and its tangent.
-    pub fn end(&mut self, state: &State, system: &System, step: &Step, scratch: Scratch) {
-        let (equations, force) = (&system.pattern.equations, scratch.numbers);
+    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in; `multiply` gives the product of its tangent
+    /// with a vector.
+    pub fn end(
+        &mut self,
+        equations: &Equations,
+        state: &State,
+        step: &Step,
+        scratch: Scratch,
+        multiply: impl FnOnce(&[f64], &mut [f64]),
+    ) {
+        let force = scratch.numbers;
         let mut correction = std::mem::take(&mut self.predicted);
         equations.gather_change(|slot| state.q[slot], &mut correction);
-        system.multiply_into(&system.values, &correction, scratch.room, force);
+        multiply(&correction, force);
         equations.scale(|slot| self.weights[self.kinds[slot] as usize], force);
         self.learn(step.length, &correction, force);
         self.predicted = correction;

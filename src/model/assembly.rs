@@ -117,6 +117,14 @@ impl Assembly {
         }
     }
 
+    /// The same where factors have taken the place of a tangent that was formed already.
+    pub fn form_again(&mut self, state: &State, weights: Weights) {
+        if let Some(linear) = &mut self.linear {
+            linear.formed = None;
+        }
+        self.evaluate(state, weights, None);
+    }
+
     /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
     fn evaluate_linear(&mut self, linear: &mut Linear, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
         linear.follow(state);

@@ -4,12 +4,14 @@ use super::block::BlockSolver;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
 use super::softest::NullVector;
+use super::tangent::Tangent;
 use crate::system::{Leftover, Slot, System};
 
 /// Solves with tangents of one pattern.
 ///
 /// Blocks serve what consists of nodes and is not too much of a net; joints with multipliers, whose diagonal is empty, and
-/// tangents whose pivots fail across blocks are left to LU with partial pivoting.
+/// tangents whose pivots fail across blocks are left to LU with partial pivoting. Factors take the place of a tangent that may go as long
+/// as that is sure to lose no digits; else they stand beside it, and what they solve is looked at.
 pub struct LinearSolver {
     /// Where the pattern suits them
     blocks: Option<Box<BlockSolver>>,
@@ -37,6 +39,8 @@ struct Trust {
     next: u32,
     /// Whether pivots have just not helped either
     in_vain: bool,
+    /// Whether the last factorisation was sure to lose no digits
+    is_sure: bool,
 }
 
 /// A solution is one of a system whose entries differ by no more than this, relative to each (Oettli and Prager 1964).
@@ -69,7 +73,7 @@ impl LinearSolver {
     fn by(blocks: Option<BlockSolver>, system: &System, multipliers: &[Slot]) -> Option<Self> {
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
-            trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false },
+            trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false, is_sure: true },
             blocks: blocks.map(Box::new),
             general,
             factored: false,
@@ -102,18 +106,21 @@ impl LinearSolver {
     }
 
     /// Factorises, as far as it can by blocks, and counts negative pivots.
-    pub(super) fn negative_of_own(&mut self, system: &System) -> Option<usize> {
-        let known = self.has_factorised(system);
-        let blocks = self.blocks_in_use()?;
-        let done = known || blocks.factorise(system);
-        let negative = blocks.negative();
-        (self.factored, self.revision) = (done, done.then_some(system.revision));
-        negative.filter(|_| done)
+    pub(super) fn negative_of_own(&mut self, tangent: &mut Tangent) -> Option<usize> {
+        let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
+        (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
+        self.blocks_in_use()?.negative().filter(|_| done)
     }
 
-    /// Its room for products with the tangent.
-    pub fn room(&mut self) -> &mut Leftover {
-        &mut self.leftover
+    /// The product of the tangent with a vector, one entry an equation: by its factors where they have taken its place.
+    pub fn multiply(&mut self, system: &System, x: &[f64], out: &mut [f64]) {
+        match &mut self.blocks {
+            Some(blocks) if system.holds_factors() => {
+                out.copy_from_slice(x);
+                blocks.multiply(system, out);
+            }
+            _ => system.multiply_into(&system.values, x, &mut self.leftover, out),
+        }
     }
 
     /// How it solves, in a few words.
@@ -127,16 +134,30 @@ impl LinearSolver {
     }
 
     /// Factorises the tangent where it is another one than the last; whether there is a factorisation, and whether it is new.
-    pub fn factorise_new(&mut self, system: &System) -> (bool, bool) {
-        if self.has_factorised(system) {
+    pub fn factorise_new(&mut self, tangent: &mut Tangent) -> (bool, bool) {
+        if self.has_factorised(tangent.system()) {
             return (true, false);
         }
-        let done = self.factorise(system);
-        self.revision = Some(system.revision);
-        (done, true)
+        self.factored = match self.trust.in_blocks {
+            true => self.factorise_in_blocks(tangent) || self.leave_blocks(tangent.look()),
+            false => self.factorise(tangent.look()),
+        };
+        self.revision = Some(tangent.system().revision);
+        (self.factored, true)
     }
 
-    /// Factorises the tangent; `false` where a pivot cannot be found.
+    /// By blocks: in the place of the tangent where it may go and that is sure to lose no digits.
+    fn factorise_in_blocks(&mut self, tangent: &mut Tangent) -> bool {
+        let was_sure = self.trust.is_sure;
+        let Some(blocks) = self.blocks_in_use() else { return false };
+        let free = tangent.give_away().filter(|system| was_sure && blocks.can_stay_within(system));
+        let within = free.is_some_and(|system| blocks.factorise_within(system) && blocks.is_sure());
+        let done = within || blocks.factorise(tangent.look());
+        self.trust.is_sure = blocks.is_sure();
+        done
+    }
+
+    /// Factorises a tangent that stays; `false` where a pivot cannot be found.
     pub fn factorise(&mut self, system: &System) -> bool {
         // Its values may not stay.
         self.revision = None;
@@ -158,10 +179,10 @@ impl LinearSolver {
     }
 
     /// Solves with the last factorisation, which is that of `system`; `false` where there is no solution. What blocks leave
-    /// of the residual is refined; but where all pivots are positive they leave round-off, as Cholesky's do: x solves with a matrix that
-    /// differs from A_ij by a few eps sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorems 10.4, 10.5).
+    /// of the residual is refined, unless all pivots are positive, or the tangent is gone: then they are [sure](BlockSolver::is_sure) to
+    /// leave no more than round-off.
     pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
-        if !self.trust.in_blocks || self.is_positive_definite() {
+        if !self.trust.in_blocks || self.is_positive_definite() || system.holds_factors() {
             return self.solve_once(system, right_hand_side);
         }
         let mut wanted = std::mem::take(&mut self.wanted);
@@ -216,8 +237,7 @@ impl LinearSolver {
 
     /// After corrections that led nowhere: in general where few digits of the softest stiffness are left, of which pivots save more; and
     /// in turns with blocks where that did not help either.
-    pub fn doubt(&mut self, system: &System) {
-        let few = |vector: NullVector| vector.digits(system) < FEW_DIGITS;
+    pub fn doubt(&mut self, tangent: &mut Tangent) {
         if !self.trust.in_blocks {
             self.return_to_blocks();
             self.trust.in_vain = true;
@@ -227,9 +247,10 @@ impl LinearSolver {
             return;
         }
         // The factorisation may be that of the iterate before; either may leave blocks itself.
-        let doubtful = self.factorise(system) && self.softest(system).is_none_or(few);
-        if doubtful && self.trust.in_blocks {
-            self.factored = self.leave_blocks(system);
+        let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
+        let is_doubtful = softest.is_some_and(|vector: NullVector| vector.digits(tangent.look()) < FEW_DIGITS);
+        if is_doubtful && self.trust.in_blocks {
+            self.factored = self.leave_blocks(tangent.look());
         }
     }
 
@@ -240,7 +261,8 @@ impl LinearSolver {
         }
         let Some(general) = &mut self.general else { return false };
         let next = self.trust.next;
-        self.trust = Trust { in_blocks: false, absence: next, next: next.saturating_mul(2), in_vain: false };
+        let next_time = next.saturating_mul(2);
+        self.trust = Trust { in_blocks: false, absence: next, next: next_time, in_vain: false, is_sure: false };
         general.factorise(system)
     }
 

@@ -3,8 +3,8 @@
 use super::convergence::size;
 use super::linear::LinearSolver;
 use super::softest::NullVector;
-use crate::model::{Assembly, Model};
-use crate::system::State;
+use super::tangent::Tangent;
+use crate::model::Model;
 
 /// The softest motion of a tangent.
 pub struct Limp {
@@ -21,16 +21,11 @@ pub struct Limp {
 const NO_STRAIN: f64 = 1e-3;
 
 impl Limp {
-    /// The softest motion of the tangent that `solver` has tried to factorise. Whether it strains is asked where the tangent has no
-    /// stiffness against it, or else where `stress` may be all that holds it.
-    pub fn find(
-        solver: &mut LinearSolver,
-        assembly: &Assembly,
-        model: &Model,
-        state: &State,
-        stress: bool,
-    ) -> Option<Self> {
-        let vector = solver.softest(&assembly.system)?;
+    /// The softest motion of a tangent; one that stays is the one that `solver` has tried to factorise. Whether it strains is asked where
+    /// the tangent has no stiffness against it, or else where `stress` may be all that holds it.
+    pub fn find(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model, stress: bool) -> Option<Self> {
+        let vector = solver.softest(tangent)?;
+        let (assembly, state) = (tangent.assembly(), tangent.state());
         if vector.held && !stress {
             return Some(Self { vector, strains: true, moves: true });
         }
@@ -60,7 +55,7 @@ impl Limp {
     }
 }
 
-/// A motion that nothing holds, of a tangent that `solver` has tried to factorise.
-pub fn mechanism(solver: &mut LinearSolver, assembly: &Assembly, model: &Model, state: &State) -> Option<NullVector> {
-    Limp::find(solver, assembly, model, state, false).filter(Limp::is_loose).map(|limp| limp.vector)
+/// A motion that nothing holds, of a tangent; see [`Limp::find`].
+pub fn mechanism(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model) -> Option<NullVector> {
+    Limp::find(solver, tangent, model, false).filter(Limp::is_loose).map(|limp| limp.vector)
 }

@@ -13,6 +13,7 @@ mod pivots;
 mod refinement;
 mod reuse;
 mod softest;
+mod tangent;
 
 pub use block::BlockSolver;
 pub use convergence::{Convergence, Residual, Verdict, size};
@@ -23,3 +24,4 @@ pub use mechanism::{Limp, mechanism};
 pub use newton::{Newton, NewtonFailure, Work, timed};
 pub use pivots::is_symmetric;
 pub use softest::NullVector;
+pub use tangent::Tangent;

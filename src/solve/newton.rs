@@ -7,6 +7,7 @@ use super::mechanism::mechanism;
 use super::refinement::Refinement;
 use super::reuse::Reuse;
 use super::softest::NullVector;
+use super::tangent::Tangent;
 use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
@@ -137,16 +138,16 @@ impl Newton {
     }
 
     /// Counts the negative pivots of a tangent, see [`LinearSolver::negative_pivots`].
-    pub fn count_pivots(&mut self, system: &System, work: &mut Work) -> Option<usize> {
-        let known = self.solver.has_factorised(system);
-        let negative = self.solver.negative_pivots(system);
-        work.factorisations += u64::from(!known && self.solver.has_factorised(system));
+    pub fn count_pivots(&mut self, tangent: &mut Tangent, work: &mut Work) -> Option<usize> {
+        let known = self.solver.has_factorised(tangent.system());
+        let negative = self.solver.negative_pivots(tangent);
+        work.factorisations += u64::from(!known && self.solver.has_factorised(tangent.system()));
         negative
     }
 
-    /// Memory that nobody needs between solutions.
-    pub fn scratch(&mut self) -> Scratch<'_> {
-        Scratch { room: self.solver.room(), numbers: &mut self.right_hand_side, vectors: &mut self.dq }
+    /// Memory that nobody needs between solutions, and what multiplies with the tangent.
+    pub fn lend(&mut self) -> (Scratch<'_>, &mut LinearSolver) {
+        (Scratch { numbers: &mut self.right_hand_side, vectors: &mut self.dq }, &mut self.solver)
     }
 
     /// The tangent of the system is that of the state that the next solution begins with, but for the loads.
@@ -204,7 +205,10 @@ impl Newton {
                 }
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, state)),
                 Verdict::Continue if iterations < self.max_iterations => refinement = Refinement::default(),
-                _ if iterations >= self.max_iterations => return Err(self.not_converged(&assembly.system, residual)),
+                _ if iterations >= self.max_iterations => {
+                    let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
+                    return Err(self.not_converged(&mut tangent, residual));
+                }
                 _ => {}
             }
             if forms || noisy || !self.reuse.keeps_tangent() {
@@ -215,16 +219,17 @@ impl Newton {
             } else {
                 self.reuse.keep();
             }
-            if !self.find_correction(&assembly.system, lift.take(), work) {
-                return Err(NewtonFailure::Singular(mechanism(&mut self.solver, assembly, model, state)));
+            let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
+            if !self.find_correction(&mut tangent, lift.take(), work) {
+                return Err(NewtonFailure::Singular(mechanism(&mut self.solver, &mut tangent, model)));
             }
             iterations += 1;
             let length = size(model, &self.dq);
             if length > RUNAWAY {
                 // Round-off may have left a stiffness where there is none.
-                return Err(match mechanism(&mut self.solver, assembly, model, state) {
+                return Err(match mechanism(&mut self.solver, &mut tangent, model) {
                     Some(vector) => NewtonFailure::Singular(Some(vector)),
-                    None => self.not_converged(&assembly.system, residual),
+                    None => self.not_converged(&mut tangent, residual),
                 });
             }
             // Where balance is expected the next tangent, if any, is that of the state itself.
@@ -276,7 +281,8 @@ impl Newton {
         if !formed && !self.reuse.has_tangent() {
             self.form(assembly, state, method, work);
         }
-        if self.substitute(&assembly.system, None, formed, work) && size(model, &self.dq) <= most {
+        let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
+        if self.substitute(&mut tangent, None, formed, work) && size(model, &self.dq) <= most {
             Self::add(model, state, method, &self.dq);
         }
     }
@@ -290,32 +296,32 @@ impl Newton {
     }
 
     /// The next attempt is better off with pivots where round-off has taken most of the softest stiffness.
-    fn not_converged(&mut self, system: &System, residual: Residual) -> NewtonFailure {
-        self.solver.doubt(system);
+    fn not_converged(&mut self, tangent: &mut Tangent, residual: Residual) -> NewtonFailure {
+        self.solver.doubt(tangent);
         NewtonFailure::NotConverged { residual, history: self.reuse.history.clone() }
     }
 
     /// Solves J dq = -g; held directions take their part of `lift`. `false` where there is no solution.
-    fn find_correction(&mut self, system: &System, lift: Option<&[Vec3]>, work: &mut Work) -> bool {
+    fn find_correction(&mut self, tangent: &mut Tangent, lift: Option<&[Vec3]>, work: &mut Work) -> bool {
         work.iterations += 1;
         // What an older tangent leaves is more than what the solver does.
-        self.substitute(system, lift, self.reuse.is_own(), work)
+        self.substitute(tangent, lift, self.reuse.is_own(), work)
     }
 
     /// The same, with a look at what the solver leaves or without.
-    fn substitute(&mut self, system: &System, lift: Option<&[Vec3]>, looks: bool, work: &mut Work) -> bool {
+    fn substitute(&mut self, tangent: &mut Tangent, lift: Option<&[Vec3]>, looks: bool, work: &mut Work) -> bool {
         let Self { solver, right_hand_side, .. } = self;
-        system.right_hand_side(right_hand_side);
+        tangent.system().right_hand_side(right_hand_side);
         let solved = timed(&mut work.solve_seconds, || {
-            let (done, new) = solver.factorise_new(system);
+            let (done, new) = solver.factorise_new(tangent);
             work.factorisations += u64::from(new);
             match looks || new {
-                true => done && solver.solve(system, right_hand_side),
-                false => done && solver.solve_once(system, right_hand_side),
+                true => done && solver.solve(tangent.system(), right_hand_side),
+                false => done && solver.solve_once(tangent.system(), right_hand_side),
             }
         });
         if solved {
-            system.pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
+            tangent.system().pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
         }
         solved
     }

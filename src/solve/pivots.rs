@@ -3,6 +3,7 @@
 use super::block::BlockSolver;
 use super::columns::Columns;
 use super::linear::LinearSolver;
+use super::tangent::Tangent;
 use crate::system::{Equations, Pattern, Slot, Symmetry, System};
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -39,12 +40,13 @@ const COMPLIANCE: f64 = 1e-9;
 impl LinearSolver {
     /// How many pivots of the tangent are negative, those of multipliers left out; `None` where it is not symmetric, or a
     /// pivot is lost. Where this solver's own factorisation tells, the tangent is what it has factorised last.
-    pub fn negative_pivots(&mut self, system: &System) -> Option<usize> {
+    pub fn negative_pivots(&mut self, tangent: &mut Tangent) -> Option<usize> {
+        if self.is_symmetric() {
+            return self.negative_of_own(tangent);
+        }
+        let system = tangent.look();
         if !is_symmetric(&system.pattern, &system.values) {
             return None;
-        }
-        if self.is_symmetric() {
-            return self.negative_of_own(system);
         }
         if self.pivots.is_none() {
             self.pivots = Pivots::beside(self, system);

@@ -1,6 +1,7 @@
 //! The softest motion of a tangent, by inverse iteration.
 
 use super::linear::LinearSolver;
+use super::tangent::Tangent;
 use crate::kernel::WIDTH;
 use crate::real::Instructions;
 use crate::system::{Equations, System};
@@ -17,6 +18,8 @@ pub struct NullVector {
     pub motion: Vec<f64>,
     /// Whether the tangent has some stiffness against it after all
     pub held: bool,
+    /// Whether no factorisation of the tangent came to its end
+    pub broke_down: bool,
 }
 
 impl NullVector {
@@ -43,43 +46,49 @@ const NO_STIFFNESS: f64 = 8.0;
 
 impl LinearSolver {
     /// A direction in which the tangent has no stiffness.
-    pub fn null_vector(&mut self, system: &System) -> Option<NullVector> {
-        self.softest(system).filter(|vector| !vector.held)
+    pub fn null_vector(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
+        self.softest(tangent).filter(|vector| !vector.held)
     }
 
-    /// The direction in which the tangent has the least stiffness, by inverse iteration with the last factorisation.
+    /// The direction in which the tangent has the least stiffness, by inverse iteration; of a tangent that stays with the last factorisation.
     /// Unknowns are scaled by their diagonal, so that forces and moments compare.
-    pub fn softest(&mut self, system: &System) -> Option<NullVector> {
+    pub fn softest(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
+        let system = tangent.look();
         if system.pattern.equations.count() == 0 {
             return None;
         }
         let diagonal = diagonal(system);
-        if let Some(empty) = empty_column(system, &diagonal) {
-            let mut entries = vec![0.0; system.pattern.equations.count()];
-            entries[empty] = 1.0;
-            return Some(NullVector { motion: entries.clone(), entries, held: false });
-        }
-        let scale = scales(system, &diagonal);
+        let empty = empty_column(system, &diagonal);
+        let scale = if empty.is_none() { scales(system, &diagonal) } else { Vec::new() };
         drop(diagonal);
+        let broke_down = !tangent.stays() && !self.factorise_new(tangent).0;
+        if let Some(empty) = empty {
+            let mut entries = vec![0.0; tangent.system().pattern.equations.count()];
+            entries[empty] = 1.0;
+            return Some(NullVector { motion: entries.clone(), entries, held: false, broke_down });
+        }
         let mut x = threads::list(scale.len(), |k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract());
         let scaled = |x: &mut [f64], by: f64| {
             threads::each_part(x, |start, x| x.iter_mut().zip(&scale[start..]).for_each(|(x, s)| *x *= s / by));
         };
         for _ in 0..3 {
             scaled(&mut x, 1.0);
-            if !self.solve_once(system, &mut x) {
-                return self.null_vector_of_shifted(system);
+            if !self.solve_once(tangent.system(), &mut x) {
+                return self.null_vector_of_shifted(tangent.look(), broke_down);
             }
             let largest = threads::largest(x.len(), |part| part.fold(0.0, |m: f64, k| m.max((x[k] * scale[k]).abs())));
             scaled(&mut x, largest);
         }
-        let motion = threads::list(x.len(), |k| x[k] / scale[k]);
-        let held = stiffness_of(system, &motion) > NO_STIFFNESS;
-        Some(NullVector { entries: x, motion, held })
+        let mut motion = scale;
+        threads::each_part(&mut motion, |start, part| {
+            part.iter_mut().zip(&x[start..]).for_each(|(scale, x)| *scale = x / *scale)
+        });
+        let held = stiffness_of(tangent.look(), &motion) > NO_STIFFNESS;
+        Some(NullVector { entries: x, motion, held, broke_down: false })
     }
 
     /// The same where the factorisation broke down: the diagonal is raised by a little first.
-    fn null_vector_of_shifted(&mut self, system: &System) -> Option<NullVector> {
+    fn null_vector_of_shifted(&mut self, system: &System, broke_down: bool) -> Option<NullVector> {
         let mut shifted = system.clone();
         // Multipliers have no diagonal: they get a little compliance.
         let shift = |value: f64| if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
@@ -95,7 +104,7 @@ impl LinearSolver {
             let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             x.iter_mut().for_each(|x| *x /= largest);
         }
-        Some(NullVector { motion: x.clone(), entries: x, held: false })
+        Some(NullVector { motion: x.clone(), entries: x, held: false, broke_down })
     }
 }
 
@@ -142,32 +151,34 @@ fn stiffness_of(system: &System, x: &[f64]) -> f64 {
 }
 
 fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
-    let parts = system.pattern.apart::<W>(x);
     let (mut whole, mut squares) = (Compensated::default(), 0.0);
     let add = |(sums, part): ([Compensated; W], [f64; W])| {
         sums.iter().flat_map(|sum| [sum.sum, sum.lost]).for_each(|term| whole.add(term));
         squares += part.iter().sum::<f64>();
     };
-    threads::in_order(threads::parts(parts.len()), |columns| stiffness_of_columns(system, &parts, columns), add);
+    let parts = threads::parts(system.pattern.groups.count());
+    threads::in_order(parts, |columns| stiffness_of_columns(system, x, columns), add);
     if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }
 
 /// The sums over some columns of tiles, of the terms and of their squares. A sum for each row of a tile: they do not wait for each other.
 fn stiffness_of_columns<const W: usize>(
     system: &System,
-    parts: &[[f64; W]],
+    x: &[f64],
     columns: Range<usize>,
 ) -> ([Compensated; W], [f64; W]) {
     let (mut sums, mut squares) = ([Compensated::default(); W], [0.0; W]);
+    let pattern = &system.pattern;
     Instructions::here().run(
         #[inline(always)]
         || {
             system.each_tile::<W>(columns, |row, column, tile| {
                 // What is not kept counts as much.
-                let times = if system.pattern.symmetry.halves() && row != column { 2.0 } else { 1.0 };
-                for (line, &x) in tile.iter().zip(&parts[column]) {
+                let times = if pattern.symmetry.halves() && row != column { 2.0 } else { 1.0 };
+                let (of_row, of_column) = (pattern.part::<W>(row, x), pattern.part::<W>(column, x));
+                for (line, x) in tile.iter().zip(of_column) {
                     for r in 0..W {
-                        let term = parts[row][r] * line[r] * x;
+                        let term = of_row[r] * line[r] * x;
                         sums[r].add(times * term);
                         squares[r] += times * term * term;
                     }

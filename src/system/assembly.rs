@@ -4,7 +4,7 @@ use super::pattern::{Pattern, Symmetry, Tile, WIDTH, transposed};
 use super::regions::{self, Region};
 use super::sink::{Part, Sink};
 use super::state::Slot;
-use super::storage::Tiles;
+use super::storage::{Tiles, as_tiles};
 use super::values::Values;
 use crate::kernel::ElementSystem;
 use crate::real::{Instructions, Lanes};
@@ -48,8 +48,6 @@ impl Leftover {
 
 /// Memory that somebody else does not need just now.
 pub struct Scratch<'a> {
-    /// For products with the tangent
-    pub room: &'a mut Leftover,
     /// One an equation
     pub numbers: &'a mut [f64],
     /// One a slot
@@ -72,6 +70,8 @@ pub struct System {
     pub values: Vec<f64>,
     /// Counts how often the tangent has become another one
     pub revision: u64,
+    /// Whether factors have taken the place of its tiles on the diagonal
+    holds_factors: bool,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
     lift: Vec<Vec3>,
     lifts: bool,
@@ -99,6 +99,7 @@ impl System {
             acting_in,
             values: vec![0.0; values],
             revision: 0,
+            holds_factors: false,
             lift: Vec::new(),
             lifts: false,
             lifted: Vec::new(),
@@ -123,6 +124,7 @@ impl System {
     /// Begins an evaluation for which each part is still to be [cleared](Part::clear).
     pub fn begin(&mut self, with_tangent: bool, lift: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
+        self.holds_factors &= !with_tangent;
         if self.lifts || lift.is_some() {
             self.lifted.clear();
             self.lifted.resize(self.pattern.equations.count(), 0.0);
@@ -170,7 +172,27 @@ impl System {
 
     /// The tangent tile by tile, each by its columns. `W` is the width of the pattern.
     pub fn tiles<const W: usize>(&self) -> Tiles<'_, W> {
+        debug_assert!(!self.holds_factors, "there is no tangent");
         self.pattern.storage.tiles(&self.values)
+    }
+
+    /// Whether factors stand in the place of the tiles on the diagonal. Until the next evaluation with weights there is no tangent then.
+    pub fn holds_factors(&self) -> bool {
+        self.holds_factors
+    }
+
+    /// Gives the numbers of the tiles on the diagonal away: their place is that of factors from here on. Beside them, the tiles beside the
+    /// diagonal.
+    pub fn give_to_factors<const W: usize>(&mut self) -> (&mut [f64], &[Tile<W>]) {
+        self.holds_factors = true;
+        let (own, beside) = self.values.split_at_mut(self.pattern.storage.boundary());
+        (own, as_tiles(beside))
+    }
+
+    /// The numbers on the diagonal, of the tangent or of factors in its place, and the tiles beside it.
+    pub fn numbers<const W: usize>(&self) -> (&[f64], &[Tile<W>]) {
+        let (own, beside) = self.values.split_at(self.pattern.storage.boundary());
+        (own, as_tiles(beside))
     }
 
     /// What a slot has of the tangent on its diagonal, in its own directions; zero where one is held.

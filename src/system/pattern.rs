@@ -6,7 +6,6 @@ use super::regions::{self, Region, Shares};
 use super::state::Slot;
 use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
-use crate::threads;
 use std::ops::Range;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
@@ -268,12 +267,7 @@ impl Pattern {
         numbers.into_iter().take(self.width())
     }
 
-    /// One number an equation as one part a group; zero where a row has no equation.
-    pub fn apart<const W: usize>(&self, x: &[f64]) -> Vec<[f64; W]> {
-        threads::list(self.groups.count(), |group| self.part(group, x))
-    }
-
-    /// The part of a group.
+    /// The part of a group of what has one number an equation; zero where a row has none.
     #[inline(always)]
     pub fn part<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
         let own = x.get(self.equations_of(group)).and_then(|own| own.first_chunk::<W>());
@@ -301,7 +295,7 @@ impl Pattern {
         self.equations.before(self.groups.first_slot(group))..self.equations.before(self.groups.first_slot(group + 1))
     }
 
-    /// The reverse of [`Pattern::apart`], for parts that are found by their groups.
+    /// The reverse of [`Pattern::part`], for parts that are found by their groups.
     pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
         self.each_region(out, |region, out| {
             for group in region.groups.clone() {

@@ -167,7 +167,7 @@ fn half<const W: usize>(numbers: &[f64], group: usize) -> &[f64] {
 }
 
 /// Values as tiles.
-fn as_tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
+pub(super) fn as_tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
     values.as_chunks::<W>().0.as_chunks::<W>().0
 }
 

@@ -5,11 +5,12 @@ use crate::random::Random;
 use beamsim::kernel::{ElementSystem, Weights};
 use beamsim::model::{Assembly, Model, SlotKind, StageContext, StageKind, charts};
 use beamsim::scene;
-use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, is_symmetric};
+use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, Tangent, is_symmetric};
 use beamsim::system::{
     Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Memory, Pattern, Plane, State, Symmetry, System,
 };
 use beamsim::tensor::{Mat3, Vec3};
+use beamsim::threads;
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
@@ -168,6 +169,138 @@ fn solve_both_ways(
     assert!(apart <= allowed * largest, "{what}: {apart:e}");
     let error = system.residual(&wanted, &by_faer, &mut Leftover::default());
     assert!(error < 1e-13, "{what}: {error:e}");
+}
+
+/// To the last bit, on any number of threads; and multiplied again they give the tangent.
+#[test]
+fn factors_in_the_place_of_a_tangent_solve_as_those_beside_it() {
+    let mut random = Random::new(21);
+    let mut elsewhere = Vec::new();
+    for (name, edges) in [patterns(&mut random), large_patterns(&mut random)].concat() {
+        for plane in [None, Plane::normal_to(Vec3::UNIT[2])] {
+            for symmetry in SYMMETRIES {
+                let what = format!("{name}, planar {}, symmetry {symmetry:?}", plane.is_some());
+                let system = system_in(plane, &edges, symmetry, 30.0, &mut random);
+                let n = system.pattern.equations.count();
+                let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
+                let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+                let mut beside = wanted.clone();
+                assert!(blocks.factorise(&system) && blocks.is_sure(), "{what}");
+                blocks.solve(&system, &mut beside);
+                if !blocks.can_stay_within(&system) {
+                    elsewhere.push(name);
+                    continue;
+                }
+                let solve = || {
+                    let (mut used_up, mut x) = (system.clone(), wanted.clone());
+                    let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+                    assert!(blocks.factorise_within(&mut used_up) && blocks.is_sure(), "{what}");
+                    assert!(used_up.holds_factors(), "{what}");
+                    blocks.solve(&used_up, &mut x);
+                    let mut back = x.clone();
+                    blocks.multiply(&used_up, &mut back);
+                    (x, back)
+                };
+                let (within, back) = solve();
+                assert_eq!(within, beside, "{what}");
+                assert_eq!(threads::on(3, solve), (within, back.clone()), "{what}");
+                let lost = wanted.iter().zip(&back).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                assert!(lost < 1e-13, "{what}: {lost:e}");
+                // What was factorised in another way before is gone.
+                let mut used_up = system.clone();
+                assert!(blocks.factorise_within(&mut used_up) && blocks.factorise(&system), "{what}");
+                let mut again = wanted.clone();
+                blocks.solve(&system, &mut again);
+                assert_eq!(again, beside, "{what}");
+            }
+        }
+    }
+    // Branches of trees have nodes from everywhere.
+    elsewhere.dedup();
+    assert_eq!(elsewhere, ["large tree", "large ring"]);
+}
+
+/// Of two nodes: what the first takes from the second is `taken` times what that has.
+fn taking(symmetry: Symmetry, taken: f64) -> System {
+    let mut system = system(&chain(2), symmetry, 0.0, &mut Random::new(5));
+    let pattern = system.pattern.clone();
+    let n = pattern.equations.count() as u32;
+    for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+        let [own, other] = [row, column].map(|k| pattern.equations.direction(k as usize));
+        let same = own.axis == other.axis && own.slot % 2 == other.slot % 2;
+        let value = match (own.slot / 2, other.slot / 2) {
+            _ if !same => 0.0,
+            (0, 0) => 1.0,
+            (1, 1) => 1.0 / taken,
+            _ => 1.0,
+        };
+        if let Some(place) = pattern.find(row, column) {
+            system.values[place] = value;
+        }
+    }
+    system
+}
+
+#[test]
+fn factorisations_that_lose_digits_are_not_sure() {
+    for (symmetry, taken, sure) in [
+        (Symmetry::None, 0.5, true),
+        (Symmetry::None, 100.0, true),
+        (Symmetry::None, 1e4, false),
+        (Symmetry::None, -100.0, true),
+        // No digits are lost, but that is not known of negative pivots.
+        (Symmetry::Whole, 0.5, true),
+        (Symmetry::Whole, 100.0, false),
+    ] {
+        let system = taking(symmetry, taken);
+        let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+        assert!(blocks.factorise(&system));
+        assert_eq!(blocks.is_sure(), sure, "{symmetry:?}, {taken}");
+    }
+}
+
+/// A tangent that may go is used up where nothing is lost by that, and there again for who looks at it.
+#[test]
+fn tangents_are_used_up_where_that_loses_no_digits() {
+    for kind in ["kind = \"static\"\nsteps = 1", "kind = \"dynamic\"\nend = 1\nstep = 1"] {
+        let deck = format!(
+            "[point]\nroot = [0, 0, 0]\ntip = [1, 0, 0]\n[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 10\nEI = 10\nrhoA = 1\n\
+             rhoJ = [2, 1, 1]\n[[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"root\", \"tip\"]\nelements = 20\n\
+             [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 5, 1]\n[[stage]]\n{kind}\n\
+             [effects]\nplanar = false\n"
+        );
+        let Ok((scene, _)) = scene::from_text(&deck) else { panic!("the deck is good: {deck}") };
+        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let rest = model.rest();
+        let Ok(equations) = model.begin_stage(0, stage.kind, &rest) else { panic!("the stage begins") };
+        let mut assembly = Assembly::new(&stage, equations, &model);
+        let mut solver = LinearSolver::new(&assembly.system, &[]).unwrap();
+        let wanted: Vec<f64> = (0..assembly.system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();
+        // Pulled apart it is definite; of pushed together there are negative pivots.
+        for (sign, goes) in [
+            (1.0, true),
+            (-1.0, stage.kind == StageKind::Dynamic),
+            (1.0, stage.kind == StageKind::Dynamic),
+            (1.0, true),
+        ] {
+            let weights = Weights { stiffness: sign, damping: 0.0, mass: if sign > 0.0 { 4.0 } else { -4.0 } };
+            assembly.evaluate(&rest, weights, None);
+            let before = assembly.system.clone();
+            let mut tangent = Tangent::that_may_go(&mut assembly, &rest, weights);
+            assert_eq!(solver.factorise_new(&mut tangent), (true, true));
+            assert_eq!(tangent.system().holds_factors(), goes, "{kind} {sign}");
+            assert_eq!(solver.factorise_new(&mut tangent), (true, false));
+            let mut x = wanted.clone();
+            assert!(solver.solve(tangent.system(), &mut x));
+            assert!(before.residual(&wanted, &x, &mut Leftover::default()) < 1e-12);
+            let mut back = vec![0.0; x.len()];
+            solver.multiply(tangent.system(), &x, &mut back);
+            let lost = wanted.iter().zip(&back).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(lost < 1e-9, "{lost:e}");
+            assert_eq!(tangent.look().values, before.values);
+            assert!(!tangent.system().holds_factors());
+        }
+    }
 }
 
 /// Taken as it stands, a pivot of 1e-13 would leave three digits.
@@ -488,7 +621,11 @@ fn space_takes_over_the_order_of_a_plane() {
         let mut solver = LinearSolver::beside(&own, &plane.system, &space.system, &[]).unwrap();
         space.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);
         if symmetry == Symmetry::Whole {
-            assert_eq!(solver.negative_pivots(&space.system), Some(0));
+            let (rest, weights) = (model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 });
+            let mut tangent = Tangent::that_may_go(&mut space, &rest, weights);
+            assert_eq!(solver.negative_pivots(&mut tangent), Some(0));
+            // Formed again, it is what it was.
+            tangent.look();
         }
         let solves = |solver: &mut LinearSolver, system: &System| {
             let b: Vec<f64> = (0..system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();

@@ -67,6 +67,8 @@ pub struct Elimination {
     pub branches: Vec<Range<usize>>,
     /// The rows after all branches
     pub trunk: Range<usize>,
+    /// The groups of each branch and of the trunk, where those of each follow each other; else nothing
+    pub runs: Vec<Range<usize>>,
     /// Where the later neighbours of each row begin
     pub starts: Vec<u32>,
     /// Later neighbours
@@ -107,6 +109,7 @@ impl Elimination {
             order,
             branches,
             trunk,
+            runs: Vec::new(),
             starts,
             later,
             target_starts,
@@ -117,6 +120,7 @@ impl Elimination {
             below: Vec::new(),
             idle: Vec::new(),
         };
+        out.runs = out.pieces().map(|rows| run(&out.order[rows])).collect::<Option<_>>().unwrap_or_default();
         out.find_sources(pattern);
         Some(out)
     }
@@ -245,6 +249,13 @@ impl Later {
             Self::Beyond(row) => &mut beyond[row],
         }
     }
+}
+
+/// Groups as a range, where they follow each other in some order.
+fn run(groups: &[u32]) -> Option<Range<usize>> {
+    let Some((least, most)) = groups.iter().min().zip(groups.iter().max()) else { return Some(0..0) };
+    let range = *least as usize..*most as usize + 1;
+    (range.len() == groups.len()).then_some(range)
 }
 
 /// Where row `i` keeps its block with the later row `j`.

@@ -2,8 +2,11 @@
 //! where not.
 //!
 //! The order of elimination is that of least degree, in large scenes turned towards a middle, so that chains and trees get no fill at all.
-//! Pivots are not looked for across blocks: who uses this looks at the residual of what it solved, unless all pivots are positive.
+//! Pivots are not looked for across blocks: who uses this looks at the residual of what it solved, or whether the factorisation is
+//! [sure](BlockSolver::is_sure). Where blocks are not filled up the tangent's own serve beside the diagonal; those on it may give their
+//! place to the factors, too.
 
+mod diagonal;
 mod elimination;
 mod ldl;
 mod lu;
@@ -33,17 +36,29 @@ trait Factor: Send {
     /// What it does, in a word.
     fn name(&self) -> &'static str;
 
-    /// Factorises; `false` where a pivot is zero or no number.
+    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
     fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool;
+
+    /// See [`BlockSolver::can_stay_within`].
+    fn can_stay_within(&self, elimination: &Elimination, system: &System) -> bool;
+
+    /// See [`BlockSolver::factorise_within`].
+    fn factorise_within(&mut self, elimination: &Elimination, system: &mut System) -> bool;
 
     /// See [`BlockSolver::negative`].
     fn negative(&self) -> Option<usize>;
+
+    /// See [`BlockSolver::is_sure`].
+    fn is_sure(&self) -> bool;
 
     /// See [`BlockSolver::is_symmetric`].
     fn is_symmetric(&self) -> bool;
 
     /// Solves with the last factorisation, which is that of `system`, row by row.
     fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]);
+
+    /// The product of the factors with x, row by row.
+    fn multiply(&self, elimination: &Elimination, system: &System, x: &mut [f64]);
 }
 
 impl BlockSolver {
@@ -98,9 +113,21 @@ impl BlockSolver {
         self.factor.is_symmetric()
     }
 
-    /// Factorises; `false` where a pivot is zero or no number.
+    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
     pub fn factorise(&mut self, system: &System) -> bool {
         self.factor.factorise(&self.elimination, system)
+    }
+
+    /// Whether the factors may take the place of this tangent: each branch has nodes that follow each other, and the tangent keeps as much of
+    /// the tiles on its diagonal as the factors.
+    pub fn can_stay_within(&self, system: &System) -> bool {
+        self.factor.can_stay_within(&self.elimination, system)
+    }
+
+    /// Factorises a tangent whose place the factors [can](Self::can_stay_within) take: it needs no memory. `false` where a pivot is zero or
+    /// no number; the tangent is gone in any case.
+    pub fn factorise_within(&mut self, system: &mut System) -> bool {
+        self.factor.factorise_within(&self.elimination, system)
     }
 
     /// How many pivots of the last factorisation are negative: as many as the matrix has negative eigenvalues (Sylvester).
@@ -109,19 +136,42 @@ impl BlockSolver {
         self.factor.negative()
     }
 
-    /// Solves with the last factorisation, which is that of `system`; one entry an equation.
-    pub fn solve(&mut self, system: &System, x: &mut [f64]) {
-        if system.pattern.width() == WIDTH { self.solve_by::<WIDTH>(system, x) } else { self.solve_by::<3>(system, x) }
+    /// Whether the last factorisation has lost no digits. Where the tangent is symmetric, all pivots are positive: it is that of a matrix which
+    /// differs from A_ij by a few eps sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorems 10.4,
+    /// 10.5). Where not, elimination took from no entry on the diagonal much more than it was.
+    pub fn is_sure(&self) -> bool {
+        self.factor.is_sure()
     }
 
-    fn solve_by<const W: usize>(&mut self, system: &System, x: &mut [f64]) {
-        let (Self { elimination, factor, parts }, pattern) = (self, &system.pattern);
+    /// Solves with the last factorisation, which is that of `system`; one entry an equation.
+    pub fn solve(&mut self, system: &System, x: &mut [f64]) {
+        match system.pattern.width() {
+            WIDTH => self.by_rows::<WIDTH>(&system.pattern, x, |factor, order, x| factor.solve(order, system, x)),
+            _ => self.by_rows::<3>(&system.pattern, x, |factor, order, x| factor.solve(order, system, x)),
+        }
+    }
+
+    /// The product of the tangent that was factorised last with x, one entry an equation, by its factors.
+    pub fn multiply(&mut self, system: &System, x: &mut [f64]) {
+        match system.pattern.width() {
+            WIDTH => self.by_rows::<WIDTH>(&system.pattern, x, |factor, order, x| factor.multiply(order, system, x)),
+            _ => self.by_rows::<3>(&system.pattern, x, |factor, order, x| factor.multiply(order, system, x)),
+        }
+    }
+
+    fn by_rows<const W: usize>(
+        &mut self,
+        pattern: &Pattern,
+        x: &mut [f64],
+        work: impl FnOnce(&dyn Factor, &Elimination, &mut [f64]),
+    ) {
+        let Self { elimination, factor, parts } = self;
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
             for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
                 *part = pattern.part(group as usize, x);
             }
         });
-        factor.solve(elimination, system, parts);
+        work(&**factor, elimination, parts);
         let parts = parts.as_chunks::<W>().0;
         pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
     }

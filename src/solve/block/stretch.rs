@@ -52,13 +52,6 @@ impl<const W: usize> Stretch<Tile<W>> {
     }
 }
 
-impl<T: AsRef<[f64]> + AsMut<[f64]>> Stretch<T> {
-    /// Adds numbers at the same places.
-    pub fn add(&mut self, other: &Self) {
-        self.entries.iter_mut().zip(&other.entries).for_each(|(sum, other)| add(sum.as_mut(), other.as_ref()));
-    }
-}
-
 fn add(sums: &mut [f64], others: &[f64]) {
     sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += other);
 }

@@ -3,16 +3,20 @@
 
 use super::elimination::{Source, Stands};
 use super::stretch::Stretch;
-use crate::real::{LANES, Lanes};
-pub use crate::system::{Tile, Tiles, transposed};
+use crate::real::{LANES, Lanes, each_lane};
+pub use crate::system::{Own, Tile, transposed};
 use crate::system::{upper_entry, upper_start};
 
 /// A part of a vector that belongs to one tile row.
 pub type Part<const W: usize> = [f64; W];
 
 /// Rows of a tile keep their order as long as no pivot takes so many times its size from the diagonal entry of a row below it: a measure
-/// without units, as entries of L have some. What it is does not matter much: what a tile loses, a look at the residual finds.
+/// without units, as entries of L have some. What it is does not matter much: tiles that take their rows in another order are doubtful.
 const GROWTH: f64 = 16.0;
+
+/// The terms that elimination takes from an entry on the diagonal may be so many times that entry: they cost as many times its round-off
+/// (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorem 13.6).
+const MODERATE: f64 = 1e3;
 
 /// The order in which a tile takes its rows as pivots.
 pub type RowOrder<const W: usize> = [u8; W];
@@ -31,6 +35,12 @@ pub trait Rows<const W: usize> {
     /// Nothing
     const NOTHING: Self::Upper;
 
+    /// Numbers as upper halves
+    fn uppers(numbers: &[f64]) -> &[Self::Upper];
+
+    /// The same to change them
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper];
+
     /// Into registers
     fn row(part: &Part<W>) -> Self::Row;
 
@@ -42,6 +52,9 @@ pub trait Rows<const W: usize> {
 
     /// row factor
     fn scaled(row: Self::Row, factor: f64) -> Self::Row;
+
+    /// sums += |a b|, number by number
+    fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row);
 
     /// a.b
     fn dot(a: &Part<W>, b: &Part<W>) -> f64;
@@ -61,6 +74,14 @@ impl Rows<6> for Width<6> {
     type Upper = [f64; 21];
 
     const NOTHING: Self::Upper = [0.0; 21];
+
+    fn uppers(numbers: &[f64]) -> &[Self::Upper] {
+        numbers.as_chunks().0
+    }
+
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper] {
+        numbers.as_chunks_mut().0
+    }
 
     #[inline(always)]
     fn row(part: &Part<6>) -> Self::Row {
@@ -85,6 +106,14 @@ impl Rows<6> for Width<6> {
     fn scaled(row: Self::Row, factor: f64) -> Self::Row {
         let factor = Lanes([factor; 4]);
         [row[0] * factor, row[1] * factor]
+    }
+
+    #[inline(always)]
+    fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row) {
+        for k in 0..2 {
+            let Lanes(product) = a[k] * b[k];
+            sums[k] += Lanes(each_lane!(|k| product[k].abs()));
+        }
     }
 
     /// Two sums of three: shorter chains than one of six.
@@ -115,6 +144,14 @@ impl Rows<3> for Width<3> {
 
     const NOTHING: Self::Upper = [0.0; 6];
 
+    fn uppers(numbers: &[f64]) -> &[Self::Upper] {
+        numbers.as_chunks().0
+    }
+
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper] {
+        numbers.as_chunks_mut().0
+    }
+
     #[inline(always)]
     fn row(part: &Part<3>) -> Self::Row {
         *part
@@ -135,6 +172,11 @@ impl Rows<3> for Width<3> {
     #[inline(always)]
     fn scaled(row: Self::Row, factor: f64) -> Self::Row {
         [row[0] * factor, row[1] * factor, row[2] * factor]
+    }
+
+    #[inline(always)]
+    fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row) {
+        (0..3).for_each(|k| sums[k] += (a[k] * b[k]).abs());
     }
 
     #[inline(always)]
@@ -234,10 +276,10 @@ pub enum Block<'a, const W: usize> {
 impl<'a, const W: usize> Block<'a, W> {
     /// In the tangent, or with its own.
     #[inline(always)]
-    pub fn find(source: Source, tiles: &Tiles<'a, W>, own: &'a Stretch<Tile<W>>) -> Self {
+    pub fn find(source: Source, beside: &'a [Tile<W>], own: &'a Stretch<Tile<W>>) -> Self {
         match source.stands() {
-            Stands::Tile(number) => Self::Tile(&tiles.beside[number]),
-            Stands::Transpose(number) => Self::Transpose(&tiles.beside[number]),
+            Stands::Tile(number) => Self::Tile(&beside[number]),
+            Stands::Transpose(number) => Self::Transpose(&beside[number]),
             Stands::Own(number) => Self::Tile(&own[number]),
             Stands::Nowhere => Self::Nothing,
         }
@@ -300,7 +342,27 @@ where
     });
 }
 
-/// The same for a product that is symmetric, of which one half is kept.
+/// Whether w^T y is [`MODERATE`] beside the tile on the diagonal that it is taken from.
+#[inline(always)]
+pub fn is_moderate<const W: usize>(w: &Tile<W>, y: &Tile<W>, target: &Tile<W>) -> bool
+where
+    Width<W>: Rows<W>,
+{
+    let mut sums = row::<W>(&[0.0; W]);
+    each_row!(W, |d| Width::<W>::add_sizes(&mut sums, &row::<W>(&w[d]), &row::<W>(&y[d])));
+    let (sums, mut is_moderate) = (part::<W>(sums), true);
+    each_row!(W, |r| is_moderate &= sums[r] <= MODERATE * target[r][r].abs());
+    is_moderate
+}
+
+/// Adds to a tile on the diagonal; whether that is [`MODERATE`].
+pub fn add_moderate<const W: usize>(sum: &mut Tile<W>, other: &Tile<W>) -> bool {
+    let is_moderate = (0..W).all(|r| other[r][r].abs() <= MODERATE * sum[r][r].abs());
+    sum.as_flattened_mut().iter_mut().zip(other.as_flattened()).for_each(|(sum, other)| *sum += other);
+    is_moderate
+}
+
+/// The same as [`subtract_product`] for a product that is symmetric, of which one half is kept.
 #[inline(always)]
 pub fn subtract_symmetric_product<const W: usize>(target: &mut Upper<W>, w: &Tile<W>, y: &Tile<W>)
 where
@@ -408,18 +470,21 @@ where
 }
 
 /// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds inverses. Rows stay where they are
-/// if their pivots are large enough for what is below them; else those with the largest pivots come first. `None` where a pivot is zero or no number.
+/// if their pivots are large enough for what is below them; else those with the largest pivots come first. Tells, too, whether no digits
+/// are lost. `None` where a pivot is zero or no number.
 #[inline(always)]
-pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<RowOrder<W>>
+pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<(RowOrder<W>, bool)>
 where
     Width<W>: Rows<W>,
 {
     let mut in_order = *tile;
     if factorise_in_order(&mut in_order) {
         *tile = in_order;
-        return Some(std::array::from_fn(|r| r as u8));
+        return Some((std::array::from_fn(|r| r as u8), true));
     }
-    factorise_by_largest(tile)
+    let before = *tile;
+    let order = factorise_by_largest(tile)?;
+    Some((order, has_grown_moderately(tile, &order, &before)))
 }
 
 /// The same with rows where they are; `false` where a pivot takes too much ([`GROWTH`]), is zero or no number.
@@ -463,6 +528,19 @@ where
         take_pivot(tile, r, inverse);
     }
     Some(order)
+}
+
+/// Whether |L| |U| is moderate beside the tile that was factorised with its rows in this order.
+#[inline(never)]
+fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, before: &Tile<W>) -> bool {
+    let lower = |i: usize, k: usize| if k < i { factor[i][k].abs() } else { 1.0 };
+    let upper = |k: usize, j: usize| if k < j { factor[k][j].abs() } else { 1.0 / factor[k][k].abs() };
+    (0..W).all(|i| {
+        (0..W).all(|j| {
+            let (row, sum) = (order[i] as usize, (0..=i.min(j)).map(|k| lower(i, k) * upper(k, j)).sum::<f64>());
+            sum * sum <= MODERATE * MODERATE * (before[row][row] * before[j][j]).abs()
+        })
+    })
 }
 
 /// Takes row r, whose pivot has this inverse, from those below.
@@ -629,6 +707,44 @@ where
         z[r] = sums[0] + sums[1];
     });
     z
+}
+
+/// A x, for a tile whose factors are there as for [`solve`].
+#[inline(always)]
+pub fn times<const W: usize>(inverses: &Tile<W>, order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
+    let (mut y, mut out) = (*x, [0.0; W]);
+    each_row_backwards!(W, |r| {
+        each_row!(W, |k| if k > r {
+            y[r] -= inverses[r][k] * y[k];
+        });
+        y[r] /= inverses[r][r];
+    });
+    each_row!(W, |r| {
+        each_row!(W, |k| if k < r {
+            y[r] -= inverses[r][k] * y[k];
+        });
+        out[order[r] as usize] = y[r];
+    });
+    out
+}
+
+/// The same for a symmetric tile, as for [`solve_symmetric`].
+#[inline(always)]
+pub fn times_symmetric<const W: usize>(inverses: &Upper<W>, x: &Part<W>) -> Part<W>
+where
+    Width<W>: Rows<W>,
+{
+    let (inverses, mut y) = (inverses.as_ref(), *x);
+    each_row_backwards!(W, |r| each_row!(W, |k| if k > r {
+        y[r] -= inverses[upper_entry(W, r, k)] * y[k];
+    }));
+    each_row!(W, |r| {
+        y[r] /= inverses[upper_entry(W, r, r)];
+        each_row!(W, |k| if k < r {
+            y[r] -= inverses[upper_entry(W, k, r)] * y[k];
+        });
+    });
+    y
 }
 
 /// A part in another order.
