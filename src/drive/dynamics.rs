@@ -197,11 +197,10 @@ impl Run<'_> {
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        trend.begin(&assembly.system.pattern.equations, &mut self.state, &step, newton.lend().0);
+        trend.begin(&assembly.system.pattern.equations, &mut self.state, &step, newton.scratch());
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
-        let (system, (scratch, solver)) = (&assembly.system, newton.lend());
-        let multiply = |x: &[f64], out: &mut [f64]| solver.multiply(system, x, out);
-        trend.end(&system.pattern.equations, &self.state, &step, scratch, multiply);
+        let (system, solver) = (&assembly.system, &mut newton.solver);
+        trend.end(&system.pattern.equations, &self.state, &step, |x| solver.multiply(system, x));
         self.refuse_massless_turns(massive)?;
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);

@@ -8,7 +8,8 @@
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
 use crate::real::Rough;
-use crate::system::{Equations, Scratch, State};
+use crate::system::{Equations, State};
+use crate::tensor::Vec3;
 use crate::threads;
 use std::array::from_fn;
 use std::collections::VecDeque;
@@ -79,61 +80,50 @@ impl Trend {
     }
 
     /// Adds what is foreseen to the prediction of a step.
-    pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step, scratch: Scratch) {
+    pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step, scratch: &mut [Vec3]) {
         self.predicted.resize(equations.count(), 0.0);
         equations.gather(|slot| state.q[slot], &mut self.predicted);
         let best = self.best();
         if let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) {
             self.taken = best;
-            self.foresee(&factors, scratch.numbers);
-            equations.scatter(scratch.numbers, None, scratch.vectors);
-            step.correct(state, scratch.vectors);
+            equations.scatter_found(|equation| self.foreseen(&factors, equation), scratch);
+            step.correct(state, scratch);
         }
     }
 
     /// The sum of the last corrections with their factors.
-    fn foresee(&self, factors: &Factors, sums: &mut [f64]) {
-        threads::each_part(sums, |start, sums| {
-            sums.fill(0.0);
-            for (past, factor) in self.past.iter().zip(factors) {
-                let corrections = (start..).map(|equation| past.correction.get(equation)[0]);
-                sums.iter_mut().zip(corrections).for_each(|(sum, part)| *sum += part * factor);
-            }
-        });
+    #[inline(always)]
+    fn foreseen(&self, factors: &Factors, equation: usize) -> f64 {
+        let parts = self.past.iter().zip(factors);
+        parts.fold(0.0, |sum, (past, factor)| sum + past.correction.get(equation)[0] * factor)
     }
 
-    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in; `multiply` gives the product of its tangent
-    /// with a vector.
-    pub fn end(
-        &mut self,
-        equations: &Equations,
-        state: &State,
-        step: &Step,
-        scratch: Scratch,
-        multiply: impl FnOnce(&[f64], &mut [f64]),
-    ) {
-        let force = scratch.numbers;
-        let mut correction = std::mem::take(&mut self.predicted);
-        equations.gather_change(|slot| state.q[slot], &mut correction);
-        multiply(&correction, force);
-        equations.scale(|slot| self.weights[self.kinds[slot] as usize], force);
-        self.learn(step.length, &correction, force);
-        self.predicted = correction;
+    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in; `multiply` turns a vector into its
+    /// product with the tangent.
+    pub fn end(&mut self, equations: &Equations, state: &State, step: &Step, multiply: impl FnOnce(&mut [f64])) {
+        let mut change = std::mem::take(&mut self.predicted);
+        equations.gather_change(|slot| state.q[slot], &mut change);
+        // Into the memory of the oldest, which nobody asks for any more.
+        let oldest = self.past.get_mut(MOST - 1).map(|oldest| std::mem::take(&mut oldest.correction));
+        let mut correction = oldest.unwrap_or_default();
+        correction.take(change.len(), |equation| [change[equation]]);
+        multiply(&mut change);
+        equations.scale(|slot| self.weights[self.kinds[slot] as usize], &mut change);
+        self.learn(step.length, correction, &change);
+        self.predicted = change;
     }
 
     /// Learns from a step of this length, with its correction and its force.
-    fn learn(&mut self, length: f64, correction: &[f64], force: &[f64]) {
+    fn learn(&mut self, length: f64, correction: Rough<1>, force: &[f64]) {
         let factors = from_fn(|way| self.factors(way, length, FORCE));
         let missed = self.rests(force, &factors);
         for (mean, (rest, known)) in self.missed.iter_mut().zip(missed.into_iter().zip(factors)) {
             *mean = known.map(|_| mean.map_or(rest, |mean| mean + NEWS * (rest - mean)));
         }
-        // Into the memory of the oldest, which nobody asks for any more.
         let oldest = if self.past.len() == MOST { self.past.pop_back() } else { None };
-        let mut last = Past { length, ..oldest.unwrap_or_default() };
-        last.correction.take(correction.len(), |equation| [correction[equation]]);
-        last.force.take(force.len(), |equation| [force[equation]]);
-        self.past.push_front(last);
+        let mut rough = oldest.unwrap_or_default().force;
+        rough.take(force.len(), |equation| [force[equation]]);
+        self.past.push_front(Past { length, correction, force: rough });
     }
 
     /// The last step is not taken after all.
@@ -188,10 +178,16 @@ impl Trend {
 mod tests {
     use super::*;
 
+    fn rough(numbers: &[f64]) -> Rough<1> {
+        let mut rough = Rough::default();
+        rough.take(numbers.len(), |k| [numbers[k]]);
+        rough
+    }
+
     fn with(corrections: &[f64]) -> Trend {
         let mut trend = Trend::default();
         for (length, correction) in corrections.iter().map(|c| (1.0, *c)) {
-            trend.learn(length, &[correction], &[correction]);
+            trend.learn(length, rough(&[correction]), &[correction]);
         }
         trend
     }
@@ -216,13 +212,13 @@ mod tests {
     fn steps_that_grow_are_foreseen() {
         let mut trend = Trend::default();
         for length in [1.0_f64, 1.8, 3.2, 5.8] {
-            trend.learn(length, &[length.powi(3)], &[length]);
+            trend.learn(length, rough(&[length.powi(3)]), &[length]);
         }
         assert_eq!(trend.best(), 1);
         // Of six digits the last may be off.
         assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
         // A step that is not taken has nothing to say.
-        trend.learn(5.8, &[7.0], &[1.0]);
+        trend.learn(5.8, rough(&[7.0]), &[1.0]);
         trend.withdraw();
         assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
     }
@@ -241,7 +237,7 @@ mod tests {
             for step in 1..=6 {
                 let force: Vec<f64> =
                     (0..5 * threads::PART).map(|k| (k as f64 * f64::from(step * step)).sin()).collect();
-                trend.learn(1.0, &force, &force);
+                trend.learn(1.0, rough(&force), &force);
             }
             trend.missed.map(|missed| missed.map(f64::to_bits))
         };

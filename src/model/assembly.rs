@@ -122,7 +122,8 @@ impl Assembly {
         if let Some(linear) = &mut self.linear {
             linear.formed = None;
         }
-        self.evaluate(state, weights, None);
+        let lift = self.system.lift().map(<[Vec3]>::to_vec);
+        self.evaluate(state, weights, lift.as_deref());
     }
 
     /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
@@ -163,9 +164,14 @@ impl Assembly {
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 
+    /// Whether any effect forms tangents with something that it foresees.
+    pub fn foresees(&self) -> bool {
+        self.linear.is_none() && self.effects.iter().any(|acting| !acting.memory.points.is_empty())
+    }
+
     /// Lets effects remember what the next tangent is formed with, see [`Effect::extrapolate`].
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
-        if self.linear.is_some() {
+        if !self.foresees() {
             return;
         }
         for acting in self.effects.iter_mut().filter(|acting| !acting.memory.points.is_empty()) {

@@ -37,16 +37,13 @@ const NEAR_TURN: f64 = 0.5;
 /// the time by which the algorithmic acceleration lies ahead of the state; `None` where it is the rate of a momentum, to
 /// which charts do not matter.
 pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
-    // NaN is never beyond: what is not finite is named by the assembly, not turned for ever.
-    let is_beyond = |p: Vec3| p.squared() > (PI + band) * (PI + band) && p.is_finite();
-    let goes_beyond = |part: Range<usize>| rotations[part].iter().find(|&&slot| is_beyond(state.q[slot as usize]));
-    let Some(first) = threads::first(rotations.len(), goes_beyond) else { return 0 };
+    let Some(first) = first_beyond(state, rotations, band) else { return 0 };
     state.wound_apart();
     let mut switched = 0;
-    for slot in rotations.iter().skip_while(|slot| *slot != first).map(|&slot| slot as usize) {
+    for slot in rotations.iter().skip_while(|slot| **slot != first).map(|&slot| slot as usize) {
         for _ in 0..MOST_CHANGES {
             let p = state.q[slot];
-            if !is_beyond(p) {
+            if !is_beyond(p, band) {
                 break;
             }
             let (velocity, acceleration) = (state.v[slot], state.a[slot]);
@@ -62,6 +59,18 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
         }
     }
     switched
+}
+
+/// The first rotation vector that [`switch`] replaces.
+pub fn first_beyond(state: &State, rotations: &[Slot], band: f64) -> Option<Slot> {
+    let in_part =
+        |part: Range<usize>| rotations[part].iter().copied().find(|&slot| is_beyond(state.q[slot as usize], band));
+    threads::first(rotations.len(), in_part)
+}
+
+/// NaN is never beyond: what is not finite is named by the assembly, not turned for ever.
+fn is_beyond(p: Vec3, band: f64) -> bool {
+    p.squared() > (PI + band) * (PI + band) && p.is_finite()
 }
 
 /// Chooses for each element the nodes that are converted into the chart of its first, and counts the mixed elements.
@@ -97,6 +106,16 @@ pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
             () => continued(p, *wound, Rotation::new(old).t.transpose_mul(increment)),
         };
     });
+}
+
+/// Moves the unknowns by so many times a correction, and nothing else; wound rotation vectors that are the unknowns stay so.
+pub fn shift(state: &mut State, dq: &[Vec3], times: f64) {
+    let State { q, wound, .. } = state;
+    if !wound.is_empty() {
+        let moved = |k: usize, wound: &mut Vec3| *wound = if *wound == q[k] { q[k] + dq[k] * times } else { *wound };
+        threads::each_part(wound, |start, part| (start..).zip(part).for_each(|(k, wound)| moved(k, wound)));
+    }
+    threads::each_part(q, |start, q| q.iter_mut().zip(&dq[start..]).for_each(|(q, &dq)| *q += dq * times));
 }
 
 /// Does something with what a list holds at each of some slots, which come in their order.

@@ -1,17 +1,13 @@
 //! The stress that the next tangent is formed with (the mixed-integration-point method): foreseen from the state before a correction, where
 //! it turns out that a tangent is formed at all.
 
-use crate::kernel::seam::Conversion;
-use crate::model::Assembly;
+use crate::model::{Assembly, charts};
 use crate::system::State;
 use crate::tensor::Vec3;
-use crate::threads;
 
-/// What stress is foreseen from.
+/// Whether there is something that stress can be foreseen from.
 #[derive(Default)]
 pub(super) struct Foresight {
-    q: Vec<Vec3>,
-    mixed: Vec<Conversion>,
     is_pending: bool,
 }
 
@@ -22,25 +18,19 @@ impl Foresight {
         self.is_pending = false;
     }
 
-    /// The state is going to be corrected: what stress it leads to is looked at when a tangent is formed with it.
-    pub fn remember(&mut self, state: &State) {
-        threads::copy(&mut self.q, &state.q);
-        self.mixed.clone_from(&state.mixed);
+    /// The state is going to be corrected: what stress that leads to is looked at when a tangent is formed with it.
+    pub fn remember(&mut self) {
         self.is_pending = true;
     }
 
-    /// A tangent is going to be formed at `state`, which has been corrected by `dq` since.
+    /// A tangent is going to be formed at `state`, which has been corrected by `dq` since, in the charts that it still has. It goes back and
+    /// forth, which leaves round-off of its unknowns: a copy of them would take as long as all corrections.
     pub fn foresee(&mut self, assembly: &mut Assembly, state: &mut State, dq: &[Vec3]) {
-        if !std::mem::take(&mut self.is_pending) {
+        if !std::mem::take(&mut self.is_pending) || !assembly.foresees() {
             return;
         }
-        self.swap(state);
+        charts::shift(state, dq, -1.0);
         assembly.extrapolate(state, dq);
-        self.swap(state);
-    }
-
-    fn swap(&mut self, state: &mut State) {
-        std::mem::swap(&mut self.q, &mut state.q);
-        std::mem::swap(&mut self.mixed, &mut state.mixed);
+        charts::shift(state, dq, 1.0);
     }
 }

@@ -6,6 +6,7 @@ use super::pivots::Pivots;
 use super::softest::NullVector;
 use super::tangent::Tangent;
 use crate::system::{Leftover, Slot, System};
+use crate::tensor::Vec3;
 
 /// Solves with tangents of one pattern.
 ///
@@ -25,7 +26,8 @@ pub struct LinearSolver {
     pub(super) multipliers: Vec<Slot>,
     /// Where it cannot count them itself
     pub(super) pivots: Option<Pivots>,
-    /// The last right-hand side, and what its solution left of it
+    /// The last right-hand side where it had to be one list, solved, as it was, and what its solution left of it
+    right_hand_side: Vec<f64>,
     wanted: Vec<f64>,
     leftover: Leftover,
 }
@@ -80,6 +82,7 @@ impl LinearSolver {
             revision: None,
             multipliers: multipliers.to_vec(),
             pivots: None,
+            right_hand_side: Vec::new(),
             wanted: Vec::new(),
             leftover: Leftover::default(),
         })
@@ -112,15 +115,32 @@ impl LinearSolver {
         self.blocks_in_use()?.negative().filter(|_| done)
     }
 
-    /// The product of the tangent with a vector, one entry an equation: by its factors where they have taken its place.
-    pub fn multiply(&mut self, system: &System, x: &[f64], out: &mut [f64]) {
+    /// The product of the tangent with x, one entry an equation: by its factors where they have taken its place.
+    pub fn multiply(&mut self, system: &System, x: &mut [f64]) {
         match &mut self.blocks {
-            Some(blocks) if system.holds_factors() => {
-                out.copy_from_slice(x);
-                blocks.multiply(system, out);
-            }
-            _ => system.multiply_into(&system.values, x, &mut self.leftover, out),
+            Some(blocks) if system.holds_factors() => blocks.multiply(system, x),
+            _ => system.multiply_in_place(&system.values, x, &mut self.leftover),
         }
+    }
+
+    /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field
+    /// of slots; held directions take their part of `held`. It [looks](LinearSolver::solve) at what is left where it is asked to.
+    /// `false` where there is no solution.
+    pub fn correct(&mut self, system: &System, looks: bool, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
+        let nothing_to_look_at = !looks || self.is_positive_definite() || system.holds_factors();
+        let is_factored = self.factored;
+        if let Some(blocks) = self.blocks_in_use().filter(|_| nothing_to_look_at) {
+            return is_factored && blocks.correct(system, held, out);
+        }
+        let mut x = std::mem::take(&mut self.right_hand_side);
+        x.resize(system.pattern.equations.count(), 0.0);
+        system.right_hand_side(&mut x);
+        let done = if looks { self.solve(system, &mut x) } else { self.solve_once(system, &mut x) };
+        if done {
+            system.pattern.equations.scatter(&x, held, out);
+        }
+        self.right_hand_side = x;
+        done
     }
 
     /// How it solves, in a few words.

@@ -12,7 +12,7 @@ use crate::integrate::Method;
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
 use crate::real::Rough;
-use crate::system::{Scratch, State, System};
+use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
 use std::time::Instant;
 
@@ -103,7 +103,6 @@ pub struct Newton {
     pub max_iterations: usize,
     /// Solves with the tangent
     pub solver: LinearSolver,
-    right_hand_side: Vec<f64>,
     dq: Vec<Vec3>,
     /// The size of the last correction of a solution: `None` before the first, infinite after a change of chart
     last: Option<f64>,
@@ -121,14 +120,11 @@ const RUNAWAY: f64 = 1e6;
 impl Newton {
     /// For a stage with these unknowns.
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
-        let (equations, slots) = (system.pattern.equations.count(), system.force[0].len());
-        let (right_hand_side, dq) = (vec![0.0; equations], zeros(slots));
         Self {
             convergence,
             max_iterations,
             solver,
-            right_hand_side,
-            dq,
+            dq: zeros(system.force[0].len()),
             last: None,
             first: Rough::default(),
             reuse: Reuse::new(),
@@ -145,9 +141,9 @@ impl Newton {
         negative
     }
 
-    /// Memory that nobody needs between solutions, and what multiplies with the tangent.
-    pub fn lend(&mut self) -> (Scratch<'_>, &mut LinearSolver) {
-        (Scratch { numbers: &mut self.right_hand_side, vectors: &mut self.dq }, &mut self.solver)
+    /// Memory for a field of slots that nobody needs between solutions.
+    pub fn scratch(&mut self) -> &mut [Vec3] {
+        &mut self.dq
     }
 
     /// The tangent of the system is that of the state that the next solution begins with, but for the loads.
@@ -236,7 +232,7 @@ impl Newton {
             if !noisy && self.reuse.expects_balance() {
                 self.foresight.forget(assembly);
             } else {
-                self.foresight.remember(state);
+                self.foresight.remember();
             }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {
@@ -310,31 +306,24 @@ impl Newton {
 
     /// The same, with a look at what the solver leaves or without.
     fn substitute(&mut self, tangent: &mut Tangent, lift: Option<&[Vec3]>, looks: bool, work: &mut Work) -> bool {
-        let Self { solver, right_hand_side, .. } = self;
-        tangent.system().right_hand_side(right_hand_side);
-        let solved = timed(&mut work.solve_seconds, || {
+        let Self { solver, dq, .. } = self;
+        timed(&mut work.solve_seconds, || {
             let (done, new) = solver.factorise_new(tangent);
             work.factorisations += u64::from(new);
-            match looks || new {
-                true => done && solver.solve(tangent.system(), right_hand_side),
-                false => done && solver.solve_once(tangent.system(), right_hand_side),
-            }
-        });
-        if solved {
-            tangent.system().pattern.equations.scatter(right_hand_side, lift, &mut self.dq);
-        }
-        solved
+            done && solver.correct(tangent.system(), looks || new, lift, dq)
+        })
     }
 
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn; whether one did.
     fn change_charts(&mut self, model: &Model, assembly: &mut Assembly, state: &mut State, work: &mut Work) -> bool {
-        let switched = charts::switch(state, &model.charted.rotations, charts::STATIC_BAND, None);
-        if switched > 0 {
-            work.chart_switches += switched as u64;
-            charts::freeze(state, &model.charted.elements);
-            self.reuse.forget();
-            self.foresight.foresee(assembly, state, &self.dq);
+        let rotations = &model.charted.rotations;
+        if charts::first_beyond(state, rotations, charts::STATIC_BAND).is_none() {
+            return false;
         }
-        switched > 0
+        self.foresight.foresee(assembly, state, &self.dq);
+        work.chart_switches += charts::switch(state, rotations, charts::STATIC_BAND, None) as u64;
+        charts::freeze(state, &model.charted.elements);
+        self.reuse.forget();
+        true
     }
 }

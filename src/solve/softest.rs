@@ -59,8 +59,7 @@ impl LinearSolver {
         }
         let diagonal = diagonal(system);
         let empty = empty_column(system, &diagonal);
-        let scale = if empty.is_none() { scales(system, &diagonal) } else { Vec::new() };
-        drop(diagonal);
+        let scale = scales(system, diagonal);
         let broke_down = !tangent.stays() && !self.factorise_new(tangent).0;
         if let Some(empty) = empty {
             let mut entries = vec![0.0; tangent.system().pattern.equations.count()];
@@ -115,22 +114,23 @@ fn diagonal(system: &System) -> Vec<f64> {
 }
 
 /// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column comparable.
-fn scales(system: &System, diagonal: &[f64]) -> Vec<f64> {
-    let roots = threads::list(diagonal.len(), |k| diagonal[k].abs().sqrt());
+fn scales(system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
+    threads::each_part(&mut diagonal, |_, part| part.iter_mut().for_each(|entry| *entry = entry.abs().sqrt()));
+    let roots = &diagonal;
     let column = |c: usize| {
         let compared = entries(system, c).map(|(row, value)| (value, roots[row]));
         compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
     };
     let entry = |c: usize| entries(system, c).fold(0.0_f64, |m, (_, value)| m.max(value.abs()));
-    let scale = |c: usize| match roots[c] {
-        root if root > 0.0 => root,
-        _ => match column(c) {
-            compared if compared > 0.0 => compared,
-            // Unknowns and multipliers that only meet each other.
-            _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
-        },
+    let scale = |c: usize| match column(c) {
+        compared if compared > 0.0 => compared,
+        // Unknowns and multipliers that only meet each other.
+        _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
     };
-    threads::list(roots.len(), scale)
+    let without: Vec<usize> = (0..roots.len()).filter(|&c| roots[c].is_nan() || roots[c] <= 0.0).collect();
+    let scales = threads::list(without.len(), |k| scale(without[k]));
+    without.into_iter().zip(scales).for_each(|(c, scale)| diagonal[c] = scale);
+    diagonal
 }
 
 /// Row and value of the entries of a column.

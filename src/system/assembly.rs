@@ -46,14 +46,6 @@ impl Leftover {
     }
 }
 
-/// Memory that somebody else does not need just now.
-pub struct Scratch<'a> {
-    /// One an equation
-    pub numbers: &'a mut [f64],
-    /// One a slot
-    pub vectors: &'a mut [Vec3],
-}
-
 /// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
 ///
 /// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).
@@ -214,21 +206,21 @@ impl System {
 
     /// A x, for a matrix with these values on the pattern of the tangent.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; x.len()];
-        self.multiply_into(values, x, &mut Leftover::default(), &mut out);
+        let mut out = x.to_vec();
+        self.multiply_in_place(values, &mut out, &mut Leftover::default());
         out
     }
 
-    /// The same into memory that is there.
-    pub fn multiply_into(&self, values: &[f64], x: &[f64], room: &mut Leftover, out: &mut [f64]) {
+    /// The same in the place of x.
+    pub fn multiply_in_place(&self, values: &[f64], x: &mut [f64], room: &mut Leftover) {
         if self.pattern.width() == WIDTH {
-            self.product::<WIDTH>(values, x, room, out);
+            self.product::<WIDTH>(values, x, room);
         } else {
-            self.product::<3>(values, x, room, out);
+            self.product::<3>(values, x, room);
         }
     }
 
-    fn product<const W: usize>(&self, values: &[f64], x: &[f64], room: &mut Leftover, out: &mut [f64]) {
+    fn product<const W: usize>(&self, values: &[f64], x: &mut [f64], room: &mut Leftover) {
         let sums = room.take::<W>(&self.pattern, 1);
         threads::each_part(sums, |_, sums| sums.fill([0.0; W]));
         self.each_product::<W, _>(
@@ -243,7 +235,7 @@ impl System {
             },
         );
         let sums = &*sums;
-        self.pattern.join(|group| &sums[group], out);
+        self.pattern.join(|group| &sums[group], x);
     }
 
     /// Shows each tile with what belongs to the group of its rows, and the part of x that its columns take: regions at once. Tiles that
@@ -368,6 +360,34 @@ impl System {
         let total =
             |region: &Region, slot: usize| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot]);
         self.fill_right_hand_side(total, out);
+    }
+
+    /// The part of a group of that, row by row.
+    #[inline(always)]
+    pub fn right_hand_side_at<const W: usize>(&self, group: usize) -> [f64; W] {
+        let Pattern { equations, groups, .. } = &self.pattern;
+        let (region, own_equations, mut own) =
+            (self.pattern.region_of(group), self.pattern.equations_of(group), [0.0; W]);
+        let force = |slot: u32| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot as usize]);
+        let slots = groups.members(group);
+        if !self.lifts && equations.are_components(slots.clone()) && 3 * slots.len() == W {
+            slots.zip(own.as_chunks_mut().0).for_each(|(slot, own)| *own = (-force(slot)).0);
+            return own;
+        }
+        for slot in slots {
+            let force = force(slot);
+            let (local, own) = (equations.to_local(slot, force), &mut own[..own_equations.len()]);
+            equations.each_of(slot as usize, local, own_equations.start, own, |own, entry| *own = -entry);
+        }
+        if self.lifts {
+            own.iter_mut().zip(&self.lifted[own_equations]).for_each(|(own, lifted)| *own -= lifted);
+        }
+        self.pattern.spread(group, own)
+    }
+
+    /// The increments of held directions that the next correction takes with it.
+    pub fn lift(&self) -> Option<&[Vec3]> {
+        self.lifts.then_some(&self.lift)
     }
 
     /// The same for other forces than those that were assembled.

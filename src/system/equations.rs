@@ -185,6 +185,13 @@ impl Equations {
         (slot as Slot, directions.count() as u8)
     }
 
+    /// Whether the equations of some slots that follow each other are their components.
+    #[inline(always)]
+    pub fn are_components(&self, slots: std::ops::Range<Slot>) -> bool {
+        let count = self.before(slots.end as usize) - self.before(slots.start as usize);
+        self.frame.is_empty() && count == 3 * slots.len()
+    }
+
     /// The turned axes of a slot as columns.
     #[inline]
     pub fn frame(&self, slot: Slot) -> Option<Mat3> {
@@ -263,19 +270,37 @@ impl Equations {
     pub fn scatter(&self, solution: &[f64], held: Option<&[Vec3]>, out: &mut [Vec3]) {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
-                let mut local = held.map_or(Vec3::ZERO, |held| self.to_local(slot as Slot, held[slot]));
-                match solution.get(self.before(slot)..self.before(slot + 1)) {
-                    Some(&[x, y, z]) => local = Vec3([x, y, z]),
-                    _ => {
-                        for (local, number) in local.0.iter_mut().zip(self.of(slot as Slot)) {
-                            // What is held has the number of no equation.
-                            *local = solution.get(number as usize).copied().unwrap_or(*local);
-                        }
-                    }
-                }
-                *out = self.axes(slot as Slot).map_or(local, |frame| *frame * local);
+                let first = self.before(slot);
+                *out = self.at(slot, &solution[first..self.before(slot + 1)], first, held);
             }
         });
+    }
+
+    /// The same where the solution is found by equation, and nothing is held that moves.
+    pub fn scatter_found(&self, solution: impl Fn(usize) -> f64 + Send + Sync, out: &mut [Vec3]) {
+        threads::each_part(out, |start, out| {
+            for (slot, out) in (start..).zip(out) {
+                let (first, end) = (self.before(slot), self.before(slot + 1));
+                let own: [f64; 3] = std::array::from_fn(|k| if first + k < end { solution(first + k) } else { 0.0 });
+                *out = self.at(slot, &own[..end - first], first, None);
+            }
+        });
+    }
+
+    /// What stands at a slot, of a solution from the equation `start` on.
+    #[inline(always)]
+    pub fn at(&self, slot: usize, solution: &[f64], start: usize, held: Option<&[Vec3]>) -> Vec3 {
+        let mut local = held.map_or(Vec3::ZERO, |held| self.to_local(slot as Slot, held[slot]));
+        match solution.get(self.before(slot) - start..self.before(slot + 1) - start) {
+            Some(&[x, y, z]) => local = Vec3([x, y, z]),
+            _ => {
+                for (local, number) in local.0.iter_mut().zip(self.of(slot as Slot)) {
+                    // What is held has the number of no equation.
+                    *local = solution.get((number as usize).wrapping_sub(start)).copied().unwrap_or(*local);
+                }
+            }
+        }
+        self.axes(slot as Slot).map_or(local, |frame| *frame * local)
     }
 
     /// Whether no direction of a slot is held but those that leave the plane.

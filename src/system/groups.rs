@@ -9,11 +9,35 @@ pub const SLOTS: usize = 2;
 /// The slots of a scene in groups of one or two.
 #[derive(Clone, Debug)]
 pub struct Groups {
+    slots: usize,
+    /// Where not all groups are pairs
+    uneven: Option<Uneven>,
+    layout: Layout,
+}
+
+#[derive(Clone, Debug)]
+struct Uneven {
     /// For each slot its group, twice, and its place in it
     places: Vec<u32>,
     /// The first slot of each group, and behind the last group the number of all
     starts: Vec<Slot>,
-    layout: Layout,
+}
+
+impl Uneven {
+    fn new(slots: usize, joins: impl Fn(Slot) -> bool) -> Self {
+        let (mut places, mut starts) = (Vec::with_capacity(slots), Vec::with_capacity(slots / SLOTS + 1));
+        for slot in 0..slots as Slot {
+            let joined = starts.last().filter(|&&first| slot - first < SLOTS as Slot && joins(slot)).copied();
+            if joined.is_none() {
+                starts.push(slot);
+            }
+            let place = joined.map_or(0, |first| slot - first);
+            places.push(SLOTS as u32 * (starts.len() as u32 - 1) + place);
+        }
+        starts.push(slots as Slot);
+        starts.shrink_to_fit();
+        Self { places, starts }
+    }
 }
 
 /// Which rows of a tile belong to the directions of its slots.
@@ -28,33 +52,25 @@ pub enum Layout {
 impl Groups {
     /// Of so many slots; `joins` tells which of them share the group of the one before.
     pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
-        let (mut places, mut starts) = (Vec::with_capacity(slots), Vec::with_capacity(slots / SLOTS + 1));
-        for slot in 0..slots as Slot {
-            let joined = starts.last().filter(|&&first| slot - first < SLOTS as Slot && joins(slot)).copied();
-            if joined.is_none() {
-                starts.push(slot);
-            }
-            let place = joined.map_or(0, |first| slot - first);
-            places.push(SLOTS as u32 * (starts.len() as u32 - 1) + place);
-        }
-        starts.push(slots as Slot);
-        starts.shrink_to_fit();
-        Self { places, starts, layout }
+        let second = |slot: Slot| slot % SLOTS as Slot != 0;
+        let are_pairs = slots % SLOTS == 0 && (0..slots as Slot).all(|slot| joins(slot) == second(slot));
+        Self { slots, uneven: (!are_pairs).then(|| Uneven::new(slots, joins)), layout }
     }
 
     /// The number of groups.
     pub fn count(&self) -> usize {
-        self.starts.len() - 1
+        self.uneven.as_ref().map_or(self.slots / SLOTS, |uneven| uneven.starts.len() - 1)
     }
 
     /// The number of slots.
     pub fn slots(&self) -> usize {
-        self.places.len()
+        self.slots
     }
 
     /// The first slot of a group; those of its others and of later groups follow. Behind the last group the number of all.
+    #[inline]
     pub fn first_slot(&self, group: usize) -> usize {
-        self.starts[group] as usize
+        self.uneven.as_ref().map_or(SLOTS * group, |uneven| uneven.starts[group] as usize)
     }
 
     /// The rows of a tile.
@@ -78,14 +94,14 @@ impl Groups {
     /// The group of a slot, and its place in it.
     #[inline]
     pub fn of(&self, slot: Slot) -> (usize, usize) {
-        let place = self.places[slot as usize] as usize;
+        let place = self.uneven.as_ref().map_or(slot, |uneven| uneven.places[slot as usize]) as usize;
         (place / SLOTS, place % SLOTS)
     }
 
     /// The slots of a group.
     #[inline]
     pub fn members(&self, group: usize) -> Range<Slot> {
-        self.starts[group]..self.starts[group + 1]
+        self.first_slot(group) as Slot..self.first_slot(group + 1) as Slot
     }
 }
 
@@ -101,5 +117,14 @@ mod tests {
         assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| groups.of(slot)), [(0, 0), (0, 1), (1, 0), (2, 0), (3, 0), (3, 1)]);
         assert_eq!((groups.row(1), groups.first_slot(4), groups.slots()), ((0, 3), 6, 6));
         assert_eq!(Groups::new(0, Layout::Planar, |_| true).count(), 0);
+    }
+
+    #[test]
+    fn pairs_need_no_list() {
+        let groups = Groups::new(8, Layout::Spatial, |slot| slot % 2 == 1);
+        let members: Vec<_> = (0..groups.count()).map(|group| groups.members(group)).collect();
+        assert_eq!(members, [0..2, 2..4, 4..6, 6..8]);
+        assert_eq!((groups.of(5), groups.row(5), groups.first_slot(4)), ((2, 1), (2, 3), 8));
+        assert!(groups.uneven.is_none() && Groups::new(7, Layout::Spatial, |slot| slot % 2 == 1).uneven.is_some());
     }
 }

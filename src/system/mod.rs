@@ -13,11 +13,11 @@ mod state;
 mod storage;
 mod values;
 
-pub use assembly::{Category, Leftover, Scratch, System};
+pub use assembly::{Category, Leftover, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use field::Field;
 pub use groups::{Groups, Layout};
-pub use pattern::{Cliques, Entry, Pattern, Symmetry, Tile, WIDTH, transposed};
+pub use pattern::{Cliques, Entry, Meetings, Pattern, Symmetry, Tile, WIDTH, transposed};
 pub use plane::{Aspect, Plane};
 pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};

@@ -6,7 +6,9 @@ use super::regions::{self, Region, Shares};
 use super::state::Slot;
 use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
+use crate::tensor::Vec3;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
@@ -145,10 +147,8 @@ pub struct Pattern {
     pub column_starts: Vec<u32>,
     /// The group of the rows of each of these.
     pub rows: Vec<u32>,
-    /// Where the tiles of each column begin that are not kept
-    mirror_starts: Vec<u32>,
-    /// These, column by column
-    mirrors: Vec<Mirror>,
+    /// The tiles that are not kept, once somebody has asked for entries of theirs
+    mirrors: OnceLock<Mirrors>,
     /// Rows without an equation: group, and row of its tile
     pub idle: Vec<(u32, u8)>,
     /// What is evaluated at once
@@ -180,8 +180,6 @@ impl Pattern {
     /// The pattern of several effects, given by the cliques of each.
     pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>, symmetry: Symmetry) -> Self {
         let (column_starts, rows) = compressed_columns(&groups, &effects, symmetry.halves());
-        let (mirror_starts, mirrors) =
-            if symmetry.halves() { mirrors(&column_starts, &rows) } else { Default::default() };
         let regions = regions::cut(&groups, &equations, &column_starts);
         let storage = Storage::new(groups.width(), groups.count(), symmetry == Symmetry::Whole);
         let (idle, between, places) = (Vec::new(), Vec::new(), Vec::new());
@@ -192,8 +190,7 @@ impl Pattern {
             storage,
             column_starts,
             rows,
-            mirror_starts,
-            mirrors,
+            mirrors: OnceLock::new(),
             idle,
             regions,
             between,
@@ -208,7 +205,7 @@ impl Pattern {
 
     /// The number of pairs of groups that meet.
     pub fn pairs(&self) -> usize {
-        (self.rows.len() + self.mirrors.len()) / 2
+        if self.symmetry.halves() { self.rows.len() } else { self.rows.len() / 2 }
     }
 
     /// The rows of a tile.
@@ -239,18 +236,13 @@ impl Pattern {
         &self.rows[self.tiles_of(column)]
     }
 
-    /// The tiles in a column that are not.
-    #[inline]
-    fn mirrors_of(&self, column: usize) -> &[Mirror] {
-        match self.mirror_starts.get(column..column + 2) {
-            Some(&[start, end]) => &self.mirrors[start as usize..end as usize],
-            _ => &[],
-        }
+    /// Who meets whom.
+    pub fn meetings(&self) -> Meetings<'_> {
+        Meetings { pattern: self, mirrors: self.find_mirrors() }
     }
 
-    /// The other groups that a group meets, in their order.
-    pub fn met_by(&self, group: usize) -> impl Iterator<Item = u32> {
-        self.mirrors_of(group).iter().map(|mirror| mirror.row).chain(self.rows_of(group).iter().copied())
+    fn find_mirrors(&self) -> Mirrors {
+        if self.symmetry.halves() { Mirrors::new(&self.column_starts, &self.rows) } else { Mirrors::default() }
     }
 
     /// The equations of a group's rows, [`Equations::HELD`] for those without.
@@ -277,6 +269,29 @@ impl Pattern {
         }
     }
 
+    /// The same of numbers of the group's own equations.
+    #[inline(always)]
+    pub fn spread<const W: usize>(&self, group: usize, own: [f64; W]) -> [f64; W] {
+        let equations = self.equations_of(group);
+        if equations.len() == W {
+            return own;
+        }
+        let mut numbers = self.numbers(group);
+        let of_row = |number: u32| own.get((number as usize).wrapping_sub(equations.start)).copied();
+        std::array::from_fn(|_| numbers.next().and_then(of_row).unwrap_or(0.0))
+    }
+
+    /// The reverse of that.
+    #[inline(always)]
+    fn gathered<const W: usize>(&self, group: usize, part: &[f64; W]) -> [f64; W] {
+        let mut own = *part;
+        if self.equations_of(group).len() != W {
+            let free = self.numbers(group).zip(part).filter(|(number, _)| *number != Equations::HELD);
+            own.iter_mut().zip(free).for_each(|(own, (_, &value))| *own = value);
+        }
+        own
+    }
+
     /// The same row by row.
     #[cold]
     fn part_by_rows<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
@@ -291,7 +306,7 @@ impl Pattern {
 
     /// The equations of a group; where they are as many as a tile is wide, those of its rows in their order.
     #[inline(always)]
-    fn equations_of(&self, group: usize) -> Range<usize> {
+    pub fn equations_of(&self, group: usize) -> Range<usize> {
         self.equations.before(self.groups.first_slot(group))..self.equations.before(self.groups.first_slot(group + 1))
     }
 
@@ -304,12 +319,45 @@ impl Pattern {
                 match out.first_chunk_mut::<W>() {
                     Some(out) => *out = *part,
                     None => {
-                        let free = self.numbers(group).zip(part).filter(|(number, _)| *number != Equations::HELD);
-                        out.iter_mut().zip(free).for_each(|(out, (_, &value))| *out = value);
+                        let length = out.len();
+                        out.copy_from_slice(&self.gathered(group, part)[..length]);
                     }
                 }
             }
         });
+    }
+
+    /// Writes parts, found by their groups, into a field of slots; held directions take their part of `held`.
+    pub fn scatter<'a, const W: usize>(
+        &self,
+        part: impl Fn(usize) -> &'a [f64; W] + Send + Sync,
+        held: Option<&[Vec3]>,
+        out: &mut [Vec3],
+    ) {
+        regions::each(
+            &self.regions,
+            out,
+            |region| region.slots.end,
+            |region, out| {
+                for group in region.groups.clone() {
+                    let (own, equations) = (self.gathered(group, part(group)), self.equations_of(group));
+                    for slot in self.groups.members(group).map(|slot| slot as usize) {
+                        out[slot - region.slots.start] =
+                            self.equations.at(slot, &own[..equations.len()], equations.start, held);
+                    }
+                }
+            },
+        );
+    }
+
+    /// The region of a group.
+    #[inline(always)]
+    pub fn region_of(&self, group: usize) -> &Region {
+        match &self.regions[..] {
+            [all] => all,
+            // All but the last are as long as the first.
+            regions => &regions[group / regions[0].groups.len()],
+        }
     }
 
     /// Does something for each region with what belongs to its equations, one number each.
@@ -332,13 +380,15 @@ impl Pattern {
             free(mirror.row as usize).map(move |(row, r)| Entry { row, place: storage.entry(tile, c, r) })
         };
         let kept = self.tiles_of(group).flat_map(move |tile| in_tile(self.rows[tile] as usize, storage.other(tile)));
-        self.mirrors_of(group).iter().flat_map(mirrored).chain(in_tile(group, storage.own(group))).chain(kept)
+        let mirrors = self.mirrors.get_or_init(|| self.find_mirrors());
+        mirrors.of(group).iter().flat_map(mirrored).chain(in_tile(group, storage.own(group))).chain(kept)
     }
 
     /// The number of entries between equations.
     pub fn nonzeros(&self) -> usize {
+        let meetings = self.meetings();
         let free = |group: usize| self.numbers(group).filter(|&n| n != Equations::HELD).count();
-        let column = |c: usize| free(c) * (free(c) + self.met_by(c).map(|row| free(row as usize)).sum::<usize>());
+        let column = |c: usize| free(c) * (free(c) + meetings.of(c).map(|row| free(row as usize)).sum::<usize>());
         (0..self.groups.count()).map(column).sum()
     }
 
@@ -503,6 +553,47 @@ fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Ve
 }
 
 /// The transposes of all tiles below the diagonal, column by column.
+#[derive(Clone, Debug, Default)]
+struct Mirrors {
+    starts: Vec<u32>,
+    all: Vec<Mirror>,
+}
+
+impl Mirrors {
+    fn new(column_starts: &[u32], rows: &[u32]) -> Self {
+        let (starts, all) = mirrors(column_starts, rows);
+        Self { starts, all }
+    }
+
+    /// Those in a column.
+    #[inline]
+    fn of(&self, column: usize) -> &[Mirror] {
+        match self.starts.get(column..column + 2) {
+            Some(&[start, end]) => &self.all[start as usize..end as usize],
+            _ => &[],
+        }
+    }
+}
+
+/// Who meets whom.
+pub struct Meetings<'a> {
+    pattern: &'a Pattern,
+    mirrors: Mirrors,
+}
+
+impl Meetings<'_> {
+    /// The number of pairs that meet.
+    pub fn pairs(&self) -> usize {
+        self.pattern.pairs()
+    }
+
+    /// The other groups that a group meets, in their order.
+    pub fn of(&self, group: usize) -> impl Iterator<Item = u32> {
+        let kept = self.pattern.rows_of(group).iter().copied();
+        self.mirrors.of(group).iter().map(|mirror| mirror.row).chain(kept)
+    }
+}
+
 fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
     let columns = column_starts.len() - 1;
     let below = || {

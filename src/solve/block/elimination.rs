@@ -73,8 +73,8 @@ pub struct Elimination {
     pub starts: Vec<u32>,
     /// Later neighbours
     pub later: Vec<u32>,
-    /// Where the targets of each row begin
-    pub target_starts: Vec<u32>,
+    /// Where the targets of each row begin, where there are some
+    target_starts: Vec<u32>,
     /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a: the number, among those that
     /// elimination changes, of the block that they share right of the diagonal
     pub targets: Vec<u32>,
@@ -136,6 +136,12 @@ impl Elimination {
     #[inline]
     pub fn neighbours(&self, row: usize) -> Range<usize> {
         self.starts[row] as usize..self.starts[row + 1] as usize
+    }
+
+    /// Where the targets of a row begin.
+    #[inline(always)]
+    pub fn first_target(&self, row: usize) -> usize {
+        self.target_starts.get(row).map_or(0, |&first| first as usize)
     }
 
     /// A block right of the diagonal, by rows.
@@ -274,5 +280,5 @@ fn targets(starts: &[u32], later: &[u32]) -> (Vec<u32>, Vec<u32>) {
             targets.extend(neighbours[..k].iter().map(|&a| find(starts, later, a, b) as u32));
         }
     }
-    (begins, targets)
+    if targets.is_empty() { Default::default() } else { (begins, targets) }
 }

@@ -100,7 +100,7 @@ where
         for row in rows {
             tile::spread(&diagonal[row], &mut factor);
             negative += tile::factorise_symmetric(&mut factor)?;
-            let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
+            let (neighbours, mut target) = (elimination.neighbours(row), elimination.first_target(row));
             before.clear();
             for k in neighbours.clone() {
                 let forward = |block: &Tile<W>| tile::forward_symmetric(&factor, block, &mut y);

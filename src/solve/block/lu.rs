@@ -114,7 +114,7 @@ where
             tile::copy(&mut factor, &diagonal[row]);
             let (order, mut is_sure) = tile::factorise(&mut factor)?;
             orders[row] = order;
-            let (neighbours, mut target) = (elimination.neighbours(row), elimination.target_starts[row] as usize);
+            let (neighbours, mut target) = (elimination.neighbours(row), elimination.first_target(row));
             before.clear();
             for k in neighbours.clone() {
                 let is_one = elimination.is_one(k);

@@ -16,6 +16,7 @@ mod stretch;
 mod tile;
 
 use crate::system::{Pattern, Symmetry, System, WIDTH};
+use crate::tensor::Vec3;
 use crate::threads;
 use elimination::Elimination;
 use ldl::Ldl;
@@ -149,6 +150,28 @@ impl BlockSolver {
             WIDTH => self.by_rows::<WIDTH>(&system.pattern, x, |factor, order, x| factor.solve(order, system, x)),
             _ => self.by_rows::<3>(&system.pattern, x, |factor, order, x| factor.solve(order, system, x)),
         }
+    }
+
+    /// Solves for the correction that a system asks for, whose tangent was factorised last, and writes it into a field of slots; held
+    /// directions take their part of `held`. Whether it is finite.
+    pub fn correct(&mut self, system: &System, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
+        match system.pattern.width() {
+            WIDTH => self.correct_by::<WIDTH>(system, held, out),
+            _ => self.correct_by::<3>(system, held, out),
+        }
+    }
+
+    fn correct_by<const W: usize>(&mut self, system: &System, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
+        let Self { elimination, factor, parts } = self;
+        threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
+            for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
+                *part = system.right_hand_side_at(group as usize);
+            }
+        });
+        factor.solve(elimination, system, parts);
+        let parts = parts.as_chunks::<W>().0;
+        system.pattern.scatter(|group| &parts[elimination.row_of[group] as usize], held, out);
+        parts.as_flattened().iter().all(|x| x.is_finite())
     }
 
     /// The product of the tangent that was factorised last with x, one entry an equation, by its factors.

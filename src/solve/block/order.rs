@@ -5,7 +5,7 @@
 //! a chordal graph, which can be eliminated without any more fill towards any of its cliques (Rose, Tarjan and Lueker 1976,
 //! doi:10.1137/0205021): here towards one in its middle.
 
-use crate::system::Pattern;
+use crate::system::{Meetings, Pattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -45,12 +45,12 @@ pub struct Neighbours {
 
 impl Neighbours {
     /// Neighbours in the pattern, and what the rows that were eliminated before leave behind. `None` where these are more than `most`.
-    fn new(pattern: &Pattern, order: &[u32], most: usize) -> Option<Self> {
+    fn new(meetings: &Meetings, order: &[u32], most: usize) -> Option<Self> {
         let (n, row_of) = (order.len(), inverse(order));
         // Rows whose first later neighbour is this one
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut seen = vec![u32::MAX; n];
-        let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(pattern.pairs()));
+        let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(meetings.pairs()));
         starts.push(0);
         for row in 0..n {
             let start = later.len();
@@ -61,7 +61,7 @@ impl Neighbours {
                     later.push(other);
                 }
             };
-            for group in pattern.met_by(order[row] as usize) {
+            for group in meetings.of(order[row] as usize) {
                 visit(row_of[group as usize], &mut later);
             }
             for child in std::mem::take(&mut children[row]) {
@@ -114,18 +114,19 @@ impl Neighbours {
 /// The order for a pattern. `None` where it fills up to more blocks than `most`, or memory cannot be had.
 pub fn find(pattern: &Pattern, most: usize) -> Option<Order> {
     let order = minimum_degree(pattern)?;
-    let neighbours = Neighbours::new(pattern, &order, most)?;
+    let meetings = &pattern.meetings();
+    let neighbours = Neighbours::new(meetings, &order, most)?;
     if order.len() < LEAST {
         return Some(Order { order, branches: Vec::new(), neighbours });
     }
     let order = permuted(&order, &towards_the_middle(&neighbours));
-    let neighbours = Neighbours::new(pattern, &order, most)?;
+    let neighbours = Neighbours::new(meetings, &order, most)?;
     let (sorted, branches) = branches(&neighbours.parents());
     if branches.is_empty() {
         return Some(Order { order, branches, neighbours });
     }
     let order = permuted(&order, &sorted);
-    Some(Order { neighbours: Neighbours::new(pattern, &order, most)?, order, branches })
+    Some(Order { neighbours: Neighbours::new(meetings, &order, most)?, order, branches })
 }
 
 /// Where each entry stands.
