@@ -6,7 +6,7 @@ use crate::drive::Moment;
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use crate::system::{Pattern, StageKind};
+use crate::system::StageKind;
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use std::path::PathBuf;
@@ -153,16 +153,15 @@ fn tell_mass(scene: &Scene) {
     say::line(&format!("inertia about the centre {:?}", inertia.0));
 }
 
-/// Of a tangent and its factors.
-fn numbers(pattern: &Pattern) -> usize {
-    pattern.values() + pattern.values_of_factors()
-}
-
-/// States, forces, mesh, elements and the places of their blocks: as much as so many vectors a slot, as measured for chains of a million elements.
-const VECTORS: usize = 15;
+/// States, forces, mesh, elements and the places of their blocks: as much as so many vectors a slot, as measured for chains of a million
+/// elements, whose factors stand within the tangent.
+const VECTORS: usize = 12;
 
 /// The same with rates, masses and what is learnt from steps
-const VECTORS_IN_DYNAMICS: usize = 33;
+const VECTORS_IN_DYNAMICS: usize = 27;
+
+/// What a planar scene takes besides where it is kept in space, too
+const VECTORS_IN_SPACE: usize = 6;
 
 /// Unknowns, entries of the tangent, memory, and what each effect adds to them; and whether the first stage can begin.
 fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
@@ -176,11 +175,12 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let shares = model.shares(&context, &equations);
     // A planar scene is kept in space, too, for the looks out of the plane.
     let in_space = equations.plane().and_then(|_| model.number(0, None).ok());
-    let in_space = in_space.map_or(0, |equations| numbers(&Assembly::new(&context, equations, &model).system.pattern));
+    let in_space = in_space.map(|equations| Assembly::new(&context, equations, &model).system.pattern.values());
     let assembly = Assembly::new(&context, equations, &model);
     let entries = assembly.system.pattern.nonzeros();
     let vectors = if kind == StageKind::Dynamic { VECTORS_IN_DYNAMICS } else { VECTORS };
-    let bytes = 8 * (numbers(&assembly.system.pattern) + in_space) + 24 * vectors * slots;
+    let vectors = vectors + in_space.map_or(0, |_| VECTORS_IN_SPACE);
+    let bytes = 8 * (assembly.system.pattern.values() + in_space.unwrap_or(0)) + 24 * vectors * slots;
     say::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),

@@ -141,8 +141,8 @@ impl Run<'_> {
         let Workshop { assembly, newton, .. } = workshop;
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
-        let limp = Limp::find(&mut newton.solver, &mut tangent, &self.model, false);
-        limp.is_none_or(|limp| !limp.vector.broke_down && !limp.is_loose())
+        newton.solver.factorise_new(&mut tangent).0
+            && Limp::find(&mut newton.solver, &mut tangent, &self.model, false).is_none_or(|limp| !limp.is_loose())
     }
 }
 
@@ -220,7 +220,8 @@ impl Run<'_> {
         let mut moves = vec![false; self.model.slots()];
         self.model.motions.iter().for_each(|motion| moves[motion.slot as usize] = true);
         let mut touched = |weights: Weights| -> Vec<bool> {
-            workshop.assembly.evaluate(&self.state, weights, None);
+            // Factors may have taken the place of the one that is there.
+            workshop.assembly.form_again(&self.state, weights);
             let system = &workshop.assembly.system;
             threads::list(moves.len(), |slot| {
                 let moves = moves[slot] && !system.pattern.equations.is_plain(slot as Slot);

@@ -117,7 +117,7 @@ impl Assembly {
         }
     }
 
-    /// The same where factors have taken the place of a tangent that was formed already.
+    /// The same where factors may have taken the place of a tangent that was formed already.
     pub fn form_again(&mut self, state: &State, weights: Weights) {
         if let Some(linear) = &mut self.linear {
             linear.formed = None;

@@ -108,14 +108,18 @@ pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
     });
 }
 
-/// Moves the unknowns by so many times a correction, and nothing else; wound rotation vectors that are the unknowns stay so.
-pub fn shift(state: &mut State, dq: &[Vec3], times: f64) {
-    let State { q, wound, .. } = state;
-    if !wound.is_empty() {
-        let moved = |k: usize, wound: &mut Vec3| *wound = if *wound == q[k] { q[k] + dq[k] * times } else { *wound };
-        threads::each_part(wound, |start, part| (start..).zip(part).for_each(|(k, wound)| moved(k, wound)));
-    }
-    threads::each_part(q, |start, q| q.iter_mut().zip(&dq[start..]).for_each(|(q, &dq)| *q += dq * times));
+/// Shows a state as it was before a correction of its unknowns alone; wound rotation vectors that are the unknowns stay so.
+pub fn there_and_back(state: &mut State, dq: &[Vec3], look: impl FnOnce(&State)) {
+    let wound = state.wound.iter().zip(&state.q).enumerate();
+    let unwound: Vec<usize> = wound.filter(|(_, (wound, q))| wound == q).map(|(slot, _)| slot).collect();
+    shift(state, dq, -1.0);
+    look(state);
+    shift(state, dq, 1.0);
+    unwound.into_iter().for_each(|slot| state.wound[slot] = state.q[slot]);
+}
+
+fn shift(state: &mut State, dq: &[Vec3], times: f64) {
+    threads::each_part(&mut state.q, |start, q| q.iter_mut().zip(&dq[start..]).for_each(|(q, &dq)| *q += dq * times));
 }
 
 /// Does something with what a list holds at each of some slots, which come in their order.

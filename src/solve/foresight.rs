@@ -24,13 +24,11 @@ impl Foresight {
     }
 
     /// A tangent is going to be formed at `state`, which has been corrected by `dq` since, in the charts that it still has. It goes back and
-    /// forth, which leaves round-off of its unknowns: a copy of them would take as long as all corrections.
+    /// forth, which leaves round-off of what was corrected: a copy of all unknowns would take as long as all corrections.
     pub fn foresee(&mut self, assembly: &mut Assembly, state: &mut State, dq: &[Vec3]) {
         if !std::mem::take(&mut self.is_pending) || !assembly.foresees() {
             return;
         }
-        charts::shift(state, dq, -1.0);
-        assembly.extrapolate(state, dq);
-        charts::shift(state, dq, 1.0);
+        charts::there_and_back(state, dq, |before| assembly.extrapolate(before, dq));
     }
 }

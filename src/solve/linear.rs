@@ -20,8 +20,8 @@ pub struct LinearSolver {
     general: Option<Box<GeneralSolver>>,
     trust: Trust,
     /// Whether the last factorisation has come to its end
-    factored: bool,
-    /// That of the tangent that was factorised last, where it stays
+    pub(super) factored: bool,
+    /// That of the tangent that was factorised last; `None` where its values may have changed under the same number
     revision: Option<u64>,
     pub(super) multipliers: Vec<Slot>,
     /// Where it cannot count them itself
@@ -124,7 +124,7 @@ impl LinearSolver {
     }
 
     /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field
-    /// of slots; held directions take their part of `held`. It [looks](LinearSolver::solve) at what is left where it is asked to.
+    /// of slots; held directions take their part of `held`. It [looks](LinearSolver::solve) at what is left where it is asked to and there is something to look at.
     /// `false` where there is no solution.
     pub fn correct(&mut self, system: &System, looks: bool, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         let nothing_to_look_at = !looks || self.is_positive_definite() || system.holds_factors();
@@ -199,8 +199,8 @@ impl LinearSolver {
     }
 
     /// Solves with the last factorisation, which is that of `system`; `false` where there is no solution. What blocks leave
-    /// of the residual is refined, unless all pivots are positive, or the tangent is gone: then they are [sure](BlockSolver::is_sure) to
-    /// leave no more than round-off.
+    /// of the residual is refined, unless all pivots are positive, or the tangent is gone: then they are [sure](BlockSolver::is_sure), and
+    /// what they leave shows in Newton's next residual.
     pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
         if !self.trust.in_blocks || self.is_positive_definite() || system.holds_factors() {
             return self.solve_once(system, right_hand_side);

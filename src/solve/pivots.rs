@@ -39,7 +39,8 @@ const COMPLIANCE: f64 = 1e-9;
 
 impl LinearSolver {
     /// How many pivots of the tangent are negative, those of multipliers left out; `None` where it is not symmetric, or a
-    /// pivot is lost. Where this solver's own factorisation tells, the tangent is what it has factorised last.
+    /// pivot is lost. Where this solver's own factorisation tells, the tangent is what it has factorised last,
+    /// and may be used up by that.
     pub fn negative_pivots(&mut self, tangent: &mut Tangent) -> Option<usize> {
         if self.is_symmetric() {
             return self.negative_of_own(tangent);

@@ -60,7 +60,7 @@ impl LinearSolver {
         let diagonal = diagonal(system);
         let empty = empty_column(system, &diagonal);
         let scale = scales(system, diagonal);
-        let broke_down = !tangent.stays() && !self.factorise_new(tangent).0;
+        let broke_down = !(if tangent.stays() { self.factored } else { self.factorise_new(tangent).0 });
         if let Some(empty) = empty {
             let mut entries = vec![0.0; tangent.system().pattern.equations.count()];
             entries[empty] = 1.0;

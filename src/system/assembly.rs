@@ -58,7 +58,8 @@ pub struct System {
     /// The numbers of those that something may add to, in all and region by region
     acting: Vec<usize>,
     acting_in: Vec<Vec<usize>>,
-    /// The values of the tangent, tile by tile: that of the last evaluation with weights
+    /// The values of the tangent, tile by tile: that of the last evaluation with weights, unless [factors](System::holds_factors) have taken
+    /// its place
     pub values: Vec<f64>,
     /// Counts how often the tangent has become another one
     pub revision: u64,
@@ -189,6 +190,7 @@ impl System {
 
     /// What a slot has of the tangent on its diagonal, in its own directions; zero where one is held.
     pub fn own_block(&self, slot: Slot) -> Mat3 {
+        debug_assert!(!self.holds_factors, "there is no tangent");
         let mut block = Mat3::ZERO;
         self.pattern.own_entries(slot).for_each(|([r, c], place)| block.0[r][c] = self.values[place]);
         block
@@ -196,6 +198,7 @@ impl System {
 
     /// Adds a symmetric block to that, in the directions that are not held.
     pub fn add_to_own_block(&mut self, slot: Slot, block: &Mat3) {
+        debug_assert!(!self.holds_factors, "there is no tangent");
         // Where one half is kept, entries share their place with their mirror images.
         let once = self.pattern.symmetry == Symmetry::Whole;
         for ([r, c], place) in self.pattern.own_entries(slot).filter(|([r, c], _)| r <= c || !once) {
@@ -316,6 +319,7 @@ impl System {
     }
 
     fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+        debug_assert!(!self.holds_factors, "there is no tangent");
         let pattern = &self.pattern;
         let residuals = room.take::<W>(pattern, 2).as_chunks_mut::<2>().0;
         threads::each_part(residuals, |start, residuals| {

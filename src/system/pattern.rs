@@ -219,11 +219,6 @@ impl Pattern {
         self.storage.other(self.rows.len())
     }
 
-    /// The number of values of its factors, where they do not fill up: beside the diagonal they are the tangent's own.
-    pub fn values_of_factors(&self) -> usize {
-        self.storage.boundary()
-    }
-
     /// The tiles in a column that are kept beside the diagonal.
     #[inline]
     pub fn tiles_of(&self, column: usize) -> Range<usize> {
@@ -340,10 +335,16 @@ impl Pattern {
             |region| region.slots.end,
             |region, out| {
                 for group in region.groups.clone() {
-                    let (own, equations) = (self.gathered(group, part(group)), self.equations_of(group));
-                    for slot in self.groups.members(group).map(|slot| slot as usize) {
-                        out[slot - region.slots.start] =
-                            self.equations.at(slot, &own[..equations.len()], equations.start, held);
+                    let (slots, part) = (self.groups.members(group), part(group));
+                    let first = slots.start as usize - region.slots.start;
+                    let out = &mut out[first..first + slots.len()];
+                    if 3 * slots.len() == W && self.equations.are_components(slots.clone()) {
+                        out.iter_mut().zip(part.as_chunks().0).for_each(|(out, part)| *out = Vec3(*part));
+                        continue;
+                    }
+                    let (own, equations) = (self.gathered(group, part), self.equations_of(group));
+                    for (slot, out) in slots.zip(out) {
+                        *out = self.equations.at(slot as usize, &own[..equations.len()], equations.start, held);
                     }
                 }
             },

@@ -137,9 +137,10 @@ impl BlockSolver {
         self.factor.negative()
     }
 
-    /// Whether the last factorisation has lost no digits. Where the tangent is symmetric, all pivots are positive: it is that of a matrix which
-    /// differs from A_ij by a few eps sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorems 10.4,
-    /// 10.5). Where not, elimination took from no entry on the diagonal much more than it was.
+    /// Whether the last factorisation shows no sign of lost digits. Where the tangent is symmetric, all pivots are positive: it is that of a
+    /// matrix which differs from A_ij by a few eps sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed.,
+    /// theorems 10.4, 10.5). Where not, no row took from an entry on the diagonal much more than what it had then: no proof, since
+    /// several rows may take some each.
     pub fn is_sure(&self) -> bool {
         self.factor.is_sure()
     }
@@ -169,9 +170,11 @@ impl BlockSolver {
             }
         });
         factor.solve(elimination, system, parts);
-        let parts = parts.as_chunks::<W>().0;
-        system.pattern.scatter(|group| &parts[elimination.row_of[group] as usize], held, out);
-        parts.as_flattened().iter().all(|x| x.is_finite())
+        let (is_finite, parts) = (parts.iter().all(|x| x.is_finite()), parts.as_chunks::<W>().0);
+        if is_finite {
+            system.pattern.scatter(|group| &parts[elimination.row_of[group] as usize], held, out);
+        }
+        is_finite
     }
 
     /// The product of the tangent that was factorised last with x, one entry an equation, by its factors.
