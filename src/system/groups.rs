@@ -52,8 +52,9 @@ pub enum Layout {
 impl Groups {
     /// Of so many slots; `joins` tells which of them share the group of the one before.
     pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
-        let second = |slot: Slot| slot % SLOTS as Slot != 0;
-        let are_pairs = slots % SLOTS == 0 && (0..slots as Slot).all(|slot| (slot > 0 && joins(slot)) == second(slot));
+        let second = |slot: Slot| !slot.is_multiple_of(SLOTS as Slot);
+        let are_pairs =
+            slots.is_multiple_of(SLOTS) && (0..slots as Slot).all(|slot| (slot > 0 && joins(slot)) == second(slot));
         Self { slots, uneven: (!are_pairs).then(|| Uneven::new(slots, joins)), layout }
     }
 

@@ -117,11 +117,14 @@ pub struct Look<'a, P: Piece<W>, const W: usize> {
     pub diagonal: Diagonal<'a, &'a [P::Own]>,
 }
 
+/// What a branch changes in the trunk: blocks beside the diagonal, and tiles on it, row by row.
+type Change<P, const W: usize> = (P, Vec<<P as Piece<W>>::Own>);
+
 /// Branches and trunk.
 pub struct Pieces<P: Piece<W>, const W: usize> {
     branches: Vec<P>,
-    /// What each branch changes in the trunk, and on its diagonal
-    changes: Vec<(P, Vec<P::Own>)>,
+    /// What each branch changes
+    changes: Vec<Change<P, W>>,
     trunk: P,
     /// Later than the trunk there is nothing.
     nothing: P,
@@ -169,13 +172,12 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
     ) -> Option<Signs> {
         let Self { branches, changes, trunk, nothing, .. } = self;
         let mut of_trunk = diagonals.pop()?;
-        let branch =
-            |((piece, mut diagonal), (change, later)): ((&mut P, Diagonal<&mut [P::Own]>), &mut (P, Vec<P::Own>))| {
-                change.clear();
-                later.fill(P::NOTHING);
-                let mut later = Diagonal::by_rows(&mut later[..], elimination.trunk.start);
-                eliminate(piece, elimination, own, beside, &mut diagonal, (change, &mut later))
-            };
+        let branch = |((piece, mut diagonal), (change, later)): (_, &mut Change<P, W>)| {
+            change.clear();
+            later.fill(P::NOTHING);
+            let mut later = Diagonal::by_rows(&mut later[..], elimination.trunk.start);
+            eliminate(piece, elimination, own, beside, &mut diagonal, (change, &mut later))
+        };
         let mut counted = Some(Signs::default());
         threads::in_order(branches.iter_mut().zip(diagonals).zip(&mut *changes), branch, |signs| {
             counted = counted.zip(signs).map(|(mut sum, signs)| {
