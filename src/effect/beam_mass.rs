@@ -19,24 +19,39 @@ pub struct BeamMass {
 struct MassElement<const N: usize> {
     /// Displacements of its nodes
     u: [Slot; N],
-    /// Their initial places
-    places: [Vec3; N],
-    /// The sum of w rhoA N_i N_j over its points, the same in all directions; neighbours that have the same share it.
-    mass: Arc<[[f64; N]; N]>,
+    /// The initial place of the first
+    place: Vec3,
+    /// All else, for it and neighbours that have the same
+    common: Arc<Common<N>>,
+}
+
+/// What neighbours share.
+#[derive(Debug, PartialEq)]
+struct Common<const N: usize> {
+    /// The initial places of the nodes as seen from the first
+    arms: [Vec3; N],
+    /// The sum of w rhoA N_i N_j over the points, the same in all directions
+    mass: [[f64; N]; N],
 }
 
 impl<const N: usize> MassElement<N> {
     fn new(element: &VolumeElement<N, f64>, neighbour: Option<&Self>) -> Self {
         let entry = |i: usize, j: usize| -> f64 {
-            element.points.iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
+            element.points().iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
         };
         let mass = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-        let shared = neighbour.map(|neighbour| &neighbour.mass).filter(|known| ***known == mass);
+        let common = Common { arms: *element.arms(), mass };
+        let shared = neighbour.map(|neighbour| &neighbour.common).filter(|known| ***known == common);
         Self {
             u: element.connection.nodes.map(|node| node.u),
-            places: element.places,
-            mass: shared.cloned().unwrap_or_else(|| Arc::new(mass)),
+            place: element.place(),
+            common: shared.cloned().unwrap_or_else(|| Arc::new(common)),
         }
+    }
+
+    #[inline(always)]
+    fn mass(&self) -> &[[f64; N]; N] {
+        &self.common.mass
     }
 
     /// The mass times what its displacements do: M a, or M v.
@@ -46,7 +61,7 @@ impl<const N: usize> MassElement<N> {
         for j in 0..N {
             let value = field[self.u[j] as usize];
             for i in 0..N {
-                out[i] += value * self.mass[i][j];
+                out[i] += value * self.mass()[i][j];
             }
         }
         out
@@ -61,7 +76,7 @@ impl<const N: usize> MassElement<N> {
     /// Shows each node's number, its present place and its share of M v.
     fn each_momentum(&self, at: &State, mut show: impl FnMut(usize, Vec3, Vec3)) {
         for (i, linear) in self.times(&at.v).into_iter().enumerate() {
-            show(i, self.places[i] + at.q[self.u[i] as usize], linear);
+            show(i, self.place + self.common.arms[i] + at.q[self.u[i] as usize], linear);
         }
     }
 }
@@ -111,7 +126,7 @@ impl Effect for BeamMass {
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
         for_each_batch!(self.elements, out.instances(), |first, batch| {
             for (k, element) in batch.iter().enumerate() {
-                out.add_mass(first + k, &element.times(&at.a), &element.mass, weights.mass);
+                out.add_mass(first + k, &element.times(&at.a), element.mass(), weights.mass);
             }
         });
     }
@@ -130,7 +145,7 @@ impl Effect for BeamMass {
         for_each_batch!(self.elements, |_first, batch| for element in batch {
             element.each_momentum(at, |i, x, linear| {
                 // A row of the matrix is what a node has of the mass.
-                let mass = element.mass[i].iter().sum();
+                let mass = element.mass()[i].iter().sum();
                 sum.add(Momentum { mass, moment: x * mass, linear, angular: x.cross(linear) });
             });
         });
@@ -158,7 +173,7 @@ mod tests {
         let place = |i: usize| Vec3([LENGTH * i as f64 / (N - 1) as f64, 0.0, 0.0]);
         let nodes = std::array::from_fn(|i| Node { u: 2 * i as Slot, p: 2 * i as Slot + 1 });
         let connection = Connection { element: 0, nodes };
-        VolumeElement { connection, places: std::array::from_fn(place), points: std::array::from_fn(point) }
+        VolumeElement::new(connection, Vec3::ZERO, std::array::from_fn(place), std::array::from_fn(point), None)
     }
 
     /// Spins an element about a pivot beside it, as a rigid body.

@@ -6,16 +6,73 @@ use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
 use crate::system::{Cliques, Sink, State};
 use crate::tensor::Vec3;
+use std::sync::Arc;
 
 /// An element of N nodes and as many points.
 #[derive(Clone, Debug)]
 pub struct VolumeElement<const N: usize, Q> {
     /// Its place in the scene
     pub connection: Connection<N>,
-    /// The initial places of its nodes
-    pub places: [Vec3; N],
-    /// Its integration points
-    pub points: [VolumePoint<N, Q>; N],
+    /// The initial place of its first node
+    place: Vec3,
+    /// All else, for it and neighbours that have the same
+    common: Arc<Common<N, Q>>,
+}
+
+/// What neighbours share.
+#[derive(Debug, PartialEq)]
+struct Common<const N: usize, Q> {
+    /// The initial places of the nodes as seen from the first
+    arms: [Vec3; N],
+    points: [VolumePoint<N, Q>; N],
+}
+
+impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
+    /// From its first node at `place` on; it shares with a neighbour what both have in common.
+    pub fn new(
+        connection: Connection<N>,
+        place: Vec3,
+        arms: [Vec3; N],
+        points: [VolumePoint<N, Q>; N],
+        neighbour: Option<&Self>,
+    ) -> Self
+    where
+        Q: PartialEq,
+    {
+        let common = Common { arms, points };
+        let shared = neighbour.map(|neighbour| &neighbour.common).filter(|known| ***known == common);
+        Self { connection, place, common: shared.cloned().unwrap_or_else(|| Arc::new(common)) }
+    }
+
+    /// The initial place of its first node.
+    pub fn place(&self) -> Vec3 {
+        self.place
+    }
+
+    /// The initial places of its nodes as seen from the first.
+    pub fn arms(&self) -> &[Vec3; N] {
+        &self.common.arms
+    }
+
+    /// Its integration points.
+    #[inline(always)]
+    pub fn points(&self) -> &[VolumePoint<N, Q>; N] {
+        &self.common.points
+    }
+
+    /// Point g of elements side by side, as a kernel takes it.
+    #[inline(always)]
+    fn point_side_by_side<K>(elements: [&Self; LANES], kernel: &K, g: usize) -> VolumePoint<N, K::Present<Lanes>, Lanes>
+    where
+        K: VolumeKernel<Quantity = Q>,
+        K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
+    {
+        let point = |k: usize| elements[k].points()[g].map(|quantity| kernel.at_present(quantity));
+        match elements[1..].iter().all(|element| Arc::ptr_eq(&element.common, &elements[0].common)) {
+            true => VolumePoint::pack([&point(0); LANES]),
+            false => VolumePoint::pack(each_lane!(|k| point(k)).each_ref()),
+        }
+    }
 }
 
 /// Elements of all orders.
@@ -57,8 +114,8 @@ impl<Q: Copy> VolumeElements<Q> {
     pub fn each_point(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3, &NodeMotion)) {
         for_each_batch!(self, |_first, batch| for element in batch {
             let nodes = element.connection.motions_in_one_chart(at);
-            for point in &element.points {
-                let place = beam::interpolate(&point.shape, |i| element.places[i]);
+            for point in element.points() {
+                let place = element.place + beam::interpolate(&point.shape, |i| element.arms()[i]);
                 show(&point.quantity, point.weight, place, &point.motion(&nodes));
             }
         });
@@ -67,7 +124,7 @@ impl<Q: Copy> VolumeElements<Q> {
     /// Shows the quantity of each point.
     pub fn each_quantity(&self, mut show: impl FnMut(&Q)) {
         for_each_batch!(self, |_first, batch| {
-            batch.iter().flat_map(|element| &element.points).for_each(|point| show(&point.quantity));
+            batch.iter().flat_map(|element| element.points()).for_each(|point| show(&point.quantity));
         });
     }
 
@@ -75,7 +132,7 @@ impl<Q: Copy> VolumeElements<Q> {
     pub fn any(&self, is: impl Fn(&Q) -> bool) -> bool {
         let mut found = false;
         for_each_batch!(self, |_first, batch| {
-            found |= batch.iter().flat_map(|element| &element.points).any(|point| is(&point.quantity));
+            found |= batch.iter().flat_map(|element| element.points()).any(|point| is(&point.quantity));
         });
         found
     }
@@ -100,8 +157,7 @@ fn add_batch<K, const N: usize>(
         let nodes = motions(each_lane!(|k| &elements[k].connection), at);
         systems.clear_for(weights);
         for g in 0..N {
-            let points = each_lane!(|k| elements[k].points[g].map(|quantity| kernel.at_present(quantity)));
-            VolumePoint::pack(each_lane!(|k| &points[k])).add(kernel, &nodes, weights, &mut systems);
+            VolumeElement::point_side_by_side(elements, kernel, g).add(kernel, &nodes, weights, &mut systems);
         }
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
         out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, is_mixed, |k, out| {
@@ -123,7 +179,7 @@ fn add_alone<K: VolumeKernel, const N: usize>(
 ) {
     let mut system = ElementSystem::new(K::BLOCKS.count(N));
     let sum = |nodes: &[NodeMotion; N], weights: Weights, system: &mut ElementSystem| {
-        for point in &element.points {
+        for point in element.points() {
             point.map(|quantity| kernel.at_present(quantity)).add(kernel, nodes, weights, system);
         }
     };

@@ -43,7 +43,7 @@ pub fn force_on_complement<T: Real>(p: Vec3<T>, force: Vec3<T>) -> (Vec3<T>, Mat
 }
 
 /// Force and moment per initial length, and the number of their amplitude.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intensity {
     /// Force per length
     pub force: Vec3,

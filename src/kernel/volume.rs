@@ -6,7 +6,7 @@ use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
 
 /// An integration point for such a quantity.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumePoint<const N: usize, Q, T = f64> {
     /// Shape functions
     pub shape: [T; N],

@@ -94,12 +94,17 @@ impl BeamElement<'_> {
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
 
+    /// The initial place of its first node.
+    pub fn place(&self) -> Vec3 {
+        self.mesh.nodes[self.nodes[0]].place
+    }
+
     /// The initial places of its nodes.
-    pub fn places<const N: usize>(&self) -> [Vec3; N] {
+    fn places<const N: usize>(&self) -> [Vec3; N] {
         std::array::from_fn(|i| self.mesh.nodes[self.nodes[i]].place)
     }
 
-    /// The same as seen from the first.
+    /// The initial places of its nodes as seen from the first.
     pub fn arms<const N: usize>(&self) -> [Vec3; N] {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
         self.beam.line.pieces[piece].arms(self.places(), count)

@@ -270,29 +270,31 @@ fn connect<const N: usize>(element: &BeamElement) -> Connection<N> {
 }
 
 /// Pushes an element with these volume points into the batch of its order.
-fn push_volume<Q: Copy>(
+fn push_volume<Q: Copy + PartialEq>(
     batches: &mut VolumeElements<Q>,
     element: &BeamElement,
     stations: &[Station],
     quantity: impl Fn(usize) -> Q,
 ) {
     match element.nodes.len() {
-        2 => batches.two.push(volume(element, stations, quantity)),
-        3 => batches.three.push(volume(element, stations, quantity)),
-        _ => batches.four.push(volume(element, stations, quantity)),
+        2 => batches.two.push(volume(element, stations, quantity, batches.two.last())),
+        3 => batches.three.push(volume(element, stations, quantity, batches.three.last())),
+        _ => batches.four.push(volume(element, stations, quantity, batches.four.last())),
     }
 }
 
-fn volume<const N: usize, Q: Copy>(
+fn volume<const N: usize, Q: Copy + PartialEq>(
     element: &BeamElement,
     stations: &[Station],
     quantity: impl Fn(usize) -> Q,
+    neighbour: Option<&VolumeElement<N, Q>>,
 ) -> VolumeElement<N, Q> {
     let point = |k: usize| {
         let Station { shape, weight, .. } = &stations[k];
         VolumePoint { shape: std::array::from_fn(|i| shape[i]), weight: *weight, quantity: quantity(k) }
     };
-    VolumeElement { connection: connect(element), places: element.places(), points: std::array::from_fn(point) }
+    let points = std::array::from_fn(point);
+    VolumeElement::new(connect(element), element.place(), element.arms(), points, neighbour)
 }
 
 fn elastic<const N: usize, const G: usize>(
