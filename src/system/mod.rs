@@ -7,6 +7,7 @@ mod groups;
 mod pattern;
 mod plane;
 mod regions;
+mod runs;
 mod sink;
 mod stage;
 mod state;

@@ -3,6 +3,7 @@
 use super::equations::Equations;
 use super::groups::{Groups, SLOTS};
 use super::regions::{self, Region, Shares};
+use super::runs::Runs;
 use super::state::Slot;
 use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
@@ -32,7 +33,7 @@ pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
 #[derive(Clone, Debug, Default)]
 pub struct Cliques {
     slots: Vec<Slot>,
-    ends: Vec<u32>,
+    instances: Runs,
     pub(super) divisible: bool,
 }
 
@@ -45,30 +46,30 @@ impl Cliques {
 
     /// Adds an instance that couples these slots, in the order of its blocks.
     pub fn push(&mut self, slots: impl IntoIterator<Item = Slot>) {
+        let before = self.slots.len();
         self.slots.extend(slots);
-        self.ends.push(self.slots.len() as u32);
+        self.instances.push(self.slots.len() - before);
     }
 
     fn shrink(&mut self) {
         self.slots.shrink_to_fit();
-        self.ends.shrink_to_fit();
+        self.instances.shrink_to_fit();
     }
 
     /// The number of instances.
     pub fn len(&self) -> usize {
-        self.ends.len()
+        self.instances.len()
     }
 
     /// Whether there is no instance.
     pub fn is_empty(&self) -> bool {
-        self.ends.is_empty()
+        self.instances.is_empty()
     }
 
     /// The slots of an instance.
     #[inline]
     pub fn get(&self, k: usize) -> &[Slot] {
-        let start = if k == 0 { 0 } else { self.ends[k - 1] as usize };
-        &self.slots[start..self.ends[k] as usize]
+        &self.slots[self.instances.get(k)]
     }
 
     /// All instances.
@@ -86,7 +87,7 @@ pub(super) struct Places {
     /// By instance and then by rows of blocks: where a block is added to, or [`NOT_KEPT`]. Blocks are those of whole nodes, or else
     /// those of slots.
     pub values: Vec<u32>,
-    starts: Vec<u32>,
+    of_instances: Runs,
     /// Instances that touch a held direction or turned axes.
     pub special: Vec<bool>,
     pub shares: Shares,
@@ -95,7 +96,7 @@ pub(super) struct Places {
 impl Places {
     #[inline]
     pub fn of(&self, k: usize) -> &[u32] {
-        &self.values[self.starts[k] as usize..self.starts[k + 1] as usize]
+        &self.values[self.of_instances.get(k)]
     }
 }
 
@@ -478,17 +479,18 @@ impl Pattern {
 
     fn places_of(&self, cliques: Cliques) -> Places {
         let whole = cliques.iter().all(|slots| self.is_whole(slots));
+        let step = if whole { SLOTS } else { 1 };
         let mut places = Places {
             whole,
-            values: Vec::new(),
-            starts: Vec::with_capacity(cliques.len() + 1),
+            values: Vec::with_capacity(cliques.iter().map(|slots| (slots.len() / step).pow(2)).sum()),
+            of_instances: Runs::default(),
             special: Vec::with_capacity(cliques.len()),
             shares: Shares::new(&cliques, &self.groups, &self.regions),
             cliques: Cliques::default(),
         };
         for slots in cliques.iter() {
-            places.starts.push(places.values.len() as u32);
-            let corners = || slots.iter().step_by(if whole { SLOTS } else { 1 }).map(|&slot| self.groups.row(slot));
+            let before = places.values.len();
+            let corners = || slots.iter().step_by(step).map(|&slot| self.groups.row(slot));
             for (i, r) in corners() {
                 let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
                     // Cliques are what the pattern was made of.
@@ -497,10 +499,10 @@ impl Pattern {
                 };
                 places.values.extend(corners().filter_map(place));
             }
+            places.of_instances.push(places.values.len() - before);
             places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
         }
-        places.starts.push(places.values.len() as u32);
-        places.values.shrink_to_fit();
+        places.of_instances.shrink_to_fit();
         places.cliques = cliques;
         places.cliques.shrink();
         places
@@ -518,38 +520,39 @@ impl Pattern {
 
 /// Column by column the other groups that a group meets; where `halves` do those that come after it.
 fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Vec<u32>, Vec<u32>) {
+    let is_kept = |column: u32, row: u32| row > column || (row != column && !halves);
+    let kept = |met: &[u32], column: u32| met.iter().filter(|&&row| is_kept(column, row)).count() as u32;
     // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
-    let mut room = vec![0_u32; groups.count()];
-    each_meeting(groups, effects, &mut |met| met.iter().for_each(|&group| room[group as usize] += met.len() as u32));
-    let mut ends = Vec::with_capacity(groups.count());
-    let mut meets = Vec::new();
-    for room in room {
-        ends.push(meets.len());
-        meets.resize(meets.len() + room as usize, 0);
-    }
+    let mut column_starts = vec![0_u32; groups.count() + 1];
+    let ends = &mut column_starts[1..];
+    each_meeting(groups, effects, &mut |met| met.iter().for_each(|&column| ends[column as usize] += kept(met, column)));
+    let mut room = 0;
+    ends.iter_mut().for_each(|end| room += std::mem::replace(end, room));
+    let mut rows = vec![0_u32; room as usize];
     each_meeting(groups, effects, &mut |met| {
         for &column in met {
             let end = &mut ends[column as usize];
-            meets[*end..*end + met.len()].copy_from_slice(met);
-            *end += met.len();
-        }
-    });
-    let (mut column_starts, mut rows) = (vec![0], Vec::new());
-    let mut start = 0;
-    for (group, end) in ends.into_iter().enumerate() {
-        let column = &mut meets[start..end];
-        column.sort_unstable();
-        let first = rows.len();
-        for &row in column.iter().filter(|&&row| row as usize > group || (row as usize != group && !halves)) {
-            if rows.get(first..).and_then(<[u32]>::last) != Some(&row) {
-                rows.push(row);
+            for &row in met.iter().filter(|&&row| is_kept(column, row)) {
+                rows[*end as usize] = row;
+                *end += 1;
             }
         }
-        column_starts.push(rows.len() as u32);
-        start = end;
+    });
+    // In place: a column has no more rows than meetings.
+    let (mut start, mut count) = (0, 0);
+    for end in ends {
+        let first = count;
+        rows[start..*end as usize].sort_unstable();
+        for k in start..*end as usize {
+            if first == count || rows[count - 1] != rows[k] {
+                rows[count] = rows[k];
+                count += 1;
+            }
+        }
+        start = std::mem::replace(end, count as u32) as usize;
     }
+    rows.truncate(count);
     rows.shrink_to_fit();
-    column_starts.shrink_to_fit();
     (column_starts, rows)
 }
 

@@ -40,6 +40,8 @@ impl Composer<'_> {
             }
         });
         let mass = BeamMass::new(&mass);
+        rotary.shrink_to_fit();
+        eccentric.shrink_to_fit();
         let rotary = RotaryInertia { elements: rotary, gyroscopic };
         let eccentric = SectionInertia { elements: eccentric, gyroscopic };
         if mass.is_empty() {
@@ -127,6 +129,7 @@ impl Composer<'_> {
         let nodal = self.each_inertia(|element, stations, found| {
             push_volume(&mut elements, element, stations, |k| (found[k], element.between(&stations[k].shape)));
         });
+        elements.shrink_to_fit();
         let bodies = [nodal, self.out.bodies.clone()].concat();
         for (number, stage) in &framed {
             let Some(frame) = &stage.frame else { continue };
@@ -192,6 +195,7 @@ impl Composer<'_> {
             let nodal = self.each_inertia(|element, stations, found| {
                 push_volume(&mut elements, element, stations, |k| found[k]);
             });
+            elements.shrink_to_fit();
             bodies.extend(nodal.into_iter().filter(|body| body.inertia.mass > 0.0));
             if elements.is_empty() {
                 self.reason("gravity on beams", false, "all masses of beams are eccentric and sit at their nodes");
@@ -218,6 +222,7 @@ impl Composer<'_> {
         let nodal = self.each_inertia(|element, stations, found| {
             push_volume(&mut elements, element, stations, |k| found[k]);
         });
+        elements.shrink_to_fit();
         if elements.is_empty() {
             self.reason(names[0], false, "no beams with mass");
         } else {

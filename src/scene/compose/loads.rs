@@ -95,7 +95,8 @@ impl Composer<'_> {
             }
         }
         let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
-        for (kind, elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
+        for (kind, mut elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
+            elements.shrink_to_fit();
             let effect = LineLoad { kind, elements, tangent };
             if effect.elements.is_empty() {
                 self.reason(effect.name(), false, "no such [[load]] along a beam");

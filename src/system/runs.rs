@@ -1,0 +1,79 @@
+//! Parts of a list, one after the other: where all have one length that is all that is kept.
+
+use std::ops::Range;
+
+/// Where each part of a list stands.
+#[derive(Clone, Debug, Default)]
+pub struct Runs {
+    count: usize,
+    /// The length of all, where they have one
+    length: usize,
+    /// Where each ends, where they do not
+    ends: Vec<u32>,
+}
+
+impl Runs {
+    /// One more, of this length.
+    pub fn push(&mut self, length: usize) {
+        if self.count == 0 {
+            self.length = length;
+        }
+        if self.ends.is_empty() && length != self.length {
+            self.ends.extend((1..=self.count).map(|k| (k * self.length) as u32));
+        }
+        if !self.ends.is_empty() || length != self.length {
+            self.ends.push((self.end() + length) as u32);
+        }
+        self.count += 1;
+    }
+
+    /// Where the last one ends.
+    fn end(&self) -> usize {
+        self.ends.last().map_or(self.count * self.length, |&end| end as usize)
+    }
+
+    /// Their number.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Where one of them stands.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> Range<usize> {
+        match self.ends.get(k) {
+            None => k * self.length..(k + 1) * self.length,
+            Some(&end) => k.checked_sub(1).map_or(0, |before| self.ends[before] as usize)..end as usize,
+        }
+    }
+
+    /// Gives back what has grown beyond the end.
+    pub fn shrink_to_fit(&mut self) {
+        self.ends.shrink_to_fit();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_one_length_and_of_several_stand_where_they_were_put() {
+        for lengths in [&[][..], &[4], &[4, 4, 4], &[0, 0, 3], &[4, 4, 2, 4], &[1, 2, 3]] {
+            let mut runs = Runs::default();
+            lengths.iter().for_each(|&length| runs.push(length));
+            assert_eq!((runs.len(), runs.is_empty()), (lengths.len(), lengths.is_empty()));
+            let mut start = 0;
+            for (k, length) in lengths.iter().enumerate() {
+                assert_eq!(runs.get(k), start..start + length, "part {k} of {lengths:?}");
+                start += length;
+            }
+            let are_equal = lengths.windows(2).all(|pair| pair[0] == pair[1]);
+            assert_eq!(runs.ends.is_empty(), are_equal, "{lengths:?}");
+        }
+    }
+}
