@@ -170,9 +170,12 @@ impl Newton {
         self.first.clear();
         self.reuse.begin(self.given.take() == Some(assembly.system.revision));
         let mut refinement = Refinement::default();
-        let mut noisy = false;
+        // A tangent of an iterate whose residual is round-off serves for all that follow: nothing but round-off lies between them.
+        let (mut noisy, mut fine) = (false, false);
         loop {
-            let forms = lift.is_some() || noisy || iterations >= self.max_iterations || self.reuse.expects_tangent();
+            let serves = fine && self.reuse.has_tangent();
+            let expected = !serves && (noisy || self.reuse.expects_tangent());
+            let forms = expected || lift.is_some() || iterations >= self.max_iterations;
             let weights = if forms { method.weights() } else { Weights::NONE };
             if forms {
                 self.foresight.foresee(assembly, state, &self.dq);
@@ -207,11 +210,13 @@ impl Newton {
                 }
                 _ => {}
             }
-            if forms || noisy || !self.reuse.keeps_tangent() {
+            let keeps = if noisy { serves } else { self.reuse.keeps_tangent() };
+            if forms || !keeps {
                 if !forms {
                     self.form(assembly, state, method, work);
                 }
                 self.reuse.form();
+                fine = noisy;
             } else {
                 self.reuse.keep();
             }

@@ -378,6 +378,12 @@ impl System {
             slots.zip(own.as_chunks_mut().0).for_each(|(slot, own)| *own = (-force(slot)).0);
             return own;
         }
+        if W == 3 && !self.lifts && equations.are_planar(slots.clone()) {
+            let (u, p) = (slots.start, slots.start + 1);
+            let (across, about) = (equations.to_local(u, -force(u)), equations.to_local(p, -force(p)));
+            own.copy_from_slice(&[across.0[0], across.0[1], about.0[2]]);
+            return own;
+        }
         for slot in slots {
             let force = force(slot);
             let (local, own) = (equations.to_local(slot, force), &mut own[..own_equations.len()]);

@@ -192,13 +192,21 @@ impl Equations {
         self.frame.is_empty() && count == 3 * slots.len()
     }
 
+    /// Whether the equations of some slots are those of a node in a plane that nothing else holds: two local components of the first, and the
+    /// third of the second.
+    #[inline(always)]
+    pub fn are_planar(&self, slots: std::ops::Range<Slot>) -> bool {
+        let freedom = self.freedom.get(slots.start as usize..slots.end as usize);
+        matches!(freedom, Some([Freedom(0b011), Freedom(0b100)]))
+    }
+
     /// The turned axes of a slot as columns.
     #[inline]
     pub fn frame(&self, slot: Slot) -> Option<Mat3> {
         self.axes(slot).copied()
     }
 
-    #[inline]
+    #[inline(always)]
     fn axes(&self, slot: Slot) -> Option<&Mat3> {
         self.frames.get(*self.frame.get(slot as usize)? as usize)
     }
@@ -300,7 +308,7 @@ impl Equations {
                 }
             }
         }
-        self.axes(slot as Slot).map_or(local, |frame| *frame * local)
+        self.to_global(slot as Slot, local)
     }
 
     /// Whether no direction of a slot is held but those that leave the plane.
@@ -320,8 +328,14 @@ impl Equations {
         self.frame(slot).map_or(local, |frame| frame * local)
     }
 
+    /// What has these components in the local directions of a slot.
+    #[inline(always)]
+    pub fn to_global(&self, slot: Slot, local: Vec3) -> Vec3 {
+        self.axes(slot).map_or(local, |frame| *frame * local)
+    }
+
     /// Components in the local directions of a slot.
-    #[inline]
+    #[inline(always)]
     pub fn to_local(&self, slot: Slot, value: Vec3) -> Vec3 {
         self.axes(slot).map_or(value, |frame| frame.transpose_mul(value))
     }

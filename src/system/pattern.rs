@@ -343,6 +343,13 @@ impl Pattern {
                         out.iter_mut().zip(part.as_chunks().0).for_each(|(out, part)| *out = Vec3(*part));
                         continue;
                     }
+                    if let ([x, y, angle], [across, about], None) = (&part[..], &mut *out, held)
+                        && self.equations.are_planar(slots.clone())
+                    {
+                        *across = self.equations.to_global(slots.start, Vec3([*x, *y, 0.0]));
+                        *about = self.equations.to_global(slots.start + 1, Vec3([0.0, 0.0, *angle]));
+                        continue;
+                    }
                     let (own, equations) = (self.gathered(group, part), self.equations_of(group));
                     for (slot, out) in slots.zip(out) {
                         *out = self.equations.at(slot as usize, &own[..equations.len()], equations.start, held);
