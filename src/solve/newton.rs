@@ -216,7 +216,8 @@ impl Newton {
                     self.form(assembly, state, method, work);
                 }
                 self.reuse.form();
-                fine = noisy;
+                // Prescribed increments go far.
+                fine = noisy && lift.is_none();
             } else {
                 self.reuse.keep();
             }
