@@ -170,20 +170,16 @@ impl Newton {
         self.first.clear();
         self.reuse.begin(self.given.take() == Some(assembly.system.revision));
         let mut refinement = Refinement::default();
-        // A tangent of an iterate whose residual is round-off serves for all that follow: nothing but round-off lies between them.
-        let (mut noisy, mut fine) = (false, false);
         loop {
-            let serves = fine && self.reuse.has_tangent();
-            let expected = !serves && (noisy || self.reuse.expects_tangent());
-            let forms = expected || lift.is_some() || iterations >= self.max_iterations;
+            let forms = lift.is_some() || iterations >= self.max_iterations || self.reuse.expects_tangent();
             let weights = if forms { method.weights() } else { Weights::NONE };
             if forms {
                 self.foresight.foresee(assembly, state, &self.dq);
             }
             timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
             let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, self.last);
-            self.reuse.history.push(residual.ratio);
-            noisy = verdict == Verdict::Noisy;
+            let noisy = verdict == Verdict::Noisy;
+            self.reuse.look(residual.ratio, noisy);
             match verdict {
                 Verdict::Converged if lift.is_none() => {
                     if residual.ratio > 0.0 {
@@ -210,14 +206,11 @@ impl Newton {
                 }
                 _ => {}
             }
-            let keeps = if noisy { serves } else { self.reuse.keeps_tangent() };
-            if forms || !keeps {
+            if forms || !self.reuse.keeps_tangent() {
                 if !forms {
                     self.form(assembly, state, method, work);
                 }
-                self.reuse.form();
-                // Prescribed increments go far.
-                fine = noisy && lift.is_none();
+                self.reuse.form(lift.is_some());
             } else {
                 self.reuse.keep();
             }

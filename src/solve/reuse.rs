@@ -3,7 +3,8 @@
 //! A correction with an old tangent costs an evaluation of forces and a substitution; one with a new tangent costs an
 //! evaluation of both and a factorisation, about three times that. Where a new tangent has made a residual smaller by theta, the
 //! same tangent makes the next one smaller by about 2 theta (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is
-//! kept where so much brings balance soon enough. Only residuals and counts decide, never a clock.
+//! kept where so much brings balance soon enough. Where a residual is round-off ratios tell nothing: a tangent of such an iterate is formed
+//! once, and serves for all that follow. Only residuals and counts decide, never a clock.
 
 /// The ratio of a residual to what is allowed that is expected to become one in balance.
 const EXPECTED: f64 = 0.1;
@@ -21,6 +22,10 @@ pub(super) struct Reuse {
     pub history: Vec<f64>,
     /// Whether there is a tangent near the present iterate
     kept: bool,
+    /// Whether the residual of the present iterate is round-off
+    noisy: bool,
+    /// Whether nothing but round-off lies between the tangent's iterate and the present one
+    fine: bool,
     /// Whether the last correction was found with the tangent of its iterate
     own: bool,
     /// The tangents that this solution could not do without so far
@@ -31,13 +36,20 @@ pub(super) struct Reuse {
 
 impl Reuse {
     pub fn new() -> Self {
-        Self { history: Vec::new(), kept: false, own: false, needed: 0, before: usize::MAX }
+        Self { history: Vec::new(), kept: false, noisy: false, fine: false, own: false, needed: 0, before: usize::MAX }
     }
 
     /// A solution begins; `kept` where the tangent is already that of its first iterate, but for the loads.
     pub fn begin(&mut self, kept: bool) {
         self.history.clear();
         (self.kept, self.own, self.needed) = (kept, false, 0);
+        (self.noisy, self.fine) = (false, false);
+    }
+
+    /// The present iterate has this residual, over what is allowed; `noisy` where that is round-off.
+    pub fn look(&mut self, residual: f64, noisy: bool) {
+        self.history.push(residual);
+        self.noisy = noisy;
     }
 
     /// A solution has come to balance.
@@ -50,7 +62,8 @@ impl Reuse {
     pub fn expects_tangent(&self) -> bool {
         match self.history.is_empty() {
             true => !self.kept,
-            false => !(self.expects_balance() || (self.kept && self.needed == self.before)),
+            false if self.serves_on() => false,
+            false => self.noisy || !(self.expects_balance() || (self.kept && self.needed == self.before)),
         }
     }
 
@@ -66,6 +79,16 @@ impl Reuse {
 
     /// Whether the tangent that is there shall serve for the present iterate.
     pub fn keeps_tangent(&self) -> bool {
+        if self.noisy { self.serves_on() } else { self.brings_balance() }
+    }
+
+    /// Whether the tangent that is there is that of the present iterate but for round-off.
+    fn serves_on(&self) -> bool {
+        self.kept && self.fine
+    }
+
+    /// Whether the tangent that is there is expected to bring balance soon enough.
+    fn brings_balance(&self) -> bool {
         self.kept && (self.begins() || self.will_do(CHEAP))
     }
 
@@ -74,10 +97,11 @@ impl Reuse {
         self.history.len() == 1
     }
 
-    /// The iterate has its own tangent, which is used unless it is in balance.
-    pub fn form(&mut self) {
-        self.needed += usize::from(!self.keeps_tangent());
+    /// The iterate has its own tangent, which is used unless it is in balance; `leaps` where prescribed increments lie between it and the next.
+    pub fn form(&mut self, leaps: bool) {
+        self.needed += usize::from(!self.brings_balance());
         (self.kept, self.own) = (true, true);
+        self.fine = self.noisy && !leaps;
     }
 
     /// The iterate is corrected with the tangent that is there.
@@ -113,14 +137,14 @@ mod tests {
         reuse.begin(false);
         for &residual in residuals {
             let forms = reuse.expects_tangent();
-            reuse.history.push(residual);
+            reuse.look(residual, false);
             if residual <= 1.0 {
                 break;
             }
             if forms || !reuse.keeps_tangent() {
                 formed += 1;
                 twice += usize::from(!forms);
-                reuse.form();
+                reuse.form(false);
             } else {
                 reuse.keep();
             }
@@ -154,15 +178,47 @@ mod tests {
         let mut reuse = Reuse::new();
         reuse.begin(true);
         assert!(!reuse.expects_tangent());
-        reuse.history.push(10.0);
+        reuse.look(10.0, false);
         assert!(reuse.keeps_tangent());
         // It is that of the iterate, and what it gives is looked at like that of a new one.
         reuse.keep();
         assert!(reuse.is_own());
-        reuse.history.push(1.5);
+        reuse.look(1.5, false);
         reuse.keep();
         assert!(!reuse.is_own());
         reuse.forget();
         assert!(!reuse.keeps_tangent());
+    }
+    #[test]
+    fn a_tangent_of_an_iterate_at_round_off_serves_on() {
+        let mut reuse = Reuse::new();
+        reuse.begin(false);
+        reuse.look(1e9, false);
+        reuse.form(false);
+        // One from further away does not.
+        reuse.look(0.5, true);
+        assert!(reuse.expects_tangent() && !reuse.keeps_tangent());
+        reuse.form(false);
+        for residual in [0.4, 0.6] {
+            reuse.look(residual, true);
+            assert!(!reuse.expects_tangent() && reuse.keeps_tangent());
+            reuse.keep();
+        }
+        // Nor where the residual is more than round-off again, or unknowns have changed their meaning.
+        reuse.look(30.0, false);
+        assert!(!reuse.keeps_tangent());
+        reuse.look(0.5, true);
+        reuse.forget();
+        assert!(reuse.expects_tangent() && !reuse.keeps_tangent());
+    }
+
+    #[test]
+    fn a_tangent_before_prescribed_increments_does_not_serve_on() {
+        let mut reuse = Reuse::new();
+        reuse.begin(false);
+        reuse.look(0.5, true);
+        reuse.form(true);
+        reuse.look(0.5, true);
+        assert!(reuse.expects_tangent() && !reuse.keeps_tangent());
     }
 }
