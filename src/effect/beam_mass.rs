@@ -1,7 +1,7 @@
 //! Translational inertia of beams without eccentric mass: consistent mass matrices, which never change and know no charts.
 
 use super::volume::{VolumeElement, VolumeElements};
-use super::{AT_ONCE, ByOrder, Effect, Energy, Momentum, for_each_batch};
+use super::{AT_ONCE, ByOrder, Effect, Energy, Momentum, for_each_batch, shared};
 use crate::kernel::Weights;
 use crate::system::{Aspect, Category, Cliques, Memory, Sink, Slot, State};
 use crate::tensor::Vec3;
@@ -40,13 +40,8 @@ impl<const N: usize> MassElement<N> {
             element.points().iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
         };
         let mass = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-        let common = Common { arms: *element.arms(), mass };
-        let shared = neighbour.map(|neighbour| &neighbour.common).filter(|known| ***known == common);
-        Self {
-            u: element.connection.nodes.map(|node| node.u),
-            place: element.place(),
-            common: shared.cloned().unwrap_or_else(|| Arc::new(common)),
-        }
+        let common = shared(Common { arms: *element.arms(), mass }, neighbour.map(|neighbour| &neighbour.common));
+        Self { u: element.connection.nodes.map(|node| node.u), place: element.place(), common }
     }
 
     #[inline(always)]

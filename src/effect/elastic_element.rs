@@ -1,6 +1,6 @@
 //! Elastic elements as they are kept: what neighbours have in common stands once.
 
-use super::{Connection, Noise};
+use super::{Connection, Noise, shared};
 use crate::kernel::beam::StiffnessPoint;
 use crate::real::{LANES, Lanes, Pack, each_lane};
 use crate::tensor::Vec3;
@@ -22,7 +22,7 @@ pub struct ElasticElement<const N: usize, const G: usize> {
 }
 
 /// What neighbours share.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 struct Common<const N: usize, const G: usize> {
     /// The initial places of the nodes as seen from the first
     arms: [Vec3; N],
@@ -52,11 +52,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         free: Option<usize>,
         neighbour: Option<&Self>,
     ) -> Self {
-        let alike = |neighbour: &&Self| (neighbour.common.arms, neighbour.common.points) == (arms, points);
-        let common = match neighbour.filter(alike) {
-            Some(neighbour) => neighbour.common.clone(),
-            None => Arc::new(Common::new(arms, points)),
-        };
+        let common = shared(Common::new(arms, points), neighbour.map(|neighbour| &neighbour.common));
         Self { connection, free: free.map(|number| number as u32), length, common }
     }
 

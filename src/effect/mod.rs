@@ -367,6 +367,11 @@ impl<A, B, C> ByOrder<A, B, C> {
     }
 }
 
+/// What an element keeps behind a pointer: what a neighbour has where that is the same, or else its own.
+fn shared<T: PartialEq>(own: T, neighbours: Option<&Arc<T>>) -> Arc<T> {
+    neighbours.filter(|known| ***known == own).cloned().unwrap_or_else(|| Arc::new(own))
+}
+
 /// Where each instance of a batch begins counting: batches follow each other in the order two, three, four. Of each batch those of
 /// some instances, where these are given.
 macro_rules! for_each_batch {

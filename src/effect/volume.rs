@@ -1,6 +1,6 @@
 //! Elements over which something per length is integrated: shared by the effects of rotary and eccentric inertia, weight and line loads.
 
-use super::{ByOrder, Connection, for_each_batch, motions, side_by_side};
+use super::{ByOrder, Connection, for_each_batch, motions, shared, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
 use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
@@ -39,9 +39,8 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
     where
         Q: PartialEq,
     {
-        let common = Common { arms, points };
-        let shared = neighbour.map(|neighbour| &neighbour.common).filter(|known| ***known == common);
-        Self { connection, place, common: shared.cloned().unwrap_or_else(|| Arc::new(common)) }
+        let common = shared(Common { arms, points }, neighbour.map(|neighbour| &neighbour.common));
+        Self { connection, place, common }
     }
 
     /// The initial place of its first node.
@@ -60,15 +59,26 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
         &self.common.points
     }
 
-    /// Point g of elements side by side, as a kernel takes it.
+    /// Whether elements share their points.
     #[inline(always)]
-    fn point_side_by_side<K>(elements: [&Self; LANES], kernel: &K, g: usize) -> VolumePoint<N, K::Present<Lanes>, Lanes>
+    fn share(elements: [&Self; LANES]) -> bool {
+        elements[1..].iter().all(|element| Arc::ptr_eq(&element.common, &elements[0].common))
+    }
+
+    /// Point g of elements side by side, which may share it, as a kernel takes it.
+    #[inline(always)]
+    fn side_by_side<K>(
+        elements: [&Self; LANES],
+        share: bool,
+        g: usize,
+        kernel: &K,
+    ) -> VolumePoint<N, K::Present<Lanes>, Lanes>
     where
         K: VolumeKernel<Quantity = Q>,
         K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
     {
         let point = |k: usize| elements[k].points()[g].map(|quantity| kernel.at_present(quantity));
-        match elements[1..].iter().all(|element| Arc::ptr_eq(&element.common, &elements[0].common)) {
+        match share {
             true => VolumePoint::pack([&point(0); LANES]),
             false => VolumePoint::pack(each_lane!(|k| point(k)).each_ref()),
         }
@@ -155,9 +165,10 @@ fn add_batch<K, const N: usize>(
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
         let nodes = motions(each_lane!(|k| &elements[k].connection), at);
+        let share = VolumeElement::share(elements);
         systems.clear_for(weights);
         for g in 0..N {
-            VolumeElement::point_side_by_side(elements, kernel, g).add(kernel, &nodes, weights, &mut systems);
+            VolumeElement::side_by_side(elements, share, g, kernel).add(kernel, &nodes, weights, &mut systems);
         }
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
         out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, is_mixed, |k, out| {

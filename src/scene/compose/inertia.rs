@@ -2,7 +2,6 @@
 
 use super::{Composer, push_volume};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
-use crate::effect::ByOrder;
 use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
 use crate::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
@@ -10,6 +9,7 @@ use crate::effect::rigid_body::{Body, RigidBody};
 use crate::effect::rotary_inertia::RotaryInertia;
 use crate::effect::rotating_frame::RotatingFrame;
 use crate::effect::section_inertia::SectionInertia;
+use crate::effect::{ByOrder, VolumeElements};
 use crate::kernel::inertia::Inertia;
 use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
 use crate::scene::names;
@@ -125,11 +125,8 @@ impl Composer<'_> {
         // One amplitude for all static stages: what one has brought in stays for the next.
         let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
         let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
-        let mut elements = ByOrder::default();
-        let nodal = self.each_inertia(|element, stations, found| {
-            push_volume(&mut elements, element, stations, |k| (found[k], element.between(&stations[k].shape)));
-        });
-        elements.shrink_to_fit();
+        let (elements, nodal) =
+            self.inertia_elements(|element, station, inertia| (inertia, element.between(&station.shape)));
         let bodies = [nodal, self.out.bodies.clone()].concat();
         for (number, stage) in &framed {
             let Some(frame) = &stage.frame else { continue };
@@ -179,6 +176,19 @@ impl Composer<'_> {
         nodal.bodies(self.mesh)
     }
 
+    /// What acts on all mass of beams: elements with a quantity of each of their points, and what sits at nodes instead.
+    fn inertia_elements<Q: Copy + PartialEq>(
+        &self,
+        quantity: impl Fn(&BeamElement, &Station, Inertia) -> Q,
+    ) -> (VolumeElements<Q>, Vec<Body>) {
+        let mut elements = VolumeElements::default();
+        let nodal = self.each_inertia(|element, stations, found| {
+            push_volume(&mut elements, element, stations, |k| quantity(element, &stations[k], found[k]));
+        });
+        elements.shrink_to_fit();
+        (elements, nodal)
+    }
+
     pub(super) fn gravity(&mut self) {
         let mut bodies = self.out.bodies.clone();
         let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
@@ -191,11 +201,7 @@ impl Composer<'_> {
         if self.mesh.element_count == 0 {
             self.reason("gravity on beams", false, "no beams");
         } else {
-            let mut elements = ByOrder::default();
-            let nodal = self.each_inertia(|element, stations, found| {
-                push_volume(&mut elements, element, stations, |k| found[k]);
-            });
-            elements.shrink_to_fit();
+            let (elements, nodal) = self.inertia_elements(|_, _, inertia| inertia);
             bodies.extend(nodal.into_iter().filter(|body| body.inertia.mass > 0.0));
             if elements.is_empty() {
                 self.reason("gravity on beams", false, "all masses of beams are eccentric and sit at their nodes");
@@ -218,11 +224,7 @@ impl Composer<'_> {
             let why = if mass == 0.0 { "no `mass` in [damping]" } else { "nothing moves in time" };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
-        let mut elements = ByOrder::default();
-        let nodal = self.each_inertia(|element, stations, found| {
-            push_volume(&mut elements, element, stations, |k| found[k]);
-        });
-        elements.shrink_to_fit();
+        let (elements, nodal) = self.inertia_elements(|_, _, inertia| inertia);
         if elements.is_empty() {
             self.reason(names[0], false, "no beams with mass");
         } else {
