@@ -192,8 +192,8 @@ impl Equations {
         self.frame.is_empty() && count == 3 * slots.len()
     }
 
-    /// Whether the equations of some slots are those of a node in a plane that nothing else holds: two local components of the first, and the
-    /// third of the second.
+    /// Whether the equations of some slots are those of a node in a plane that nothing else holds, which would stand as a fourth bit: two local
+    /// components of the first, and the third of the second.
     #[inline(always)]
     pub fn are_planar(&self, slots: std::ops::Range<Slot>) -> bool {
         let freedom = self.freedom.get(slots.start as usize..slots.end as usize);

@@ -17,19 +17,13 @@ impl Runs {
     pub fn push(&mut self, length: usize) {
         if self.count == 0 {
             self.length = length;
-        }
-        if self.ends.is_empty() && length != self.length {
+        } else if self.ends.is_empty() && length != self.length {
             self.ends.extend((1..=self.count).map(|k| (k * self.length) as u32));
         }
-        if !self.ends.is_empty() || length != self.length {
-            self.ends.push((self.end() + length) as u32);
+        if let Some(&last) = self.ends.last() {
+            self.ends.push(last + length as u32);
         }
         self.count += 1;
-    }
-
-    /// Where the last one ends.
-    fn end(&self) -> usize {
-        self.ends.last().map_or(self.count * self.length, |&end| end as usize)
     }
 
     /// Their number.
@@ -45,6 +39,7 @@ impl Runs {
     /// Where one of them stands.
     #[inline(always)]
     pub fn get(&self, k: usize) -> Range<usize> {
+        debug_assert!(k < self.count, "part {k} of {}", self.count);
         match self.ends.get(k) {
             None => k * self.length..(k + 1) * self.length,
             Some(&end) => k.checked_sub(1).map_or(0, |before| self.ends[before] as usize)..end as usize,
