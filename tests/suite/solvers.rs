@@ -220,6 +220,35 @@ fn factors_in_the_place_of_a_tangent_solve_as_those_beside_it() {
     assert_eq!(elsewhere, ["large tree", "large ring"]);
 }
 
+/// To the last bit, whichever directions are held, in space and in planes, those of turned axes among them.
+#[test]
+fn corrections_by_nodes_are_those_by_equations() {
+    let mut random = Random::new(29);
+    for (name, edges) in patterns(&mut random) {
+        for normal in [None, Some(Vec3::UNIT[2]), Some(Vec3::UNIT[1]), Some(Vec3([0.6, -0.48, 0.64]))] {
+            let mut system =
+                system_in(normal.and_then(Plane::normal_to), &edges, Symmetry::BetweenGroups, 30.0, &mut random);
+            let mut vector = || Vec3([(); 3].map(|()| random.range(-1.0, 1.0)));
+            let force: Vec<Vec3> = system.force[Category::Internal as usize].iter().map(|_| vector()).collect();
+            let held: Vec<Vec3> = force.iter().map(|_| vector()).collect();
+            system.force[Category::Internal as usize].copy_from_slice(&force);
+            let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+            assert!(blocks.factorise(&system), "{name}");
+            let mut x = vec![0.0; system.pattern.equations.count()];
+            system.right_hand_side(&mut x);
+            assert!(x.iter().all(|&x| x != 0.0), "{name}: no forces");
+            blocks.solve(&system, &mut x);
+            for held in [None, Some(&held[..])] {
+                // Nothing of what stood there before may stay.
+                let (mut by_nodes, mut by_equations) = (force.clone(), force.clone());
+                assert!(blocks.correct(&system, held, &mut by_nodes), "{name}");
+                system.pattern.equations.scatter(&x, held, &mut by_equations);
+                assert_eq!(by_nodes, by_equations, "{name}, normal {normal:?}, held {}", held.is_some());
+            }
+        }
+    }
+}
+
 /// Of two nodes: what the first takes from the second is `taken` times what that has.
 fn taking(symmetry: Symmetry, taken: f64) -> System {
     let mut system = system(&chain(2), symmetry, 0.0, &mut Random::new(5));
