@@ -12,6 +12,7 @@ use super::beam::StiffnessPoint;
 use super::elastic::Stress;
 use super::element::Weights;
 use super::inertia::Inertia;
+use super::relative::carriers;
 use crate::real::{LANES, Lanes, Pack, Real, pack};
 use crate::rotation::Series;
 use crate::tensor::{Mat3, Vec3};
@@ -135,15 +136,25 @@ impl<const N: usize> Pack for PlanarPoint<N> {
     }
 }
 
-/// Angles without the whole turns that the charts of nodes differ by: each within pi of the first.
+/// Angles without the whole turns that the charts of nodes differ by: each within pi of the frame that turns with the element, so that
+/// its ends may turn further against each other, as they may in space.
 #[inline(always)]
 pub fn in_one_turn<const N: usize, T: Real>(nodes: &mut [PlanarNode<T>; N]) {
-    for i in 1..N {
-        let ahead = nodes[i].angle - nodes[0].angle;
-        let turn = T::constant(2.0 * PI);
-        let back = ahead.above(PI, turn, T::zero()) - (-ahead).above(PI, turn, T::zero());
-        nodes[i].angle -= back;
+    let (first, last) = carriers(N);
+    nodes[last].angle = within_half_a_turn(nodes[last].angle, nodes[first].angle);
+    let frame = (nodes[first].angle + nodes[last].angle) * 0.5;
+    for i in 0..N {
+        if i != first && i != last {
+            nodes[i].angle = within_half_a_turn(nodes[i].angle, frame);
+        }
     }
+}
+
+/// The angle, a turn more or less where that brings it within pi of another.
+#[inline(always)]
+fn within_half_a_turn<T: Real>(angle: T, of: T) -> T {
+    let (ahead, turn) = (angle - of, T::constant(2.0 * PI));
+    angle - (ahead.above(PI, turn, T::zero()) - (-ahead).above(PI, turn, T::zero()))
 }
 
 /// Strain, and what turns it.

@@ -45,7 +45,7 @@ pub(super) struct Half<T> {
 }
 
 /// The nodes that carry the frame: of two and four nodes the two in the middle, of three the middle one.
-const fn carriers(nodes: usize) -> (usize, usize) {
+pub(super) const fn carriers(nodes: usize) -> (usize, usize) {
     ((nodes - 1) / 2, nodes / 2)
 }
 

@@ -446,6 +446,20 @@ fn several_turns_act_as_in_space() {
     }
 }
 
+/// The ends of one element turn past pi against each other, its neighbouring nodes by no more than the mesh may.
+#[test]
+fn ends_of_an_element_turn_past_half_a_turn_as_in_space() {
+    for (order, angle) in [(2, 3.9), (2, -3.9), (3, 4.8), (3, -4.8)] {
+        let text = frame(true, "relative", order).replace("elements = 3", "elements = 1");
+        let wound = format!(
+            "{text}[[motion]]\nat = \"knee\"\nrotate = {}\nangle = {angle}\n{}",
+            normal(true, 1.0),
+            STATIC.replace("steps = 4", "steps = 8")
+        );
+        agrees_with_space(&format!("order {order} by {angle}"), &wound);
+    }
+}
+
 fn is_planar(text: &str) -> bool {
     scene_of(text).plan.model.plane.is_some()
 }
