@@ -2,8 +2,10 @@
 //!
 //! A scheme predicts the end of a step with the acceleration of its start. What Newton's method then adds, c = q1 - q1(predicted), grows with
 //! the third power of the step and goes on as the motion does: it is foreseen as nothing, as the last one, or along the line or
-//! the parabola through the last ones. That way is taken whose residual J (c - c(foreseen)) would have been the smallest in the last
-//! steps: where motion is not smooth, or stiff directions swing from step to step, that is the scheme's own.
+//! the parabola through the last ones. In stiff directions accelerations swing from step to step (the trapezoidal rule turns them round),
+//! and c with them: it is foreseen as the last one turned round, or along what swings about a constant or about a line. That way is
+//! taken whose residual J (c - c(foreseen)) would have been the smallest in the last steps: where motion is not smooth that is the
+//! scheme's own.
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
@@ -15,8 +17,10 @@ use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// The factors of the last corrections for each way to foresee the next one, the latest first.
-const WAYS: [&[f64]; 4] = [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0]];
+/// The factors of the last corrections for each way to foresee the next one, the latest first. With E the shift by a step, they make
+/// nothing of 1, E - 1, (E - 1)^2, (E - 1)^3 times a correction; where it swings of E + 1, (E + 1) (E - 1), (E + 1) (E - 1)^2.
+const WAYS: [&[f64]; 7] =
+    [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0], &[-1.0], &[0.0, 1.0], &[1.0, 1.0, -1.0]];
 
 /// The weight of the last step in what is thought of a way.
 const NEWS: f64 = 0.5;
@@ -31,7 +35,7 @@ const CORRECTION: i32 = 3;
 const FORCE: i32 = 1;
 
 /// So many steps are remembered.
-const MOST: usize = WAYS.len() - 1;
+const MOST: usize = 3;
 
 /// Factors of the last corrections, the latest first
 type Factors = [f64; MOST];
@@ -224,9 +228,20 @@ mod tests {
     }
 
     #[test]
-    fn what_swings_from_step_to_step_is_not_foreseen() {
-        let swing = with(&[1.0, -1.0, 1.0, -1.0, 1.0]);
-        assert_eq!(swing.best(), 0);
+    fn what_swings_from_step_to_step_is_foreseen() {
+        let next = |corrections: &[f64]| {
+            let trend = with(corrections);
+            foreseen(&trend, trend.best(), 1.0)
+        };
+        assert_eq!(next(&[1.0, -1.0]), 1.0);
+        // About a constant, and about a line
+        assert_eq!(next(&[4.0, -2.0, 4.0, -2.0, 4.0, -2.0, 4.0]), -2.0);
+        assert_eq!(next(&[1.0, -1.0, 3.0, 1.0, 5.0, 3.0, 7.0, 5.0, 9.0, 7.0]), 11.0);
+    }
+
+    #[test]
+    fn what_comes_without_rule_is_not_foreseen() {
+        assert_eq!(with(&[1.0, -0.1, 0.2, 2.0, 0.1, -0.3, 1.0, 0.1, -0.1, -1.0]).best(), 0);
         assert_eq!(with(&[0.0; 5]).best(), 0);
     }
 

@@ -192,7 +192,10 @@ impl Newton {
                 Verdict::Noisy if lift.is_none() && iterations > 0 => {
                     let last = self.last.unwrap_or_default();
                     let refined = refinement.look(model, &self.dq, last, size(model, &state.q));
-                    if refined.is_done() || iterations >= self.max_iterations {
+                    if refined.stalls() && !self.reuse.is_own() && iterations < self.max_iterations {
+                        // Not round-off may end it, but an older tangent.
+                        self.reuse.forget();
+                    } else if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
                         self.end();
                         return Ok(());

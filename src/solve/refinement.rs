@@ -41,8 +41,13 @@ impl Refinement {
 
     /// Small enough, or not becoming smaller any more.
     pub fn is_done(&self) -> bool {
-        let stalls = self.ratio > if self.aligned { 0.9 } else { 0.5 };
-        self.last <= FINE || (self.last.is_finite() && stalls)
+        self.last <= FINE || self.stalls()
+    }
+
+    /// Still too large, and not becoming smaller any more.
+    pub fn stalls(&self) -> bool {
+        let most = if self.aligned { 0.9 } else { 0.5 };
+        self.last > FINE && self.last.is_finite() && self.ratio > most
     }
 
     /// What is still to come: of corrections that go one way, each `ratio` times the one before, the sum of the series.

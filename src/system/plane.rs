@@ -4,6 +4,7 @@
 //! to two directions, and rotation vectors to the normal of the plane.
 
 use crate::tensor::{Mat3, Vec3};
+use std::fmt;
 
 /// What lies less far out of a plane, relative to its size, lies in it but for round-off: some hundreds of units in the last place, what
 /// sines, cosines and a few sums in a deck leave.
@@ -34,6 +35,23 @@ pub enum Aspect {
     Coupling(Mat3),
     /// What is never treated in a plane
     Spatial,
+}
+
+impl fmt::Display for Aspect {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (what, v) = match self {
+            Self::Place(v) => ("the place", v),
+            Self::Vector(v) => ("the vector", v),
+            Self::Axial(v) => ("what turns about", v),
+            Self::Line(v) => ("the axis", v),
+            Self::Tensor(_) => return f.write_str("what is not alike on both sides of the plane"),
+            Self::Coupling(_) => return f.write_str("what couples bending in the plane with strain in it"),
+            Self::Spatial => return f.write_str("what is never treated in a plane"),
+        };
+        // Nought has no sign.
+        let [x, y, z] = v.0.map(|c| c + 0.0);
+        write!(f, "{what} [{x}, {y}, {z}]")
+    }
 }
 
 /// Shows the parts of a scene, each with whose it is.
@@ -132,12 +150,12 @@ impl Plane {
             match search.first_apart(&plane, shown) {
                 None => return Ok(plane),
                 // Told of the last.
-                name => apart = name,
+                found => apart = found,
             }
         }
         match apart {
             None => Err("nothing tells a plane: all lies in one line".into()),
-            Some(name) => Err(format!("{name}: not mirrored in a plane that the others share")),
+            Some((name, aspect)) => Err(format!("{name}: {aspect} is not mirrored in a plane that the others share")),
         }
     }
 }
@@ -224,12 +242,12 @@ impl Search {
         [self.axial, self.vectors.normal(), self.places.normal()].into_iter().flatten()
     }
 
-    /// Whose is the first that is not its own image in a plane.
-    fn first_apart(&self, plane: &Plane, shown: &Shown) -> Option<&'static str> {
+    /// The first that is not its own image in a plane, with whose it is.
+    fn first_apart(&self, plane: &Plane, shown: &Shown) -> Option<(&'static str, Aspect)> {
         let mut apart = None;
         shown(&mut |name, aspect| {
             if apart.is_none() && !plane.mirrors(&aspect, self.origin.unwrap_or(Vec3::ZERO), self.length) {
-                apart = Some(name);
+                apart = Some((name, aspect));
             }
         });
         apart
@@ -264,6 +282,8 @@ mod tests {
         assert_eq!(with(Aspect::Vector(Vec3::UNIT[1])).unwrap().normal(), Vec3::UNIT[2]);
         assert_eq!(with(Aspect::Axial(Vec3::UNIT[1] * -1.0)).unwrap().normal(), Vec3::UNIT[1]);
         assert!(with(Aspect::Axial(Vec3::UNIT[0])).is_err(), "torsion leaves every plane");
+        let apart = plane_of(&[line[0], line[1], Aspect::Vector(Vec3::UNIT[1]), Aspect::Vector(Vec3([0.0, 1.0, -0.5]))]);
+        assert_eq!(apart.unwrap_err(), "part: the vector [0, 1, -0.5] is not mirrored in a plane that the others share");
     }
 
     /// Places alone would tell the normal of a shallow arch to a few digits only.

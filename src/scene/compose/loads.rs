@@ -95,11 +95,17 @@ impl Composer<'_> {
             }
         }
         let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
-        for (kind, mut elements) in [(LineLoadKind::Spatial, spatial), (LineLoadKind::Material, material)] {
+        let [force, moment, following_force, following_moment] = nodal.each_ref().map(|loads| !loads.is_empty());
+        let kinds = [
+            (LineLoadKind::Spatial, spatial, force || moment),
+            (LineLoadKind::Material, material, following_force || following_moment),
+        ];
+        for (kind, mut elements, acts_at_nodes) in kinds {
             elements.shrink_to_fit();
             let effect = LineLoad { kind, elements, tangent };
             if effect.elements.is_empty() {
-                self.reason(effect.name(), false, "no such [[load]] along a beam");
+                let but = if acts_at_nodes { ", but on `relative` beams, where it acts at their nodes" } else { "" };
+                self.reason(effect.name(), false, format!("no such [[load]] along a beam{but}"));
             } else {
                 self.push(effect, "[[load]] along a beam".into());
             }
