@@ -212,7 +212,8 @@ impl Run<'_> {
             let State { q, v, a, algorithmic, .. } = &mut self.state;
             let (v, rates2) = (&mut v[..], [&mut a[..], &mut algorithmic[..]]);
             rateless.iter().for_each(|&slot| v[slot] = (q[slot] - self.good.q[slot]) * (1.0 / step.length));
-            rates2.into_iter().for_each(|rates| rateless.iter().for_each(|&slot| rates[slot] = Vec3::ZERO));
+            let kept = rates2.into_iter().filter(|rates| !rates.is_empty());
+            kept.for_each(|rates| rateless.iter().for_each(|&slot| rates[slot] = Vec3::ZERO));
         }
         let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;

@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
-use crate::integrate::Method;
+use crate::integrate::{Method, Step};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
@@ -17,7 +17,7 @@ const LARGEST_GAP: f64 = 1e-6;
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
-    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
+    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, step: &Step) -> Result<(), Failure> {
         if self.takes_initial_motion() {
             let initial = std::mem::take(&mut self.plan.initial);
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
@@ -31,13 +31,13 @@ impl Run<'_> {
         self.model.set_clock(&mut self.state, time, 1.0);
         self.change_charts(None);
         self.linearise(workshop)?;
-        self.refuse_loose(workshop, method)?;
-        self.refuse_loose_in_space(workshop, method.weights())?;
+        self.refuse_loose(workshop, step)?;
+        self.refuse_loose_in_space(workshop, step.weights())?;
         // Time steps do not look again.
         workshop.space = None;
         self.close_joints(workshop)?;
         self.solve_accelerations(workshop)?;
-        self.state.algorithmic.copy_from(&self.state.a);
+        step.scheme.start(&mut self.state);
         if let Some(increments) = &workshop.increments {
             increments.start(&mut self.state);
         }

@@ -45,7 +45,7 @@ pub struct Energy {
 }
 
 /// Mass and momenta of one state, global components, about the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Momentum {
     /// Total mass
     pub mass: f64,

@@ -2,9 +2,10 @@
 
 use super::volume::VolumeElements;
 use super::{Effect, Energy, Momentum, quadratic};
-use crate::kernel::inertia::{Rotary, Spin};
+use crate::kernel::inertia::Rotary;
 use crate::kernel::volume::Blocks;
 use crate::kernel::{NodeMotion, Weights};
+use crate::rotation::Rotation;
 use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 use crate::tensor::{Mat3, Vec3};
 
@@ -40,20 +41,25 @@ impl Effect for RotaryInertia {
 
     fn energy(&self, at: &State) -> Energy {
         let mut kinetic = 0.0;
-        self.elements.each_point(at, |j, w, _, motion| kinetic += w * quadratic(*j, spin(motion).omega));
+        let energy =
+            |sum: &mut f64, j: &Mat3, w: f64, _, motion: &NodeMotion| *sum += w * quadratic(*j, spin(motion).1);
+        self.elements.sum(at, energy, |part| kinetic += part);
         Energy { kinetic, strain: 0.0 }
     }
 
     fn momentum(&self, at: &State) -> Momentum {
-        let mut sum = Momentum::ZERO;
-        self.elements.each_point(at, |j, w, _, motion| {
-            let spin = spin(motion);
-            sum.angular += spin.rotation.r * (*j * spin.omega) * w;
-        });
-        sum
+        let mut angular = Vec3::ZERO;
+        let momentum = |sum: &mut Vec3, j: &Mat3, w: f64, _, motion: &NodeMotion| {
+            let (rotation, omega) = spin(motion);
+            *sum += rotation.r * (*j * omega) * w;
+        };
+        self.elements.sum(at, momentum, |part| angular += part);
+        Momentum { angular, ..Momentum::ZERO }
     }
 }
 
-fn spin(motion: &NodeMotion) -> Spin {
-    Spin::new(motion.p, motion.p_rate, Vec3::ZERO)
+/// R and Omega
+fn spin(motion: &NodeMotion) -> (Rotation, Vec3) {
+    let rotation = Rotation::new(motion.p);
+    (rotation, rotation.t * motion.p_rate)
 }

@@ -2,9 +2,9 @@
 
 use super::volume::VolumeElements;
 use super::{Effect, Energy, Momentum, inertia_aspects, rigid_body};
-use crate::kernel::Weights;
 use crate::kernel::inertia::{Eccentric, Inertia};
 use crate::kernel::volume::Blocks;
+use crate::kernel::{NodeMotion, Weights};
 use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
 
 /// All beam elements with eccentric mass, by their mass properties per length.
@@ -39,15 +39,19 @@ impl Effect for SectionInertia {
 
     fn energy(&self, at: &State) -> Energy {
         let mut kinetic = 0.0;
-        self.elements.each_point(at, |inertia, w, _, motion| kinetic += w * rigid_body::kinetic(inertia, motion));
+        let energy = |sum: &mut f64, inertia: &Inertia, w: f64, _, motion: &NodeMotion| {
+            *sum += w * rigid_body::kinetic(inertia, motion);
+        };
+        self.elements.sum(at, energy, |part| kinetic += part);
         Energy { kinetic, strain: 0.0 }
     }
 
     fn momentum(&self, at: &State) -> Momentum {
         let mut sum = Momentum::ZERO;
-        self.elements.each_point(at, |inertia, w, place, motion| {
+        let momentum = |sum: &mut Momentum, inertia: &Inertia, w: f64, place, motion: &NodeMotion| {
             sum.add(rigid_body::momentum(inertia, place, motion, w));
-        });
+        };
+        self.elements.sum(at, momentum, |part| sum.add(part));
         sum
     }
 }

@@ -1,11 +1,12 @@
 //! Elements over which something per length is integrated: shared by the effects of rotary and eccentric inertia, weight and line loads.
 
-use super::{ByOrder, Connection, for_each_batch, motions, shared, side_by_side};
+use super::{AT_ONCE, ByOrder, Connection, for_each_batch, motions, shared, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
 use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
 use crate::real::{Instructions, LANES, Lanes, Pack, each_lane};
 use crate::system::{Cliques, Sink, State};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::sync::Arc;
 
 /// An element of N nodes and as many points.
@@ -57,6 +58,15 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
     #[inline(always)]
     pub fn points(&self) -> &[VolumePoint<N, Q>; N] {
         &self.common.points
+    }
+
+    /// Shows each point's quantity, its weight, its initial place and its motion.
+    fn each_point(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3, &NodeMotion)) {
+        let nodes = self.connection.motions_in_one_chart(at);
+        for point in self.points() {
+            let place = self.place + beam::interpolate(&point.shape, |i| self.arms()[i]);
+            show(&point.quantity, point.weight, place, &point.motion(&nodes));
+        }
     }
 
     /// Whether elements share their points.
@@ -120,14 +130,24 @@ impl<Q: Copy> VolumeElements<Q> {
         });
     }
 
-    /// Shows each point's quantity, its weight, its initial place and its motion.
-    pub fn each_point(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3, &NodeMotion)) {
-        for_each_batch!(self, |_first, batch| for element in batch {
-            let nodes = element.connection.motions_in_one_chart(at);
-            for point in element.points() {
-                let place = element.place + beam::interpolate(&point.shape, |i| element.arms()[i]);
-                show(&point.quantity, point.weight, place, &point.motion(&nodes));
-            }
+    /// Sums over points: `add` is shown each one's quantity, its weight, its initial place and its motion, and `take` the sums of parts in
+    /// their order, which are the same for any number of threads.
+    pub fn sum<S: Default + Send>(
+        &self,
+        at: &State,
+        add: impl Fn(&mut S, &Q, f64, Vec3, &NodeMotion) + Send + Sync,
+        mut take: impl FnMut(S),
+    ) where
+        Q: Send + Sync,
+    {
+        for_each_batch!(self, |_first, batch| {
+            let sum_of = |part: &[VolumeElement<_, Q>]| {
+                let mut sum = S::default();
+                part.iter()
+                    .for_each(|element| element.each_point(at, |q, w, x, motion| add(&mut sum, q, w, x, motion)));
+                sum
+            };
+            threads::in_order(batch.chunks(AT_ONCE), sum_of, &mut take);
         });
     }
 

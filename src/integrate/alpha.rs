@@ -16,9 +16,10 @@
 use super::Method;
 use crate::kernel::Weights;
 use crate::kernel::turn::{StepCoefficients, Turn};
-use crate::system::State;
+use crate::system::{Field, State};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
+use std::iter::repeat_with;
 
 /// The coefficients of a method.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +77,12 @@ impl Scheme {
         self.alpha_m - self.alpha_f
     }
 
+    /// At the start of a stage, what is algorithmic is what is; where the scheme has nothing of the kind it takes no memory.
+    pub fn start(&self, state: &mut State) {
+        let has_own = self.rotations == Rotations::Increments || self.alpha_m != 0.0 || self.alpha_f != 0.0;
+        state.algorithmic = if has_own { state.a.clone() } else { Field::none() };
+    }
+
     /// The factor of h^2 (a1 - a0) in the local error of a step: beta - 1/6 + (alpha_m - alpha_f)/2. `None` where it is
     /// zero, so that this difference tells nothing.
     pub fn error_factor(&self) -> Option<f64> {
@@ -106,11 +113,14 @@ impl Step {
                     (v[k], a[k]) = turn.rates(q[k]);
                     continue;
                 }
-                let old = if stretch == 1.0 { algorithmic[k] } else { a[k] + (algorithmic[k] - a[k]) * stretch };
+                let own = algorithmic.get(k).copied().unwrap_or(a[k]);
+                let old = if stretch == 1.0 { own } else { a[k] + (own - a[k]) * stretch };
                 let new = if alpha_m == 0.0 { a[k] } else { (a[k] - old * alpha_m) * (1.0 / (1.0 - alpha_m)) };
                 q[k] += v[k] * h + (old * (0.5 - beta) + new * beta) * (h * h);
                 v[k] += (old * (1.0 - gamma) + new * gamma) * h;
-                algorithmic[k] = new;
+                if let Some(algorithmic) = algorithmic.get_mut(k) {
+                    *algorithmic = new;
+                }
             }
         });
     }
@@ -143,7 +153,9 @@ impl Method for Step {
                 }
                 v[k] += dq * damping;
                 a[k] += dq * mass;
-                algorithmic[k] += dq * filtered;
+                if let Some(algorithmic) = algorithmic.get_mut(k) {
+                    *algorithmic += dq * filtered;
+                }
             }
         });
     }
@@ -154,6 +166,7 @@ struct Slots<'a> {
     q: &'a mut [Vec3],
     v: &'a mut [Vec3],
     a: &'a mut [Vec3],
+    /// Where the scheme has one
     algorithmic: &'a mut [Vec3],
     /// From the first of them on, where there are any
     turns: &'a [Option<Turn>],
@@ -162,7 +175,8 @@ struct Slots<'a> {
 /// Does something with each part of a state, which begins at a slot: parts at once.
 fn each_part(state: &mut State, work: impl Fn(usize, Slots) + Send + Sync) {
     let State { q, v, a, algorithmic, turns, .. } = state;
-    let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(algorithmic.chunks_mut(PART));
+    let algorithmic = algorithmic.chunks_mut(PART).chain(repeat_with(|| &mut [][..]));
+    let rates = v.chunks_mut(PART).zip(a.chunks_mut(PART)).zip(algorithmic);
     threads::each(q.chunks_mut(PART).zip(rates).enumerate(), |(number, (q, ((v, a), algorithmic)))| {
         let start = PART * number;
         work(start, Slots { q, v, a, algorithmic, turns: turns.get(start..).unwrap_or_default() });

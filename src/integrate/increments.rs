@@ -44,7 +44,7 @@ impl Increments {
         Self { carriers: model.charted.rotations.iter().map(carrier).collect() }
     }
 
-    /// At the start of a stage, what is algorithmic is what is.
+    /// At the start of a stage, after [`super::Scheme::start`]: the same of momenta.
     pub fn start(&self, state: &mut State) {
         for &(slot, carrier) in &self.carriers {
             let spin = state.spin(slot);

@@ -19,8 +19,7 @@ use std::sync::Arc;
 
 /// The factors of the last corrections for each way to foresee the next one, the latest first. With E the shift by a step, they make
 /// nothing of 1, E - 1, (E - 1)^2, (E - 1)^3 times a correction; where it swings of E + 1, (E + 1) (E - 1), (E + 1) (E - 1)^2.
-const WAYS: [&[f64]; 7] =
-    [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0], &[-1.0], &[0.0, 1.0], &[1.0, 1.0, -1.0]];
+const WAYS: [&[f64]; 7] = [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0], &[-1.0], &[0.0, 1.0], &[1.0, 1.0, -1.0]];
 
 /// The weight of the last step in what is thought of a way.
 const NEWS: f64 = 0.5;

@@ -48,7 +48,7 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
             }
             let (velocity, acceleration) = (state.v[slot], state.a[slot]);
             let change = Complement::new(p, velocity, acceleration);
-            if let Some(lag) = lag {
+            if let Some(lag) = lag.filter(|_| !state.algorithmic.is_empty()) {
                 let drift = (change.b_rate * acceleration) * 2.0 + change.b_rate2 * velocity;
                 state.algorithmic[slot] = change.b * state.algorithmic[slot] + change.b_rate * velocity + drift * lag;
             }

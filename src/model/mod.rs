@@ -387,6 +387,7 @@ impl Model {
             let slot = slot as usize;
             [&mut state.v, &mut state.a, &mut state.algorithmic]
                 .into_iter()
+                .filter(|rates| !rates.is_empty())
                 .for_each(|rates| rates.put(slot, Vec3::ZERO));
         }
     }

@@ -15,6 +15,11 @@ impl Field {
         Self(Arc::new(zeros(slots)))
     }
 
+    /// At no slot: nothing is kept.
+    pub fn none() -> Self {
+        Self::zero(0)
+    }
+
     /// Puts a value at a slot, where another one stands there.
     #[inline]
     pub fn put(&mut self, slot: usize, value: Vec3) {
@@ -29,8 +34,8 @@ impl Field {
             return;
         }
         match Arc::get_mut(&mut self.0) {
-            Some(own) => threads::copy_over(own, &other.0),
-            None => self.0 = other.0.clone(),
+            Some(own) if own.len() == other.len() => threads::copy_over(own, &other.0),
+            _ => self.0 = other.0.clone(),
         }
     }
 }

@@ -282,8 +282,12 @@ mod tests {
         assert_eq!(with(Aspect::Vector(Vec3::UNIT[1])).unwrap().normal(), Vec3::UNIT[2]);
         assert_eq!(with(Aspect::Axial(Vec3::UNIT[1] * -1.0)).unwrap().normal(), Vec3::UNIT[1]);
         assert!(with(Aspect::Axial(Vec3::UNIT[0])).is_err(), "torsion leaves every plane");
-        let apart = plane_of(&[line[0], line[1], Aspect::Vector(Vec3::UNIT[1]), Aspect::Vector(Vec3([0.0, 1.0, -0.5]))]);
-        assert_eq!(apart.unwrap_err(), "part: the vector [0, 1, -0.5] is not mirrored in a plane that the others share");
+        let apart =
+            plane_of(&[line[0], line[1], Aspect::Vector(Vec3::UNIT[1]), Aspect::Vector(Vec3([0.0, 1.0, -0.5]))]);
+        assert_eq!(
+            apart.unwrap_err(),
+            "part: the vector [0, 1, -0.5] is not mirrored in a plane that the others share"
+        );
     }
 
     /// Places alone would tell the normal of a shallow arch to a few digits only.

@@ -45,7 +45,7 @@ pub struct State {
     pub v: Field,
     /// d2q/dt2; zero in static stages.
     pub a: Field,
-    /// The algorithmic acceleration of generalised-alpha methods; equal to `a` where a method has none of its own. Where
+    /// The algorithmic acceleration of generalised-alpha methods; empty where a method has none of its own, for which it is `a`. Where
     /// the unknowns of steps are increments, that of a rotation is the rate of the momentum that it carries, see [`Turn`];
     /// while a step is iterated, that of its start.
     pub algorithmic: Field,
@@ -77,8 +77,8 @@ impl State {
             load: 0.0,
             q: zeros(slots),
             v: rates.clone(),
-            a: rates.clone(),
-            algorithmic: rates,
+            a: rates,
+            algorithmic: Field::none(),
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
             wound: Vec::new(),
@@ -112,13 +112,17 @@ impl State {
     pub fn stand_still(&mut self) {
         if self.moves() {
             let rest = Field::zero(self.v.len());
-            (self.v, self.a, self.algorithmic) = (rest.clone(), rest.clone(), rest);
+            (self.v, self.a, self.algorithmic) = (rest.clone(), rest, Field::none());
         }
     }
 
     /// Whether it has velocities or accelerations.
     pub fn moves(&self) -> bool {
-        let moves = |&slot: &usize| [&self.v, &self.a, &self.algorithmic].iter().any(|rates| rates[slot] != Vec3::ZERO);
+        let moves = |&slot: &usize| {
+            [&self.v, &self.a, &self.algorithmic]
+                .iter()
+                .any(|rates| rates.get(slot).is_some_and(|&rate| rate != Vec3::ZERO))
+        };
         threads::first(self.v.len(), |mut part| part.find(moves)).is_some()
     }
 

@@ -130,6 +130,7 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
     let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
     let combinations = if incremental {
         let increments = Increments::new(&model, &assembly.system.pattern.equations);
+        step.scheme.start(&mut state);
         increments.start(&mut state);
         increments.begin(&mut state, &step, 0.5);
         step.predict(&mut state, 0.5);

@@ -99,7 +99,6 @@ fn set_in_motion(motions: &[InitialMotion], state: &mut State, assembly: &mut As
     assembly.system.right_hand_side(&mut right_hand_side);
     assert!(solver.factorise(&assembly.system) && solver.solve(&assembly.system, &mut right_hand_side));
     assembly.system.pattern.equations.scatter(&right_hand_side, None, &mut state.a);
-    state.algorithmic.copy_from_slice(&state.a);
 }
 
 /// The same for any scene that starts from rest without acceleration, or with spins of bodies.
@@ -117,6 +116,7 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
     if !scene.plan.initial.is_empty() {
         set_in_motion(&scene.plan.initial, &mut state, &mut assembly, &mut newton.solver);
     }
+    scheme.start(&mut state);
     if let Some(increments) = &increments {
         increments.start(&mut state);
     }
