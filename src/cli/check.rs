@@ -47,7 +47,7 @@ fn tell(scene: &Scene) -> Result<(), String> {
         let share = shares.iter().find(|share| reason.active && share.name == reason.name);
         let added = share.map_or(String::new(), |Share { instances, unknowns, entries, .. }| {
             format!(
-                " (in the first stage {instances} of them, which alone bring {unknowns} unknowns and {entries} entries of the matrix)"
+                " ({instances} in the first stage; {unknowns} unknowns and {entries} entries of the matrix come from nothing else)"
             )
         });
         say::line(&format!("  {mark} {:<width$}  {}{added}", reason.name, reason.reason));

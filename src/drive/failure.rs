@@ -207,8 +207,8 @@ impl Failure {
         match self {
             Self::NotConverged { tried, .. } => Some(tried.hint()),
             Self::TurnsTooFar { .. } => Some(
-                "use smaller steps; where nothing should turn so fast the step does not resolve the motion: damp what it cannot \
-                 resolve (a smaller `rho_inf`)",
+                "use smaller steps; in a dynamic stage in which nothing should turn so fast the step does not resolve the motion: damp \
+                 what it cannot resolve (a smaller `rho_inf`)",
             ),
             Self::LimitPoint { .. } => Some(
                 "the path it is on does not come to this load (the rows follow it beyond its limit points): more `steps` may keep it on another; else \

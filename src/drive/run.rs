@@ -9,9 +9,10 @@ use super::warnings::Told;
 use crate::integrate::{Increments, Scheme, Trend};
 use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
-use crate::system::{Node, Plane, State, System};
+use crate::system::{Node, Plane, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
+use std::f64::consts::PI;
 use std::fmt;
 use std::sync::Arc;
 
@@ -521,6 +522,7 @@ impl<'o> Run<'o> {
             // Rotations of any size, without charts.
             self.state.wound.clear();
         }
+        charts::unwind(&mut self.state, &self.good, &self.model.charted.elements, &self.model.charted.rotations);
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
@@ -551,6 +553,22 @@ impl<'o> Run<'o> {
         let rotations = self.model.charted.elements[element].rotations();
         let names = [rotations[0], rotations[rotations.len() - 1]].map(|slot| self.model.node_at(slot as usize));
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
+    }
+
+    /// Where a spring or the spring of a joint seems to have been wound by more than half a turn since the last good state nobody knows
+    /// whether that were the load or the corrections on their way to the balance: smaller levels tell.
+    pub(super) fn refuse_windings(&self) -> Result<(), NewtonFailure> {
+        let turned = |slot: Slot| self.state.wound_at(slot) - self.good.wound_at(slot);
+        let of_joint = |[a, b]: [Option<Slot>; 2]| {
+            let [start, end] = [a, b].map(|slot| slot.map_or(Vec3::ZERO, turned));
+            (a.or(b).unwrap_or_default(), (end - start).norm())
+        };
+        let springs = self.model.sprung.iter().map(|&slot| (slot, turned(slot).norm()));
+        let mut wound = springs.chain(self.model.sprung_joints.iter().copied().map(of_joint));
+        match wound.find(|&(_, angle)| angle > PI) {
+            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
+            None => Ok(()),
+        }
     }
 
     /// Between the last good state and this one neighbours may have turned past pi against each other: smaller steps tell.

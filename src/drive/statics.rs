@@ -220,7 +220,8 @@ impl Run<'_> {
         let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
         let work = &mut self.counters.work;
         newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
-        self.refuse_leaps()
+        self.refuse_leaps()?;
+        self.refuse_windings()
     }
 
     pub(super) fn static_progress(&self, load: f64) -> f64 {

@@ -136,7 +136,7 @@ impl Effect for BeamMass {
     }
 
     fn momentum(&self, at: &State) -> Momentum {
-        let mut sum = Momentum::ZERO;
+        let mut sum = Momentum::default();
         for_each_batch!(self.elements, |_first, batch| for element in batch {
             element.each_momentum(at, |i, x, linear| {
                 // A row of the matrix is what a node has of the mass.

@@ -58,9 +58,6 @@ pub struct Momentum {
 }
 
 impl Momentum {
-    /// Of nothing.
-    pub const ZERO: Self = Self { mass: 0.0, moment: Vec3::ZERO, linear: Vec3::ZERO, angular: Vec3::ZERO };
-
     /// Adds another part.
     pub fn add(&mut self, other: Self) {
         self.mass += other.mass;
@@ -158,7 +155,7 @@ pub trait Effect: Send + Sync {
 
     /// Mass and momenta.
     fn momentum(&self, _at: &State) -> Momentum {
-        Momentum::ZERO
+        Momentum::default()
     }
 
     /// Shows the bodies at nodes with their mass properties.

@@ -87,7 +87,7 @@ impl Effect for RigidBody {
     }
 
     fn momentum(&self, at: &State) -> Momentum {
-        let mut sum = Momentum::ZERO;
+        let mut sum = Momentum::default();
         self.bodies.iter().for_each(|b| sum.add(momentum(&b.inertia, b.place, &at.motion(b.node), 1.0)));
         sum
     }

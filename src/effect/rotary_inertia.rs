@@ -54,7 +54,7 @@ impl Effect for RotaryInertia {
             *sum += rotation.r * (*j * omega) * w;
         };
         self.elements.sum(at, momentum, |part| angular += part);
-        Momentum { angular, ..Momentum::ZERO }
+        Momentum { angular, ..Momentum::default() }
     }
 }
 

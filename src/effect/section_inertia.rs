@@ -47,7 +47,7 @@ impl Effect for SectionInertia {
     }
 
     fn momentum(&self, at: &State) -> Momentum {
-        let mut sum = Momentum::ZERO;
+        let mut sum = Momentum::default();
         let momentum = |sum: &mut Momentum, inertia: &Inertia, w: f64, place, motion: &NodeMotion| {
             sum.add(rigid_body::momentum(inertia, place, motion, w));
         };

@@ -79,8 +79,12 @@ impl Scheme {
 
     /// At the start of a stage, what is algorithmic is what is; where the scheme has nothing of the kind it takes no memory.
     pub fn start(&self, state: &mut State) {
-        let has_own = self.rotations == Rotations::Increments || self.alpha_m != 0.0 || self.alpha_f != 0.0;
-        state.algorithmic = if has_own { state.a.clone() } else { Field::none() };
+        state.algorithmic = if self.has_algorithmic() { state.a.clone() } else { Field::none() };
+    }
+
+    /// Whether it carries an algorithmic acceleration beside the true one.
+    fn has_algorithmic(&self) -> bool {
+        self.rotations == Rotations::Increments || self.alpha_m != 0.0 || self.alpha_f != 0.0
     }
 
     /// The factor of h^2 (a1 - a0) in the local error of a step: beta - 1/6 + (alpha_m - alpha_f)/2. `None` where it is
@@ -102,8 +106,9 @@ pub struct Step {
 
 impl Step {
     /// Predicts the end of the step with the acceleration of its start. `before` is the length of the step that the
-    /// algorithmic acceleration comes from: on a change of step its lag changes with it.
+    /// algorithmic acceleration comes from: on a change of step its lag changes with it. The stage has begun with [`Scheme::start`].
     pub fn predict(&self, state: &mut State, before: f64) {
+        debug_assert_ne!(self.scheme.has_algorithmic(), state.algorithmic.is_empty(), "the scheme was not started");
         let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
         let stretch = h / before;
         each_part(state, |_, Slots { q, v, a, algorithmic, turns }| {

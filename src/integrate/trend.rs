@@ -34,7 +34,7 @@ const CORRECTION: i32 = 3;
 const FORCE: i32 = 1;
 
 /// So many steps are remembered.
-const MOST: usize = 3;
+const MOST: usize = WAYS[3].len();
 
 /// Factors of the last corrections, the latest first
 type Factors = [f64; MOST];

@@ -6,6 +6,7 @@ use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
 use crate::system::{Slot, State};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -29,6 +30,9 @@ const FAR: f64 = PI / 2.0;
 
 /// From here on a rotation may have gone the long way round.
 pub const HALF_TURN: f64 = 3.0;
+
+/// Corrections that lead round and round do not end so near to where they began but by chance.
+const LITTLE: f64 = 1.0;
 
 /// Within this angle of a whole turn the direction of P tells nothing of the axis.
 const NEAR_TURN: f64 = 0.5;
@@ -179,6 +183,38 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     let in_part = |part: &[Slot]| part.iter().copied().filter(is_ambiguous).collect::<Vec<_>>();
     threads::in_order(rotations.chunks(PART), in_part, |part| ambiguous.extend(part));
     ambiguous
+}
+
+/// Takes away turns that only the corrections of an iteration made: they may lead round and round before they find a balance. Where a
+/// node seems to have turned by more than pi since the state `before`, those that have turned by little tell the others: along an
+/// element the rotations of neighbours differ by less than pi, and so do their wound vectors. What no such node leads to stays.
+pub fn unwind(state: &mut State, before: &State, elements: &[ElementInfo], rotations: &[Slot]) {
+    if state.wound.is_empty() {
+        return;
+    }
+    let turned = |slot: Slot| (state.wound_at(slot) - before.wound_at(slot)).norm();
+    let far = |part: Range<usize>| rotations[part].iter().find(|&&slot| turned(slot) > PI);
+    if threads::first(rotations.len(), far).is_none() {
+        return;
+    }
+    let mut unsettled: BTreeSet<Slot> = rotations.iter().copied().filter(|&slot| turned(slot) > LITTLE).collect();
+    // Along a beam one pass settles all that follows, and the next one all that comes before.
+    let mut left = usize::MAX;
+    while !unsettled.is_empty() && unsettled.len() < left {
+        left = unsettled.len();
+        let mut settle = |element: &ElementInfo| {
+            let mut pairs: Vec<[Slot; 2]> = element.rotations().windows(2).map(|pair| [pair[0], pair[1]]).collect();
+            pairs.extend(pairs.clone().into_iter().rev().map(|[a, b]| [b, a]));
+            for [from, to] in pairs {
+                if !unsettled.contains(&from) && unsettled.remove(&to) {
+                    let (p, own) = (state.q[to as usize], state.q[from as usize]);
+                    state.wound[to as usize] = continued(p, state.wound[from as usize], rotated(own, p));
+                }
+            }
+        };
+        elements.iter().for_each(&mut settle);
+        elements.iter().rev().for_each(settle);
+    }
 }
 
 /// The largest relative rotation between neighbouring nodes of elements that interpolate total vectors.

@@ -113,6 +113,8 @@ pub struct Model {
     pub angles: usize,
     /// The slots on which rotational springs act: how they are wound must be known
     pub sprung: Vec<Slot>,
+    /// Those of the two sides of each joint that remembers its angle
+    pub sprung_joints: Vec<[Option<Slot>; 2]>,
     /// How many beam elements there are
     pub elements: usize,
     /// What large rotations ask for
@@ -394,7 +396,7 @@ impl Model {
 
     /// Mass and momenta.
     pub fn momentum(&self, state: &State) -> Momentum {
-        let mut sum = Momentum::ZERO;
+        let mut sum = Momentum::default();
         self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
         sum
     }

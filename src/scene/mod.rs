@@ -218,6 +218,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
         angles: composition.angles,
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
+        sprung_joints: composition.sprung_joints,
         elements: mesh.element_count,
         charted: rotating.clone(),
         rotating,

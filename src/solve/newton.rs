@@ -169,7 +169,7 @@ impl Newton {
         self.last = None;
         self.first.clear();
         self.reuse.begin(self.given.take() == Some(assembly.system.revision));
-        let mut refinement = Refinement::default();
+        let (mut refinement, mut formed_anew) = (Refinement::default(), false);
         loop {
             let forms = lift.is_some() || iterations >= self.max_iterations || self.reuse.expects_tangent();
             let weights = if forms { method.weights() } else { Weights::NONE };
@@ -192,9 +192,10 @@ impl Newton {
                 Verdict::Noisy if lift.is_none() && iterations > 0 => {
                     let last = self.last.unwrap_or_default();
                     let refined = refinement.look(model, &self.dq, last, size(model, &state.q));
-                    if refined.stalls() && !self.reuse.is_own() && iterations < self.max_iterations {
-                        // Not round-off may end it, but an older tangent.
-                        self.reuse.forget();
+                    if refined.stalls() && !self.reuse.is_own() && !formed_anew {
+                        // Not round-off may make it stall, but an older tangent.
+                        formed_anew = true;
+                        self.reuse.doubt();
                     } else if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
                         self.end();
@@ -214,6 +215,8 @@ impl Newton {
                     self.form(assembly, state, method, work);
                 }
                 self.reuse.form(lift.is_some());
+                // What one tangent leaves tells nothing of the corrections with another one.
+                refinement = Refinement::default();
             } else {
                 self.reuse.keep();
             }

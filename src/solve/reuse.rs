@@ -4,7 +4,7 @@
 //! evaluation of both and a factorisation, about three times that. Where a new tangent has made a residual smaller by theta, the
 //! same tangent makes the next one smaller by about 2 theta (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is
 //! kept where so much brings balance soon enough. Where a residual is round-off ratios tell nothing: a tangent of such an iterate is formed
-//! once, and serves for all that follow. Only residuals and counts decide, never a clock.
+//! once, and serves for all that follow as long as their corrections become smaller. Only residuals and counts decide, never a clock.
 
 /// The ratio of a residual to what is allowed that is expected to become one in balance.
 const EXPECTED: f64 = 0.1;
@@ -116,6 +116,11 @@ impl Reuse {
 
     /// Unknowns have changed their meaning.
     pub fn forget(&mut self) {
+        self.kept = false;
+    }
+
+    /// Corrections with the tangent that is there do not become smaller.
+    pub fn doubt(&mut self) {
         self.kept = false;
     }
 

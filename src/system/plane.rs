@@ -44,14 +44,20 @@ impl fmt::Display for Aspect {
             Self::Vector(v) => ("the vector", v),
             Self::Axial(v) => ("what turns about", v),
             Self::Line(v) => ("the axis", v),
-            Self::Tensor(_) => return f.write_str("what is not alike on both sides of the plane"),
-            Self::Coupling(_) => return f.write_str("what couples bending in the plane with strain in it"),
-            Self::Spatial => return f.write_str("what is never treated in a plane"),
+            Self::Tensor(_) => return f.write_str("a stiffness, an inertia or a support with axes aside of the plane"),
+            Self::Coupling(_) => {
+                return f.write_str("a coupling of strain in the plane with torsion or with bending out of it");
+            }
+            Self::Spatial => return f.write_str("what has no kernel for planes"),
         };
-        // Nought has no sign.
-        let [x, y, z] = v.0.map(|c| c + 0.0);
-        write!(f, "{what} [{x}, {y}, {z}]")
+        write!(f, "{what} [{}]", v.0.map(rounded).join(", "))
     }
+}
+
+/// Six digits; nought has no sign.
+fn rounded(component: f64) -> String {
+    let rounded: f64 = format!("{component:.5e}").parse().unwrap_or(component);
+    format!("{:?}", rounded + 0.0)
 }
 
 /// Shows the parts of a scene, each with whose it is.
@@ -155,7 +161,9 @@ impl Plane {
         }
         match apart {
             None => Err("nothing tells a plane: all lies in one line".into()),
-            Some((name, aspect)) => Err(format!("{name}: {aspect} is not mirrored in a plane that the others share")),
+            Some((name, aspect)) => {
+                Err(format!("{name}: {aspect} is not its own image in a plane that all else shares"))
+            }
         }
     }
 }
@@ -286,7 +294,7 @@ mod tests {
             plane_of(&[line[0], line[1], Aspect::Vector(Vec3::UNIT[1]), Aspect::Vector(Vec3([0.0, 1.0, -0.5]))]);
         assert_eq!(
             apart.unwrap_err(),
-            "part: the vector [0, 1, -0.5] is not mirrored in a plane that the others share"
+            "part: the vector [0.0, 1.0, -0.5] is not its own image in a plane that all else shares"
         );
     }
 

@@ -264,3 +264,73 @@ fn a_reversal_is_no_leap_over_pi() {
         assert!((uy - exact).abs() < 1e-4, "{steps}: {uy} for {exact}");
     }
 }
+
+/// A cantilever with a kink, slender enough for Newton's method to wander.
+fn kinked(middle: &str, tip: &str, beam: &str, loads: &str, steps: u32) -> String {
+    format!(
+        r#"
+[point]
+a = [0, 0, 0]
+m = {middle}
+t = {tip}
+[section.s]
+EA = 100000
+GA = 10000
+GJ = 40
+EI = 5
+[[beam]]
+name = "b"
+section = "s"
+through = ["a", "m", "t"]
+{beam}
+[[support]]
+at = "a"
+fix = "all"
+{loads}
+[[stage]]
+kind = "static"
+steps = {steps}
+[output]
+nodes = ["t"]
+columns = ["u", "rc"]
+"#
+    )
+}
+
+/// Corrections lead round and round before they find the balance: those turns are none, neither of a free node nor of a spring that they
+/// would wind up. With levels as they are given the tip turned by 64, 81, -21 and -114.
+#[test]
+fn turns_that_only_an_iteration_makes_are_not_counted() {
+    let spring = "[[spring]]\nat = \"t\"\nstiffness = [0, 0, 0, 0.05, 0.05, 0.05]\n";
+    let along = |force: &str| format!("[[load]]\nalong = \"b\"\nforce = {force}\n");
+    let following = "[[load]]\nat = \"t\"\nforce = [-47.223, 0, 18.151]\nframe = \"body\"\n";
+    let dead = "[[load]]\nat = \"t\"\nforce = [-18.30774777872953, 0, 1.6755443038253581]\n";
+    let scenes = [
+        ("[0.719, 0, 0]", "[1.813, 0, 1.2]", "elements = 2", along("[15.699, 0, -17.217]") + spring),
+        (
+            "[1.1257941185301423, 0, 0]",
+            "[1.5837411923261038, 0, 1.2]",
+            "elements = 2\ninterpolation = \"total\"",
+            along("[8.794413597688731, 0, 45.95237977177054]") + spring,
+        ),
+        ("[1.038, 0, 0.7]", "[1.064, 0, 1.2]", "elements = 1", along("[11.079, 0, 34.067]") + following),
+        (
+            "[0.8725941437251136, 0, 0]",
+            "[1.050695481461016, 0, 1.2]",
+            "elements = 1\norder = 2",
+            along("[18.762288677159496, 0, 8.988762391513092]") + dead,
+        ),
+    ];
+    for (number, (middle, tip, beam, loads)) in scenes.iter().enumerate() {
+        let end = |steps: u32| {
+            let simulation = simulate(&kinked(middle, tip, beam, loads, steps));
+            ["t.ux", "t.uz", "t.ry"].map(|column| simulation.end(column))
+        };
+        let fine = end(100);
+        for steps in [1, 2, 4] {
+            let coarse = end(steps);
+            let apart = coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-6, "scene {number}, {steps} levels: {coarse:?}, 100 levels: {fine:?}");
+        }
+    }
+}

@@ -140,6 +140,7 @@ impl Composer<'_> {
             angle: turns.then_some(self.out.angles),
         };
         self.out.angles += usize::from(turns);
+        self.out.sprung_joints.extend(turns.then(|| nodes.map(|node| node.map(|node| node.p))));
         self.out.jointed.extend(connection.nodes.into_iter().flatten());
         if !shared && !support {
             instance.along = Some(self.multiplier(SlotKind::Force, connection));

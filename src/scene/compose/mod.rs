@@ -21,6 +21,7 @@ use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Strain;
 use crate::kernel::volume::VolumePoint;
 use crate::model::{Amplitude, History, SlotKind, StageSet, Support};
+use crate::system::Slot;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -60,6 +61,8 @@ pub struct Composition {
     pub jointed: Vec<usize>,
     /// How many joints remember their angle
     pub angles: usize,
+    /// The slots of the rotations on both sides of each of them
+    pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
 
 /// Collects effects while the tables of the deck are walked through.
@@ -94,6 +97,7 @@ pub fn compose(
         idle_multipliers: Vec::new(),
         jointed: Vec::new(),
         angles: 0,
+        sprung_joints: Vec::new(),
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
     composer.formulation();
