@@ -522,7 +522,8 @@ impl<'o> Run<'o> {
             // Rotations of any size, without charts.
             self.state.wound.clear();
         }
-        charts::unwind(&mut self.state, &self.good, &self.model.charted.elements, &self.model.charted.rotations);
+        let is_prescribed = |slot: Slot| self.model.motions.iter().any(|motion| motion.slot == slot);
+        charts::unwind(&mut self.state, &self.good, &self.model.charted, is_prescribed);
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);

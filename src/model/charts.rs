@@ -1,6 +1,6 @@
 //! Changes of chart at nodes, and the choice of charts in elements.
 
-use super::ElementInfo;
+use super::{Charted, ElementInfo};
 use crate::kernel::seam;
 use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
 use crate::system::{Slot, State};
@@ -186,9 +186,11 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
 }
 
 /// Takes away turns that only the corrections of an iteration made: they may lead round and round before they find a balance. Where a
-/// node seems to have turned by more than pi since the state `before`, those that have turned by little tell the others: along an
-/// element the rotations of neighbours differ by less than pi, and so do their wound vectors. What no such node leads to stays.
-pub fn unwind(state: &mut State, before: &State, elements: &[ElementInfo], rotations: &[Slot]) {
+/// node seems to have turned by more than pi since the state `before`, those that have turned by little, or as is `prescribed`, tell
+/// the others: along an element the rotations of neighbours differ by less than pi, and so do their wound vectors. What no such node
+/// leads to stays.
+pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: impl Fn(Slot) -> bool) {
+    let Charted { elements, rotations } = charted;
     if state.wound.is_empty() {
         return;
     }
@@ -197,7 +199,8 @@ pub fn unwind(state: &mut State, before: &State, elements: &[ElementInfo], rotat
     if threads::first(rotations.len(), far).is_none() {
         return;
     }
-    let mut unsettled: BTreeSet<Slot> = rotations.iter().copied().filter(|&slot| turned(slot) > LITTLE).collect();
+    let is_unsettled = |&slot: &Slot| turned(slot) > LITTLE && !prescribed(slot);
+    let mut unsettled: BTreeSet<Slot> = rotations.iter().copied().filter(is_unsettled).collect();
     // Along a beam one pass settles all that follows, and the next one all that comes before.
     let mut left = usize::MAX;
     while !unsettled.is_empty() && unsettled.len() < left {
