@@ -522,7 +522,7 @@ impl<'o> Run<'o> {
             // Rotations of any size, without charts.
             self.state.wound.clear();
         }
-        let is_prescribed = |slot: Slot| self.model.motions.iter().any(|motion| motion.slot == slot);
+        let is_prescribed = |slot: Slot| self.model.motions.iter().any(|motion| motion.slot == slot && motion.acts());
         charts::unwind(&mut self.state, &self.good, &self.model.charted, is_prescribed);
         let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {

@@ -205,18 +205,18 @@ pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: 
     let mut left = usize::MAX;
     while !unsettled.is_empty() && unsettled.len() < left {
         left = unsettled.len();
-        let mut settle = |element: &ElementInfo| {
-            let mut pairs: Vec<[Slot; 2]> = element.rotations().windows(2).map(|pair| [pair[0], pair[1]]).collect();
-            pairs.extend(pairs.clone().into_iter().rev().map(|[a, b]| [b, a]));
-            for [from, to] in pairs {
-                if !unsettled.contains(&from) && unsettled.remove(&to) {
-                    let (p, own) = (state.q[to as usize], state.q[from as usize]);
-                    state.wound[to as usize] = continued(p, state.wound[from as usize], rotated(own, p));
-                }
-            }
-        };
-        elements.iter().for_each(&mut settle);
-        elements.iter().rev().for_each(settle);
+        for element in elements.iter().chain(elements.iter().rev()) {
+            let pairs = element.rotations().windows(2).flat_map(|pair| [[pair[0], pair[1]], [pair[1], pair[0]]]);
+            pairs.for_each(|[from, to]| settle(state, &mut unsettled, from, to));
+        }
+    }
+}
+
+/// The turns of a node from those of a neighbour, where these are known and its own are not.
+fn settle(state: &mut State, unsettled: &mut BTreeSet<Slot>, from: Slot, to: Slot) {
+    if !unsettled.contains(&from) && unsettled.remove(&to) {
+        let [own, p] = [from, to].map(|slot| state.q[slot as usize]);
+        state.wound[to as usize] = continued(p, state.wound[from as usize], rotated(own, p));
     }
 }
 

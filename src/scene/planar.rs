@@ -5,7 +5,7 @@ use super::mesh::Mesh;
 use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, StageBody};
 use crate::drive::InitialMotion;
 use crate::model::Model;
-use crate::system::{Aspect, Plane};
+use crate::system::{Aspect, Plane, rounded};
 
 /// The plane of a scene, if it has one and the deck does not refuse it.
 pub fn plane(
@@ -28,7 +28,7 @@ pub fn plane(
                 ["x = constant", "y = constant", "z = constant"][[x, y, z].iter().position(|c| *c != 0.0).unwrap_or(2)]
                     .into()
             } else {
-                format!("the plane normal to [{}]", [x, y, z].map(shown).join(", "))
+                format!("the plane normal to {}", rounded(plane.normal()))
             };
             let reason = format!(
                 "all of it lies in {which} and is loaded there: three unknowns a node in static and dynamic stages"
@@ -43,12 +43,6 @@ pub fn plane(
             (None, Reason { name, active: false, reason })
         }
     }
-}
-
-/// Six digits behind the point; what rounds to nought has no sign.
-fn shown(component: f64) -> String {
-    let rounded = (component * 1e6).round() / 1e6 + 0.0;
-    format!("{rounded:.6}")
 }
 
 fn find(deck: &Deck, model: &Model, mesh: &Mesh, initial: &[InitialMotion]) -> Result<Plane, String> {

@@ -195,7 +195,7 @@ impl Newton {
                     if refined.stalls() && !self.reuse.is_own() && !formed_anew {
                         // Not round-off may make it stall, but an older tangent.
                         formed_anew = true;
-                        self.reuse.doubt();
+                        self.reuse.forget();
                     } else if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
                         self.end();

@@ -114,13 +114,8 @@ impl Reuse {
         self.own
     }
 
-    /// Unknowns have changed their meaning.
+    /// The tangent that is there serves no more: unknowns have changed their meaning, or corrections with it do not become smaller.
     pub fn forget(&mut self) {
-        self.kept = false;
-    }
-
-    /// Corrections with the tangent that is there do not become smaller.
-    pub fn doubt(&mut self) {
         self.kept = false;
     }
 

@@ -19,7 +19,7 @@ pub use equations::{Direction, Equations, FrameConflict};
 pub use field::Field;
 pub use groups::{Groups, Layout};
 pub use pattern::{Cliques, Entry, Meetings, Pattern, Symmetry, Tile, WIDTH, transposed};
-pub use plane::{Aspect, Plane};
+pub use plane::{Aspect, Plane, rounded};
 pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};
 pub use stage::{StageContext, StageKind, StageSet};

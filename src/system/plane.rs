@@ -50,14 +50,14 @@ impl fmt::Display for Aspect {
             }
             Self::Spatial => return f.write_str("what has no kernel for planes"),
         };
-        write!(f, "{what} [{}]", v.0.map(rounded).join(", "))
+        write!(f, "{what} {}", rounded(*v))
     }
 }
 
-/// Six digits; nought has no sign.
-fn rounded(component: f64) -> String {
-    let rounded: f64 = format!("{component:.5e}").parse().unwrap_or(component);
-    format!("{:?}", rounded + 0.0)
+/// A vector in six digits, for messages; nought has no sign.
+pub fn rounded(v: Vec3) -> String {
+    let rounded = |component: f64| format!("{component:.5e}").parse().unwrap_or(component) + 0.0;
+    format!("{:?}", v.0.map(rounded))
 }
 
 /// Shows the parts of a scene, each with whose it is.
