@@ -199,8 +199,7 @@ impl Run<'_> {
         }
         trend.begin(&assembly.system.pattern.equations, &mut self.state, &step, newton.scratch());
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
-        let (system, solver) = (&assembly.system, &mut newton.solver);
-        trend.end(&system.pattern.equations, &self.state, &step, |x| solver.multiply(system, x));
+        trend.end(&assembly.system.pattern.equations, &self.state, &step);
         self.refuse_massless_turns(massive)?;
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);

@@ -1,11 +1,17 @@
 //! What the corrections of the last steps tell about the next one.
 //!
 //! A scheme predicts the end of a step with the acceleration of its start. What Newton's method then adds, c = q1 - q1(predicted), grows with
-//! the third power of the step and goes on as the motion does: it is foreseen as nothing, as the last one, or along the line or
-//! the parabola through the last ones. In stiff directions accelerations swing from step to step (the trapezoidal rule turns them round),
-//! and c with them: it is foreseen as the last one turned round, or along what swings about a constant or about a line. That way is
-//! taken whose residual J (c - c(foreseen)) would have been the smallest in the last steps: where motion is not smooth that is the
-//! scheme's own.
+//! the third power of the step and goes on as the motion does: smoothly in soft directions, while in stiff ones accelerations swing from step
+//! to step (the trapezoidal rule turns them round), and c with them. Sums of such motions follow from those before them,
+//!
+//! ```text
+//! c(n) = a1 c(n-1) + a2 c(n-2) + ...
+//! ```
+//!
+//! and the factors are those that would have left the least in the last steps (linear prediction: Makhoul 1975,
+//! doi:10.1109/PROC.1975.9792). What counts is the size of c, not that of its forces: they are large where it is stiff, which the first correction
+//! takes away, but what that correction leaves grows with the square of how far things turn. Where motion has no rule the factors are small, and the
+//! prediction is the scheme's own.
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
@@ -13,28 +19,25 @@ use crate::real::Rough;
 use crate::system::{Equations, State};
 use crate::tensor::Vec3;
 use crate::threads;
+use nalgebra::{SMatrix, SVector};
 use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// The factors of the last corrections for each way to foresee the next one, the latest first. With E the shift by a step, they make
-/// nothing of 1, E - 1, (E - 1)^2, (E - 1)^3 times a correction; where it swings of E + 1, (E + 1) (E - 1), (E + 1) (E - 1)^2.
-const WAYS: [&[f64]; 7] = [&[], &[1.0], &[2.0, -1.0], &[3.0, -3.0, 1.0], &[-1.0], &[0.0, 1.0], &[1.0, 1.0, -1.0]];
+/// So many steps are remembered, and tell of the next one.
+const MOST: usize = 4;
 
-/// The weight of the last step in what is thought of a way.
-const NEWS: f64 = 0.5;
+/// What a step counts for beside the next one.
+const MEMORY: f64 = 0.5;
 
 /// A step that is longer or shorter than another one by more than this has nothing to say of it.
 const ALIKE: f64 = 4.0;
 
 /// The power of the length of a step with which corrections grow
-const CORRECTION: i32 = 3;
+const GROWTH: i32 = 3;
 
-/// And forces J c, since J has the mass over the square of the length
-const FORCE: i32 = 1;
-
-/// So many steps are remembered.
-const MOST: usize = WAYS[3].len();
+/// Directions in which the corrections of the last steps differ by less than this share, in squares, are those of their six digits.
+const DIGITS: f64 = 1e-11;
 
 /// Factors of the last corrections, the latest first
 type Factors = [f64; MOST];
@@ -42,91 +45,130 @@ type Factors = [f64; MOST];
 /// The corrections of the last steps of a stage.
 #[derive(Default)]
 pub struct Trend {
-    /// What forces are compared by: of each slot its kind, and of each kind a factor
+    /// What corrections are compared by: of each slot its kind, and of each kind a factor of squares
     kinds: Arc<Vec<SlotKind>>,
     weights: [f64; SlotKind::ALL.len()],
     /// The latest first
     past: VecDeque<Past>,
-    /// By way, how much residual it would have left (squares, in the mean of the last steps); `None` where that is not known
-    missed: [Option<f64>; WAYS.len()],
+    /// For each number of steps that the next one is foreseen from, one less, what their factors come from
+    fits: [Fit; MOST],
     /// Where the scheme's own prediction went in the present step, by equation
     predicted: Vec<f64>,
-    /// The way that was taken there
-    taken: usize,
+    has_foreseen: bool,
 }
 
-/// A step that has come to its end, by equation: what is held is not corrected. A guess needs few digits.
+/// The normal equations of some factors, of corrections over the power of the length of their steps.
+#[derive(Default)]
+struct Fit {
+    /// Lower triangle
+    matrix: SMatrix<f64, MOST, MOST>,
+    goals: SVector<f64, MOST>,
+}
+
+/// A step that has come to its end.
 #[derive(Default)]
 struct Past {
     length: f64,
-    /// c
+    /// What makes corrections of steps of different lengths comparable
+    rate: f64,
+    /// c by equation: what is held is not corrected. A guess needs few digits.
     correction: Rough<1>,
-    /// J c, moments over the length of the scene; gaps do not count
-    force: Rough<1>,
+    /// Its products with itself and with those before it, where there are any
+    products: [f64; MOST + 1],
 }
 
 impl Trend {
     /// For a stage of a scene.
     pub fn new(model: &Model) -> Self {
-        let weight = |kind: SlotKind| if kind.is_multiplier() { 0.0 } else { 1.0 / kind.arm(model.length) };
+        let weight = |kind| match kind {
+            SlotKind::Displacement => model.length.powi(-2),
+            SlotKind::Rotation => 1.0,
+            SlotKind::Force | SlotKind::Moment => 0.0,
+        };
         Self { kinds: model.kinds.clone(), weights: SlotKind::ALL.map(weight), ..Self::default() }
     }
 
     /// Another attempt at a step begins: nothing has been foreseen of it yet.
     pub fn reset(&mut self) {
-        self.taken = 0;
+        self.has_foreseen = false;
     }
 
     /// Whether something was foreseen of the present step.
     pub fn has_foreseen(&self) -> bool {
-        self.taken > 0
+        self.has_foreseen
     }
 
     /// Adds what is foreseen to the prediction of a step.
     pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step, scratch: &mut [Vec3]) {
         self.predicted.resize(equations.count(), 0.0);
         equations.gather(|slot| state.q[slot], &mut self.predicted);
-        let best = self.best();
-        if let Some(factors) = self.factors(best, step.length, CORRECTION).filter(|_| best > 0) {
-            self.taken = best;
-            equations.scatter_found(|equation| self.foreseen(&factors, equation), scratch);
-            step.correct(state, scratch);
-        }
+        let Some(factors) = self.factors(step.length) else { return };
+        self.has_foreseen = true;
+        let past: [_; MOST] = self.corrections();
+        let of = |equation| past.iter().zip(&factors).map(move |(past, factor)| past.get(equation)[0] * factor);
+        equations.scatter_found(|equation| of(equation).sum(), scratch);
+        step.correct(state, scratch);
     }
 
-    /// The sum of the last corrections with their factors.
-    #[inline(always)]
-    fn foreseen(&self, factors: &Factors, equation: usize) -> f64 {
-        let parts = self.past.iter().zip(factors);
-        parts.fold(0.0, |sum, (past, factor)| sum + past.correction.get(equation)[0] * factor)
-    }
-
-    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in; `multiply` turns a vector into its
-    /// product with the tangent.
-    pub fn end(&mut self, equations: &Equations, state: &State, step: &Step, multiply: impl FnOnce(&mut [f64])) {
+    /// Takes note of a step that has come to its end, with the unknowns that it was predicted in.
+    pub fn end(&mut self, equations: &Equations, state: &State, step: &Step) {
         let mut change = std::mem::take(&mut self.predicted);
         equations.gather_change(|slot| state.q[slot], &mut change);
-        // Into the memory of the oldest, which nobody asks for any more.
-        let oldest = self.past.get_mut(MOST - 1).map(|oldest| std::mem::take(&mut oldest.correction));
-        let mut correction = oldest.unwrap_or_default();
+        // Into the memory of one that nobody asks for any more.
+        let forgotten = if self.past.len() > MOST { self.past.pop_back() } else { None };
+        let mut correction = forgotten.unwrap_or_default().correction;
         correction.take(change.len(), |equation| [change[equation]]);
-        multiply(&mut change);
-        equations.scale(|slot| self.weights[self.kinds[slot] as usize], &mut change);
+        equations.fill(|slot| self.weights[self.kinds[slot] as usize], &mut change);
         self.learn(step.length, correction, &change);
         self.predicted = change;
     }
 
-    /// Learns from a step of this length, with its correction and its force.
-    fn learn(&mut self, length: f64, correction: Rough<1>, force: &[f64]) {
-        let factors = from_fn(|way| self.factors(way, length, FORCE));
-        let missed = self.rests(force, &factors);
-        for (mean, (rest, known)) in self.missed.iter_mut().zip(missed.into_iter().zip(factors)) {
-            *mean = known.map(|_| mean.map_or(rest, |mean| mean + NEWS * (rest - mean)));
-        }
-        let oldest = if self.past.len() == MOST { self.past.pop_back() } else { None };
-        let mut rough = oldest.unwrap_or_default().force;
-        rough.take(force.len(), |equation| [force[equation]]);
-        self.past.push_front(Past { length, correction, force: rough });
+    /// Learns from a step of this length with its correction; `weights` are the factors of squares.
+    fn learn(&mut self, length: f64, correction: Rough<1>, weights: &[f64]) {
+        let rate = length.powi(-GROWTH);
+        self.past.push_front(Past { length, rate, correction, products: [0.0; MOST + 1] });
+        let all: [_; MOST + 1] = self.corrections();
+        let products = threads::sums(weights.len(), |equations| {
+            let mut sums = [0.0; MOST + 1];
+            for equation in equations {
+                let own = all[0].get(equation)[0] * weights[equation];
+                sums.iter_mut().zip(&all).for_each(|(sum, one)| *sum += own * one.get(equation)[0]);
+            }
+            sums
+        });
+        self.past[0].products = products;
+        let known = self.alike(length, 1);
+        let told = Fit {
+            matrix: lower(|row, column| if row < known { self.product(column + 1, row + 1) } else { 0.0 }),
+            goals: SVector::from_fn(|row, _| if row < known { self.product(0, row + 1) } else { 0.0 }),
+        };
+        // Where few steps are remembered, what was learnt of more of them stays.
+        self.fits[..known].iter_mut().zip(1..).for_each(|(fit, count)| fit.learn(&told, count));
+    }
+
+    /// The last corrections, the latest first; in the place of what is not known stands the first of them.
+    fn corrections<const N: usize>(&self) -> [&Rough<1>; N] {
+        from_fn(|number| &self.past.get(number).unwrap_or(&self.past[0]).correction)
+    }
+
+    /// The product of a correction with one `later` than it, both over the power of the length of their steps.
+    fn product(&self, later: usize, earlier: usize) -> f64 {
+        let [of, with] = [later, earlier].map(|number| &self.past[number]);
+        of.products[earlier - later] * of.rate * with.rate
+    }
+
+    /// How many of the steps from the one `since` on, but no more than count, have something to say of one of this length.
+    fn alike(&self, length: f64, since: usize) -> usize {
+        let past = self.past.iter().skip(since).take(MOST);
+        past.take_while(|past| (1.0 / ALIKE..=ALIKE).contains(&(length / past.length))).count()
+    }
+
+    /// The factors of the last corrections in what is foreseen of a step of this length; `None` where nothing is known.
+    fn factors(&self, length: f64) -> Option<Factors> {
+        let fits = self.fits[..self.alike(length, 0)].iter();
+        let factors = fits.rev().find_map(Fit::solve)?;
+        let growth = length.powi(GROWTH);
+        Some(from_fn(|number| self.past.get(number).map_or(0.0, |past| factors[number] * past.rate * growth)))
     }
 
     /// The last step is not taken after all.
@@ -138,133 +180,139 @@ impl Trend {
     pub fn forget(&mut self) {
         self.past.clear();
     }
+}
 
-    /// The first of the ways that miss least.
-    fn best(&self) -> usize {
-        let known = self.missed.iter().enumerate().filter_map(|(way, missed)| Some((way, (*missed)?)));
-        known.reduce(|best, next| if next.1 < best.1 { next } else { best }).map_or(0, |(way, _)| way)
+impl Fit {
+    /// Takes note of what a step tells of so many factors.
+    fn learn(&mut self, told: &Self, count: usize) {
+        self.matrix =
+            self.matrix * MEMORY + lower(|row, column| if row < count { told.matrix[(row, column)] } else { 0.0 });
+        self.goals = self.goals * MEMORY + SVector::from_fn(|row, _| if row < count { told.goals[row] } else { 0.0 });
     }
 
-    /// The factors of the last steps by which a way foresees what grows with this power of the length of a step; `None` where too
-    /// little is known.
-    fn factors(&self, way: usize, length: f64, power: i32) -> Option<Factors> {
-        let mut factors = [0.0; MOST];
-        for (number, factor) in WAYS[way].iter().enumerate() {
-            let stretch = length / self.past.get(number)?.length;
-            if !(1.0 / ALIKE..=ALIKE).contains(&stretch) {
-                return None;
-            }
-            factors[number] = factor * stretch.powi(power);
+    /// Factors that leave least; of steps of which nothing is known they are zero.
+    fn solve(&self) -> Option<SVector<f64, MOST>> {
+        let size = self.matrix.trace();
+        if !(size > 0.0 && size.is_finite()) {
+            return None;
         }
-        Some(factors)
+        let mut matrix = self.matrix;
+        for k in 0..MOST {
+            matrix[(k, k)] += DIGITS * size;
+        }
+        Some(matrix.cholesky()?.solve(&self.goals))
     }
+}
 
-    /// By way, the sum of squares of what it leaves of a force.
-    fn rests(&self, force: &[f64], factors: &[Option<Factors>; WAYS.len()]) -> [f64; WAYS.len()] {
-        let factors = factors.map(|factors| factors.unwrap_or_default());
-        threads::sums(force.len(), |equations| {
-            let mut sums = [0.0; WAYS.len()];
-            for equation in equations {
-                let past: Factors =
-                    from_fn(|number| self.past.get(number).map_or(0.0, |past| past.force.get(equation)[0]));
-                for (sum, factors) in sums.iter_mut().zip(&factors) {
-                    let foreseen = past[0] * factors[0] + past[1] * factors[1] + past[2] * factors[2];
-                    *sum += (force[equation] - foreseen).powi(2);
-                }
-            }
-            sums
-        })
-    }
+/// A lower triangle.
+fn lower(entry: impl Fn(usize, usize) -> f64) -> SMatrix<f64, MOST, MOST> {
+    SMatrix::from_fn(|row, column| if column <= row { entry(row, column) } else { 0.0 })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn rough(numbers: &[f64]) -> Rough<1> {
-        let mut rough = Rough::default();
-        rough.take(numbers.len(), |k| [numbers[k]]);
-        rough
-    }
-
-    fn with(corrections: &[f64]) -> Trend {
+    /// Has seen steps of these lengths with these corrections.
+    fn with<const N: usize>(steps: &[(f64, [f64; N])]) -> Trend {
         let mut trend = Trend::default();
-        for (length, correction) in corrections.iter().map(|c| (1.0, *c)) {
-            trend.learn(length, rough(&[correction]), &[correction]);
-        }
+        steps.iter().for_each(|(length, correction)| learn(&mut trend, *length, correction));
         trend
     }
 
-    fn foreseen(trend: &Trend, way: usize, length: f64) -> f64 {
-        let factors = trend.factors(way, length, CORRECTION).unwrap();
-        trend.past.iter().zip(factors).map(|(past, factor)| past.correction.get(0)[0] * factor).sum()
+    fn learn(trend: &mut Trend, length: f64, correction: &[f64]) {
+        let mut rough = Rough::default();
+        rough.take(correction.len(), |k| [correction[k]]);
+        trend.learn(length, rough, &vec![1.0; correction.len()]);
     }
 
-    #[test]
-    fn lines_and_parabolas_go_on() {
-        let line = with(&[1.0, 3.0, 5.0, 7.0, 9.0]);
-        assert_eq!((line.best(), foreseen(&line, 2, 1.0)), (2, 11.0));
-        let parabola = with(&[1.0, 4.0, 9.0, 16.0, 25.0, 36.0]);
-        assert_eq!((parabola.best(), foreseen(&parabola, 3, 1.0)), (3, 49.0));
-        // With half the step an eighth.
-        assert_eq!(foreseen(&line, 2, 0.5), 11.0 / 8.0);
-        assert!(line.factors(2, 0.1, CORRECTION).is_none());
+    /// Of steps of one second with one number.
+    fn after(corrections: impl IntoIterator<Item = f64>) -> Trend {
+        with(&corrections.into_iter().map(|c| (1.0, [c])).collect::<Vec<_>>())
     }
 
-    #[test]
-    fn steps_that_grow_are_foreseen() {
-        let mut trend = Trend::default();
-        for length in [1.0_f64, 1.8, 3.2, 5.8] {
-            trend.learn(length, rough(&[length.powi(3)]), &[length]);
-        }
-        assert_eq!(trend.best(), 1);
-        // Of six digits the last may be off.
-        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
-        // A step that is not taken has nothing to say.
-        trend.learn(5.8, rough(&[7.0]), &[1.0]);
-        trend.withdraw();
-        assert!((foreseen(&trend, 1, 10.0) - 1000.0).abs() < 1e-3);
+    fn foreseen(trend: &Trend, length: f64) -> Option<Vec<f64>> {
+        let factors = trend.factors(length)?;
+        let past: [_; MOST] = trend.corrections();
+        let of = |k| (0..MOST).map(|step| past[step].get(k)[0] * factors[step]).sum();
+        Some((0..past[0].len()).map(of).collect())
     }
 
+    #[track_caller]
+    fn assert_foreseen(trend: &Trend, length: f64, wanted: &[f64], share: f64) {
+        let Some(foreseen) = foreseen(trend, length) else { panic!("nothing is foreseen") };
+        let largest = wanted.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= share * largest;
+        assert!(foreseen.iter().zip(wanted).all(is_near), "{foreseen:?}, not {wanted:?}");
+    }
+
+    /// Smooth in one direction, swinging in others: each obeys a rule of its own, and both the same one.
     #[test]
-    fn what_swings_from_step_to_step_is_foreseen() {
-        let next = |corrections: &[f64]| {
-            let trend = with(corrections);
-            foreseen(&trend, trend.best(), 1.0)
+    fn sums_of_smooth_and_swinging_motions_go_on() {
+        let at = |step: i32| {
+            let t = f64::from(step);
+            [1.0 + 0.3 * t, (-1.0_f64).powi(step), (2.0 * t).cos() * 0.1 + 0.2, 0.0]
         };
-        assert_eq!(next(&[1.0, -1.0]), 1.0);
-        // About a constant, and about a line
-        assert_eq!(next(&[4.0, -2.0, 4.0, -2.0, 4.0, -2.0, 4.0]), -2.0);
-        assert_eq!(next(&[1.0, -1.0, 3.0, 1.0, 5.0, 3.0, 7.0, 5.0, 9.0, 7.0]), 11.0);
+        // A constant, a line, and what turns round: three factors. A cosine has two more, and is one of five.
+        let three: Vec<_> = (0..12).map(|k| (0.1, [at(k)[0], at(k)[1], at(k)[0] - at(k)[1]])).collect();
+        assert_foreseen(&with(&three), 0.1, &[at(12)[0], at(12)[1], at(12)[0] - at(12)[1]], 1e-3);
+        let cosine: Vec<_> = (0..12).map(|k| (0.1, [at(k)[2], at(k)[3]])).collect();
+        assert_foreseen(&with(&cosine), 0.1, &[at(12)[2], at(12)[3]], 1e-3);
+    }
+
+    #[test]
+    fn the_first_steps_already_tell() {
+        assert!(foreseen(&Trend::default(), 1.0).is_none() && foreseen(&after([2.0]), 1.0).is_none());
+        // What halves goes on to halve, what turns round goes on to do so.
+        assert_foreseen(&after([4.0, 2.0]), 1.0, &[1.0], 1e-5);
+        assert_foreseen(&after([4.0, -4.0]), 1.0, &[4.0], 1e-5);
+    }
+
+    #[test]
+    fn corrections_grow_with_the_third_power_of_steps() {
+        let steps: Vec<_> = [1.0_f64, 1.8, 3.2, 5.8].map(|length| (length, [length.powi(3), 0.0])).into();
+        let mut trend = with(&steps);
+        assert_foreseen(&trend, 10.0, &[1000.0, 0.0], 1e-4);
+        assert_foreseen(&trend, 2.0, &[8.0, 0.0], 1e-4);
+        assert!(foreseen(&trend, 100.0).is_none(), "of a step like none before");
+        // A step that is not taken has little to say.
+        learn(&mut trend, 5.8, &[5.8_f64.powi(3), 0.0]);
+        trend.withdraw();
+        assert_foreseen(&trend, 10.0, &[1000.0, 0.0], 1e-4);
     }
 
     #[test]
     fn what_comes_without_rule_is_not_foreseen() {
-        assert_eq!(with(&[1.0, -0.1, 0.2, 2.0, 0.1, -0.3, 1.0, 0.1, -0.1, -1.0]).best(), 0);
-        assert_eq!(with(&[0.0; 5]).best(), 0);
+        let noise = |step: u32| from_fn::<f64, 500, _>(|k| f64::from(1000 * step + k as u32).powi(2).sin());
+        let trend = with(&(0..20).map(|step| (1.0, noise(step))).collect::<Vec<_>>());
+        let Some(factors) = trend.factors(1.0) else { panic!("there is a past") };
+        assert!(factors.iter().all(|factor| factor.abs() < 0.15), "{factors:?}");
+        assert_eq!(after([0.0; 5]).factors(1.0), None);
+    }
+
+    #[test]
+    fn what_is_learnt_outlasts_what_is_forgotten() {
+        let parabola = |k: i32| f64::from(k * k);
+        let mut trend = after((0..10).map(parabola));
+        trend.forget();
+        assert!(foreseen(&trend, 1.0).is_none());
+        (20..23).for_each(|k| learn(&mut trend, 1.0, &[parabola(k)]));
+        assert_foreseen(&trend, 1.0, &[parabola(23)], 1e-3);
     }
 
     #[test]
     fn what_is_learnt_does_not_depend_on_threads() {
         let learnt = || {
+            let count = 5 * threads::PART;
             let mut trend = Trend::default();
             for step in 1..=6 {
-                let force: Vec<f64> =
-                    (0..5 * threads::PART).map(|k| (k as f64 * f64::from(step * step)).sin()).collect();
-                trend.learn(1.0, rough(&force), &force);
+                let correction: Vec<f64> = (0..count).map(|k| (k as f64 * f64::from(step * step)).sin()).collect();
+                learn(&mut trend, 1.0, &correction);
             }
-            trend.missed.map(|missed| missed.map(f64::to_bits))
+            trend.factors(1.0).map(|factors| factors.map(f64::to_bits))
         };
         let alone = learnt();
-        assert!(alone.iter().all(Option::is_some));
+        assert!(alone.is_some());
         assert_eq!(threads::on(3, learnt), alone);
-    }
-
-    #[test]
-    fn forgotten_steps_are_not_gone_on_with() {
-        let mut trend = with(&[1.0, 1.0, 1.0]);
-        assert_eq!(trend.best(), 1);
-        trend.forget();
-        assert!(trend.factors(1, 1.0, CORRECTION).is_none());
     }
 }

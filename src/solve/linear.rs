@@ -115,14 +115,6 @@ impl LinearSolver {
         self.blocks_in_use()?.negative().filter(|_| done)
     }
 
-    /// The product of the tangent with x, one entry an equation: by its factors where they have taken its place.
-    pub fn multiply(&mut self, system: &System, x: &mut [f64]) {
-        match &mut self.blocks {
-            Some(blocks) if system.holds_factors() => blocks.multiply(system, x),
-            _ => system.multiply_in_place(&system.values, x, &mut self.leftover),
-        }
-    }
-
     /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field
     /// of slots; held directions take their part of `held`. It [looks](LinearSolver::solve) at what is left where it is asked to and there is something to look at.
     /// `false` where there is no solution.

@@ -210,20 +210,15 @@ impl System {
     /// A x, for a matrix with these values on the pattern of the tangent.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
         let mut out = x.to_vec();
-        self.multiply_in_place(values, &mut out, &mut Leftover::default());
+        match self.pattern.width() {
+            WIDTH => self.product::<WIDTH>(values, &mut out),
+            _ => self.product::<3>(values, &mut out),
+        }
         out
     }
 
-    /// The same in the place of x.
-    pub fn multiply_in_place(&self, values: &[f64], x: &mut [f64], room: &mut Leftover) {
-        if self.pattern.width() == WIDTH {
-            self.product::<WIDTH>(values, x, room);
-        } else {
-            self.product::<3>(values, x, room);
-        }
-    }
-
-    fn product<const W: usize>(&self, values: &[f64], x: &mut [f64], room: &mut Leftover) {
+    fn product<const W: usize>(&self, values: &[f64], x: &mut [f64]) {
+        let mut room = Leftover::default();
         let sums = room.take::<W>(&self.pattern, 1);
         threads::each_part(sums, |_, sums| sums.fill([0.0; W]));
         self.each_product::<W, _>(

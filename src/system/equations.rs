@@ -228,9 +228,9 @@ impl Equations {
         self.each_entry(|slot| self.to_local(slot as Slot, field(slot)), out, |_, out, entry| *out = entry - *out);
     }
 
-    /// Multiplies each entry with a factor of its slot.
-    pub fn scale(&self, factor: impl Fn(usize) -> f64 + Send + Sync, out: &mut [f64]) {
-        self.each_entry(|_| Vec3::ZERO, out, |slot, out, _| *out *= factor(slot));
+    /// Gives each entry what its slot has.
+    pub fn fill(&self, own: impl Fn(usize) -> f64 + Send + Sync, out: &mut [f64]) {
+        self.each_entry(|_| Vec3::ZERO, out, |slot, out, _| *out = own(slot));
     }
 
     /// Shows for each equation its slot, what is kept for it, and its entry of what stands at the slot in local directions.

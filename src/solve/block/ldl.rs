@@ -6,7 +6,6 @@ use super::pieces::{Look, Piece, Signs};
 use super::stretch::Stretch;
 use super::tile::{self, Block, Own, Part, Rows, Tile, Upper, Width};
 use crate::system::upper_entry;
-use std::array;
 use std::ops::Range;
 
 /// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 A_kj a row
@@ -137,24 +136,6 @@ where
         for row in self.rows().rev() {
             let part = tile::solve_symmetric(&look.diagonal[row], &self.subtracted_by_later(look, row, x, beyond));
             x[row - self.rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
-        }
-    }
-
-    #[inline(always)]
-    fn times_upper(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
-        for row in self.rows() {
-            let part = self.subtracted_by_later(look, row, x, beyond);
-            let own = &mut x[row - self.rows.start];
-            let product = tile::times_symmetric(&look.diagonal[row], own);
-            *own = array::from_fn(|r| product[r] - part[r]);
-        }
-    }
-
-    #[inline(always)]
-    fn times_lower(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
-        for row in self.rows().rev() {
-            let part = tile::solve_symmetric(&look.diagonal[row], &x[row - self.rows.start]).map(|x| -x);
-            self.subtract_from_later(look, row, &part, x, beyond);
         }
     }
 }

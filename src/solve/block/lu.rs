@@ -5,7 +5,6 @@ use super::elimination::Elimination;
 use super::pieces::{Look, Piece, Signs};
 use super::stretch::Stretch;
 use super::tile::{self, Block, Own, Part, RowOrder, Rows, Tile, Width};
-use std::array;
 use std::ops::Range;
 
 /// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 P A_kj and
@@ -170,26 +169,6 @@ where
         for row in rows.clone().rev() {
             let part = self.solved(look, row, &self.subtracted_by_later(look, row, x, beyond));
             x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
-        }
-    }
-
-    #[inline(always)]
-    fn times_upper(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
-        let rows = self.rows();
-        for row in rows.clone() {
-            let part = self.subtracted_by_later(look, row, x, beyond);
-            let own = &mut x[row - rows.start];
-            let product = tile::times(&look.diagonal[row], &self.orders[row], own);
-            *own = array::from_fn(|r| product[r] - part[r]);
-        }
-    }
-
-    #[inline(always)]
-    fn times_lower(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
-        let rows = self.rows();
-        for row in rows.clone().rev() {
-            let part = self.solved(look, row, &x[row - rows.start]).map(|x| -x);
-            self.subtract_from_later(look, row, &part, x, beyond);
         }
     }
 }

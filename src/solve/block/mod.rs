@@ -57,9 +57,6 @@ trait Factor: Send {
 
     /// Solves with the last factorisation, which is that of `system`, row by row.
     fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]);
-
-    /// The product of the factors with x, row by row.
-    fn multiply(&self, elimination: &Elimination, system: &System, x: &mut [f64]);
 }
 
 impl BlockSolver {
@@ -148,8 +145,8 @@ impl BlockSolver {
     /// Solves with the last factorisation, which is that of `system`; one entry an equation.
     pub fn solve(&mut self, system: &System, x: &mut [f64]) {
         match system.pattern.width() {
-            WIDTH => self.by_rows::<WIDTH>(&system.pattern, x, |factor, order, x| factor.solve(order, system, x)),
-            _ => self.by_rows::<3>(&system.pattern, x, |factor, order, x| factor.solve(order, system, x)),
+            WIDTH => self.solve_by::<WIDTH>(system, x),
+            _ => self.solve_by::<3>(system, x),
         }
     }
 
@@ -177,28 +174,15 @@ impl BlockSolver {
         is_finite
     }
 
-    /// The product of the tangent that was factorised last with x, one entry an equation, by its factors.
-    pub fn multiply(&mut self, system: &System, x: &mut [f64]) {
-        match system.pattern.width() {
-            WIDTH => self.by_rows::<WIDTH>(&system.pattern, x, |factor, order, x| factor.multiply(order, system, x)),
-            _ => self.by_rows::<3>(&system.pattern, x, |factor, order, x| factor.multiply(order, system, x)),
-        }
-    }
-
-    fn by_rows<const W: usize>(
-        &mut self,
-        pattern: &Pattern,
-        x: &mut [f64],
-        work: impl FnOnce(&dyn Factor, &Elimination, &mut [f64]),
-    ) {
+    fn solve_by<const W: usize>(&mut self, system: &System, x: &mut [f64]) {
         let Self { elimination, factor, parts } = self;
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
             for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
-                *part = pattern.part(group as usize, x);
+                *part = system.pattern.part(group as usize, x);
             }
         });
-        work(&**factor, elimination, parts);
+        factor.solve(elimination, system, parts);
         let parts = parts.as_chunks::<W>().0;
-        pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
+        system.pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
     }
 }

@@ -100,12 +100,6 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
 
     /// Solves with the upper factor for its own part `x`, where all later rows are solved.
     fn backward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]);
-
-    /// The product of the upper factor with `x`, in its own part.
-    fn times_upper(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]);
-
-    /// The product of the lower factor with that; what it adds to later rows goes to `beyond`, too.
-    fn times_lower(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]);
 }
 
 /// What a piece looks at to solve.
@@ -296,24 +290,6 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
         run!(self.trunk.backward(&of_trunk, trunk, &[]));
         let up = |((piece, look), x): ((&P, &Look<P, W>), &mut [Part<W>])| run!(piece.backward(look, x, trunk));
         threads::each(branches().zip(parts), up);
-    }
-
-    fn multiply(&self, elimination: &Elimination, system: &System, x: &mut [f64]) {
-        let mut looks = self.looks(elimination, system);
-        let mut parts = threads::split(x.as_chunks_mut().0, elimination.pieces().map(|rows| rows.end));
-        let (Some(trunk), Some(of_trunk)) = (parts.pop(), looks.pop()) else { return };
-        let branches = || self.branches.iter().zip(&looks);
-        let both = |((piece, look), x): ((&P, &Look<P, W>), &mut [Part<W>])| {
-            let mut change = vec![[0.0; W]; elimination.trunk.len()];
-            run!(piece.times_upper(look, x, trunk));
-            run!(piece.times_lower(look, x, &mut change));
-            change
-        };
-        let mut changes = Vec::new();
-        threads::in_order(branches().zip(parts), both, |change| changes.push(change));
-        run!(self.trunk.times_upper(&of_trunk, trunk, &[]));
-        run!(self.trunk.times_lower(&of_trunk, trunk, &mut []));
-        changes.iter().for_each(|change| add(trunk, change));
     }
 }
 

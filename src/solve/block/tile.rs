@@ -709,44 +709,6 @@ where
     z
 }
 
-/// A x, for a tile whose factors are there as for [`solve`].
-#[inline(always)]
-pub fn times<const W: usize>(inverses: &Tile<W>, order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
-    let (mut y, mut out) = (*x, [0.0; W]);
-    each_row_backwards!(W, |r| {
-        each_row!(W, |k| if k > r {
-            y[r] -= inverses[r][k] * y[k];
-        });
-        y[r] /= inverses[r][r];
-    });
-    each_row!(W, |r| {
-        each_row!(W, |k| if k < r {
-            y[r] -= inverses[r][k] * y[k];
-        });
-        out[order[r] as usize] = y[r];
-    });
-    out
-}
-
-/// The same for a symmetric tile, as for [`solve_symmetric`].
-#[inline(always)]
-pub fn times_symmetric<const W: usize>(inverses: &Upper<W>, x: &Part<W>) -> Part<W>
-where
-    Width<W>: Rows<W>,
-{
-    let (inverses, mut y) = (inverses.as_ref(), *x);
-    each_row_backwards!(W, |r| each_row!(W, |k| if k > r {
-        y[r] -= inverses[upper_entry(W, r, k)] * y[k];
-    }));
-    each_row!(W, |r| {
-        y[r] /= inverses[upper_entry(W, r, r)];
-        each_row!(W, |k| if k < r {
-            y[r] -= inverses[upper_entry(W, k, r)] * y[k];
-        });
-    });
-    y
-}
-
 /// A part in another order.
 #[inline(always)]
 pub fn reordered<const W: usize>(order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
