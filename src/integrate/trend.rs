@@ -80,11 +80,7 @@ struct Past {
 impl Trend {
     /// For a stage of a scene.
     pub fn new(model: &Model) -> Self {
-        let weight = |kind| match kind {
-            SlotKind::Displacement => model.length.powi(-2),
-            SlotKind::Rotation => 1.0,
-            SlotKind::Force | SlotKind::Moment => 0.0,
-        };
+        let weight = |kind: SlotKind| if kind.is_multiplier() { 0.0 } else { kind.scale(model.length).powi(-2) };
         Self { kinds: model.kinds.clone(), weights: SlotKind::ALL.map(weight), ..Self::default() }
     }
 

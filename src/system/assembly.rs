@@ -30,19 +30,18 @@ impl Category {
     pub const ALL: [Self; 4] = [Self::Internal, Self::Inertia, Self::External, Self::Damping];
 }
 
-/// Room for products with the tangent, and to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for
-/// again and again.
+/// Room to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for again and again.
 #[derive(Default)]
 pub struct Leftover {
     residuals: Vec<f64>,
 }
 
 impl Leftover {
-    /// Room for so many numbers of each row of a group's tile.
-    fn take<const W: usize>(&mut self, pattern: &Pattern, numbers: usize) -> &mut [[f64; W]] {
-        let length = numbers * W * pattern.groups.count();
+    /// Of each row of a group's tile what is left, and the size that it is compared with.
+    fn take<const W: usize>(&mut self, pattern: &Pattern) -> &mut [[[f64; W]; 2]] {
+        let length = 2 * W * pattern.groups.count();
         self.residuals.resize(self.residuals.len().max(length), 0.0);
-        self.residuals[..length].as_chunks_mut::<W>().0
+        self.residuals[..length].as_chunks_mut::<W>().0.as_chunks_mut::<2>().0
     }
 }
 
@@ -218,13 +217,11 @@ impl System {
     }
 
     fn product<const W: usize>(&self, values: &[f64], x: &mut [f64]) {
-        let mut room = Leftover::default();
-        let sums = room.take::<W>(&self.pattern, 1);
-        threads::each_part(sums, |_, sums| sums.fill([0.0; W]));
+        let mut sums = vec![[0.0; W]; self.pattern.groups.count()];
         self.each_product::<W, _>(
             values,
             x,
-            sums,
+            &mut sums,
             #[inline(always)]
             |sum: &mut [f64; W], tile: &Tile<W>, x: &[f64; W]| {
                 for (line, x) in tile.iter().zip(x) {
@@ -232,7 +229,6 @@ impl System {
                 }
             },
         );
-        let sums = &*sums;
         self.pattern.join(|group| &sums[group], x);
     }
 
@@ -316,7 +312,7 @@ impl System {
     fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
         debug_assert!(!self.holds_factors, "there is no tangent");
         let pattern = &self.pattern;
-        let residuals = room.take::<W>(pattern, 2).as_chunks_mut::<2>().0;
+        let residuals = room.take::<W>(pattern);
         threads::each_part(residuals, |start, residuals| {
             for (group, [residual, size]) in (start..).zip(residuals) {
                 *residual = pattern.part(group, b);
