@@ -37,6 +37,13 @@ pub fn in_order<T: Send, R: Send>(
     results.into_iter().for_each(take);
 }
 
+/// A list of what items give, in their order.
+pub fn map<T: Send, R: Send>(items: impl Iterator<Item = T>, work: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
+    let mut list = Vec::new();
+    in_order(items, work, |result| list.push(result));
+    list
+}
+
 /// Whether whoever calls has given threads.
 fn are_given() -> bool {
     rayon::current_thread_index().is_some()

@@ -23,9 +23,9 @@ impl Run<'_> {
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
         }
         let equations = &workshop.assembly.system.pattern.equations;
-        for (slot, v) in self.state.v.iter_mut().enumerate() {
-            *v -= equations.held_part(slot as Slot, *v);
-        }
+        threads::each_part(&mut self.state.v, |start, part| {
+            (start..).zip(part).for_each(|(slot, v)| *v -= equations.held_part(slot as Slot, *v));
+        });
         self.state.a.fill(Vec3::ZERO);
         let time = self.state.time;
         self.model.set_clock(&mut self.state, time, 1.0);

@@ -42,7 +42,8 @@ impl<I: Interpolation> PlanarElasticity<I> {
 }
 
 fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane: &Plane) -> Vec<Block<N, G>> {
-    let block = |elements: &[ElasticElement<N, G>]| {
+    let block = |number: usize| {
+        let elements = &batch[number * LANES..batch.len().min((number + 1) * LANES)];
         let all: [&ElasticElement<N, G>; LANES] = each_lane!(|k| &elements[k.min(elements.len() - 1)]);
         let point = |g: usize| {
             let points = all.map(|element| PlanarPoint::new(&element.points()[g], plane.axes()));
@@ -54,7 +55,7 @@ fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane:
             points: std::array::from_fn(point),
         }
     };
-    batch.chunks(LANES).map(block).collect()
+    threads::list(batch.len().div_ceil(LANES), block)
 }
 
 impl<const N: usize, const G: usize> Block<N, G> {

@@ -7,7 +7,8 @@ use crate::kernel::Weights;
 use crate::system::{
     Category, Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, Symmetry, System,
 };
-use crate::tensor::Vec3;
+use crate::tensor::{Vec3, zeros};
+use crate::threads;
 use std::sync::Arc;
 
 /// The effects of one stage with their scratch, and the system they add to.
@@ -78,7 +79,7 @@ impl Assembly {
     /// The system of what acts in a stage on these equations.
     pub fn new(stage: &StageContext, equations: Equations, model: &Model) -> Self {
         let acting = model.acting(stage);
-        let cliques: Vec<_> = acting.iter().map(|effect| effect.cliques()).collect();
+        let cliques = threads::map(acting.iter(), |effect| effect.cliques());
         let acts = |(effect, own): (Arc<dyn Effect>, &Cliques)| Acting::new(effect, equations.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&cliques).map(acts).collect();
         // What is linear adds its forces by itself.
@@ -186,8 +187,7 @@ impl Assembly {
 
     /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Effect::drift`].
     pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
-        let zero = vec![Vec3::ZERO; state.q.len()];
-        let (mut rates, mut rates2) = (zero.clone(), zero);
+        let [mut rates, mut rates2] = [state.q.len(); 2].map(zeros);
         self.effects.iter().for_each(|acting| acting.effect.drift(state, &mut rates, &mut rates2));
         [rates, rates2]
     }

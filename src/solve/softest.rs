@@ -109,7 +109,10 @@ impl LinearSolver {
 
 fn diagonal(system: &System) -> Vec<f64> {
     let mut diagonal = vec![0.0; system.pattern.equations.count()];
-    system.pattern.each_diagonal(|equation, place| diagonal[equation] = system.values[place]);
+    system.pattern.each_region(&mut diagonal, |region, own| {
+        let (groups, first) = (region.groups.clone(), region.equations.start);
+        system.pattern.each_diagonal_of(groups, |equation, place| own[equation - first] = system.values[place]);
+    });
     diagonal
 }
 

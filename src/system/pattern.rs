@@ -8,6 +8,7 @@ use super::state::Slot;
 use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
 use crate::tensor::Vec3;
+use crate::threads;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -200,7 +201,7 @@ impl Pattern {
         debug_assert!((0..pattern.groups.count()).all(|group| pattern.is_ascending(group)), "rows out of order");
         pattern.idle = pattern.idle();
         pattern.between = pattern.between();
-        pattern.places = effects.into_iter().map(|cliques| pattern.places_of(cliques)).collect();
+        pattern.places = threads::map(effects.into_iter(), |cliques| pattern.places_of(cliques));
         pattern
     }
 
@@ -437,8 +438,13 @@ impl Pattern {
     }
 
     /// Shows each equation and where its entry of the diagonal is stored.
-    pub fn each_diagonal(&self, mut show: impl FnMut(usize, usize)) {
-        for group in 0..self.groups.count() {
+    pub fn each_diagonal(&self, show: impl FnMut(usize, usize)) {
+        self.each_diagonal_of(0..self.groups.count(), show);
+    }
+
+    /// The same of some groups.
+    pub fn each_diagonal_of(&self, groups: Range<usize>, mut show: impl FnMut(usize, usize)) {
+        for group in groups {
             for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != Equations::HELD) {
                 show(number as usize, self.storage.entry(self.storage.own(group), r, r));
             }

@@ -81,6 +81,20 @@ impl Neighbours {
         Some(Self { starts, later })
     }
 
+    /// The same where rows come in another order, in which each still comes before those that it changes.
+    fn in_order(&self, places: &[u32]) -> Self {
+        let row_of = inverse(places);
+        let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
+        starts.push(0);
+        for &place in places {
+            let start = later.len();
+            later.extend(self.of(place as usize).iter().map(|&row| row_of[row as usize]));
+            later[start..].sort_unstable();
+            starts.push(later.len() as u32);
+        }
+        Self { starts, later }
+    }
+
     fn of(&self, row: usize) -> &[u32] {
         &self.later[self.starts[row] as usize..self.starts[row + 1] as usize]
     }
@@ -126,7 +140,7 @@ pub fn find(pattern: &Pattern, most: usize) -> Option<Order> {
         return Some(Order { order, branches, neighbours });
     }
     let order = permuted(&order, &sorted);
-    Some(Order { neighbours: Neighbours::new(meetings, &order, most)?, order, branches })
+    Some(Order { neighbours: neighbours.in_order(&sorted), order, branches })
 }
 
 /// Where each entry stands.
