@@ -4,7 +4,9 @@
 //! results are the same on any number of threads, to the last bit.
 
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+use std::io;
 use std::ops::Range;
+use std::thread::{self, Scope, ScopedJoinHandle};
 
 /// Of each thread; that of the main thread on most systems
 const STACK: usize = 8 << 20;
@@ -16,6 +18,14 @@ pub fn on<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
         Some(pool) => pool.install(work),
         None => work(),
     }
+}
+
+/// A thread for a whole scene. `Err`: the system gives none.
+pub fn beside<'scope, R: Send + 'scope>(
+    scope: &'scope Scope<'scope, '_>,
+    work: impl FnOnce() -> R + Send + 'scope,
+) -> io::Result<ScopedJoinHandle<'scope, R>> {
+    thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work)
 }
 
 /// Does something with each item.

@@ -1,36 +1,43 @@
 //! Work that is done side by side, each piece once, in an order of the caller's.
 
+use crate::threads;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
-use std::sync::mpsc;
+use std::sync::mpsc::{self, Sender};
 use std::thread;
 
 /// Does the pieces `open`, the last first, on some threads until all are done or `stopped`; `take` sees what came of each as it ends, on
 /// this thread. `None` of `work` is a piece that was not brought to its end. A fault of the program in one piece is none of the others':
 /// `broken` stands for what would have come of it.
 pub fn side_by_side<T: Send>(
-    threads: usize,
+    wanted: usize,
     open: Vec<usize>,
     stopped: &(dyn Fn() -> bool + Sync),
     work: &(dyn Fn(usize) -> Option<T> + Sync),
     broken: &(dyn Fn(usize) -> T + Sync),
     mut take: impl FnMut(usize, T),
 ) {
-    let threads = threads.clamp(1, open.len().max(1));
+    let wanted = wanted.clamp(1, open.len().max(1));
     let queue = Mutex::new(open);
+    let go_on = |sender: Sender<(usize, T)>| {
+        let next = || queue.lock().ok()?.pop();
+        while let Some(k) = (!stopped()).then(next).flatten() {
+            let done = catch_unwind(AssertUnwindSafe(|| work(k))).unwrap_or_else(|_| Some(broken(k)));
+            if done.is_none_or(|done| sender.send((k, done)).is_err()) {
+                return;
+            }
+        }
+    };
     let (sender, receiver) = mpsc::channel();
     thread::scope(|scope| {
-        for _ in 0..threads {
-            let (queue, sender) = (&queue, sender.clone());
-            scope.spawn(move || {
-                let next = || queue.lock().ok()?.pop();
-                while let Some(k) = (!stopped()).then(next).flatten() {
-                    let done = catch_unwind(AssertUnwindSafe(|| work(k))).unwrap_or_else(|_| Some(broken(k)));
-                    if done.is_none_or(|done| sender.send((k, done)).is_err()) {
-                        return;
-                    }
-                }
-            });
+        let start = |_| {
+            let sender = sender.clone();
+            threads::beside(scope, || go_on(sender)).ok()
+        };
+        let started = (0..wanted).map_while(start).count();
+        // Where the system gives no thread.
+        if started == 0 {
+            go_on(sender.clone());
         }
         drop(sender);
         receiver.iter().for_each(|(k, done)| take(k, done));

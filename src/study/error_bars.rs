@@ -10,7 +10,8 @@ use crate::deck::{Deck, Diagnostic, StageBody};
 use crate::drive::Failure;
 use crate::output::Beside;
 use crate::scene::Scene;
-use std::thread;
+use crate::threads;
+use std::thread::{self, ScopedJoinHandle};
 
 /// The step tolerance of a companion whose steps adapt, over that of the run.
 const LOOSER: f64 = 10.0;
@@ -52,8 +53,9 @@ pub fn error_bars(
     let variants = companions(text, deck, &sampler);
     let run = |point: &Point| trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted);
     let outcomes: Vec<Result<Outcome, String>> = thread::scope(|scope| {
-        let started: Vec<_> = variants.iter().map(|(point, _)| scope.spawn(|| run(point))).collect();
-        started.into_iter().map(|thread| thread.join().unwrap_or(Err("it broke off".into()))).collect()
+        let started: Vec<_> = variants.iter().map(|(point, _)| threads::beside(scope, || run(point))).collect();
+        let join = |thread: ScopedJoinHandle<_>| thread.join().unwrap_or(Err("it broke off".into()));
+        started.into_iter().map(|thread| thread.map_or_else(|error| Err(error.to_string()), join)).collect()
     });
     let mut found = Vec::new();
     for ((_, divisors), outcome) in variants.into_iter().zip(outcomes) {
