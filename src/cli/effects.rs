@@ -53,7 +53,7 @@ fn study(
     let table = found.to_csv().map_err(|error| (Status::Io, "io", error.to_string()))?;
     PartFile::write(&folder, "effects.csv", &table).map_err(|error| (Status::Io, "io", error.to_string()))?;
     say::line(&format!("  {}", folder.join("effects.csv").display()));
-    json::wrote("effects", &folder.join("effects.csv"));
+    json::effects(path, &folder.join("effects.csv"), &found, tolerance);
     Ok(())
 }
 

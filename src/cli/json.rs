@@ -1,8 +1,10 @@
 //! Summaries for scripts: with `--json` a line on standard output for each deck, folder or table, instead of words.
 
 use super::say;
+use crate::deck::EffectWord;
 use crate::output::Record;
 use crate::scene::Scene;
+use crate::study::ablation::{Ablation, Variant};
 use crate::study::{Comparison, Judgement};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -57,6 +59,36 @@ pub fn compare(a: &Path, b: &Path, cells: &[Comparison]) {
     let columns: Vec<Value> = cells.iter().map(one).collect();
     let holds = cells.iter().all(|cell| cell.ratio <= 1.0);
     tell("compare", json!({ "history": a, "stored": b, "holds": holds, "columns": columns }));
+}
+
+/// What each effect of a deck changes and costs, as the table tells it, and what all outputs can do without.
+pub fn effects(deck: &Path, file: &Path, found: &Ablation, tolerance: f64) {
+    let keys = |words: &[EffectWord]| words.iter().map(|word| word.key()).collect::<Vec<_>>();
+    let one = |variant: &Variant| {
+        let ((change, column), outcome) = (variant.largest(), variant.outcome());
+        json!({
+            "without": keys(&variant.without),
+            "failure": if outcome.is_none() { Some(variant.failure()) } else { None },
+            "change": outcome.map(|_| change),
+            "of": outcome.filter(|_| change > 0.0).map(|_| &found.columns[column]),
+            "time": outcome.map(|outcome| outcome.seconds / found.whole.seconds),
+            "iterations": outcome.map(|outcome| outcome.counters.work.iterations),
+        })
+    };
+    let all: Vec<Value> = found.variants.iter().map(one).collect();
+    tell(
+        "effects",
+        json!({
+            "deck": deck,
+            "file": file,
+            "seconds": found.whole.seconds,
+            "iterations": found.whole.counters.work.iterations,
+            "tolerance": tolerance,
+            "variants": all,
+            "cheapest": one(&found.cheapest),
+            "absent": keys(&found.absent),
+        }),
+    );
 }
 
 /// A sweep, with the points that did not finish by what they ended with.

@@ -113,6 +113,21 @@ fn the_manner_of_speaking_is_the_users() {
     let swept = folder.beamsim(&["sweep", "calm.toml", "--vary", "section.s.EI=1,0", "--json"]);
     let line: serde_json::Value = serde_json::from_slice(&swept.stdout).unwrap();
     assert!(status(&swept) == 3 && line["finished"] == 1 && line["failed"]["deck"][0] == 2, "{line}");
+    let studied = folder.beamsim(&["effects", "calm.toml", "--tolerance", "0.5", "--json"]);
+    let line: serde_json::Value = serde_json::from_slice(&studied.stdout).unwrap();
+    assert_eq!((&line["command"], &line["tolerance"]), (&"effects".into(), &0.5.into()));
+    let mut told: Vec<_> = line["variants"].as_array().unwrap().iter().collect();
+    told.push(&line["cheapest"]);
+    let table = fs::read_to_string(folder.0.join(line["file"].as_str().unwrap())).unwrap();
+    for variant in &told {
+        let words: Vec<_> = variant["without"].as_array().unwrap().iter().map(|word| word.as_str().unwrap()).collect();
+        let own = table.lines().map(|row| row.split(',').collect::<Vec<_>>()).filter(|row| row[0] == words.join("+"));
+        let changes = own.filter_map(|row| Some((row[5].parse::<f64>().ok()?, row[4].to_string())));
+        let largest = changes.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, String::new()));
+        assert_eq!(variant["change"], largest.0, "{words:?}");
+        assert!(largest.0 == 0.0 || variant["of"] == largest.1.as_str(), "{words:?}: {variant}");
+    }
+    assert!(told.iter().any(|variant| variant["without"][0] == "large_rotations" && variant["change"] != 0.0));
 
     // One element that turns by 2 rad: a warning of the run.
     let warned = folder.beamsim(&["run", "turned.toml"]);
