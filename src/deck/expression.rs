@@ -347,28 +347,19 @@ fn call(name: &str, a: Jet, b: Jet) -> Jet {
             let f = x.sqrt();
             chain(a, f, 0.5 / f, -0.25 / (f * x))
         }
-        "abs" => {
-            if x < 0.0 {
-                a.map(|v| -v)
-            } else {
-                a
-            }
-        }
-        "min" => {
-            if b[0] < x {
-                b
-            } else {
-                a
-            }
-        }
-        _ => {
-            if b[0] > x {
-                b
-            } else {
-                a
-            }
-        }
+        "abs" if falls_below(a, [0.0; 3]) => a.map(|v| -v),
+        "abs" => a,
+        "min" if falls_below(b, a) => b,
+        "min" => a,
+        _ if falls_below(a, b) => b,
+        _ => a,
     }
+}
+
+/// Whether one is less than another, or where they meet, is so right after that: what depends on it has the derivatives of what comes then, as
+/// tables have, whatever the order of its arguments.
+fn falls_below(a: Jet, b: Jet) -> bool {
+    (0..3).find(|&k| a[k] != b[k]).is_some_and(|k| a[k] < b[k])
 }
 
 #[cfg(test)]
@@ -402,6 +393,28 @@ mod tests {
         assert_eq!(error("atan2(1)").message, "`atan2` takes 2 argument(s), not 1");
         assert_eq!(error("3 $ 4").offset, 2);
         assert!(Expression::parse(&"(".repeat(1000)).is_err());
+    }
+
+    /// A ramp and what holds it would add up at their corner if each took its side by the order of its arguments.
+    #[test]
+    fn corners_have_the_derivatives_of_what_follows() {
+        let at_corner = |text: &str| {
+            Expression::parse(text).unwrap().evaluate(&mut |name| (name == "t").then_some([2.0, 1.0, 0.0])).unwrap()
+        };
+        for (text, rates) in [
+            ("min(t, 2)", [0.0, 0.0]),
+            ("min(2, t)", [0.0, 0.0]),
+            ("max(t, 2)", [1.0, 0.0]),
+            ("max(2, t)", [1.0, 0.0]),
+            ("abs(t - 2)", [1.0, 0.0]),
+            ("abs(2 - t)", [1.0, 0.0]),
+            ("max((t - 2)^2, 0)", [0.0, 2.0]),
+            ("min(0, (t - 2)^2)", [0.0, 0.0]),
+            ("2*(min(t/2, 1) - 0.5) + max(t - 2, 0)", [1.0, 0.0]),
+            ("min(t, t)", [1.0, 0.0]),
+        ] {
+            assert_eq!(at_corner(text)[1..], rates, "{text}");
+        }
     }
 
     #[test]

@@ -175,6 +175,46 @@ fn a_study_tells_what_each_effect_changes() {
 }
 
 /// What cannot be taken out is told, and does not end the study.
+/// All that can be switched off is there, and each switch shows in the reasons that `check` and run.json tell.
+#[test]
+fn what_is_switched_off_is_told() {
+    let text = |switch: &str| {
+        let top = "gravity = [0, 0, -1]\n";
+        let moment = "[[load]]\nat = \"tip\"\nmoment = [0, 1, 0]\n[damping]\nmass = 0.1\nstiffness = 0.01\n";
+        format!("{top}{}{switch}", cantilever(&format!("{moment}{DYNAMIC}")))
+    };
+    let reasons = |switch: &str| scene::from_text(&text(switch)).unwrap().0.reasons;
+    let all = reasons("");
+    for (word, name) in [
+        (EffectWord::RotaryInertia, "rotary inertia"),
+        (EffectWord::Gyroscopic, "gyroscopic forces"),
+        (EffectWord::Shear, "shear"),
+        (EffectWord::Extension, "extension"),
+        (EffectWord::Damping, "mass-proportional damping of beams"),
+        (EffectWord::Gravity, "gravity on beams"),
+        (EffectWord::FollowerTangent, "follower tangent"),
+        (EffectWord::GeometricStiffness, "geometric stiffness"),
+        (EffectWord::LargeRotations, "large rotations"),
+    ] {
+        // Rotary inertia of relative beams sits at nodes.
+        let is_it = |told: &str| told == name || (name == "rotary inertia" && told == "section inertia at nodes");
+        assert!(all.iter().any(|reason| is_it(reason.name) && reason.active), "{name}");
+        let without = reasons(&format!("[effects]\n{} = false\n", word.key()));
+        let own: Vec<_> = without.iter().filter(|reason| is_it(reason.name)).collect();
+        assert!(own.iter().all(|reason| !reason.active), "{name}");
+        assert!(own.iter().any(|reason| reason.reason.contains("switched off in [effects]")), "{name}: {own:?}");
+    }
+}
+
+/// A deck that insists on its plane can be held against the linear theory, which is one in space.
+#[test]
+fn the_linear_theory_needs_no_plane() {
+    let text = cantilever(&format!("{}{STATIC}[effects]\nplanar = true\n", force(0.0, 1.0)));
+    let found = study(&text, 1e-3);
+    let linear = found.variants.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
+    assert!(linear.outcome().is_some() && linear.largest().0 > 1e-6, "{}", linear.failure());
+}
+
 #[test]
 fn a_variant_that_fails_is_a_result() {
     let hanging = "[[spring]]\nat = \"tip\"\nstiffness = [0, 0, 0, 0, 0, 5]\n";

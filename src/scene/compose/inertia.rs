@@ -1,6 +1,6 @@
 //! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional damping.
 
-use super::{Composer, push_volume};
+use super::{Composer, SWITCHED_OFF, push_volume};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
 use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
@@ -50,7 +50,7 @@ impl Composer<'_> {
             self.push(mass, "a dynamic stage, and sections with `rhoA`".into());
         }
         match (rotary.elements.is_empty(), wanted) {
-            (_, false) => self.reason(names[1], false, "switched off in [effects]"),
+            (_, false) => self.reason(names[1], false, SWITCHED_OFF),
             (true, _) if !bodies.is_empty() => self.reason(names[1], false, "what sections have is at the nodes"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
             _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
@@ -193,7 +193,11 @@ impl Composer<'_> {
         let mut bodies = self.out.bodies.clone();
         let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
         let Some(acceleration) = acceleration else {
-            let why = if self.deck.gravity.is_some() { "`gravity` is zero" } else { "no `gravity`" };
+            let why = match &self.deck.gravity {
+                _ if !self.deck.effects.allow(EffectWord::Gravity) => SWITCHED_OFF,
+                Some(_) => "`gravity` is zero",
+                None => "no `gravity`",
+            };
             self.reason("gravity on beams", false, why);
             return self.reason("gravity on bodies", false, why);
         };
@@ -221,7 +225,11 @@ impl Composer<'_> {
         let names = ["mass-proportional damping of beams", "mass-proportional damping of bodies"];
         let [mass, _] = self.deck.damping.unwrap_or_default();
         if mass == 0.0 || !self.dynamic {
-            let why = if mass == 0.0 { "no `mass` in [damping]" } else { "nothing moves in time" };
+            let why = match mass {
+                _ if !self.deck.effects.allow(EffectWord::Damping) => SWITCHED_OFF,
+                0.0 => "no `mass` in [damping]",
+                _ => "nothing moves in time",
+            };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
         let (elements, nodal) = self.inertia_elements(|_, _, inertia| inertia);

@@ -76,6 +76,12 @@ struct Composer<'a> {
     dynamic: bool,
 }
 
+/// Why what a scene has does not act
+const SWITCHED_OFF: &str = "switched off in [effects]";
+/// The same of parts of the tangent, whose pivots tell whether a state is stable
+const UNSTRESSED: &str = "switched off in [effects]: what stress makes unstable is not told";
+const UNTURNED: &str = "switched off in [effects]: negative pivots are those of a tangent without it";
+
 /// Composes the effects of a deck.
 pub fn compose(
     deck: &Deck,
@@ -115,6 +121,7 @@ pub fn compose(
     let along = composer.line_loads();
     composer.node_loads(along);
     composer.fading_inertia();
+    composer.parts();
     composer.never();
     composer.out
 }
@@ -175,7 +182,8 @@ impl Composer<'_> {
         for (word, name, why) in parts {
             match (beams, self.deck.effects.allow(word)) {
                 (false, _) => self.reason(name, false, "no beams"),
-                (true, false) => self.reason(name, false, "switched off in [effects]"),
+                (true, false) if word == EffectWord::GeometricStiffness => self.reason(name, false, UNSTRESSED),
+                (true, false) => self.reason(name, false, SWITCHED_OFF),
                 (true, true) => self.reason(name, true, why),
             }
         }
@@ -219,6 +227,7 @@ impl Composer<'_> {
             Some([_, factor]) if factor != 0.0 && self.dynamic => {
                 self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
             }
+            _ if !self.deck.effects.allow(EffectWord::Damping) => self.reason(I::DAMPING_NAME, false, SWITCHED_OFF),
             _ => self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time"),
         }
     }
@@ -235,6 +244,27 @@ impl Composer<'_> {
     fn each_element(&self, mut visit: impl FnMut(&BeamElement)) {
         let beams = self.mesh.beams.iter();
         beams.flat_map(|beam| self.mesh.elements_of(beam)).for_each(|element| visit(&element));
+    }
+
+    /// Parts of other effects that can be left out.
+    fn parts(&mut self) {
+        let inertia = ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "rigid body inertia"];
+        let spin = "inertia against rotation has forces of its spin alone";
+        let why = [spin, SWITCHED_OFF, "nothing has inertia against rotation"];
+        self.part(EffectWord::Gyroscopic, "gyroscopic forces", &inertia, why);
+        let loads = ["following line loads", "following forces", "following moments", "dead moments"];
+        let why = ["the tangent knows how loads turn", UNTURNED, "no load follows, and no moment stands fixed"];
+        self.part(EffectWord::FollowerTangent, "follower tangent", &loads, why);
+    }
+
+    /// A part of these effects: why it is there, was switched off, or has nothing that it belongs to.
+    fn part(&mut self, word: EffectWord, name: &'static str, of: &[&str], [there, off, nowhere]: [&str; 3]) {
+        let some = self.out.reasons.iter().any(|reason| reason.active && of.contains(&reason.name));
+        match (some, self.deck.effects.allow(word)) {
+            (false, _) => self.reason(name, false, nowhere),
+            (true, false) => self.reason(name, false, off),
+            (true, true) => self.reason(name, true, there),
+        }
     }
 
     /// What is known and never acts yet.

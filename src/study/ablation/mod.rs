@@ -20,7 +20,7 @@ const FEW_ATTEMPTS: u64 = 200;
 const TIMED: f64 = 0.2;
 
 /// But not more often than this.
-const MOST_REPEATS: usize = 9;
+const MOST_REPEATS: usize = 99;
 
 /// Times that differ by less than this part are the same: medians of several runs repeat to about this.
 const SAME_TIME: f64 = 0.02;
@@ -124,6 +124,10 @@ impl Study<'_> {
     fn without(&self, words: &[EffectWord]) -> Result<Variant, Failure> {
         let mut deck = self.deck.clone();
         words.iter().for_each(|&word| deck.effects.force(word, false));
+        if words.contains(&EffectWord::LargeRotations) {
+            // Linear stages are treated in space, also where the deck insists on a plane.
+            deck.effects.force(EffectWord::Planar, false);
+        }
         let most = MOST_ATTEMPTS * self.whole.attempts + FEW_ATTEMPTS;
         let outcome = build(&deck).map(|scene| timed(&scene, most, self.interrupted));
         if let Ok(Outcome { ended: Err(failure @ Failure::Interrupted { .. }), .. }) = &outcome {

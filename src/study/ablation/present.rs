@@ -8,16 +8,12 @@ pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
     match word {
         EffectWord::Planar => &["planar"],
         EffectWord::RotaryInertia => &["rotary inertia", "section inertia at nodes"],
-        EffectWord::Gyroscopic => {
-            &["rotary inertia", "eccentric section inertia", "section inertia at nodes", "rigid body inertia"]
-        }
+        EffectWord::Gyroscopic => &["gyroscopic forces"],
         EffectWord::Shear => &["shear"],
         EffectWord::Extension => &["extension"],
         EffectWord::Damping => &[],
         EffectWord::Gravity => &["gravity on beams", "gravity on bodies"],
-        EffectWord::FollowerTangent => {
-            &["following line loads", "following forces", "following moments", "dead moments"]
-        }
+        EffectWord::FollowerTangent => &["follower tangent"],
         EffectWord::GeometricStiffness => &["geometric stiffness"],
         EffectWord::LargeRotations => &["large rotations"],
     }
