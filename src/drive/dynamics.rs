@@ -166,16 +166,17 @@ impl Run<'_> {
     fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
         workshop.trend.reset();
-        let result = self.attempt_step(workshop, step, before, next);
-        if result.is_ok() {
-            return result;
+        let mut result = self.attempt_step(workshop, step, before, next);
+        if result.is_err() && workshop.trend.has_foreseen() {
+            workshop.trend.fail();
+            self.state.copy_from(&self.good);
+            result = self.attempt_step(workshop, step, before, next);
         }
-        workshop.trend.forget();
-        if !workshop.trend.has_foreseen() {
-            return result;
+        if result.is_err() {
+            // It may have come to an end that is refused.
+            workshop.trend.fail();
         }
-        self.state.copy_from(&self.good);
-        self.attempt_step(workshop, step, before, next)
+        result
     }
 
     /// Predict, prescribe, iterate.

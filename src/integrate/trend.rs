@@ -11,7 +11,7 @@
 //! and the factors are those that would have left the least in the last steps (linear prediction: Makhoul 1975,
 //! doi:10.1109/PROC.1975.9792). What counts is the size of c, not that of its forces: they are large where it is stiff, which the first correction
 //! takes away, but what that correction leaves grows with the square of how far things turn. Where motion has no rule the factors are small, and the
-//! prediction is the scheme's own.
+//! prediction is the scheme's own; where it jolts they are too large to be those of a motion, and lower orders are asked.
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
@@ -24,11 +24,15 @@ use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// So many steps are remembered, and tell of the next one.
+/// The order of the prediction: so many steps tell of the next one. One more is remembered, to learn from.
 const MOST: usize = 4;
 
-/// What a step counts for beside the next one.
+/// The forgetting factor: what a step counts for beside the next one.
 const MEMORY: f64 = 0.5;
+
+/// Motions that do not grow have factors whose sizes add up to this at most: (1 + 1)^MOST - 1, of roots in the unit disc. Where small corrections are
+/// followed by a jolt, the one is no multiple of the others, although the factors say so.
+const LARGEST: f64 = ((1 << MOST) - 1) as f64;
 
 /// A step that is longer or shorter than another one by more than this has nothing to say of it.
 const ALIKE: f64 = 4.0;
@@ -50,15 +54,17 @@ pub struct Trend {
     weights: [f64; SlotKind::ALL.len()],
     /// The latest first
     past: VecDeque<Past>,
-    /// For each number of steps that the next one is foreseen from, one less, what their factors come from
+    /// Entry k: what the factors of a prediction of order k + 1 come from
     fits: [Fit; MOST],
+    /// The same before the last step
+    before: [Fit; MOST],
     /// Where the scheme's own prediction went in the present step, by equation
     predicted: Vec<f64>,
     has_foreseen: bool,
 }
 
 /// The normal equations of some factors, of corrections over the power of the length of their steps.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Fit {
     /// Lower triangle
     matrix: SMatrix<f64, MOST, MOST>,
@@ -138,6 +144,7 @@ impl Trend {
             matrix: lower(|row, column| if row < known { self.product(column + 1, row + 1) } else { 0.0 }),
             goals: SVector::from_fn(|row, _| if row < known { self.product(0, row + 1) } else { 0.0 }),
         };
+        self.before = self.fits.clone();
         // Where few steps are remembered, what was learnt of more of them stays.
         self.fits[..known].iter_mut().zip(1..).for_each(|(fit, count)| fit.learn(&told, count));
     }
@@ -153,7 +160,7 @@ impl Trend {
         of.products[earlier - later] * of.rate * with.rate
     }
 
-    /// How many of the steps from the one `since` on, but no more than count, have something to say of one of this length.
+    /// How many of the steps from the one `since` on, at most [`MOST`], have something to say of one of this length.
     fn alike(&self, length: f64, since: usize) -> usize {
         let past = self.past.iter().skip(since).take(MOST);
         past.take_while(|past| (1.0 / ALIKE..=ALIKE).contains(&(length / past.length))).count()
@@ -167,14 +174,21 @@ impl Trend {
         Some(from_fn(|number| self.past.get(number).map_or(0.0, |past| factors[number] * past.rate * growth)))
     }
 
-    /// The last step is not taken after all.
+    /// The last step is not taken after all: what it told does not count.
     pub fn withdraw(&mut self) {
         self.past.pop_front();
+        self.fits = self.before.clone();
     }
 
-    /// Forgets all steps: unknowns have changed their meaning, or the motion does not go on.
+    /// Forgets all steps, since unknowns have changed their meaning; how they followed each other stays known.
     pub fn forget(&mut self) {
         self.past.clear();
+    }
+
+    /// The last step has failed, perhaps for what was foreseen of it: what foresaw it would do so again.
+    pub fn fail(&mut self) {
+        self.forget();
+        (self.fits, self.before) = Default::default();
     }
 }
 
@@ -186,7 +200,8 @@ impl Fit {
         self.goals = self.goals * MEMORY + SVector::from_fn(|row, _| if row < count { told.goals[row] } else { 0.0 });
     }
 
-    /// Factors that leave least; of steps of which nothing is known they are zero.
+    /// Factors that leave least; of steps of which nothing is known they are zero. `None` where there is nothing to learn from, or they are those
+    /// of no motion.
     fn solve(&self) -> Option<SVector<f64, MOST>> {
         let size = self.matrix.trace();
         if !(size > 0.0 && size.is_finite()) {
@@ -196,7 +211,7 @@ impl Fit {
         for k in 0..MOST {
             matrix[(k, k)] += DIGITS * size;
         }
-        Some(matrix.cholesky()?.solve(&self.goals))
+        Some(matrix.cholesky()?.solve(&self.goals)).filter(|factors| factors.lp_norm(1) <= LARGEST)
     }
 }
 
@@ -271,8 +286,9 @@ mod tests {
         assert_foreseen(&trend, 10.0, &[1000.0, 0.0], 1e-4);
         assert_foreseen(&trend, 2.0, &[8.0, 0.0], 1e-4);
         assert!(foreseen(&trend, 100.0).is_none(), "of a step like none before");
-        // A step that is not taken has little to say.
-        learn(&mut trend, 5.8, &[5.8_f64.powi(3), 0.0]);
+        // A step that is not taken says nothing, however it contradicts the others.
+        learn(&mut trend, 5.8, &[-5.0 * 5.8_f64.powi(3), 7.0]);
+        assert!(foreseen(&trend, 10.0).is_none_or(|wrong| (wrong[0] - 1000.0).abs() > 100.0));
         trend.withdraw();
         assert_foreseen(&trend, 10.0, &[1000.0, 0.0], 1e-4);
     }
@@ -284,6 +300,31 @@ mod tests {
         let Some(factors) = trend.factors(1.0) else { panic!("there is a past") };
         assert!(factors.iter().all(|factor| factor.abs() < 0.15), "{factors:?}");
         assert_eq!(after([0.0; 5]).factors(1.0), None);
+    }
+
+    /// Round-off at rest, and then a load: its correction is 1e8 times the last one, and the next one is not 1e8 times it.
+    #[test]
+    fn a_jolt_does_not_run_away() {
+        let mut trend = after((0..6).map(|k| 1e-8 * f64::from(2 + k % 2)));
+        for _ in 0..6 {
+            learn(&mut trend, 1.0, &[1.0]);
+            let next = foreseen(&trend, 1.0).map_or(0.0, |next| next[0]);
+            assert!(next.abs() <= LARGEST, "{next}");
+        }
+        assert_foreseen(&trend, 1.0, &[1.0], 1e-3);
+    }
+
+    #[test]
+    fn what_failed_is_not_foreseen_again() {
+        let mut trend = after([1.0, 3.0, 9.0, 27.0]);
+        assert_foreseen(&trend, 1.0, &[81.0], 1e-4);
+        trend.fail();
+        learn(&mut trend, 1.0, &[30.0]);
+        assert!(foreseen(&trend, 1.0).is_none());
+        // Nor does what is withdrawn bring it back.
+        trend.withdraw();
+        learn(&mut trend, 1.0, &[30.0]);
+        assert!(foreseen(&trend, 1.0).is_none());
     }
 
     #[test]

@@ -269,6 +269,29 @@ fn a_step_whose_newton_fails_is_taken_smaller() {
     }
 }
 
+/// At rest but for round-off, and then a load: what the rest foresees of it, 1e8 times too much, fails once and not in every step from there on.
+#[test]
+fn a_jolt_out_of_rest_costs_no_more_than_its_steps() {
+    let leg = |name: &str, ends: &str| {
+        format!(
+            "[[beam]]\nname = \"{name}\"\nsection = \"leg\"\nthrough = {ends}\nelements = 2\ninterpolation = \"total\"\n"
+        )
+    };
+    let text = format!(
+        "[point]\nroot = [0, 0, 0]\nelbow = [10, 0, 0]\ntip = [10, 10, 0]\n\
+         [section.leg]\nEA = 1e6\nGA = 1e6\nGJ = 1e3\nEI = 1e3\nrhoA = 1\nrhoJ = [20, 10, 10]\n{}{}\
+         [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 0, 0.1]\n\
+         [[load]]\nat = \"elbow\"\nforce = [0, 0, 50]\nhistory = \"hat\"\n\
+         [history.hat]\ntimes = [0, 4, 4.01, 5, 5.01]\nvalues = [0, 0, 1, 1, 0]\n\
+         [[stage]]\nkind = \"static\"\nsteps = 1\n[[stage]]\nkind = \"dynamic\"\nend = 8\nstep = 0.01\n[output]\nnodes = [\"tip\"]\n",
+        leg("lower", "[\"root\", \"elbow\"]"),
+        leg("upper", "[\"elbow\", \"tip\"]"),
+    );
+    let counters = simulate(&text).counters;
+    assert_eq!((counters.steps, counters.cutbacks), (801, 0));
+    assert!(counters.work.iterations < 3 * counters.steps, "{} iterations", counters.work.iterations);
+}
+
 /// The deck of a scene of the paper with other settings, and a column at its end.
 fn paper(deck: &str, settings: &[String], column: &str) -> [f64; 3] {
     simulate(&with_settings(&read(deck), settings)).vector(column)
