@@ -174,7 +174,6 @@ fn a_study_tells_what_each_effect_changes() {
     assert_eq!(csv.lines().filter(|line| line.starts_with("shear,finished,")).count(), found.columns.len());
 }
 
-/// What cannot be taken out is told, and does not end the study.
 /// All that can be switched off is there, and each switch shows in the reasons that `check` and run.json tell.
 #[test]
 fn what_is_switched_off_is_told() {
@@ -215,6 +214,7 @@ fn the_linear_theory_needs_no_plane() {
     assert!(linear.outcome().is_some() && linear.largest().0 > 1e-6, "{}", linear.failure());
 }
 
+/// What cannot be taken out is told, and does not end the study.
 #[test]
 fn a_variant_that_fails_is_a_result() {
     let hanging = "[[spring]]\nat = \"tip\"\nstiffness = [0, 0, 0, 0, 0, 5]\n";

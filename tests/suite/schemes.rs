@@ -269,7 +269,7 @@ fn a_step_whose_newton_fails_is_taken_smaller() {
     }
 }
 
-/// At rest but for round-off, and then a load: what the rest foresees of it, 1e8 times too much, fails once and not in every step from there on.
+/// At rest but for round-off, and then a load: what the rest foresees of it, many times too much, fails once and not in every step from there on.
 #[test]
 fn a_jolt_out_of_rest_costs_no_more_than_its_steps() {
     let leg = |name: &str, ends: &str| {

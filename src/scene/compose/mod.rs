@@ -180,12 +180,8 @@ impl Composer<'_> {
             ),
         ];
         for (word, name, why) in parts {
-            match (beams, self.deck.effects.allow(word)) {
-                (false, _) => self.reason(name, false, "no beams"),
-                (true, false) if word == EffectWord::GeometricStiffness => self.reason(name, false, UNSTRESSED),
-                (true, false) => self.reason(name, false, SWITCHED_OFF),
-                (true, true) => self.reason(name, true, why),
-            }
+            let off = if word == EffectWord::GeometricStiffness { UNSTRESSED } else { SWITCHED_OFF };
+            self.part(word, name, beams, [why, off, "no beams"]);
         }
     }
 
@@ -248,22 +244,23 @@ impl Composer<'_> {
 
     /// Parts of other effects that can be left out.
     fn parts(&mut self) {
+        let acts = |of: &[&str]| self.out.reasons.iter().any(|reason| reason.active && of.contains(&reason.name));
         let inertia = ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "rigid body inertia"];
+        let loads = ["following line loads", "following forces", "following moments", "dead moments"];
+        let (turns, loaded) = (acts(&inertia), acts(&loads));
         let spin = "inertia against rotation has forces of its spin alone";
         let why = [spin, SWITCHED_OFF, "nothing has inertia against rotation"];
-        self.part(EffectWord::Gyroscopic, "gyroscopic forces", &inertia, why);
-        let loads = ["following line loads", "following forces", "following moments", "dead moments"];
+        self.part(EffectWord::Gyroscopic, "gyroscopic forces", turns, why);
         let why = ["the tangent knows how loads turn", UNTURNED, "no load follows, and no moment stands fixed"];
-        self.part(EffectWord::FollowerTangent, "follower tangent", &loads, why);
+        self.part(EffectWord::FollowerTangent, "follower tangent", loaded, why);
     }
 
-    /// A part of these effects: why it is there, was switched off, or has nothing that it belongs to.
-    fn part(&mut self, word: EffectWord, name: &'static str, of: &[&str], [there, off, nowhere]: [&str; 3]) {
-        let some = self.out.reasons.iter().any(|reason| reason.active && of.contains(&reason.name));
-        match (some, self.deck.effects.allow(word)) {
+    /// A part of what may be there: why it acts, was switched off, or has nothing that it belongs to.
+    fn part(&mut self, word: EffectWord, name: &'static str, there: bool, [acts, off, nowhere]: [&str; 3]) {
+        match (there, self.deck.effects.allow(word)) {
             (false, _) => self.reason(name, false, nowhere),
             (true, false) => self.reason(name, false, off),
-            (true, true) => self.reason(name, true, there),
+            (true, true) => self.reason(name, true, acts),
         }
     }
 

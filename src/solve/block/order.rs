@@ -82,7 +82,7 @@ impl Neighbours {
     }
 
     /// The same where rows come in another order, in which each still comes before those that it changes.
-    fn in_order(&self, places: &[u32]) -> Self {
+    fn permuted(&self, places: &[u32]) -> Self {
         let row_of = inverse(places);
         let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
         starts.push(0);
@@ -140,7 +140,7 @@ pub fn find(pattern: &Pattern, most: usize) -> Option<Order> {
         return Some(Order { order, branches, neighbours });
     }
     let order = permuted(&order, &sorted);
-    Some(Order { neighbours: neighbours.in_order(&sorted), order, branches })
+    Some(Order { neighbours: neighbours.permuted(&sorted), order, branches })
 }
 
 /// Where each entry stands.
