@@ -281,3 +281,31 @@ fn in_branches(mut trees: Vec<(u32, Reverse<u32>)>, enough: usize) -> Vec<Vec<u3
     }
     branches
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::system::{Cliques, Equations, Groups, Layout, Symmetry};
+
+    /// Three chains of nodes that meet in node 0, one of them in a ladder, which fills up.
+    fn star(length: u32) -> Pattern {
+        let node = |chain: u32, k: u32| if k == 0 { 0 } else { chain * length + k };
+        let rungs = (2..length).map(|k| [node(0, k - 2), node(0, k)]);
+        let steps = (0..3).flat_map(|chain| (1..=length).map(move |k| [node(chain, k - 1), node(chain, k)]));
+        let mut cliques = Cliques::default();
+        steps.chain(rungs).for_each(|[a, b]| cliques.push([2 * a, 2 * a + 1, 2 * b, 2 * b + 1]));
+        let slots = 2 * (3 * length as usize + 1);
+        let groups = Groups::new(slots, Layout::Spatial, |slot| slot % 2 == 1);
+        Pattern::new(Equations::new(slots, &[]).unwrap(), groups, vec![cliques], Symmetry::Whole)
+    }
+
+    /// What is permuted is what would be found.
+    #[test]
+    fn neighbours_of_branches_are_those_of_their_order() {
+        let pattern = star(700);
+        let Order { order, branches, neighbours } = find(&pattern, usize::MAX).unwrap();
+        let found = Neighbours::new(&pattern.meetings(), &order, usize::MAX).unwrap();
+        assert!(branches.len() > 1, "nothing was permuted");
+        assert_eq!((neighbours.starts, neighbours.later), (found.starts, found.later));
+    }
+}
