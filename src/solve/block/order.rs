@@ -81,7 +81,7 @@ impl Neighbours {
         Some(Self { starts, later })
     }
 
-    /// The same where rows come in another order, in which each still comes before those that it changes.
+    /// The same where rows come in another order, in which each still comes before those that it changes, and these as they did.
     fn permuted(&self, places: &[u32]) -> Self {
         let row_of = inverse(places);
         let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
@@ -89,7 +89,7 @@ impl Neighbours {
         for &place in places {
             let start = later.len();
             later.extend(self.of(place as usize).iter().map(|&row| row_of[row as usize]));
-            later[start..].sort_unstable();
+            debug_assert!(later[start..].is_sorted(), "rows of a branch have changed places");
             starts.push(later.len() as u32);
         }
         Self { starts, later }
