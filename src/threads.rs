@@ -6,6 +6,7 @@
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use std::io;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
 /// Of each thread; that of the main thread on most systems
@@ -42,9 +43,30 @@ pub fn in_order<T: Send, R: Send>(
     if !are_given() {
         return items.for_each(|item| take(work(item)));
     }
-    let items: Vec<T> = items.collect();
-    let results: Vec<R> = items.into_par_iter().with_max_len(1).map(work).collect();
-    results.into_iter().for_each(take);
+    let slots: Vec<Mutex<Slot<T, R>>> = items.map(|item| Mutex::new(Slot::Item(item))).collect();
+    at_once(slots.len(), &|number| {
+        let mut slot = slots[number].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Slot::Item(item) = std::mem::replace(&mut *slot, Slot::Empty) {
+            *slot = Slot::Result(work(item));
+        }
+    });
+    for slot in slots {
+        if let Slot::Result(result) = slot.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            take(result);
+        }
+    }
+}
+
+/// One item of work: before it is done, while it is done, and what came of it.
+enum Slot<T, R> {
+    Item(T),
+    Empty,
+    Result(R),
+}
+
+/// Does numbered work, one number at a time a thread. The machinery of rayon is compiled once, here, not once for each caller.
+fn at_once(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().with_max_len(1).for_each(work);
 }
 
 /// A list of what items give, in their order.
@@ -72,10 +94,13 @@ pub fn each_part<T: Send>(list: &mut [T], work: impl Fn(usize, &mut [T]) + Send 
 
 /// A list of what is found for each place.
 pub fn list<T: Send>(length: usize, entry: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-    match are_given() {
-        false => (0..length).map(entry).collect(),
-        true => (0..length).into_par_iter().with_min_len(PART).map(entry).collect(),
+    if !are_given() {
+        return (0..length).map(entry).collect();
     }
+    let mut list = Vec::with_capacity(length);
+    let of_part = |part: Range<usize>| part.map(&entry).collect::<Vec<T>>();
+    in_order(parts(length), of_part, |part| list.extend(part));
+    list
 }
 
 /// The largest of what parts of a list give: ranges of places.
