@@ -370,6 +370,10 @@ impl Effect for Joints {
         self.joints.iter().any(|joint| joint.drive.damps())
     }
 
+    fn is_symmetric(&self) -> bool {
+        !self.damps()
+    }
+
     fn cliques(&self) -> Cliques {
         let mut cliques = Cliques::default();
         self.joints.iter().for_each(|joint| cliques.push(joint.slots().into_iter().flatten()));

@@ -33,19 +33,11 @@ impl Columns {
         SymbolicSparseColMatRef::new_checked(n, n, &self.starts, None, &self.rows)
     }
 
-    /// The tangent; `change` may alter its values, which stand in the order of the columns.
-    pub fn matrix(&mut self, system: &System, change: impl FnOnce(&mut [f64])) -> SparseColMatRef<'_, u32, f64> {
+    /// The tangent.
+    pub fn matrix(&mut self, system: &System) -> SparseColMatRef<'_, u32, f64> {
         for (value, &place) in self.values.iter_mut().zip(&self.places) {
             *value = system.values[place as usize];
         }
-        change(&mut self.values);
         SparseColMatRef::new(self.structure(), &self.values)
-    }
-
-    /// Where a diagonal entry stands among the values.
-    pub fn diagonal(&self, equation: u32) -> Option<usize> {
-        let start = self.starts[equation as usize] as usize;
-        let rows = &self.rows[start..self.starts[equation as usize + 1] as usize];
-        rows.binary_search(&equation).ok().map(|k| start + k)
     }
 }

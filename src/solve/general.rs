@@ -28,7 +28,7 @@ impl GeneralSolver {
 
     /// Factorises; `false` where a pivot cannot be found.
     pub fn factorise(&mut self, system: &System) -> bool {
-        let matrix = self.columns.matrix(system, |_| {});
+        let matrix = self.columns.matrix(system);
         let stack = MemStack::new(&mut self.memory);
         self.symbolic.factorize_numeric_lu(&mut self.numeric, matrix, Par::Seq, stack, Default::default()).is_ok()
     }

@@ -1,6 +1,7 @@
 //! The linear solver: by blocks where that is fast and safe, else in general.
 
 use super::block::BlockSolver;
+use super::constraints::Constraints;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
 use super::softest::NullVector;
@@ -10,8 +11,8 @@ use crate::tensor::Vec3;
 
 /// Solves with tangents of one pattern.
 ///
-/// Blocks serve what consists of nodes and is not too much of a net; joints with multipliers, whose diagonal is empty, and
-/// tangents whose pivots fail across blocks are left to LU with partial pivoting. Factors take the place of a tangent that may go as long
+/// Blocks serve what is not too much of a net; multipliers of joints are made ready for them ([`Constraints`]). Tangents whose pivots fail
+/// across blocks are left to LU with partial pivoting. Factors take the place of a tangent that may go as long
 /// as that is sure to lose no digits; else they stand beside it, and what they solve is looked at.
 pub struct LinearSolver {
     /// Where the pattern suits them
@@ -24,6 +25,8 @@ pub struct LinearSolver {
     /// That of the tangent that was factorised last; `None` where its values may have changed under the same number
     revision: Option<u64>,
     pub(super) multipliers: Vec<Slot>,
+    /// The tangent that blocks factorise where there are multipliers
+    constraints: Option<Constraints>,
     /// Where it cannot count them itself
     pub(super) pivots: Option<Pivots>,
     /// The last right-hand side where it had to be one list, solved, as it was, and what its solution left of it
@@ -60,19 +63,29 @@ const REFINEMENTS: usize = 3;
 impl LinearSolver {
     /// Analyses the pattern of a system. `None` where memory for it cannot be had.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
-        let blocks = multipliers.is_empty().then(|| BlockSolver::new(&system.pattern)).flatten();
-        Self::by(blocks, system, multipliers)
+        let constraints = Constraints::new(&system.pattern, multipliers);
+        let late = constraints.as_ref().map_or(&[][..], Constraints::groups);
+        let blocks = BlockSolver::new(&system.pattern, late);
+        Self::by(blocks, constraints, system, multipliers)
     }
 
     /// The same beside the solver of another system, whose analysis it takes over where the patterns are alike.
     pub fn beside(other: &Self, others: &System, system: &System, multipliers: &[Slot]) -> Option<Self> {
         match other.blocks().filter(|_| system.pattern.is_like(&others.pattern)) {
-            Some(blocks) => Self::by(Some(blocks.of_like(&system.pattern)?), system, multipliers),
+            Some(blocks) => {
+                let constraints = Constraints::new(&system.pattern, multipliers);
+                Self::by(Some(blocks.of_like(&system.pattern)?), constraints, system, multipliers)
+            }
             None => Self::new(system, multipliers),
         }
     }
 
-    fn by(blocks: Option<BlockSolver>, system: &System, multipliers: &[Slot]) -> Option<Self> {
+    fn by(
+        blocks: Option<BlockSolver>,
+        constraints: Option<Constraints>,
+        system: &System,
+        multipliers: &[Slot],
+    ) -> Option<Self> {
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
             trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false, is_sure: true },
@@ -81,6 +94,7 @@ impl LinearSolver {
             factored: false,
             revision: None,
             multipliers: multipliers.to_vec(),
+            constraints,
             pivots: None,
             right_hand_side: Vec::new(),
             wanted: Vec::new(),
@@ -103,16 +117,17 @@ impl LinearSolver {
         self.trust.in_blocks && self.blocks().is_some_and(BlockSolver::is_symmetric)
     }
 
-    /// Whether what was factorised last is known to have positive pivots only.
+    /// Whether what was factorised last is known to have positive pivots only: then no digits are lost.
     fn is_positive_definite(&self) -> bool {
-        self.factored && self.blocks().is_some_and(|blocks| blocks.negative() == Some(0))
+        self.factored && self.constraints.is_none() && self.blocks().is_some_and(|blocks| blocks.negative() == Some(0))
     }
 
     /// Factorises, as far as it can by blocks, and counts negative pivots.
     pub(super) fn negative_of_own(&mut self, tangent: &mut Tangent) -> Option<usize> {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
         (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
-        self.blocks_in_use()?.negative().filter(|_| done)
+        let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
+        self.blocks_in_use()?.negative().filter(|_| done)?.checked_sub(of_multipliers)
     }
 
     /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field
@@ -120,8 +135,8 @@ impl LinearSolver {
     /// `false` where there is no solution.
     pub fn correct(&mut self, system: &System, looks: bool, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         let nothing_to_look_at = !looks || self.is_positive_definite() || system.holds_factors();
-        let is_factored = self.factored;
-        if let Some(blocks) = self.blocks_in_use().filter(|_| nothing_to_look_at) {
+        let (is_factored, is_plain) = (self.factored, self.constraints.is_none());
+        if let Some(blocks) = self.blocks_in_use().filter(|_| nothing_to_look_at && is_plain) {
             return is_factored && blocks.correct(system, held, out);
         }
         let mut x = std::mem::take(&mut self.right_hand_side);
@@ -160,22 +175,37 @@ impl LinearSolver {
 
     /// By blocks: in the place of the tangent where it may go and that is sure to lose no digits.
     fn factorise_in_blocks(&mut self, tangent: &mut Tangent) -> bool {
+        if self.constraints.is_some() {
+            return self.trust.in_blocks && self.factorise_staying(tangent.look());
+        }
         let was_sure = self.trust.is_sure;
         let Some(blocks) = self.blocks_in_use() else { return false };
         let free = tangent.give_away().filter(|system| was_sure && blocks.can_stay_within(system));
         let within = free.is_some_and(|system| blocks.factorise_within(system) && blocks.is_sure());
-        let done = within || blocks.factorise(tangent.look());
+        let done = within || blocks.factorise(tangent.look().matrix());
         self.trust.is_sure = blocks.is_sure();
         done
+    }
+
+    /// By blocks, beside the tangent.
+    fn factorise_staying(&mut self, system: &System) -> bool {
+        match (&mut self.blocks, &mut self.constraints) {
+            (Some(blocks), Some(constraints)) => {
+                constraints.take(system);
+                blocks.factorise(constraints.matrix(&system.pattern))
+            }
+            (Some(blocks), None) => blocks.factorise(system.matrix()),
+            (None, _) => false,
+        }
     }
 
     /// Factorises a tangent that stays; `false` where a pivot cannot be found.
     pub fn factorise(&mut self, system: &System) -> bool {
         // Its values may not stay.
         self.revision = None;
-        self.factored = match self.blocks_in_use() {
-            Some(blocks) => blocks.factorise(system) || self.leave_blocks(system),
-            None => self.general.as_mut().is_some_and(|general| general.factorise(system)),
+        self.factored = match self.trust.in_blocks {
+            true => self.factorise_staying(system) || self.leave_blocks(system),
+            false => self.general.as_mut().is_some_and(|general| general.factorise(system)),
         };
         self.factored
     }
@@ -218,8 +248,14 @@ impl LinearSolver {
         if !self.factored {
             return false;
         }
-        match (self.blocks_in_use().is_some(), &mut self.blocks, &mut self.general) {
-            (true, Some(blocks), _) => blocks.solve(system, right_hand_side),
+        match (self.trust.in_blocks, &mut self.blocks, &mut self.general) {
+            (true, Some(blocks), _) => match &self.constraints {
+                Some(constraints) => {
+                    constraints.change(right_hand_side);
+                    blocks.solve(constraints.matrix(&system.pattern), right_hand_side);
+                }
+                None => blocks.solve(system.matrix(), right_hand_side),
+            },
             (false, _, Some(general)) => general.solve(right_hand_side),
             _ => return false,
         }

@@ -2,6 +2,7 @@
 
 mod block;
 mod columns;
+mod constraints;
 mod convergence;
 mod foresight;
 mod general;

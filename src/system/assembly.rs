@@ -45,6 +45,39 @@ impl Leftover {
     }
 }
 
+/// The values of a tangent on its pattern; factors may have taken the place of its tiles on the diagonal.
+#[derive(Clone, Copy)]
+pub struct Matrix<'a> {
+    /// The pattern
+    pub pattern: &'a Pattern,
+    values: &'a [f64],
+    holds_factors: bool,
+}
+
+impl<'a> Matrix<'a> {
+    /// A matrix with these values, tile by tile.
+    pub fn new(pattern: &'a Pattern, values: &'a [f64]) -> Self {
+        Self { pattern, values, holds_factors: false }
+    }
+
+    /// The matrix tile by tile, each by its columns. `W` is the width of the pattern.
+    pub fn tiles<const W: usize>(self) -> Tiles<'a, W> {
+        debug_assert!(!self.holds_factors, "there is no tangent");
+        self.pattern.storage.tiles(self.values)
+    }
+
+    /// The numbers on the diagonal, of the tangent or of factors in its place, and the tiles beside it.
+    pub fn numbers<const W: usize>(self) -> (&'a [f64], &'a [Tile<W>]) {
+        let (own, beside) = self.values.split_at(self.pattern.storage.boundary());
+        (own, as_tiles(beside))
+    }
+
+    /// Whether factors stand in the place of the tiles on the diagonal.
+    pub fn holds_factors(self) -> bool {
+        self.holds_factors
+    }
+}
+
 /// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
 ///
 /// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).
@@ -162,10 +195,9 @@ impl System {
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
-    /// The tangent tile by tile, each by its columns. `W` is the width of the pattern.
-    pub fn tiles<const W: usize>(&self) -> Tiles<'_, W> {
-        debug_assert!(!self.holds_factors, "there is no tangent");
-        self.pattern.storage.tiles(&self.values)
+    /// The tangent, or what has taken its place.
+    pub fn matrix(&self) -> Matrix<'_> {
+        Matrix { pattern: &self.pattern, values: &self.values, holds_factors: self.holds_factors }
     }
 
     /// Whether factors stand in the place of the tiles on the diagonal. Until the next evaluation with weights there is no tangent then.
@@ -178,12 +210,6 @@ impl System {
     pub fn give_to_factors<const W: usize>(&mut self) -> (&mut [f64], &[Tile<W>]) {
         self.holds_factors = true;
         let (own, beside) = self.values.split_at_mut(self.pattern.storage.boundary());
-        (own, as_tiles(beside))
-    }
-
-    /// The numbers on the diagonal, of the tangent or of factors in its place, and the tiles beside it.
-    pub fn numbers<const W: usize>(&self) -> (&[f64], &[Tile<W>]) {
-        let (own, beside) = self.values.split_at(self.pattern.storage.boundary());
         (own, as_tiles(beside))
     }
 
@@ -286,7 +312,7 @@ impl System {
     /// Shows each tile that is kept in some columns with the groups of its rows and of its columns.
     #[inline(always)]
     pub fn each_tile<const W: usize>(&self, columns: Range<usize>, mut show: impl FnMut(usize, usize, &Tile<W>)) {
-        let tiles = self.tiles();
+        let tiles = self.matrix().tiles();
         for column in columns {
             tiles.own.with(
                 column,

@@ -14,7 +14,7 @@ mod state;
 mod storage;
 mod values;
 
-pub use assembly::{Category, Leftover, System};
+pub use assembly::{Category, Leftover, Matrix, System};
 pub use equations::{Direction, Equations, FrameConflict};
 pub use field::Field;
 pub use groups::{Groups, Layout};

@@ -4,6 +4,7 @@ mod assembled;
 mod bad_decks;
 mod coefficients;
 mod command;
+mod constraints;
 mod convergence;
 mod corners;
 mod cost;

@@ -151,14 +151,14 @@ fn solve_both_ways(
     let n = system.pattern.equations.count();
     let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
     let (mut by_blocks, mut by_faer) = (wanted.clone(), wanted.clone());
-    let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+    let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
     // What other tangents have left behind is gone, even where they broke down half-way.
     let mut broken = other.clone();
     let middle = system.pattern.find(n as u32 / 2, n as u32 / 2).unwrap();
     broken.values[middle] = f64::NAN;
-    assert!(blocks.factorise(&other) && !blocks.factorise(&broken), "{what}");
-    assert!(blocks.factorise(&system), "{what}");
-    blocks.solve(&system, &mut by_blocks);
+    assert!(blocks.factorise(other.matrix()) && !blocks.factorise(broken.matrix()), "{what}");
+    assert!(blocks.factorise(system.matrix()), "{what}");
+    blocks.solve(system.matrix(), &mut by_blocks);
     let mut general = GeneralSolver::new(&system).unwrap();
     assert!(general.factorise(&system), "{what}");
     general.solve(&mut by_faer);
@@ -183,29 +183,29 @@ fn factors_in_the_place_of_a_tangent_solve_as_those_beside_it() {
                 let system = system_in(plane, &edges, symmetry, 30.0, &mut random);
                 let n = system.pattern.equations.count();
                 let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
-                let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+                let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
                 let mut beside = wanted.clone();
-                assert!(blocks.factorise(&system) && blocks.is_sure(), "{what}");
-                blocks.solve(&system, &mut beside);
+                assert!(blocks.factorise(system.matrix()) && blocks.is_sure(), "{what}");
+                blocks.solve(system.matrix(), &mut beside);
                 if !blocks.can_stay_within(&system) {
                     elsewhere.push(name);
                     continue;
                 }
                 let solve = || {
                     let (mut used_up, mut x) = (system.clone(), wanted.clone());
-                    let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+                    let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
                     assert!(blocks.factorise_within(&mut used_up) && blocks.is_sure(), "{what}");
                     assert!(used_up.holds_factors(), "{what}");
-                    blocks.solve(&used_up, &mut x);
+                    blocks.solve(used_up.matrix(), &mut x);
                     x
                 };
                 assert_eq!(solve(), beside, "{what}");
                 assert_eq!(threads::on(3, solve), beside, "{what}");
                 // What was factorised in another way before is gone.
                 let mut used_up = system.clone();
-                assert!(blocks.factorise_within(&mut used_up) && blocks.factorise(&system), "{what}");
+                assert!(blocks.factorise_within(&mut used_up) && blocks.factorise(system.matrix()), "{what}");
                 let mut again = wanted.clone();
-                blocks.solve(&system, &mut again);
+                blocks.solve(system.matrix(), &mut again);
                 assert_eq!(again, beside, "{what}");
             }
         }
@@ -227,12 +227,12 @@ fn corrections_by_nodes_are_those_by_equations() {
             let force: Vec<Vec3> = system.force[Category::Internal as usize].iter().map(|_| vector()).collect();
             let held: Vec<Vec3> = force.iter().map(|_| vector()).collect();
             system.force[Category::Internal as usize].copy_from_slice(&force);
-            let mut blocks = BlockSolver::new(&system.pattern).unwrap();
-            assert!(blocks.factorise(&system), "{name}");
+            let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
+            assert!(blocks.factorise(system.matrix()), "{name}");
             let mut x = vec![0.0; system.pattern.equations.count()];
             system.right_hand_side(&mut x);
             assert!(x.iter().all(|&x| x != 0.0), "{name}: no forces");
-            blocks.solve(&system, &mut x);
+            blocks.solve(system.matrix(), &mut x);
             for held in [None, Some(&held[..])] {
                 // Nothing of what stood there before may stay.
                 let (mut by_nodes, mut by_equations) = (force.clone(), force.clone());
@@ -277,8 +277,8 @@ fn factorisations_that_lose_digits_are_not_sure() {
         (Symmetry::Whole, 100.0, false),
     ] {
         let system = taking(symmetry, taken);
-        let mut blocks = BlockSolver::new(&system.pattern).unwrap();
-        assert!(blocks.factorise(&system));
+        let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
+        assert!(blocks.factorise(system.matrix()));
         assert_eq!(blocks.is_sure(), sure, "{symmetry:?}, {taken}");
     }
 }
@@ -335,9 +335,9 @@ fn rows_with_small_pivots_wait() {
     }
     let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
     let mut x = wanted.clone();
-    let mut blocks = BlockSolver::new(&system.pattern).unwrap();
-    assert!(blocks.factorise(&system));
-    blocks.solve(&system, &mut x);
+    let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
+    assert!(blocks.factorise(system.matrix()));
+    blocks.solve(system.matrix(), &mut x);
     let left = system.residual(&wanted, &x, &mut Leftover::default());
     assert!(left < 1e-11, "{left:e}");
 }
@@ -349,7 +349,7 @@ fn pivots_that_are_no_numbers_end_a_factorisation() {
         for symmetry in SYMMETRIES {
             let system = system_in(plane, &tree(20, &mut random), symmetry, 30.0, &mut random);
             let n = system.pattern.equations.count() as u32;
-            let mut blocks = BlockSolver::new(&system.pattern).unwrap();
+            let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
             let mut with = |values: &dyn Fn(u32, u32) -> Option<f64>| {
                 let mut changed = system.clone();
                 for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
@@ -357,7 +357,7 @@ fn pivots_that_are_no_numbers_end_a_factorisation() {
                         changed.values[place] = value;
                     }
                 }
-                blocks.factorise(&changed)
+                blocks.factorise(changed.matrix())
             };
             let at = n / 2;
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -383,8 +383,8 @@ fn negative_pivots_are_negative_eigenvalues() {
         let system = system(&edges, Symmetry::Whole, 1.0, &mut random);
         let eigenvalues = dense(&system).symmetric_eigenvalues();
         let negative = eigenvalues.iter().filter(|&&value| value < 0.0).count();
-        let mut blocks = BlockSolver::new(&system.pattern).unwrap();
-        assert!(blocks.factorise(&system));
+        let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
+        assert!(blocks.factorise(system.matrix()));
         assert!(negative > 0);
         assert_eq!(blocks.negative(), Some(negative), "{name}");
     }
@@ -396,7 +396,7 @@ fn large_patterns_are_eliminated_in_branches() {
     let mut random = Random::new(9);
     for (name, edges) in large_patterns(&mut random) {
         let system = system(&edges, Symmetry::Whole, 30.0, &mut random);
-        let blocks = BlockSolver::new(&system.pattern).unwrap();
+        let blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
         let sizes = blocks.branches();
         let nodes = system.pattern.groups.count();
         let trunk = nodes - sizes.iter().sum::<usize>();
@@ -494,7 +494,7 @@ fn a_lost_pivot_is_no_lost_solution() {
 fn nets_are_left_to_faer() {
     let mut random = Random::new(7);
     let system = system(&lattice(120), Symmetry::Whole, 30.0, &mut random);
-    assert!(BlockSolver::new(&system.pattern).is_none());
+    assert!(BlockSolver::new(&system.pattern, &[]).is_none());
     assert_eq!(LinearSolver::new(&system, &[]).unwrap().name(), "sparse LU");
 }
 

@@ -7,6 +7,15 @@ use std::ops::Range;
 /// Elimination makes so many blocks out of one at most; beyond, a supernodal factorisation is faster.
 const MOST_FILL: usize = 8;
 
+/// How much fill a factorisation may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fill {
+    /// As much as is faster than another solver
+    Little,
+    /// As much as it takes
+    Any,
+}
+
 /// Where a block stands, in one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Source(u32);
@@ -91,11 +100,14 @@ pub struct Elimination {
 }
 
 impl Elimination {
-    /// In the order of [`order::find`]: without any fill on chains and trees. `None` where fill makes it slow, or memory for
-    /// the analysis cannot be had.
-    pub fn new(pattern: &Pattern) -> Option<Self> {
-        let most = MOST_FILL * pattern.pairs();
-        let Order { order, branches, neighbours } = order::find(pattern, most)?;
+    /// In the order of [`order::find`]: without any fill on chains and trees. `None` where there is more fill than there may be, or memory
+    /// for the analysis cannot be had.
+    pub fn new(pattern: &Pattern, multipliers: &[u32], fill: Fill) -> Option<Self> {
+        let most = match fill {
+            Fill::Little => MOST_FILL * pattern.pairs(),
+            Fill::Any => usize::MAX,
+        };
+        let Order { order, branches, neighbours } = order::find(pattern, multipliers, most)?;
         let (starts, later) = (neighbours.starts, neighbours.later);
         let (target_starts, mut targets) = targets(&starts, &later);
         let mut changed = targets.clone();

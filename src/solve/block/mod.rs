@@ -15,10 +15,10 @@ mod pieces;
 mod stretch;
 mod tile;
 
-use crate::system::{Pattern, Symmetry, System, WIDTH};
+use crate::system::{Matrix, Pattern, Symmetry, System, WIDTH};
 use crate::tensor::Vec3;
 use crate::threads;
-use elimination::Elimination;
+use elimination::{Elimination, Fill};
 use ldl::Ldl;
 use lu::Lu;
 use pieces::Pieces;
@@ -38,7 +38,7 @@ trait Factor: Send {
     fn name(&self) -> &'static str;
 
     /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
-    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool;
+    fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool;
 
     /// See [`BlockSolver::can_stay_within`].
     fn can_stay_within(&self, elimination: &Elimination, system: &System) -> bool;
@@ -55,19 +55,22 @@ trait Factor: Send {
     /// See [`BlockSolver::is_symmetric`].
     fn is_symmetric(&self) -> bool;
 
-    /// Solves with the last factorisation, which is that of `system`, row by row.
-    fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]);
+    /// Solves with the last factorisation, which is that of `matrix`, row by row.
+    fn solve(&self, elimination: &Elimination, matrix: Matrix, x: &mut [f64]);
 }
 
 impl BlockSolver {
-    /// For tangents of this pattern. `None` where blocks would fill up, or memory cannot be had.
-    pub fn new(pattern: &Pattern) -> Option<Self> {
-        Self::by(Arc::new(Elimination::new(pattern)?), pattern, pattern.symmetry == Symmetry::Whole)
+    /// For tangents of this pattern; groups of `multipliers` are eliminated behind those that they meet. `None` where blocks would fill
+    /// up, or memory cannot be had.
+    pub fn new(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
+        let elimination = Elimination::new(pattern, multipliers, Fill::Little)?;
+        Self::by(Arc::new(elimination), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
-    /// For tangents of this pattern that are symmetric, even where the pattern does not say so.
-    pub fn symmetric(pattern: &Pattern) -> Option<Self> {
-        Self::by(Arc::new(Elimination::new(pattern)?), pattern, true)
+    /// For tangents of this pattern that are symmetric, even where the pattern does not say so, and with as much fill as it takes.
+    /// `None` where memory cannot be had.
+    pub fn symmetric(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
+        Self::by(Arc::new(Elimination::new(pattern, multipliers, Fill::Any)?), pattern, true)
     }
 
     /// Another one for tangents of a pattern that is [like](Pattern::is_like) its own: in the same order.
@@ -112,8 +115,8 @@ impl BlockSolver {
     }
 
     /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
-    pub fn factorise(&mut self, system: &System) -> bool {
-        self.factor.factorise(&self.elimination, system)
+    pub fn factorise(&mut self, matrix: Matrix) -> bool {
+        self.factor.factorise(&self.elimination, matrix)
     }
 
     /// Whether the factors may take the place of this tangent: each branch has nodes that follow each other, and the tangent keeps as much of
@@ -142,11 +145,11 @@ impl BlockSolver {
         self.factor.is_sure()
     }
 
-    /// Solves with the last factorisation, which is that of `system`; one entry an equation.
-    pub fn solve(&mut self, system: &System, x: &mut [f64]) {
-        match system.pattern.width() {
-            WIDTH => self.solve_by::<WIDTH>(system, x),
-            _ => self.solve_by::<3>(system, x),
+    /// Solves with the last factorisation, which is that of `matrix`; one entry an equation.
+    pub fn solve(&mut self, matrix: Matrix, x: &mut [f64]) {
+        match matrix.pattern.width() {
+            WIDTH => self.solve_by::<WIDTH>(matrix, x),
+            _ => self.solve_by::<3>(matrix, x),
         }
     }
 
@@ -166,7 +169,7 @@ impl BlockSolver {
                 *part = system.right_hand_side_at(group as usize);
             }
         });
-        factor.solve(elimination, system, parts);
+        factor.solve(elimination, system.matrix(), parts);
         let (is_finite, parts) = (parts.iter().all(|x| x.is_finite()), parts.as_chunks::<W>().0);
         if is_finite {
             system.pattern.scatter(|group| &parts[elimination.row_of[group] as usize], held, out);
@@ -174,15 +177,15 @@ impl BlockSolver {
         is_finite
     }
 
-    fn solve_by<const W: usize>(&mut self, system: &System, x: &mut [f64]) {
+    fn solve_by<const W: usize>(&mut self, matrix: Matrix, x: &mut [f64]) {
         let Self { elimination, factor, parts } = self;
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
             for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
-                *part = system.pattern.part(group as usize, x);
+                *part = matrix.pattern.part(group as usize, x);
             }
         });
-        factor.solve(elimination, system, parts);
+        factor.solve(elimination, matrix, parts);
         let parts = parts.as_chunks::<W>().0;
-        system.pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
+        matrix.pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
     }
 }

@@ -125,12 +125,16 @@ impl Neighbours {
     }
 }
 
-/// The order for a pattern. `None` where it fills up to more blocks than `most`, or memory cannot be had.
-pub fn find(pattern: &Pattern, most: usize) -> Option<Order> {
-    let order = minimum_degree(pattern)?;
+/// The order for a pattern, in which each group of `multipliers` stands behind the groups that it meets. `None` where it fills up to more
+/// blocks than `most`, or memory cannot be had.
+pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order> {
     let meetings = &pattern.meetings();
+    let order = match multipliers {
+        [] => minimum_degree(pattern.groups.count(), &pattern.column_starts, &pattern.rows)?,
+        _ => constrained(pattern.groups.count(), meetings, multipliers)?,
+    };
     let neighbours = Neighbours::new(meetings, &order, most)?;
-    if order.len() < LEAST {
+    if order.len() < LEAST || !multipliers.is_empty() {
         return Some(Order { order, branches: Vec::new(), neighbours });
     }
     let order = permuted(&order, &towards_the_middle(&neighbours));
@@ -155,10 +159,38 @@ fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
     places.iter().map(|&place| order[place as usize]).collect()
 }
 
-fn minimum_degree(pattern: &Pattern) -> Option<Vec<u32>> {
-    let n = pattern.groups.count();
-    let structure = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.rows);
-    let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, pattern.rows.len())).ok()?;
+/// That of least degree among all other groups, and each multiplier right behind the last group that it meets: with everything after it
+/// clamped, what it ties is there, so that its pivot has the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
+fn constrained(groups: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
+    let mut is_multiplier = vec![false; groups];
+    multipliers.iter().for_each(|&group| is_multiplier[group as usize] = true);
+    let others: Vec<u32> = (0..groups as u32).filter(|&group| !is_multiplier[group as usize]).collect();
+    let mut number_of = vec![NONE; groups];
+    (0..).zip(&others).for_each(|(number, &group)| number_of[group as usize] = number);
+    let (mut starts, mut rows) = (vec![0], Vec::new());
+    for &group in &others {
+        rows.extend(meetings.of(group as usize).map(|other| number_of[other as usize]).filter(|&row| row != NONE));
+        starts.push(rows.len() as u32);
+    }
+    let found = minimum_degree(others.len(), &starts, &rows)?;
+    let mut order = permuted(&others, &found);
+    let place_of = inverse(&found);
+    let last_met = |multiplier: u32| {
+        let met = meetings.of(multiplier as usize).map(|other| number_of[other as usize]).filter(|&row| row != NONE);
+        met.map(|number| place_of[number as usize]).max().unwrap_or(0)
+    };
+    let mut places: Vec<(u32, u32)> = (0..).zip(&order).map(|(place, &group)| (place, group)).collect();
+    places.extend(multipliers.iter().map(|&multiplier| (last_met(multiplier), multiplier)));
+    // Stable: at the same place a multiplier stays behind the group.
+    places.sort_by_key(|&(place, _)| place);
+    order.clear();
+    order.extend(places.iter().map(|&(_, group)| group));
+    Some(order)
+}
+
+fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>> {
+    let structure = SymbolicSparseColMatRef::new_checked(n, n, column_starts, None, rows);
+    let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, rows.len())).ok()?;
     let (mut order, mut row_of) = (vec![0_u32; n], vec![0_u32; n]);
     amd::order(&mut order, &mut row_of, structure, Default::default(), MemStack::new(&mut memory)).ok()?;
     Some(order)
@@ -303,7 +335,7 @@ mod tests {
     #[test]
     fn neighbours_of_branches_are_those_of_their_order() {
         let pattern = star(700);
-        let Order { order, branches, neighbours } = find(&pattern, usize::MAX).unwrap();
+        let Order { order, branches, neighbours } = find(&pattern, &[], usize::MAX).unwrap();
         let found = Neighbours::new(&pattern.meetings(), &order, usize::MAX).unwrap();
         assert!(branches.len() > 1, "nothing was permuted");
         assert_eq!((neighbours.starts, neighbours.later), (found.starts, found.later));

@@ -5,7 +5,7 @@ use super::diagonal::Diagonal;
 use super::elimination::Elimination;
 use super::tile::{Own, Part, Tile};
 use crate::real::Instructions;
-use crate::system::{Symmetry, System};
+use crate::system::{Matrix, Symmetry, System};
 use crate::threads;
 use std::ops::{AddAssign, Range};
 
@@ -198,9 +198,9 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
     }
 
     /// What pieces look at, one after the other; see [`Look`].
-    fn looks<'a>(&'a self, elimination: &'a Elimination, system: &'a System) -> Vec<Look<'a, P, W>> {
-        debug_assert_eq!(self.is_within, system.holds_factors(), "another tangent");
-        let (own, beside) = system.numbers::<W>();
+    fn looks<'a>(&'a self, elimination: &'a Elimination, matrix: Matrix<'a>) -> Vec<Look<'a, P, W>> {
+        debug_assert_eq!(self.is_within, matrix.holds_factors(), "another tangent");
+        let (own, beside) = matrix.numbers::<W>();
         let diagonals = match self.is_within {
             true => within(elimination, P::within(own)),
             false => {
@@ -232,12 +232,12 @@ fn within_mut<'a, T>(elimination: &'a Elimination, tiles: &'a mut [T]) -> Vec<Di
 }
 
 impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
-    fn factorise(&mut self, elimination: &Elimination, system: &System) -> bool {
+    fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool {
         (self.is_within, self.signs) = (false, None);
         if !self.make_room(elimination.order.len()) {
             return false;
         }
-        let tiles = &system.tiles::<W>();
+        let tiles = matrix.tiles::<W>();
         let mut diagonal = std::mem::take(&mut self.diagonal);
         let parts = threads::split(&mut diagonal, elimination.pieces().map(|rows| rows.end));
         let diagonals =
@@ -275,8 +275,8 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
         P::NAME
     }
 
-    fn solve(&self, elimination: &Elimination, system: &System, x: &mut [f64]) {
-        let mut looks = self.looks(elimination, system);
+    fn solve(&self, elimination: &Elimination, matrix: Matrix, x: &mut [f64]) {
+        let mut looks = self.looks(elimination, matrix);
         let mut parts = threads::split(x.as_chunks_mut().0, elimination.pieces().map(|rows| rows.end));
         let (Some(trunk), Some(of_trunk)) = (parts.pop(), looks.pop()) else { return };
         let branches = || self.branches.iter().zip(&looks);

@@ -1,0 +1,161 @@
+//! Tangents with Lagrange multipliers, made ready for a factorisation without pivoting.
+//!
+//! With the rows B and columns C of the multipliers (C = B^T where the tangent is symmetric) and weights W,
+//!
+//! ```text
+//! | K  C | |u|   |f|                  | K + C W B  C | |u|   |f + C W g|
+//! | B  0 | |l| = |g|   is the same as |     B      0 | |l| = |    g    |
+//! ```
+//!
+//! C W B stands in for the stiffness that a part has only through its joints: its pivots are then those of a part that is held, and each
+//! multiplier, which is eliminated behind what it ties, has a negative one. The inertia on the space that the constraints leave is
+//! that of the tangent for any W (congruence with [I, C W/2; 0, I]), and so is the solution.
+
+use crate::system::{Equations, Matrix, Pattern, Slot, System};
+use std::collections::BTreeMap;
+
+/// A weight is not smaller than this part of what the stiffest slot that a multiplier ties would have alone.
+const LEAST_PART: f64 = 1e-8;
+
+/// The multipliers of a pattern, and the values of the last tangent that was made ready.
+pub struct Constraints {
+    rows: Vec<Row>,
+    additions: Vec<Addition>,
+    /// Groups of multipliers
+    groups: Vec<u32>,
+    /// Of each row
+    weights: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// The row of a multiplier.
+struct Row {
+    equation: u32,
+    ends: Vec<End>,
+}
+
+/// An equation that a multiplier enters: where the entries of C, of B and of the diagonal stand.
+struct End {
+    slot: Slot,
+    equation: u32,
+    of_column: usize,
+    of_row: usize,
+    diagonal: usize,
+}
+
+/// An entry of C W B: the place that it is added to, the number of the multiplier, and where its two factors stand.
+struct Addition {
+    place: usize,
+    row: usize,
+    of_column: usize,
+    of_row: usize,
+}
+
+impl Constraints {
+    /// Of these multipliers; `None` where there are none.
+    pub fn new(pattern: &Pattern, multipliers: &[Slot]) -> Option<Self> {
+        let equations = multipliers.iter().flat_map(|&slot| pattern.equations.of(slot));
+        let equations: Vec<u32> = equations.filter(|&equation| equation != Equations::HELD).collect();
+        if equations.is_empty() {
+            return None;
+        }
+        let mut is_multiplier = vec![false; pattern.equations.count()];
+        equations.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
+        let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
+        let mut place = |row: u32, column: u32| {
+            let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
+            columns.entry(column).or_insert_with(entries).get(&row).copied()
+        };
+        let (mut rows, mut additions) = (Vec::new(), Vec::new());
+        for (number, &equation) in equations.iter().enumerate() {
+            let met: Vec<u32> = pattern.entries(equation).map(|entry| entry.row).collect();
+            let others = met.into_iter().filter(|&other| !is_multiplier[other as usize]);
+            let end = |other: u32| {
+                let (of_column, of_row) = (place(other, equation)?, place(equation, other)?);
+                let slot = pattern.equations.direction(other as usize).slot;
+                Some(End { slot, equation: other, of_column, of_row, diagonal: place(other, other)? })
+            };
+            let ends: Vec<End> = others.filter_map(end).collect();
+            for (k, a) in ends.iter().enumerate() {
+                for b in &ends[k..] {
+                    let pair = [place(a.equation, b.equation), place(b.equation, a.equation)];
+                    let [Some(above), Some(below)] = pair else { continue };
+                    let add = |place, of_column, of_row| Addition { place, row: number, of_column, of_row };
+                    additions.push(add(above, a.of_column, b.of_row));
+                    // Where one half is kept both entries stand at one place.
+                    if below != above {
+                        additions.push(add(below, b.of_column, a.of_row));
+                    }
+                }
+            }
+            rows.push(Row { equation, ends });
+        }
+        let mut groups: Vec<u32> = multipliers.iter().map(|&slot| pattern.groups.of(slot).0 as u32).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        let weights = vec![0.0; rows.len()];
+        Some(Self { rows, additions, groups, weights, values: Vec::new() })
+    }
+
+    /// The groups of multipliers.
+    pub fn groups(&self) -> &[u32] {
+        &self.groups
+    }
+
+    /// The number of multipliers.
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Makes a tangent ready.
+    pub fn take(&mut self, system: &System) {
+        let Self { rows, additions, weights, values, .. } = self;
+        values.clear();
+        values.extend_from_slice(&system.values);
+        let largest = rows.iter().flat_map(|row| &row.ends).map(|end| values[end.diagonal].abs()).fold(0.0, f64::max);
+        weights.iter_mut().zip(&*rows).for_each(|(weight, row)| *weight = row.weight(values, largest));
+        for addition in additions {
+            let product = system.values[addition.of_column] * system.values[addition.of_row];
+            values[addition.place] += weights[addition.row] * product;
+        }
+    }
+
+    /// What was made ready last, on the pattern of its tangent.
+    pub fn matrix<'a>(&'a self, pattern: &'a Pattern) -> Matrix<'a> {
+        Matrix::new(pattern, &self.values)
+    }
+
+    /// The right-hand side that belongs to it: f + C W g.
+    pub fn change(&self, right_hand_side: &mut [f64]) {
+        for (row, weight) in self.rows.iter().zip(&self.weights) {
+            let gap = weight * right_hand_side[row.equation as usize];
+            if gap != 0.0 {
+                row.ends.iter().for_each(|end| right_hand_side[end.equation as usize] += self.values[end.of_column] * gap);
+            }
+        }
+    }
+}
+
+impl Row {
+    /// The stiffness beside a multiplier in its own unit, so that it does not depend on any: 1/w = sum B_k C_k/K_kk. Where nothing has
+    /// stiffness that of others, `largest`, must do.
+    fn weight(&self, values: &[f64], largest: f64) -> f64 {
+        let square = |end: &End| (values[end.of_column] * values[end.of_row]).abs();
+        let softness = |ends: &[End]| -> f64 {
+            let stiff = ends.iter().filter(|end| values[end.diagonal] != 0.0);
+            stiff.map(|end| square(end) / values[end.diagonal].abs()).sum()
+        };
+        let of_slots = self.ends.chunk_by(|a, b| a.slot == b.slot).map(softness);
+        let (mut sum, mut least) = (0.0, f64::INFINITY);
+        for softness in of_slots.filter(|&softness| softness > 0.0) {
+            sum += softness;
+            least = softness.min(least);
+        }
+        let squares: f64 = self.ends.iter().map(square).sum();
+        match (sum > 0.0, squares > 0.0) {
+            (true, _) => (1.0 / sum).max(LEAST_PART / least),
+            (false, true) => largest / squares,
+            (false, false) => 0.0,
+        }
+    }
+}
