@@ -14,8 +14,8 @@
 use crate::system::{Equations, Matrix, Pattern, Slot, System};
 use std::collections::BTreeMap;
 
-/// A weight is not smaller than this part of what the stiffest slot that a multiplier ties would have alone.
-const LEAST_PART: f64 = 1e-8;
+/// A multiplier gets so many times the stiffness beside it: what it ties is then held even where it has lost its own stiffness.
+const FACTOR: f64 = 8.0;
 
 /// The multipliers of a pattern, and the values of the last tangent that was made ready.
 pub struct Constraints {
@@ -36,7 +36,6 @@ struct Row {
 
 /// An equation that a multiplier enters: where the entries of C, of B and of the diagonal stand.
 struct End {
-    slot: Slot,
     equation: u32,
     of_column: usize,
     of_row: usize,
@@ -72,8 +71,7 @@ impl Constraints {
             let others = met.into_iter().filter(|&other| !is_multiplier[other as usize]);
             let end = |other: u32| {
                 let (of_column, of_row) = (place(other, equation)?, place(equation, other)?);
-                let slot = pattern.equations.direction(other as usize).slot;
-                Some(End { slot, equation: other, of_column, of_row, diagonal: place(other, other)? })
+                Some(End { equation: other, of_column, of_row, diagonal: place(other, other)? })
             };
             let ends: Vec<End> = others.filter_map(end).collect();
             for (k, a) in ends.iter().enumerate() {
@@ -137,23 +135,15 @@ impl Constraints {
 }
 
 impl Row {
-    /// The stiffness beside a multiplier in its own unit, so that it does not depend on any: 1/w = sum B_k C_k/K_kk. Where nothing has
-    /// stiffness that of others, `largest`, must do.
+    /// From the stiffness beside a multiplier in its own unit, so that it does not depend on any: FACTOR/w = sum B_k C_k/|K_kk|. Where
+    /// nothing has stiffness that of others, `largest`, must do.
     fn weight(&self, values: &[f64], largest: f64) -> f64 {
         let square = |end: &End| (values[end.of_column] * values[end.of_row]).abs();
-        let softness = |ends: &[End]| -> f64 {
-            let stiff = ends.iter().filter(|end| values[end.diagonal] != 0.0);
-            stiff.map(|end| square(end) / values[end.diagonal].abs()).sum()
-        };
-        let of_slots = self.ends.chunk_by(|a, b| a.slot == b.slot).map(softness);
-        let (mut sum, mut least) = (0.0, f64::INFINITY);
-        for softness in of_slots.filter(|&softness| softness > 0.0) {
-            sum += softness;
-            least = softness.min(least);
-        }
+        let stiff = self.ends.iter().filter(|end| values[end.diagonal] != 0.0);
+        let softness: f64 = stiff.map(|end| square(end) / values[end.diagonal].abs()).sum();
         let squares: f64 = self.ends.iter().map(square).sum();
-        match (sum > 0.0, squares > 0.0) {
-            (true, _) => (1.0 / sum).max(LEAST_PART / least),
+        match (softness > 0.0, squares > 0.0) {
+            (true, _) => FACTOR / softness,
             (false, true) => largest / squares,
             (false, false) => 0.0,
         }
