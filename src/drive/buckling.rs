@@ -258,7 +258,7 @@ impl Run<'_> {
         let symmetric = stable && self.model.multipliers.is_empty();
         let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
         let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
-        let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default();
+        let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default().values;
         let load = self.state.load;
         let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
         let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();

@@ -106,6 +106,7 @@ impl Run<'_> {
             let Some(values) = found_values else {
                 return Err(Failure::Limit("the modes could not be found: a solve with the tangent failed".into()));
             };
+            let values = values.values;
             found = if symmetric { undamped(&values, shift) } else { damped_modes(&values, shift) };
             sort(&mut found);
             found.truncate(modes);

@@ -19,7 +19,7 @@ mod tangent;
 pub use block::BlockSolver;
 pub use convergence::{Convergence, Residual, Verdict, size};
 pub use general::GeneralSolver;
-pub use krylov::{Operator, largest_eigenvalues};
+pub use krylov::{Operator, Spectrum, largest_eigenvalues};
 pub use linear::LinearSolver;
 pub use mechanism::{Limp, mechanism};
 pub use newton::{Newton, NewtonFailure, Work, timed};
