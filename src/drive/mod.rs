@@ -12,6 +12,7 @@ mod ledger;
 mod levels;
 mod modal;
 mod path;
+mod rigid;
 mod run;
 mod space;
 mod start;

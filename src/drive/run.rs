@@ -34,6 +34,8 @@ pub struct Plan {
     pub energy: bool,
     /// Whether somebody looks at continued rotation vectors
     pub continued: bool,
+    /// The initial places of all nodes, where a modal stage asks for them
+    pub places: Vec<(Node, Vec3)>,
 }
 
 /// Velocities given to nodes: velocity + spin x (place - about).

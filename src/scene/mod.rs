@@ -23,7 +23,7 @@ use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
-use crate::model::{Charted, ElementInfo, Model, SlotKind};
+use crate::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
 use crate::probe::{Figure, Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
@@ -240,6 +240,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
             continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
             model,
             initial,
+            places: places(&mesh, &stages),
             stages,
             interval: deck.output.interval,
         },
@@ -254,6 +255,13 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
     })
+}
+
+/// The initial places of all nodes, where a modal stage asks for them.
+fn places(mesh: &Mesh, stages: &[Stage]) -> Vec<(Node, Vec3)> {
+    let is_modal = |stage: &Stage| stage.work.kind() == StageKind::Modal;
+    let wanted = stages.iter().any(is_modal);
+    mesh.nodes.iter().filter(|_| wanted).map(|node| (node.node, node.place)).collect()
 }
 
 /// The rotations of all nodes, and the elements beam by beam.

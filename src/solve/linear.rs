@@ -126,8 +126,14 @@ impl LinearSolver {
     pub(super) fn negative_of_own(&mut self, tangent: &mut Tangent) -> Option<usize> {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
         (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
+        if done { self.negative_of_last() } else { None }
+    }
+
+    /// The negative pivots of the last factorisation, where it tells them.
+    pub(super) fn negative_of_last(&self) -> Option<usize> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
-        self.blocks_in_use()?.negative().filter(|_| done)?.checked_sub(of_multipliers)
+        let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
+        blocks.negative()?.checked_sub(of_multipliers)
     }
 
     /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field

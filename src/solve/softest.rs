@@ -153,6 +153,11 @@ fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
 }
 
+/// The part of x.Jx that round-off in the entries of J may have taken.
+pub(super) fn lost_part(system: &System, x: &[f64]) -> f64 {
+    1.0 / stiffness_of(system, x).max(1.0)
+}
+
 fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
     let (mut whole, mut squares) = (Compensated::default(), 0.0);
     let add = |(sums, part): ([Compensated; W], [f64; W])| {
