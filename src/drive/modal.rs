@@ -7,6 +7,8 @@ use crate::kernel::Weights;
 use crate::model::Model;
 use crate::solve::{Convergence, Matrices, ModeSearch, SmallMotion, Tangent, Verdict, mechanism, timed};
 use crate::system::System;
+use crate::tensor::Vec3;
+use nalgebra::Complex;
 
 /// Part of the lowest frequencies at which the first look is taken.
 const FIRST_SHIFT: f64 = 1e-4;
@@ -16,8 +18,6 @@ const SHIFT: f64 = 0.3;
 const NEAR_SHIFT: f64 = 0.5;
 /// Looks until the shift is near enough
 const MOST_LOOKS: usize = 6;
-/// Modes that are looked at to place the shift
-const FEW: usize = 3;
 /// More than asked for are searched where the number of unstable ones is not known.
 const SPARE: usize = 24;
 /// Times that more modes are searched where some are missing.
@@ -57,7 +57,8 @@ impl Run<'_> {
         let matrices = self.matrices(workshop);
         let rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);
         let found = self.find_modes(workshop, &matrices, rigid, modes)?;
-        let listed = listed(&found, modes);
+        let mut listed = listed(&found, modes);
+        listed.iter_mut().for_each(|motion| self.refine(workshop, motion));
         self.warn_of_modes(&found, &listed);
         self.count_steps();
         // What moved moves on.
@@ -118,8 +119,9 @@ impl Run<'_> {
         for look in 0..MOST_LOOKS {
             let done = 0.5 * look as f64 / MOST_LOOKS as f64;
             self.observer.progress(self.moment(), self.static_progress(done))?;
-            let found = self.look(&mut search, shift, FEW.min(modes)).ok_or_else(failed)?;
-            let Some(lowest) = lowest(&found) else { break };
+            self.counters.work.factorisations += 1;
+            let sizes = search.factorise(shift).then(|| search.roughly_nearest()).flatten().ok_or_else(failed)?;
+            let Some(lowest) = lowest(&sizes) else { break };
             if look > 0 && shift <= NEAR_SHIFT * lowest {
                 break;
             }
@@ -218,6 +220,22 @@ impl Run<'_> {
         search.slower(at).is_none_or(|count| count == found.rigid + growing + behind)
     }
 
+    /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has lost are there again, as far as the
+    /// shape is right.
+    fn refine(&mut self, workshop: &mut Workshop, motion: &mut SmallMotion) {
+        let Some((shape, mass)) = motion.shape.take() else { return };
+        let mut field = vec![Vec3::ZERO; self.state.q.len()];
+        workshop.assembly.system.pattern.equations.scatter(&shape, None, &mut field);
+        let Some(stiffness) = workshop.assembly.stiffness_along(&self.state, &field) else { return };
+        let square = -stiffness / mass;
+        motion.exponent = match square < 0.0 {
+            true => Complex::new(0.0, (-square).sqrt()),
+            false => Complex::new(square.sqrt(), 0.0),
+        };
+        // What is wrong with the shape enters squared.
+        motion.uncertainty *= motion.uncertainty;
+    }
+
     fn warn_of_modes(&mut self, found: &Found, listed: &[SmallMotion]) {
         let stage = self.stage + 1;
         if found.missing > 0 {
@@ -236,10 +254,9 @@ impl Run<'_> {
 }
 
 /// The slowest motion that something holds.
-fn lowest(found: &[SmallMotion]) -> Option<f64> {
-    let sizes = || found.iter().map(|motion| motion.exponent.norm());
-    let highest = sizes().fold(0.0, f64::max);
-    sizes().filter(|&size| size > FREE * highest).reduce(f64::min)
+fn lowest(sizes: &[f64]) -> Option<f64> {
+    let highest = sizes.iter().copied().fold(0.0, f64::max);
+    sizes.iter().copied().filter(|&size| size > FREE * highest).reduce(f64::min)
 }
 
 fn grows(motion: &SmallMotion) -> bool {
@@ -258,12 +275,12 @@ fn add_new(motions: &mut Vec<SmallMotion>, more: impl Iterator<Item = SmallMotio
 
 /// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones behind them.
 fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
-    let rigid = SmallMotion { exponent: Default::default(), uncertainty: 0.0 };
-    let mut stable: Vec<SmallMotion> = found.motions.iter().copied().filter(|motion| !grows(motion)).collect();
+    let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
+    let mut stable: Vec<SmallMotion> = found.motions.iter().cloned().filter(|motion| !grows(motion)).collect();
     stable.extend(std::iter::repeat_n(rigid, found.rigid));
     stable.sort_by(|a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
     stable.truncate(modes);
-    let mut all: Vec<SmallMotion> = found.motions.iter().copied().filter(grows).chain(stable).collect();
+    let mut all: Vec<SmallMotion> = found.motions.iter().cloned().filter(grows).chain(stable).collect();
     sort(&mut all);
     let number = std::cell::Cell::new(0);
     all.retain(|motion| {

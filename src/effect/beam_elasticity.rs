@@ -164,6 +164,14 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         largest
     }
 
+    fn stiffness_along(&self, at: &State, field: &[Vec3]) -> Option<f64> {
+        let mut sum = 0.0;
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            sum += element.stiffness_along::<I>(at, field)?;
+        });
+        Some(sum)
+    }
+
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element
@@ -187,6 +195,9 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         largest
     }
 }
+
+/// Axial strains below this leave a beam its stiffness against bending, as round-off does.
+const UNSTRESSED: f64 = 1e-14;
 
 /// The largest round-off of the forces of some elements.
 fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> Noise {
@@ -423,6 +434,23 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             strain.gamma.norm().max(strain.kappa.norm() * length)
         };
         self.points().iter().map(at_point).fold(0.0, f64::max)
+    }
+
+    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
+    fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
+        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
+        let free = self.free_amplitude(at);
+        let at_point = |point: &StiffnessPoint<N>| {
+            let (_, stress) = point.strain_and_stress(view.nodes(), free);
+            let axial = point.stiffness.stress(&Strain { gamma: Vec3::UNIT[0], kappa: Vec3::ZERO }).n.norm();
+            if stress.n.norm() > UNSTRESSED * axial {
+                return None;
+            }
+            let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
+            let stress = point.stiffness.stress(&strain);
+            Some(point.weight * (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)))
+        };
+        self.points().iter().map(at_point).sum()
     }
 
     /// Adds the element alone as instance `number`; its nodes may sit in different charts.

@@ -153,6 +153,12 @@ pub trait Effect: Send + Sync {
         0.0
     }
 
+    /// x.K x of a field of increments, from the strains that it makes: no digits are lost between nodes that move alike. `None` where the
+    /// tangent alone tells, as under stress.
+    fn stiffness_along(&self, _at: &State, _field: &[Vec3]) -> Option<f64> {
+        None
+    }
+
     /// Mass and momenta.
     fn momentum(&self, _at: &State) -> Momentum {
         Momentum::default()

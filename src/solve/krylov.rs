@@ -30,6 +30,8 @@ pub struct Spectrum {
     space: Space,
 }
 
+/// Vectors that give a rough idea of the largest eigenvalue
+const ROUGH: usize = 12;
 /// Vectors a block
 const BLOCK: usize = 6;
 /// Relative change at which eigenvalues count as found
@@ -39,11 +41,22 @@ const NOTHING_NEW: f64 = 1e-11;
 
 /// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer. `None` where an image cannot be had.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
+    let most = operator.size().min(24 * wanted + 160);
+    eigenvalues_within(operator, wanted, most)
+}
+
+/// A rough idea of the eigenvalues of largest magnitude, from few images.
+pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
+    let most = operator.size().min(ROUGH);
+    eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
+}
+
+/// From a basis of at most so many vectors.
+fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
     let size = operator.size();
     if size == 0 {
         return Some(Spectrum::default());
     }
-    let most = size.min(24 * wanted + 160);
     let mut space = Space::default();
     let mut block: Vec<Vec<f64>> = Vec::new();
     for k in 0..BLOCK.min(size) {

@@ -1,6 +1,6 @@
 //! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each checked before it is given.
 
-use super::krylov::{Operator, Spectrum, largest_eigenvalues};
+use super::krylov::{Operator, Spectrum, largest_eigenvalues, roughly_largest_eigenvalues};
 use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
@@ -16,10 +16,16 @@ const BALANCE: f64 = 1e-6;
 /// Damping forces below this part of inertia and stiffness forces are none.
 const NO_DAMPING: f64 = 1e-14;
 
+/// Of a rough look so many exponents tell.
+const NEARLY_RIGHT: usize = 6;
+
+/// Frequencies that round-off may change by more than this part of themselves are found once more from strains.
+const UNCERTAIN: f64 = 1e-9;
+
 /// Motions slower than this part of the shift are free ones: their stiffness is round-off, and balances nothing.
 const FREE: f64 = 1e-3;
 
-/// Without dampers, a motion that decays faster than this part of |s| is the twin exp(-s t) of one that grows.
+/// Without dampers, a motion that grows faster than this part of |s| has a twin that decays.
 const TWIN: f64 = 1e-6;
 
 /// K, C and M on the pattern of the tangent.
@@ -33,12 +39,14 @@ pub struct Matrices {
 }
 
 /// A small motion: its exponent, and how large round-off may be in it, relative to itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SmallMotion {
     /// s = growth + i omega, omega >= 0
     pub exponent: Complex<f64>,
     /// The part of |s| that round-off in the stiffness may have taken
     pub uncertainty: f64,
+    /// Of motions without damping that are uncertain, the unknowns, one number an equation, and x.M x
+    pub shape: Option<(Vec<f64>, f64)>,
 }
 
 /// What is known of the matrices.
@@ -52,6 +60,16 @@ enum Form {
     Gyroscopic,
     /// Anything
     General,
+}
+
+impl Form {
+    /// The exponent that belongs to an eigenvalue, see [`Motions`].
+    fn exponent(self, shift: f64, theta: Complex<f64>) -> Complex<f64> {
+        match self {
+            Self::Symmetric | Self::Undamped => root(shift * shift - theta.inv()),
+            Self::Gyroscopic | Self::General => theta.inv() + shift,
+        }
+    }
 }
 
 /// The eigenvalue problem of a state.
@@ -153,11 +171,23 @@ impl<'a> ModeSearch<'a> {
     /// Factorises at a shift; `false` where that cannot be done.
     pub fn factorise(&mut self, shift: f64) -> bool {
         self.shift = shift;
-        self.matrices.combine_squared(shift * shift, &mut self.system.values);
-        self.negative = if self.form == Form::Undamped { None } else { self.solver.negative_beside(self.system) };
+        if matches!(self.form, Form::Gyroscopic | Form::General) {
+            self.matrices.combine_squared(shift * shift, &mut self.system.values);
+            self.negative = self.solver.negative_beside(self.system);
+        }
         self.matrices.combine(shift, &mut self.system.values);
         self.system.revision += 1;
-        self.solver.factorise_surely(self.system)
+        let done = self.solver.factorise_surely(self.system);
+        if self.form == Form::Symmetric {
+            self.negative = self.count(done);
+        }
+        done
+    }
+
+    /// Negative pivots of the system, which was factorised, or was tried to be.
+    fn count(&mut self, done: bool) -> Option<usize> {
+        let own = self.solver.negative_of_last().filter(|_| done);
+        own.or_else(|| self.solver.negative_beside(self.system))
     }
 
     /// How many motions grow faster than the shift, where pivots tell.
@@ -175,7 +205,26 @@ impl<'a> ModeSearch<'a> {
     pub fn slower(&mut self, omega: f64) -> Option<usize> {
         self.matrices.combine_squared(-omega * omega, &mut self.system.values);
         self.system.revision += 1;
-        if self.form == Form::Symmetric { self.solver.negative_beside(self.system) } else { None }
+        if self.form != Form::Symmetric {
+            return None;
+        }
+        let done = self.solver.factorise(self.system);
+        self.count(done)
+    }
+
+    /// What the exponents nearest to the shift are like; `None` where a solution fails.
+    pub fn roughly_nearest(&mut self) -> Option<Vec<f64>> {
+        let (shift, form, diagonal) = (self.shift, self.form, self.inner_product());
+        let values = roughly_largest_eigenvalues(&mut Motions { search: self, diagonal })?;
+        // The first ones are nearly right.
+        let there = values.into_iter().filter(|theta| theta.norm() > 0.0).take(NEARLY_RIGHT);
+        Some(there.map(|theta| form.exponent(shift, theta).norm()).collect())
+    }
+
+    /// See [`Motions::diagonal`].
+    fn inner_product(&self) -> Vec<f64> {
+        let takes_energies = matches!(self.form, Form::Symmetric | Form::Undamped) || self.is_held();
+        if takes_energies { Vec::new() } else { self.diagonal() }
     }
 
     /// The motions nearest to the shift that was factorised last, nearest first; those that do not pass the checks are left out.
@@ -185,19 +234,15 @@ impl<'a> ModeSearch<'a> {
             Form::Symmetric | Form::Undamped => wanted,
             Form::Gyroscopic | Form::General => 2 * wanted + 2,
         };
-        let diagonal = if self.is_held() { Vec::new() } else { self.diagonal() };
-        let (shift, form) = (self.shift, self.form);
+        let (shift, form, diagonal) = (self.shift, self.form, self.inner_product());
         let mut operator = Motions { search: self, diagonal };
         let spectrum = largest_eigenvalues(&mut operator, room)?;
         let mut found = Vec::new();
         for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| theta.norm() > 0.0) {
-            let exponent = match form {
-                Form::Symmetric | Form::Undamped => root(shift * shift - theta.inv()),
-                Form::Gyroscopic | Form::General => theta.inv() + shift,
-            };
+            let exponent = form.exponent(shift, theta);
             // Of a conjugate pair one
             let upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
-            let is_twin = form == Form::Gyroscopic && exponent.re < -TWIN * exponent.norm();
+            let is_twin = form == Form::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
             if upper && !is_twin && spectrum.residual(&mut operator, number) <= RESIDUAL {
                 found.push((number, exponent));
             }
@@ -205,8 +250,16 @@ impl<'a> ModeSearch<'a> {
         // What follows asks for K alone.
         self.system.values.copy_from_slice(&self.matrices.stiffness);
         self.system.revision += 1;
-        let checked = |(number, exponent): (usize, Complex<f64>)| self.check(&spectrum, number, exponent);
-        Some(found.into_iter().filter_map(checked).collect())
+        let mut motions = Vec::new();
+        for motion in found.into_iter().filter_map(|(number, exponent)| self.check(&spectrum, number, exponent)) {
+            let s = motion.exponent;
+            // Flutter: with s, -s* is a motion of the same frequency.
+            let twin = form == Form::Undamped && s.re > TWIN * s.norm() && s.im > 0.0;
+            let twin = twin.then(|| SmallMotion { exponent: -s.conj(), ..motion.clone() });
+            motions.push(motion);
+            motions.extend(twin);
+        }
+        Some(motions)
     }
 
     /// A motion that balances: multiplied from the left with its own x*, m s^2 + c s + k = 0.
@@ -219,8 +272,9 @@ impl<'a> ModeSearch<'a> {
             let [of_re, of_im] = [&re, &im].map(|x| self.system.multiply(values, x));
             Complex::new(dot(&re, &of_re) + dot(&im, &of_im), dot(&re, &of_im) - dot(&im, &of_re))
         };
+        let mass = form(&self.matrices.mass);
         let terms = [
-            form(&self.matrices.mass) * exponent * exponent,
+            mass * exponent * exponent,
             form(&self.matrices.damping) * exponent,
             form(&self.matrices.stiffness),
         ];
@@ -232,7 +286,8 @@ impl<'a> ModeSearch<'a> {
         let is_free = exponent.norm() <= FREE * self.shift;
         // s goes with the root of K.
         let uncertainty = if is_free { 0.0 } else { 0.5 * uncertainty };
-        (balances || is_free).then_some(SmallMotion { exponent, uncertainty })
+        let shape = (self.form == Form::Symmetric && uncertainty > UNCERTAIN).then(|| (re, mass.re));
+        (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
 
 
