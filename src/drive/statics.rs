@@ -14,12 +14,18 @@ use crate::threads;
 /// Load increments whose length a detour by arc length begins with.
 const DETOUR: (f64, f64) = (0.01, 0.05);
 
+/// A level whose corrections grow has left the neighbourhood of the path: where they do not contract, the step was too long (Deuflhard 2011,
+/// Newton Methods for Nonlinear Problems, 5.1).
+const LARGEST_CONTRACTION: f64 = 1.0;
+
 /// What came of a step.
 enum Tried {
     /// Balance, with so many negative pivots
     Good(Option<usize>),
     /// Balance, perhaps on another branch
     Jumped(Option<usize>),
+    /// Balance, by an iteration that has not gone straight to it
+    Strayed(Option<usize>),
     /// None
     Failed(NewtonFailure),
 }
@@ -119,6 +125,7 @@ impl Run<'_> {
                     self.state.copy_all_but_rates(&self.good);
                 }
                 // Nothing tells better.
+                Tried::Strayed(negative) => self.take_step(workshop, negative, levels)?,
                 Tried::Jumped(negative) if levels.approach != Approach::Path => {
                     self.take_step(workshop, negative, levels)?;
                 }
@@ -135,8 +142,13 @@ impl Run<'_> {
         }
         let negative = levels.stability.count(self, workshop);
         let states = [&self.good, &self.state];
-        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &workshop.newton.first, negative);
-        if jumped { Tried::Jumped(negative) } else { Tried::Good(negative) }
+        let newton = &workshop.newton;
+        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, negative);
+        match jumped {
+            true => Tried::Jumped(negative),
+            false if newton.contraction > LARGEST_CONTRACTION && !self.soft => Tried::Strayed(negative),
+            false => Tried::Good(negative),
+        }
     }
 
     fn take_step(
