@@ -14,6 +14,9 @@ use crate::threads;
 /// A level is not approached in smaller parts than this.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
 
+/// Nor, in parts of the stage, where it has few levels.
+const SMALLEST_OF_STAGE: f64 = 1.0 / 65536.0;
+
 /// Where round-off takes the stiffness smaller parts hardly help.
 const SMALLEST_SOFT_PART: f64 = 1.0 / 16.0;
 
@@ -116,8 +119,11 @@ impl Levels {
     /// Takes the next step half as long; `false` where it may not be. `soft`: round-off takes the stiffness of the softest motion.
     pub fn halve(&mut self, soft: bool) -> bool {
         let smaller = 0.5 * self.increment;
-        let smallest = if soft { SMALLEST_SOFT_PART } else { SMALLEST_PART };
-        let may = self.approach != Approach::Straight && smaller >= smallest * self.level;
+        let smallest = match soft {
+            true => SMALLEST_SOFT_PART * self.level,
+            false => (SMALLEST_PART * self.level).min(SMALLEST_OF_STAGE),
+        };
+        let may = self.approach != Approach::Straight && smaller >= smallest;
         self.increment = if may { smaller } else { self.increment };
         may
     }

@@ -188,7 +188,8 @@ impl Run<'_> {
         let motion = if self.state.fading.is_empty() { "" } else { IN_MOTION };
         self.observer
             .warn(&format!("load control stands still at {at}: the path is followed by arc length from there{motion}"));
-        let arrival = self.detour(workshop, &levels.start, target, levels.level.clamp(DETOUR.0, DETOUR.1));
+        let increment = levels.level.clamp(DETOUR.0, DETOUR.1);
+        let arrival = self.detour(workshop, &levels.start, target, increment, levels.level);
         let (end, increments) = (self.moment(), self.counters.steps - steps);
         let limit = Failure::LimitPoint { at, goal: target, increments, end };
         match arrival {
