@@ -146,9 +146,17 @@ impl Run<'_> {
         let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, negative);
         match jumped {
             true => Tried::Jumped(negative),
-            false if newton.contraction > LARGEST_CONTRACTION && !self.soft => Tried::Strayed(negative),
+            false if !self.soft && self.has_strayed(newton.contraction, levels.stability.change_to(negative)) => {
+                Tried::Strayed(negative)
+            }
             false => Tried::Good(negative),
         }
+    }
+
+    /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical
+    /// points at once, of which each may have a branch that the path turns into.
+    fn has_strayed(&self, contraction: f64, critical: usize) -> bool {
+        contraction > LARGEST_CONTRACTION || critical > 1
     }
 
     fn take_step(
