@@ -78,12 +78,7 @@ impl Stability {
     }
 
     fn changes_to(&self, negative: Option<usize>) -> bool {
-        self.change_to(negative) > 0
-    }
-
-    /// By how much the number changes; zero where it is not known.
-    pub fn change_to(&self, negative: Option<usize>) -> usize {
-        self.negative.zip(negative).map_or(0, |(before, after)| before.abs_diff(after))
+        matches!((self.negative, negative), (Some(before), Some(after)) if before != after)
     }
 
     /// Says where a limit or branch point lies behind.

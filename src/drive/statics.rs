@@ -18,6 +18,9 @@ const DETOUR: (f64, f64) = (0.01, 0.05);
 /// Newton Methods for Nonlinear Problems, 5.1).
 const LARGEST_CONTRACTION: f64 = 1.0;
 
+/// The same where no pivots tell whether it ended on another branch.
+const LARGEST_UNCOUNTED: f64 = 0.5;
+
 /// What came of a step.
 enum Tried {
     /// Balance, with so many negative pivots
@@ -146,17 +149,11 @@ impl Run<'_> {
         let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, negative);
         match jumped {
             true => Tried::Jumped(negative),
-            false if !self.soft && self.has_strayed(newton.contraction, levels.stability.change_to(negative)) => {
+            false if !self.soft && has_strayed(newton.contraction, levels.stability.negative, negative) => {
                 Tried::Strayed(negative)
             }
             false => Tried::Good(negative),
         }
-    }
-
-    /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical
-    /// points at once, of which each may have a branch that the path turns into.
-    fn has_strayed(&self, contraction: f64, critical: usize) -> bool {
-        contraction > LARGEST_CONTRACTION || critical > 1
     }
 
     fn take_step(
@@ -247,5 +244,14 @@ impl Run<'_> {
 
     pub(super) fn static_progress(&self, load: f64) -> f64 {
         (self.stage as f64 + load) / self.plan.stages.len() as f64
+    }
+}
+
+/// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points at
+/// once, of which each may have a branch that the path turns into.
+fn has_strayed(contraction: f64, before: Option<usize>, after: Option<usize>) -> bool {
+    match before.zip(after) {
+        Some((before, after)) => contraction > LARGEST_CONTRACTION || before.abs_diff(after) > 1,
+        None => contraction > LARGEST_UNCOUNTED,
     }
 }
