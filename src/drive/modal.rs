@@ -8,6 +8,7 @@ use crate::solve::{
     Convergence, LinearSolver, Operator, Tangent, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed,
 };
 use crate::system::System;
+use crate::warning::WarningKind;
 use nalgebra::Complex;
 
 /// Part of the lowest frequencies at which the first look is taken.
@@ -50,8 +51,8 @@ impl Run<'_> {
         let loose = Convergence { tolerance: 1e-5 };
         let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, noise, None);
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
-            self.observer
-                .warn("the state of a modal or buckling stage is not in balance: let a static stage come before it");
+            let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
+            self.warn(WarningKind::OutOfBalance, message);
         }
     }
 
