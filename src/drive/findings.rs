@@ -58,14 +58,15 @@ pub struct StageStability {
     pub stage: usize,
     /// What is known
     pub verdict: StabilityVerdict,
-    /// The number of negative pivots of the tangent, where it is known
+    /// The number of negative pivots of the tangent in space, where it is known
     pub negative: Option<usize>,
 }
 
 impl StageStability {
-    /// As the number of negative pivots tells.
-    pub(super) fn of_pivots(stage: usize, negative: Option<usize>) -> Self {
-        let verdict = match negative {
+    /// As the numbers of negative pivots tell: those of the stage as it is treated, and for one in a plane those `aside` of it.
+    pub(super) fn of_pivots(stage: usize, treated: Option<usize>, aside: Option<usize>) -> Self {
+        let negative = treated.zip(aside).map(|(treated, aside)| treated + aside);
+        let verdict = match negative.or(treated.filter(|&treated| treated > 0)) {
             None => StabilityVerdict::Unknown,
             Some(0) => StabilityVerdict::Stable,
             Some(_) => StabilityVerdict::Unstable,

@@ -104,8 +104,7 @@ impl Run<'_> {
             let message = format!("the path ends after `max_steps` = {max_steps} increments at {at}");
             self.warn(WarningKind::PathEnds, message);
         }
-        self.note_stability(path.here.negative);
-        if path.here.on_limit { Ok(()) } else { self.look_out_of_plane(workshop, path.here.negative) }
+        self.conclude_static(workshop, path.here.negative, path.here.on_limit)
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control

@@ -62,10 +62,9 @@ impl Run<'_> {
                 break;
             }
         }
-        let at_end = levels.stability.negative;
         // What is linear keeps the tangent of its start.
-        self.note_stability(if self.is_linear() { at_start } else { at_end });
-        self.look_out_of_plane(workshop, at_end)
+        let negative = if self.is_linear() { at_start } else { levels.stability.negative };
+        self.conclude_static(workshop, negative, false)
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.

@@ -1,7 +1,7 @@
 //! What a run tells its user beside its results, each thing once.
 
 use super::failure::Moment;
-use super::findings::{StabilityVerdict, StageStability, Warning};
+use super::findings::Warning;
 use super::guard::EnergyGuard;
 use super::run::{Run, Workshop};
 use crate::model::{StageKind, charts};
@@ -161,19 +161,14 @@ impl Run<'_> {
         }
     }
 
-    /// Notes the stability of the equilibrium in which a static stage ends, and warns where it is unstable. `negative`: the number
-    /// of negative pivots there, where it is known.
-    pub(super) fn note_stability(&mut self, negative: Option<usize>) {
-        let found = StageStability::of_pivots(self.stage + 1, negative);
-        self.counters.findings.stability.push(found);
-        if found.verdict == StabilityVerdict::Unstable {
-            let count = match negative {
-                None => String::new(),
-                Some(1) => " (1 negative pivot)".into(),
-                Some(count) => format!(" ({count} negative pivots)"),
-            };
-            let stage = found.stage;
-            let message = format!("stage {stage} ends in an unstable equilibrium{count}: a real structure would leave it");
+    /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.
+    pub(super) fn warn_of_instability(&mut self, negative: Option<usize>) {
+        if let Some(count @ 1..) = negative {
+            let stage = self.stage + 1;
+            let pivots = if count == 1 { "pivot" } else { "pivots" };
+            let message = format!(
+                "stage {stage} ends in an unstable equilibrium ({count} negative {pivots}): a real structure would leave it"
+            );
             self.warn(WarningKind::Unstable, message);
         }
     }
