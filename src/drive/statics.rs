@@ -178,7 +178,8 @@ impl Run<'_> {
         }
         let (at, steps) = (self.moment(), self.counters.steps);
         let motion = if self.state.fading.is_empty() { "" } else { IN_MOTION };
-        let message = format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
+        let message =
+            format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
         self.warn(WarningKind::ArcLengthDetour, message);
         let arrival = self.detour(workshop, &levels.start, target, levels.level.clamp(DETOUR.0, DETOUR.1));
         let (end, increments) = (self.moment(), self.counters.steps - steps);

@@ -126,9 +126,7 @@ fn events(counters: &Counters) -> Value {
 
 /// Of each static stage that came to its end.
 fn stability(counters: &Counters) -> Value {
-    let one = |found: &StageStability| {
-        json!({ "stage": found.stage, "verdict": found.verdict.name(), "negative": found.negative })
-    };
+    let one = |found: &StageStability| json!({ "stage": found.stage, "verdict": found.verdict.name(), "negative": found.negative });
     counters.findings.stability.iter().map(one).collect()
 }
 

@@ -17,9 +17,7 @@ pub use compose::Reason;
 pub use mesh::{Mesh, MeshBeam, Rule};
 pub use section::{MassPerLength, SectionMatrices};
 
-use crate::deck::{
-    self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Severity, Spanned, StageBody,
-};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Severity, Spanned, StageBody};
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;

@@ -72,7 +72,9 @@ fn a_record_lists_the_warnings_of_a_snap_through_and_the_stability_of_its_end() 
     let expected = ["arc_length_detour", "limit_point", "turning_point", "turning_point", "limit_point"];
     assert_eq!(names[..5], expected);
     assert_eq!(names[5..], ["load_control_resumed"]);
-    assert!(warnings.iter().all(|warning| warning["about"] == "path" && warning["stage"] == 1 && warning["time"] == 0.0));
+    assert!(
+        warnings.iter().all(|warning| warning["about"] == "path" && warning["stage"] == 1 && warning["time"] == 0.0)
+    );
     let limit = &record["events"][0];
     assert_eq!((&limit["kind"], &limit["load"]), (&Value::from("limit point"), &warnings[1]["load"]));
     assert!((limit["load"].as_f64().unwrap() - 0.9278).abs() < 1e-3);
@@ -80,7 +82,8 @@ fn a_record_lists_the_warnings_of_a_snap_through_and_the_stability_of_its_end() 
     // On the terminal the same, in the same order.
     let told = String::from_utf8_lossy(&ran.stderr).into_owned();
     let told: Vec<&str> = told.lines().filter(|line| line.starts_with("warning")).collect();
-    let lines = warnings.iter().zip(&names).map(|(w, name)| format!("warning[{name}]: {}", w["message"].as_str().unwrap()));
+    let lines =
+        warnings.iter().zip(&names).map(|(w, name)| format!("warning[{name}]: {}", w["message"].as_str().unwrap()));
     assert_eq!(told, lines.collect::<Vec<_>>());
 }
 
@@ -128,7 +131,10 @@ fn a_detour_that_ends_by_until_tells_the_stability_of_its_end() {
     let stage = "[[stage]]\nkind = \"static\"\nsteps = 4\nuntil = { column = \"loaded.uy\", below = -60 }\n";
     let simulation = simulate(&format!("{scene}{stage}"));
     let findings = &simulation.counters.findings;
-    assert_eq!(findings.stability, [StageStability { stage: 1, verdict: StabilityVerdict::Unstable, negative: Some(1) }]);
+    assert_eq!(
+        findings.stability,
+        [StageStability { stage: 1, verdict: StabilityVerdict::Unstable, negative: Some(1) }]
+    );
     assert_eq!(findings.warnings.last().map(|warning| warning.kind), Some(WarningKind::Unstable));
 }
 
@@ -177,7 +183,10 @@ fn expected_warnings_are_judged() {
 #[test]
 fn a_sweep_tells_the_warnings_of_its_points() {
     let folder = Folder::new("sweep_warnings");
-    folder.write("deck.toml", &format!("[param]\nx = 0\n{}[[expect]]\ncolumn = \"top.uz\"\nbelow = 1\n", column(1.1 * CRITICAL, STATIC)));
+    folder.write(
+        "deck.toml",
+        &format!("[param]\nx = 0\n{}[[expect]]\ncolumn = \"top.uz\"\nbelow = 1\n", column(1.1 * CRITICAL, STATIC)),
+    );
     let swept = folder.beamsim(&["sweep", "deck.toml", "--vary", "section.s.GJ=10,11", "--output", "top.uz"]);
     assert_eq!(status(&swept), 0, "{}", last_line(&swept));
     let table = fs::read_to_string(folder.0.join("results/deck/sweep.csv")).unwrap();
