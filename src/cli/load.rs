@@ -123,7 +123,7 @@ pub fn text(path: &Path) -> Result<String, Refusal> {
 fn expected_failures(deck: &Deck) -> Vec<String> {
     let name = |expect: &deck::Expect| match &expect.body {
         ExpectBody::Fails(name) => Some(name.value.clone()),
-        ExpectBody::Column { .. } => None,
+        ExpectBody::Column { .. } | ExpectBody::Warns(_) | ExpectBody::Quiet => None,
     };
     deck.expects.iter().filter_map(name).collect()
 }

@@ -5,7 +5,7 @@
 //! the load found, and looked at again from there, until it is reached.
 
 use super::direction::Direction;
-use super::failure::Failure;
+use super::failure::{Failure, Moment};
 use super::levels::{NO_MOTION, distance};
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
@@ -13,6 +13,7 @@ use crate::model::charts;
 use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
+use crate::warning::WarningKind;
 use nalgebra::Complex;
 
 /// How far the state is moved along the path to see the tangent vary: lengths of the scene, and radians.
@@ -188,7 +189,7 @@ impl Run<'_> {
         let message = format!(
             "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it{why}"
         );
-        self.observer.warn(&message);
+        self.warn_at(WarningKind::BucklingEstimate, Moment { load: from, ..self.moment() }, message);
     }
 
     /// Of the tangent at the present state, where it is symmetric.

@@ -5,6 +5,7 @@ mod control;
 mod direction;
 mod dynamics;
 mod failure;
+mod findings;
 mod grid;
 mod guard;
 mod handover;
@@ -20,6 +21,7 @@ mod statics;
 mod warnings;
 
 pub use failure::{Failure, Moment, Place};
+pub use findings::{Findings, StabilityVerdict, StageStability, Warning};
 pub use ledger::Ledger;
 pub use levels::Approach;
 pub use run::{

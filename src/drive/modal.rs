@@ -8,6 +8,7 @@ use crate::model::Model;
 use crate::solve::{Convergence, Matrices, ModeSearch, SmallMotion, Tangent, Verdict, mechanism, timed};
 use crate::system::System;
 use crate::tensor::Vec3;
+use crate::warning::WarningKind;
 use nalgebra::Complex;
 
 /// Part of the lowest frequencies at which the first look is taken.
@@ -79,8 +80,8 @@ impl Run<'_> {
         let loose = Convergence { tolerance: 1e-5 };
         let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, noise, None);
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
-            self.observer
-                .warn("the state of a modal or buckling stage is not in balance: let a static stage come before it");
+            let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
+            self.warn(WarningKind::OutOfBalance, message);
         }
     }
 
@@ -205,7 +206,8 @@ impl Run<'_> {
 
     /// Whether no mode is missing among those that are asked for: as many pivots are negative at a frequency behind them.
     fn is_complete(&mut self, search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
-        let mut omegas: Vec<f64> = found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
+        let mut omegas: Vec<f64> =
+            found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
         omegas.sort_by(f64::total_cmp);
         let growing = found.motions.len() - omegas.len();
         let first = modes.saturating_sub(found.rigid + growing).max(1);
@@ -239,16 +241,19 @@ impl Run<'_> {
     fn warn_of_modes(&mut self, found: &Found, listed: &[SmallMotion]) {
         let stage = self.stage + 1;
         if found.missing > 0 {
-            self.observer.warn(&format!("stage {stage}: {} more unstable mode(s) exist and were not found", found.missing));
+            let missing = found.missing;
+            let message = format!("stage {stage}: {missing} more unstable mode(s) exist and were not found");
+            self.warn(WarningKind::MissingModes, message);
         }
         let worst = listed.iter().enumerate().max_by(|a, b| a.1.uncertainty.total_cmp(&b.1.uncertainty));
         if let Some((number, motion)) = worst.filter(|(_, motion)| motion.uncertainty > TOLD) {
-            self.observer.warn(&format!(
+            let message = format!(
                 "stage {stage}: round-off makes the frequency of mode {} uncertain by about {:.1} % (very slender beams on very \
                  fine meshes lose digits: use fewer elements of a higher order)",
                 number + 1,
                 100.0 * motion.uncertainty
-            ));
+            );
+            self.warn(WarningKind::LostDigits, message);
         }
     }
 }

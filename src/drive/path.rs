@@ -18,6 +18,7 @@ use crate::model::{SlotKind, charts};
 use crate::solve::{self, NewtonFailure, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
+use crate::warning::WarningKind;
 
 /// Iterations after which the next step stays as long.
 const EASY: f64 = 5.0;
@@ -114,10 +115,10 @@ impl Run<'_> {
         let bounds = Bounds { increments: max_steps, patience: max_steps };
         if self.go_along(workshop, &mut path, 1.0, bounds)? == Arrival::OutOfSteps {
             let at = self.moment();
-            self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
+            let message = format!("the path ends after `max_steps` = {max_steps} increments at {at}");
+            self.warn(WarningKind::PathEnds, message);
         }
-        self.warn_of_instability(path.here.negative);
-        if path.here.on_limit { Ok(()) } else { self.look_out_of_plane(workshop, path.here.negative) }
+        self.conclude_static(workshop, path.here.negative, path.here.on_limit)
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
@@ -255,12 +256,15 @@ impl Run<'_> {
         let Some(kind) = kind else { return Ok(()) };
         let event = Event { at: self.moment(), kind, negative_pivots: after };
         match self.told.points {
-            0..MOST_TOLD => self.observer.warn(&event.to_string()),
-            MOST_TOLD => self.observer.warn("more limit and branch points follow: all stand as `events` in run.json"),
+            0..MOST_TOLD => self.warn(kind.warning(), event.to_string()),
+            MOST_TOLD => {
+                let message = "more limit and branch points follow: run.json lists all of them as `events`";
+                self.warn(WarningKind::MorePoints, message);
+            }
             _ => {}
         }
         self.told.points += 1;
-        self.counters.events.push(event);
+        self.counters.findings.events.push(event);
         if kind == EventKind::Limit { Ok(()) } else { self.look_out_of_plane(workshop, after) }
     }
 }

@@ -1,6 +1,7 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
 use super::failure::{Failure, Moment, Tried, place};
+use super::findings::{Findings, Warning};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use super::levels::Approach;
@@ -12,6 +13,7 @@ use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector,
 use crate::system::{Node, Plane, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
+use crate::warning::WarningKind;
 use std::f64::consts::PI;
 use std::fmt;
 use std::sync::Arc;
@@ -192,8 +194,8 @@ pub trait Observer {
         Ok(())
     }
 
-    /// A remark that is not a failure.
-    fn warn(&mut self, _message: &str) {}
+    /// Something that is not a failure.
+    fn warn(&mut self, _warning: &Warning) {}
 
     /// How far the run has come, from 0 to 1; called at each attempt. It may end the run.
     fn progress(&mut self, _at: Moment, _done: f64) -> Result<(), Failure> {
@@ -232,6 +234,15 @@ impl EventKind {
             Self::Branch => "branch or limit point passed",
         }
     }
+
+    /// The warning that tells of it.
+    pub(super) fn warning(self) -> WarningKind {
+        match self {
+            Self::Limit => WarningKind::LimitPoint,
+            Self::Turning => WarningKind::TurningPoint,
+            Self::Branch => WarningKind::BranchPoint,
+        }
+    }
 }
 
 impl fmt::Display for Event {
@@ -247,7 +258,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// Work done in a run.
+/// Work done in a run, and what it found out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counters {
     /// Converged levels and time steps
@@ -256,8 +267,8 @@ pub struct Counters {
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
-    /// Limit, turning and branch points of static paths
-    pub events: Vec<Event>,
+    /// Events, stability, warnings
+    pub findings: Findings,
     /// Iterations, factorisations, chart switches, seconds
     pub work: Work,
     /// Evaluations of instances by effect
@@ -548,7 +559,7 @@ impl<'o> Run<'o> {
             return Err(failure);
         }
         self.told.coarse = true;
-        self.observer.warn(&format!("{failure}: more elements would tell the shape better"));
+        self.warn(WarningKind::CoarseMesh, format!("{failure}: more elements would tell the shape better"));
         Ok(())
     }
 

@@ -10,6 +10,7 @@ use crate::solve::{Limp, NewtonFailure, Tangent, mechanism};
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
+use crate::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 
 /// What a joint may be open by when a dynamic stage begins, in radians or relative to the scene's length.
@@ -89,9 +90,10 @@ impl Run<'_> {
             return Err(self.name_failure(failure, &workshop.assembly.system));
         }
         let Some(solved) = self.solve_with_mass(workshop, &rates2)? else {
-            self.observer.warn(
-                "mass does not tell how the motion begins (a point mass with an offset and without inertia?): it begins without \
-                 accelerations",
+            self.warn(
+                WarningKind::NoStartAccelerations,
+                "mass does not determine the accelerations at the start (a point mass with an offset and without inertia?): the motion \
+                 begins without them",
             );
             workshop.assembly.evaluate(&self.state, Weights::NONE, None);
             return Ok(());

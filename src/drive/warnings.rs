@@ -1,9 +1,12 @@
 //! What a run tells its user beside its results, each thing once.
 
+use super::failure::Moment;
+use super::findings::Warning;
 use super::guard::EnergyGuard;
 use super::run::{Run, Workshop};
 use crate::model::{StageKind, charts};
 use crate::system::Slot;
+use crate::warning::WarningKind;
 
 /// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
 /// their nodes: measured over 4000 orientations.
@@ -43,16 +46,29 @@ impl Default for Told {
 }
 
 impl Run<'_> {
+    /// Warns of something at the present moment.
+    pub(super) fn warn(&mut self, kind: WarningKind, message: impl Into<String>) {
+        self.warn_at(kind, self.moment(), message);
+    }
+
+    /// Warns of something that happened at some moment.
+    pub(super) fn warn_at(&mut self, kind: WarningKind, at: Moment, message: impl Into<String>) {
+        let warning = Warning { kind, at: Some(at), message: message.into() };
+        self.observer.warn(&warning);
+        self.counters.findings.warnings.push(warning);
+    }
+
     /// Says where the answer has fewer digits than it shows.
     pub(super) fn warn_of_round_off(&mut self) {
         let uncertainty = self.counters.work.uncertainty;
         if uncertainty > 10.0 * self.told.uncertainty {
             self.told.uncertainty = uncertainty;
-            self.observer.warn(&format!(
+            let message = format!(
                 "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
                  largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
                 16.0 + uncertainty.log10()
-            ));
+            );
+            self.warn(WarningKind::LostDigits, message);
         }
     }
 
@@ -60,7 +76,8 @@ impl Run<'_> {
     pub(super) fn warn_of_softness(&mut self) {
         self.soft = true;
         if !std::mem::replace(&mut self.told.soft, true) {
-            self.observer.warn(
+            self.warn(
+                WarningKind::LostStiffness,
                 "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
                  all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
             );
@@ -70,12 +87,13 @@ impl Run<'_> {
     /// Energy that a scheme takes is a motion that its steps do not resolve.
     pub(super) fn warn_of_loss(&mut self, workshop: &Workshop) {
         if let Some(share) = workshop.guard.as_ref().and_then(EnergyGuard::loss) {
-            self.observer.warn(&format!(
+            let message = format!(
                 "stage {}: the scheme has taken {:.0} % of the largest energy: its steps do not resolve part of the motion (a smaller \
                  `step`, or less dissipation)",
                 self.stage + 1,
                 100.0 * share
-            ));
+            );
+            self.warn(WarningKind::EnergyLoss, message);
         }
     }
 
@@ -89,12 +107,13 @@ impl Run<'_> {
         let error = FRAME_ERROR * angle * angle;
         if error > self.told.frame {
             self.told.frame = 2.0 * error;
-            self.observer.warn(&format!(
+            let message = format!(
                 "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
                  two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
                  the square of the element's length)",
                 100.0 * error
-            ));
+            );
+            self.warn(WarningKind::FrameDependence, message);
         }
     }
 
@@ -103,9 +122,10 @@ impl Run<'_> {
         let planar = self.model.plane.is_some() && matches!(kind, StageKind::Static | StageKind::Dynamic);
         if planar && self.plane.is_none() {
             let stage = self.stage + 1;
-            self.observer.warn(&format!(
+            let message = format!(
                 "stage {stage} is simulated in space: the state in which it begins is not in the plane of the scene to the last digits"
-            ));
+            );
+            self.warn(WarningKind::SimulatedInSpace, message);
         }
     }
 
@@ -113,19 +133,22 @@ impl Run<'_> {
     pub(super) fn warn_out_of_plane(&mut self, count: usize) {
         self.told.unstable = Some(self.stage);
         let at = self.moment();
-        self.observer.warn(&format!(
-            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in: what it would do is seen with a small load or imperfection out of the plane"
-        ));
+        let message = format!(
+            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in: \
+             what it would do is seen with a small load or imperfection out of the plane"
+        );
+        self.warn(WarningKind::UnstableOutOfPlane, message);
     }
 
     /// A node passed a whole turn aside of its axis.
     pub(super) fn warn_of_lost_axis(&mut self, slot: Slot) {
         if !std::mem::replace(&mut self.told.axis, true) {
             let (at, node) = (self.moment(), self.model.node_at(slot as usize));
-            self.observer.warn(&format!(
+            let message = format!(
                 "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
                  its increments from there on, and depends on the steps (`r` does not)"
-            ));
+            );
+            self.warn(WarningKind::LostAxis, message);
         }
     }
 
@@ -133,17 +156,20 @@ impl Run<'_> {
     pub(super) fn warn_of_subdivision(&mut self) {
         if !std::mem::replace(&mut self.told.subdivision, true) {
             let at = self.moment();
-            self.observer.warn(&format!("a step fails at {at} and is taken in smaller ones, as are others that fail"));
+            let message = format!("a step fails at {at} and is taken in smaller ones, as are others that fail");
+            self.warn(WarningKind::StepSubdivided, message);
         }
     }
 
-    /// A state that a stage ends in, and that the next begins with.
+    /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.
     pub(super) fn warn_of_instability(&mut self, negative: Option<usize>) {
         if let Some(count @ 1..) = negative {
             let stage = self.stage + 1;
-            self.observer.warn(&format!(
-                "stage {stage} ends in an unstable state, with {count} negative pivot(s): nothing real stays in it"
-            ));
+            let pivots = if count == 1 { "pivot" } else { "pivots" };
+            let message = format!(
+                "stage {stage} ends in an unstable equilibrium ({count} negative {pivots}): a real structure would leave it"
+            );
+            self.warn(WarningKind::Unstable, message);
         }
     }
 }

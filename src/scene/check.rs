@@ -6,6 +6,7 @@ use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, S
 use crate::model::{StageSet, Support};
 use crate::system::Direction;
 use crate::tensor::{Mat3, Vec3};
+use crate::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::HashSet;
 
@@ -98,7 +99,7 @@ fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             if place == there && used(&name.value) && used(&other.value) {
                 let message =
                     format!("the points `{}` and `{}` lie at the same place and stay apart", other.value, name.value);
-                let diagnostic = Diagnostic::warning(message, name.span.clone());
+                let diagnostic = Diagnostic::warning(WarningKind::EqualPlaces, message, name.span.clone());
                 diagnostics.push(diagnostic.help("beams are joined where they name the same point"));
             }
         }
@@ -178,7 +179,8 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
             let message = "joints with multipliers need a scheme that dissipates: without, accelerations and forces of joints \
                            oscillate from step to step";
             let help = "take scheme = \"generalized_alpha\"; without dissipation a run may even lose its balance";
-            diagnostics.push(Diagnostic::warning(message, stage.span.clone()).help(help));
+            let diagnostic = Diagnostic::warning(WarningKind::UndampedMultipliers, message, stage.span.clone());
+            diagnostics.push(diagnostic.help(help));
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, MotionW
 use crate::model::{History, Motion, MotionKind, StageSet, Support, Table};
 use crate::system::{Direction, Node, Slot};
 use crate::tensor::{Mat3, Vec3};
+use crate::warning::WarningKind;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -185,7 +186,7 @@ fn refuse_early_jump(deck: &Deck, motion: &deck::Motion, found: &Motion, diagnos
     if course[1] != 0.0 {
         let message = "this motion begins with a velocity, while its node is at rest: velocities jump there";
         let help = "a history that begins with a slope of zero does not excite vibrations";
-        diagnostics.push(Diagnostic::warning(message, motion.span.clone()).help(help));
+        diagnostics.push(Diagnostic::warning(WarningKind::VelocityJump, message, motion.span.clone()).help(help));
     }
     let start = found.value * course[0];
     if start.abs() > 1e-12 * found.value.abs() || start.is_nan() {
@@ -206,7 +207,7 @@ fn warn_of_kinks(deck: &Deck, motion: &deck::Motion, diagnostics: &mut Vec<Diagn
         && values.windows(2).any(|pair| pair[0] != pair[1])
     {
         let message = format!("the history `{}` of this motion has kinks: velocities jump there", history.name.value);
-        let diagnostic = Diagnostic::warning(message, motion.span.clone());
+        let diagnostic = Diagnostic::warning(WarningKind::HistoryKinks, message, motion.span.clone());
         diagnostics.push(diagnostic.help("`smooth = true` makes velocity and acceleration continuous"));
     }
 }

@@ -17,8 +17,8 @@ pub use compose::Reason;
 pub use mesh::{Mesh, MeshBeam, Rule};
 pub use section::{MassPerLength, SectionMatrices};
 
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
-use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Severity, Spanned, StageBody};
+use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;
 use crate::effect::rigid_body::Body;
@@ -27,6 +27,7 @@ use crate::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
 use crate::probe::{Figure, Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
+use crate::warning::WarningKind;
 use output::Columns;
 use std::sync::Arc;
 
@@ -44,6 +45,8 @@ pub struct Scene {
     pub vtk: bool,
     /// What is expected
     pub expectations: Vec<Expectation>,
+    /// Warnings about the deck itself, where the scene was built by [`from_deck`]
+    pub warnings: Vec<Warning>,
     /// Which effects act, and why
     pub reasons: Vec<Reason>,
     /// Nodes, beams, elements
@@ -68,7 +71,7 @@ impl Scene {
 /// What is expected of a run.
 #[derive(Clone)]
 pub struct Expectation {
-    /// The column or failure as it stands in the deck
+    /// The column, failure or warning as it stands in the deck
     pub name: String,
     /// What is expected
     pub kind: ExpectationKind,
@@ -108,6 +111,10 @@ pub enum ExpectationKind {
     },
     /// That it fails
     Fails,
+    /// A warning of this kind
+    Warns(WarningKind),
+    /// No warning that puts an answer in doubt
+    Quiet,
 }
 
 /// A number of a mode.
@@ -163,9 +170,22 @@ pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene
         }
     }
     match scene {
-        Some(scene) if told.iter().all(Diagnostic::is_warning) => Ok((scene, told)),
+        Some(scene) if told.iter().all(Diagnostic::is_warning) => {
+            let warnings = told.iter().filter_map(before_the_run).collect();
+            Ok((Scene { warnings, ..scene }, told))
+        }
         _ => Err(told),
     }
+}
+
+/// The warning of a diagnostic, with the help that belongs to it.
+fn before_the_run(diagnostic: &Diagnostic) -> Option<Warning> {
+    let Severity::Warning(kind) = diagnostic.severity else { return None };
+    let message = match &diagnostic.help {
+        Some(help) => format!("{}: {help}", diagnostic.message),
+        None => diagnostic.message.clone(),
+    };
+    Some(Warning { kind, at: None, message })
 }
 
 /// Whether a name speaks of a table: `arm`, `arm@end`, `arm:3`.
@@ -248,6 +268,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         every: deck.output.every,
         vtk: deck.output.vtk,
         expectations,
+        warnings: Vec::new(),
         reasons: [vec![planar], composition.reasons].concat(),
         mesh,
         bodies: composition.bodies,
@@ -341,6 +362,12 @@ fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic
         match &expect.body {
             ExpectBody::Fails(name) => {
                 found.push(Expectation { name: name.value.clone(), kind: ExpectationKind::Fails, source });
+            }
+            ExpectBody::Warns(kind) => {
+                found.push(Expectation { name: kind.name().into(), kind: ExpectationKind::Warns(*kind), source });
+            }
+            ExpectBody::Quiet => {
+                found.push(Expectation { name: "no warning".into(), kind: ExpectationKind::Quiet, source });
             }
             ExpectBody::Column { column, reduce, value, below, above } => {
                 let bounds = Bounds { value: *value, below: *below, above: *above };

@@ -100,6 +100,11 @@ impl Constraints {
         &self.groups
     }
 
+    /// The equations of multipliers.
+    pub fn equations(&self) -> impl Iterator<Item = usize> {
+        self.rows.iter().map(|row| row.equation as usize)
+    }
+
     /// The number of multipliers.
     pub fn count(&self) -> usize {
         self.rows.len()
@@ -128,7 +133,9 @@ impl Constraints {
         for (row, weight) in self.rows.iter().zip(&self.weights) {
             let gap = weight * right_hand_side[row.equation as usize];
             if gap != 0.0 {
-                row.ends.iter().for_each(|end| right_hand_side[end.equation as usize] += self.values[end.of_column] * gap);
+                row.ends
+                    .iter()
+                    .for_each(|end| right_hand_side[end.equation as usize] += self.values[end.of_column] * gap);
             }
         }
     }

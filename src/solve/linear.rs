@@ -102,6 +102,11 @@ impl LinearSolver {
         })
     }
 
+    /// What its multipliers are, where there are some.
+    pub(super) fn constraints(&self) -> Option<&Constraints> {
+        self.constraints.as_ref()
+    }
+
     /// Its solver in blocks, where it has one, whether it is in use or not.
     pub(super) fn blocks(&self) -> Option<&BlockSolver> {
         self.blocks.as_deref()

@@ -273,11 +273,8 @@ impl<'a> ModeSearch<'a> {
             Complex::new(dot(&re, &of_re) + dot(&im, &of_im), dot(&re, &of_im) - dot(&im, &of_re))
         };
         let mass = form(&self.matrices.mass);
-        let terms = [
-            mass * exponent * exponent,
-            form(&self.matrices.damping) * exponent,
-            form(&self.matrices.stiffness),
-        ];
+        let terms =
+            [mass * exponent * exponent, form(&self.matrices.damping) * exponent, form(&self.matrices.stiffness)];
         // The larger part of the vector tells.
         let of_part = if dot(&re, &re) >= dot(&im, &im) { &re } else { &im };
         let uncertainty = lost_part(self.system, of_part);
@@ -289,7 +286,6 @@ impl<'a> ModeSearch<'a> {
         let shape = (self.form == Form::Symmetric && uncertainty > UNCERTAIN).then(|| (re, mass.re));
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
-
 
     /// |K_ii| + shift^2 M_ii, an inner product that every scene has.
     fn diagonal(&self) -> Vec<f64> {
@@ -361,7 +357,12 @@ impl Operator for Motions<'_, '_> {
         let squared = shift * shift;
         let kinetic = |x: &[f64]| system.multiply(&matrices.mass, x).into_iter().map(|v| squared * v);
         let mut out: Vec<f64> = match self.diagonal.is_empty() {
-            true => system.multiply(&matrices.stiffness, first).into_iter().zip(kinetic(first)).map(|(k, m)| k + m).collect(),
+            true => system
+                .multiply(&matrices.stiffness, first)
+                .into_iter()
+                .zip(kinetic(first))
+                .map(|(k, m)| k + m)
+                .collect(),
             false => first.iter().zip(&self.diagonal).map(|(x, d)| x * d).collect(),
         };
         out.extend(kinetic(second));
@@ -387,7 +388,8 @@ fn is_skew(system: &System, values: &[f64]) -> bool {
     if system.pattern.symmetry == Symmetry::Whole {
         return false;
     }
-    let x: Vec<f64> = (0..system.pattern.equations.count()).map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract()).collect();
+    let x: Vec<f64> =
+        (0..system.pattern.equations.count()).map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract()).collect();
     let y: Vec<f64> = (0..x.len()).map(|k| 0.5 + (k as f64 * 0.414_213_562_373_095).fract()).collect();
     // Random vectors tell: y.C x = -x.C y, and x.C x = 0.
     let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();

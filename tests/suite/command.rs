@@ -310,8 +310,8 @@ fn what_a_search_has_run_is_written_as_if_it_ran_again() {
         }
         let [found, again] = [&found, &again].map(|name| record(name));
         assert_eq!(
-            [&found["counters"], &found["deck"], &found["text"]],
-            [&again["counters"], &again["deck"], &again["text"]]
+            [&found["counters"], &found["deck"], &found["text"], &found["warnings"], &found["stability"]],
+            [&again["counters"], &again["deck"], &again["text"], &again["warnings"], &again["stability"]]
         );
     }
 }

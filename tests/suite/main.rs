@@ -34,4 +34,5 @@ mod sweep;
 mod tangents;
 mod threads;
 mod turned;
+mod warnings;
 mod words;

@@ -130,7 +130,7 @@ steps = 10
 "#),
     );
     assert_eq!(simulation.end("load"), 1.0);
-    assert!(simulation.counters.events.is_empty());
+    assert!(simulation.counters.findings.events.is_empty());
 }
 
 /// Beams that joints chain at one point: each hangs on the one that it names.

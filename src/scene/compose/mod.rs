@@ -284,7 +284,7 @@ fn needs_mass(deck: &Deck) -> bool {
     let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
     let expected = deck.expects.iter().any(|expect| match &expect.body {
         deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
-        deck::ExpectBody::Fails(_) => false,
+        deck::ExpectBody::Fails(_) | deck::ExpectBody::Warns(_) | deck::ExpectBody::Quiet => false,
     });
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
     dynamic || written || expected || watched
