@@ -3,7 +3,7 @@
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
 use super::{Status, Verdict, json, load, on_threads, report, say, signals, threads_of};
-use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
+use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Row, RowCounter, Rows,
     remove_fields, remove_if_there,
@@ -165,7 +165,7 @@ impl Observer for Watcher<'_> {
         Ok(())
     }
 
-    fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.modes.push_loads(stage, loads);
         Ok(())

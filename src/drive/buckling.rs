@@ -5,9 +5,9 @@
 //! the load found, and looked at again from there, until it is reached.
 
 use super::direction::Direction;
-use super::failure::{Failure, Moment};
+use super::failure::Failure;
 use super::levels::{NO_MOTION, distance};
-use super::run::{Run, Workshop};
+use super::run::{CriticalKind, CriticalLoad, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
@@ -28,11 +28,21 @@ const NEAR: f64 = 1e-4;
 const SEEN: f64 = 1e-3;
 /// A state that has moved so many times further than the tangent said has come down on another branch.
 const LEAP: f64 = 8.0;
+/// States on both sides of a critical load that are further apart than this do not lie on one path.
+const APART: f64 = 1e-3;
 /// States of one load that lie nearer together than this are one.
 const SAME: f64 = 1e-5;
 /// A step along the path moves nothing further than this, in lengths of the scene and radians: a longer one may come down on
 /// another branch.
 const STRIDE: f64 = 0.5;
+/// A step whose corrections grow may come down on another branch, too.
+const LARGEST_CONTRACTION: f64 = 1.0;
+/// Where the tangent is extrapolated, so much of the way to where it would be singular lies between two looks,
+const STRIDE_AHEAD: f64 = 0.15;
+/// so near is the last one,
+const NEAREST_EXTRAPOLATION: f64 = 5e-3;
+/// and there are so many.
+const MOST_EXTRAPOLATIONS: usize = 48;
 /// The path is not followed in steps smaller than this part of the way.
 const SMALLEST_PART: f64 = 1e-4;
 /// Imaginary part up to which a critical load counts as real, relative; double ones come apart a little.
@@ -52,13 +62,14 @@ impl Run<'_> {
         self.change_charts(None);
         self.open_account(workshop)?;
         self.warn_out_of_balance(workshop);
-        let mut loads = self.critical_loads(workshop, modes)?;
+        let loads = self.critical_loads(workshop, modes)?;
         if loads.is_empty() {
             return Err(Failure::Deck("no load of this scene takes stiffness away: nothing can buckle (under following loads it may flutter: \
                  see a modal stage)".into()));
         }
         let start = self.state.clone();
         let mut passed = [0, 0];
+        let mut found = Vec::new();
         for number in 0..loads.len() {
             let back = loads[number] < load;
             // Of the loads on this side of the present one it is number `before`.
@@ -67,13 +78,19 @@ impl Run<'_> {
             // The look from the start is as much work as a search.
             let count = loads.len() as f64;
             let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-            loads[number] = self.follow(workshop, loads[number], before, &done)?;
+            let mut critical = self.follow(workshop, loads[number], before, &done)?;
             self.state.copy_from(&start);
             self.good.copy_from(&start);
+            if critical.kind == CriticalKind::Estimate {
+                critical.load = self.extrapolate(workshop, loads[number], before)?.unwrap_or(critical.load);
+                self.state.copy_from(&start);
+                self.good.copy_from(&start);
+            }
+            found.push(critical);
         }
-        loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
+        found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.count_steps();
-        self.observer.buckling(self.stage + 1, &loads)
+        self.observer.buckling(self.stage + 1, &found)
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the
@@ -85,17 +102,18 @@ impl Run<'_> {
         estimate: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<f64, Failure> {
+    ) -> Result<CriticalLoad, Failure> {
         let way = (estimate - self.state.load).signum();
         let none = self.negative_pivots(workshop);
         let mut search =
-            Search { here: self.state.clone(), beyond: None, estimate, stretch: 1.0, way, seen: estimate, ended: None };
+            Search { here: self.state.clone(), beyond: None, behind: None, estimate, stretch: 1.0, way, seen: estimate, ended: None };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
-                if search.is_a_limit(found) {
+                let is_apart = |behind: &State| distance(&self.model, &search.here, behind) > APART;
+                if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.state.copy_from(&search.here);
                     self.judge_mesh()?;
-                    return Ok(found);
+                    return Ok(CriticalLoad { load: found, kind: search.kind() });
                 }
                 break;
             }
@@ -118,6 +136,7 @@ impl Run<'_> {
             };
             if passed > before {
                 search.beyond = Some(target);
+                search.behind = Some(self.state.clone());
                 search.ended = None;
                 search.stretch = 1.0;
             } else {
@@ -128,8 +147,43 @@ impl Run<'_> {
                 );
             }
         }
-        self.warn_of_estimate(search.estimate, search.here.load, search.ended);
-        Ok(search.estimate)
+        self.warn_of_estimate(search.here.load, search.ended);
+        Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+    }
+
+    /// A structure that an imperfection lets turn aside has no critical point. From smaller loads its tangent looks like that of the perfect one:
+    /// there the load at which it seems to be singular does not move, until the imperfection is felt. That load, of the critical
+    /// load with `before` others below it; `None` where nothing is seen.
+    fn extrapolate(&mut self, workshop: &mut Workshop, first: f64, before: usize) -> Result<Option<f64>, Failure> {
+        let way = (first - self.state.load).signum();
+        let (mut seen, mut steadiest): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+        for _ in 0..MOST_EXTRAPOLATIONS {
+            let load = self.state.load;
+            let ahead = self.critical_loads(workshop, before + 4)?;
+            let Some(critical) = ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before) else {
+                break;
+            };
+            if let Some((from, last)) = seen {
+                let drift = ((critical - last) / (load - from)).abs();
+                if steadiest.is_none_or(|(least, _)| drift < least) {
+                    steadiest = Some((drift, 0.5 * (critical + last)));
+                }
+            } else {
+                steadiest = Some((f64::INFINITY, critical));
+            }
+            seen = Some((load, critical));
+            if (critical - load).abs() < NEAREST_EXTRAPOLATION * critical.abs() {
+                break;
+            }
+            let none = self.negative_pivots(workshop);
+            self.good.copy_from(&self.state);
+            if self.continue_path(workshop, load + STRIDE_AHEAD * (critical - load)) != Walked::There
+                || self.negative_pivots(workshop) != none
+            {
+                break;
+            }
+        }
+        Ok(steadiest.map(|(_, critical)| critical))
     }
 
     /// Whether the state is on another branch than one before it: it has moved much further than the path goes there, or does not
@@ -160,7 +214,7 @@ impl Run<'_> {
         mut critical: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<f64, Failure> {
+    ) -> Result<CriticalLoad, Failure> {
         let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
             self.observer.progress(self.moment(), self.static_progress(done(0.0)))?;
@@ -171,7 +225,7 @@ impl Run<'_> {
             let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
             critical = next;
             if (critical - from).abs() <= NEAR * critical.abs() {
-                return Ok(critical);
+                return Ok(CriticalLoad { load: critical, kind: CriticalKind::Branch });
             }
             let target = critical - 0.5 * NEAR * (critical - self.state.load).signum() * critical.abs();
             walked = self.continue_path(workshop, target);
@@ -179,17 +233,22 @@ impl Run<'_> {
                 break;
             }
         }
-        self.warn_of_estimate(critical, self.state.load, Some(walked));
-        Ok(critical)
+        self.warn_of_estimate(self.state.load, Some(walked));
+        Ok(CriticalLoad { load: critical, kind: CriticalKind::Estimate })
     }
 
-    fn warn_of_estimate(&mut self, critical: f64, from: f64, ended: Option<Walked>) {
+    fn warn_of_estimate(&mut self, from: f64, ended: Option<Walked>) {
         let coarse = ended == Some(Walked::TooCoarse);
-        let why = if coarse { ", since the mesh does not tell the shape there: use more `elements`" } else { "" };
+        let why = if coarse {
+            "since the mesh does not tell the shape there: use more `elements`"
+        } else {
+            "as where an imperfection makes the structure turn aside without a critical point"
+        };
         let message = format!(
-            "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it{why}"
+            "a buckling load is an estimate, extrapolated from smaller loads: the path was followed to load factor {from} and no critical \
+             point was closed in, {why}"
         );
-        self.warn_at(WarningKind::BucklingEstimate, Moment { load: from, ..self.moment() }, message);
+        self.warn(WarningKind::BucklingEstimate, message);
     }
 
     /// Of the tangent at the present state, where it is symmetric.
@@ -233,6 +292,9 @@ impl Run<'_> {
     /// One step along the path: how far it moved, where it came down near by.
     fn step_along(&mut self, workshop: &mut Workshop, load: f64) -> Option<f64> {
         self.attempt(workshop, load).ok()?;
+        if workshop.newton.contraction > LARGEST_CONTRACTION && !self.is_linear() {
+            return None;
+        }
         let moved = distance(&self.model, &self.good, &self.state);
         (self.is_linear() || moved <= STRIDE).then_some(moved)
     }
@@ -289,6 +351,8 @@ impl Run<'_> {
 struct Search {
     here: State,
     beyond: Option<f64>,
+    /// The state at the load that lies beyond, where load control comes to it
+    behind: Option<State>,
     /// What it looks like from here
     estimate: f64,
     /// How much farther than the estimate the next look goes: it may fall short again and again
@@ -320,6 +384,11 @@ impl Search {
         closed.then_some(if between { self.estimate } else { 0.5 * (from + beyond) })
     }
 
+    /// What lies at the critical load: behind a limit load control finds nothing near by.
+    fn kind(&self) -> CriticalKind {
+        if self.ended.is_some() { CriticalKind::Limit } else { CriticalKind::Branch }
+    }
+
     /// The part of the search that lies behind: digits that both points around the load share.
     fn come(&self) -> f64 {
         let beyond = self.beyond.filter(|&beyond| beyond != 0.0);
@@ -330,6 +399,7 @@ impl Search {
     /// The path by load control ends before this load.
     fn end_at(&mut self, load: f64, walked: Walked) {
         self.beyond = Some(load);
+        self.behind = None;
         self.ended = Some(walked);
         self.stretch = 1.0;
         self.estimate = 0.5 * (self.here.load + load);

@@ -25,5 +25,6 @@ pub use findings::{Findings, StabilityVerdict, StageStability, Warning};
 pub use ledger::Ledger;
 pub use levels::Approach;
 pub use run::{
-    Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until,
+    Counters, CriticalKind, CriticalLoad, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage,
+    StageWork, Until,
 };

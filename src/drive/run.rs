@@ -91,6 +91,37 @@ impl Mode {
     }
 }
 
+/// A load factor at which the tangent loses its stiffness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CriticalLoad {
+    /// The load factor
+    pub load: f64,
+    /// What lies there
+    pub kind: CriticalKind,
+}
+
+/// Kinds of critical loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CriticalKind {
+    /// Another branch begins; the path goes on.
+    Branch,
+    /// The load is stationary.
+    Limit,
+    /// The path has no critical point that was reached: the load at which the tangent, extrapolated from smaller loads, would be singular
+    Estimate,
+}
+
+impl CriticalKind {
+    /// Its name in buckling.csv
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Branch => "branch",
+            Self::Limit => "limit",
+            Self::Estimate => "estimate",
+        }
+    }
+}
+
 /// What a stage does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StageWork {
@@ -190,7 +221,7 @@ pub trait Observer {
     }
 
     /// The critical loads of a stage (from 1).
-    fn buckling(&mut self, _stage: usize, _loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, _stage: usize, _loads: &[CriticalLoad]) -> Result<(), Failure> {
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! A run of a scene: all its outputs, and what they took.
 
 use crate::deck::{Diagnostic, Spanned, is_named, nearest};
-use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
+use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
 use crate::model::StageKind;
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
@@ -234,10 +234,10 @@ impl Observer for Columns<'_> {
         Ok(())
     }
 
-    fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.found.push_loads(stage, loads);
-        self.take_modes(stage, loads.to_vec());
+        self.take_modes(stage, loads.iter().map(|critical| critical.load).collect());
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Expectations held against a run.
 
 use crate::deck::{Instant, Reduce};
-use crate::drive::{Counters, Failure, Mode, Snapshot, Warning};
+use crate::drive::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
 use crate::probe::Probe;
 use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
 
@@ -71,8 +71,8 @@ impl Recorder {
     }
 
     /// Takes the critical loads of a stage.
-    pub fn buckling(&mut self, loads: &[f64]) {
-        self.critical = loads.to_vec();
+    pub fn buckling(&mut self, loads: &[CriticalLoad]) {
+        self.critical = loads.iter().map(|critical| critical.load).collect();
     }
 
     fn mode(&self, quantity: ModeQuantity, number: usize) -> Option<f64> {
