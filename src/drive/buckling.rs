@@ -28,6 +28,8 @@ const NEAR: f64 = 1e-4;
 const SEEN: f64 = 1e-3;
 /// A state that has moved so many times further than the tangent said has come down on another branch.
 const LEAP: f64 = 8.0;
+/// Just before a limit point a unit of load moves the scene so many times further than at the start: by the root of one over [`CLOSED`].
+const RUNS_AWAY: f64 = 50.0;
 /// States on both sides of a critical load that are further apart than this do not lie on one path.
 const APART: f64 = 1e-3;
 /// States of one load that lie nearer together than this are one.
@@ -68,6 +70,8 @@ impl Run<'_> {
                  see a modal stage)".into()));
         }
         let start = self.state.clone();
+        // Next to a critical load round-off moves the scene along; the load itself is closed in by pivots.
+        let uncertainty = self.counters.work.uncertainty;
         let mut passed = [0, 0];
         let mut found = Vec::new();
         for number in 0..loads.len() {
@@ -88,6 +92,7 @@ impl Run<'_> {
             }
             found.push(critical);
         }
+        self.counters.work.uncertainty = uncertainty;
         found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.count_steps();
         self.observer.buckling(self.stage + 1, &found)
@@ -104,16 +109,26 @@ impl Run<'_> {
         done: &dyn Fn(f64) -> f64,
     ) -> Result<CriticalLoad, Failure> {
         let way = (estimate - self.state.load).signum();
+        let start_rate = self.size_of_rate(workshop)?;
         let none = self.negative_pivots(workshop);
-        let mut search =
-            Search { here: self.state.clone(), beyond: None, behind: None, estimate, stretch: 1.0, way, seen: estimate, ended: None };
+        let mut search = Search {
+            here: self.state.clone(),
+            beyond: None,
+            behind: None,
+            estimate,
+            stretch: 1.0,
+            way,
+            seen: estimate,
+            ended: None,
+        };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
                 let is_apart = |behind: &State| distance(&self.model, &search.here, behind) > APART;
                 if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.state.copy_from(&search.here);
                     self.judge_mesh()?;
-                    return Ok(CriticalLoad { load: found, kind: search.kind() });
+                    let kind = self.kind_of_critical(workshop, start_rate)?;
+                    return Ok(CriticalLoad { load: found, kind });
                 }
                 break;
             }
@@ -149,6 +164,19 @@ impl Run<'_> {
         }
         self.warn_of_estimate(search.here.load, search.ended);
         Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+    }
+
+    /// What lies just ahead of the present state: towards a limit point the path moves without bounds.
+    fn kind_of_critical(&mut self, workshop: &mut Workshop, start_rate: f64) -> Result<CriticalKind, Failure> {
+        let runs_away = self.size_of_rate(workshop)? > RUNS_AWAY * start_rate;
+        Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
+    }
+
+    /// How far a unit of load moves the scene at the present state, in lengths of it and radians.
+    fn size_of_rate(&mut self, workshop: &mut Workshop) -> Result<f64, Failure> {
+        let Some(Direction { rate, .. }) = self.path_direction(workshop)? else { return Ok(0.0) };
+        let sizes = rate.iter().zip(self.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+        Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.model.length)).fold(0.0, f64::max))
     }
 
     /// A structure that an imperfection lets turn aside has no critical point. From smaller loads its tangent looks like that of the perfect one:
@@ -382,11 +410,6 @@ impl Search {
         let between = (self.estimate - from) * self.way > 0.0 && (beyond - self.estimate) * self.way > 0.0;
         let closed = (beyond - from).abs() <= CLOSED * beyond.abs();
         closed.then_some(if between { self.estimate } else { 0.5 * (from + beyond) })
-    }
-
-    /// What lies at the critical load: behind a limit load control finds nothing near by.
-    fn kind(&self) -> CriticalKind {
-        if self.ended.is_some() { CriticalKind::Limit } else { CriticalKind::Branch }
     }
 
     /// The part of the search that lies behind: digits that both points around the load share.

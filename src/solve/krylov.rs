@@ -4,9 +4,9 @@
 //! inner product x . W y that makes the operator symmetric where there is one.
 
 use crate::real::{LANES, Lanes};
-use faer::Mat;
-use faer::linalg::solvers::Eigen;
-use nalgebra::{Complex, DMatrix, SymmetricEigen};
+use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
+use faer::{Mat, Side};
+use nalgebra::Complex;
 
 /// A linear operator on vectors.
 pub trait Operator {
@@ -197,9 +197,9 @@ impl Space {
         }
     }
 
-    fn symmetric_part(&self) -> DMatrix<f64> {
+    fn symmetric_part(&self) -> Mat<f64> {
         let n = self.projected.len();
-        DMatrix::from_fn(n, n, |i, j| 0.5 * (self.projected[i][j] + self.projected[j][i]))
+        Mat::from_fn(n, n, |i, j| 0.5 * (self.projected[i][j] + self.projected[j][i]))
     }
 
     fn matrix(&self) -> Mat<f64> {
@@ -209,7 +209,8 @@ impl Space {
 
     fn eigenvalues(&self, is_symmetric: bool, wanted: usize) -> Vec<Complex<f64>> {
         let mut values: Vec<Complex<f64>> = if is_symmetric {
-            self.symmetric_part().symmetric_eigenvalues().iter().map(|&v| Complex::new(v, 0.0)).collect()
+            let values = self.symmetric_part().self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
+            values.into_iter().map(|value| Complex::new(value, 0.0)).collect()
         } else {
             self.matrix().eigenvalues().unwrap_or_default()
         };
@@ -221,9 +222,13 @@ impl Space {
     fn into_spectrum(self, is_symmetric: bool, wanted: usize) -> Spectrum {
         let n = self.projected.len();
         let mut pairs: Vec<(Complex<f64>, Vec<Complex<f64>>)> = if is_symmetric {
-            let SymmetricEigen { eigenvalues, eigenvectors } = self.symmetric_part().symmetric_eigen();
-            let vector = |k: usize| eigenvectors.column(k).iter().map(|&v| Complex::new(v, 0.0)).collect();
-            (0..n).map(|k| (Complex::new(eigenvalues[k], 0.0), vector(k))).collect()
+            match SelfAdjointEigen::new(self.symmetric_part().as_ref(), Side::Lower) {
+                Ok(eigen) => {
+                    let vector = |k: usize| eigen.U().col(k).iter().map(|&v| Complex::new(v, 0.0)).collect();
+                    (0..n).map(|k| (Complex::new(eigen.S()[k], 0.0), vector(k))).collect()
+                }
+                Err(_) => Vec::new(),
+            }
         } else {
             match Eigen::new_from_real(self.matrix().as_ref()) {
                 Ok(eigen) => (0..n).map(|k| (eigen.S()[k], eigen.U().col(k).iter().copied().collect())).collect(),
