@@ -8,19 +8,22 @@ mod failure;
 mod grid;
 mod guard;
 mod handover;
+mod hint;
 mod ledger;
 mod levels;
 mod modal;
 mod path;
+mod rehearsal;
 mod run;
 mod space;
 mod start;
 mod statics;
 mod warnings;
 
-pub use failure::{Failure, Moment, Place};
+pub use failure::{Failure, Moment, Place, refusal, refusal_help};
 pub use ledger::Ledger;
 pub use levels::Approach;
+pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use run::{
     Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until,
 };

@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
-use crate::model::Model;
+use crate::model::{Model, StageError};
 use crate::solve::{
     Convergence, LinearSolver, Operator, Tangent, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed,
 };
@@ -75,7 +75,7 @@ impl Run<'_> {
         let [stiffest, heaviest, dampest] =
             [&matrices.stiffness, &matrices.mass, &matrices.damping].map(|v| largest(v));
         if heaviest == 0.0 {
-            return Err(Failure::Deck("a modal stage needs mass: nothing that is free to move has any".into()));
+            return Err(self.describe(StageError::NoMass));
         }
         let mut shift = FIRST_SHIFT * softest_ratio(&assembly.system, matrices).unwrap_or(stiffest / heaviest).sqrt();
         if shift == 0.0 {

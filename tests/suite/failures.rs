@@ -104,9 +104,9 @@ fn a_snap_under_a_history_is_told_what_to_try() {
          [[support]]\nat = \"right\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"rz\"]\n\
          [[load]]\nat = \"crown\"\nforce = [0, 0, -20]\nhistory = \"h\"\n[history.h]\ntimes = [0, 0.5, 1]\nvalues = [0, 1, 0]\n\
          [[stage]]\nkind = \"static\"\nsteps = 20\n";
-    let failure = attempt(text).result.expect_err("it snaps");
-    assert_eq!(failure.name(), "not_converged");
-    assert!(failure.hint().is_some_and(|hint| hint.contains("`history`")), "{failure}");
+    let simulation = attempt(text);
+    assert_eq!(simulation.result.expect_err("it snaps").name(), "not_converged");
+    assert!(simulation.hint.is_some_and(|hint| hint.contains("`history`")));
 }
 
 #[test]
