@@ -17,10 +17,12 @@ pub fn tell(deck: &Deck, plan: &Plan, tables: &[DrivenTable], diagnostics: &mut 
         diagnostics.push(if span == stage { diagnostic } else { diagnostic.context(stage.clone(), "this stage") });
     }
     let teller = Teller { deck, plan, tables };
+    // Whose place is wrong has no velocity to speak of.
+    let refused: Vec<&Span> = rehearsal.refusals.iter().filter_map(|(_, error)| place(error, tables)).collect();
     let mut told: Vec<Warned> = Vec::new();
     for jump in &rehearsal.jumps {
         let own = tables.iter().filter(|table| table.drives == jump.what && teller.concerns(jump, table));
-        for table in own {
+        for table in own.filter(|table| !refused.contains(&&table.span)) {
             let history = table.history.as_ref().map(|history| history.name.value.as_str());
             let same = |told: &&mut Warned| {
                 let kinds = std::mem::discriminant(&told.jump.how) == std::mem::discriminant(&jump.how);

@@ -171,6 +171,14 @@ impl Observer for Frequencies {
     }
 }
 
+/// Those of all modal stages of a deck, which must finish.
+pub fn frequencies(text: &str) -> Vec<f64> {
+    let mut found = Frequencies::default();
+    let plan = scene::from_text(text).unwrap_or_else(|error| panic!("{error:?}")).0.plan;
+    assert_eq!(Run::new(plan, &mut found).finish().0, Ok(()));
+    found.0
+}
+
 /// Where few modes are asked for, they are all rigid: a second look about a part of the lowest elastic one has none to go by.
 #[test]
 fn rigid_motions_alone_are_modes() {
@@ -180,11 +188,9 @@ fn rigid_motions_alone_are_modes() {
              rhoJ = [3e-3, 1e-3, 2e-3]\n[[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 1\n\
              [[stage]]\nkind = \"modal\"\nmodes = {modes}\n"
         );
-        let mut found = Frequencies::default();
-        let plan = scene::from_text(&text).unwrap_or_else(|error| panic!("{error:?}")).0.plan;
-        assert_eq!(Run::new(plan, &mut found).finish().0, Ok(()));
-        assert_eq!(found.0.len(), modes);
-        assert!(found.0.iter().take(6).all(|omega| *omega < 1e-3), "{:?}", found.0);
-        assert_eq!(found.0.iter().any(|omega| *omega > 1.0), stiff, "{:?}", found.0);
+        let found = frequencies(&text);
+        assert_eq!(found.len(), modes);
+        assert!(found.iter().take(6).all(|omega| *omega < 1e-3), "{found:?}");
+        assert_eq!(found.iter().any(|omega| *omega > 1.0), stiff, "{found:?}");
     }
 }

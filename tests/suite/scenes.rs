@@ -42,6 +42,22 @@ pub fn attempt(text: &str) -> Simulation {
     Simulation { names, rows: collector.rows, result, counters, hint }
 }
 
+/// What is said of a deck that is refused.
+pub fn refusal(text: &str) -> String {
+    match scene::from_text(text) {
+        Ok(_) => panic!("the deck is accepted:\n{text}"),
+        Err(found) => found.iter().map(|d| d.render("deck", text, false)).collect::<Vec<_>>().join("\n"),
+    }
+}
+
+/// What a deck that is accepted is warned of.
+pub fn warnings(text: &str) -> Vec<String> {
+    match scene::from_text(text) {
+        Ok((_, found)) => found.into_iter().map(|d| d.message).collect(),
+        Err(_) => panic!("{}", refusal(text)),
+    }
+}
+
 /// Runs a deck that must finish.
 pub fn simulate(text: &str) -> Simulation {
     let simulation = attempt(text);
