@@ -106,13 +106,18 @@ fn duration(seconds: f64) -> String {
     }
 }
 
+/// A number, with a power of ten where it is very large or very small.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e16).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
 fn tell_beams(mesh: &Mesh) {
     for beam in &mesh.beams {
         let count = beam.elements.len();
         say::line(&format!(
             "beam {}: length {}, {count} elements of order {}, {} nodes",
             beam.name,
-            beam.line.length,
+            number(beam.line.length),
             beam.order,
             beam.nodes.len()
         ));
@@ -128,7 +133,12 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
     let k = section.stiffness;
     say::line(&format!(
         "  section{place}: EA {} GA [{}, {}] GJ {} EI [{}, {}]",
-        k[0][0], k[1][1], k[2][2], k[3][3], k[4][4], k[5][5]
+        number(k[0][0]),
+        number(k[1][1]),
+        number(k[2][2]),
+        number(k[3][3]),
+        number(k[4][4]),
+        number(k[5][5])
     ));
     let coupled = (0..6).any(|i| (0..i).any(|j| k[i][j] != 0.0));
     if coupled {
@@ -138,7 +148,11 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
         let j = mass.about_line.0;
         say::line(&format!(
             "  rhoA {} rhoJ [{}, {}, {}] mass centre {:?}",
-            mass.mass, j[0][0], j[1][1], j[2][2], mass.offset.0
+            number(mass.mass),
+            number(j[0][0]),
+            number(j[1][1]),
+            number(j[2][2]),
+            mass.offset.0
         ));
     }
 }
@@ -179,7 +193,7 @@ fn tell_mass(scene: &Scene) {
     if !(mass.is_finite() && arm.is_finite() && inertia.max_abs().is_finite()) {
         return say::line("mass: its sums are beyond the range of floating-point numbers");
     }
-    say::line(&format!("mass {mass}, centre {:?}", (about + arm).0));
+    say::line(&format!("mass {}, centre {:?}", number(mass), (about + arm).0));
     say::line(&format!("inertia about the centre {:?}", inertia.0));
 }
 

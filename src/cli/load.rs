@@ -161,7 +161,7 @@ pub fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
 /// A message without names and numbers.
 fn bare(message: &str) -> String {
     let words = message.split('`').step_by(2).collect::<String>();
-    words.chars().filter(|c| !c.is_ascii_digit() && *c != '.').collect()
+    words.chars().filter(|c| !c.is_ascii_digit() && !['.', '-'].contains(c)).collect()
 }
 
 /// The name of a deck: its file without the extension.

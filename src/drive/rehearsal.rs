@@ -4,7 +4,7 @@
 
 use super::run::{InitialMotion, Plan, Stage, StageWork};
 use super::start::set_in_motion;
-use crate::model::{Model, Motion, MotionKind, StageError, StageKind};
+use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
 use crate::system::{Equations, Slot, State};
 use crate::tensor::Vec3;
 use std::collections::HashMap;
@@ -245,7 +245,9 @@ impl<'p> Rehearser<'p> {
             let how = if ![value, rate, rate2].iter().all(|value| value.is_finite()) {
                 Some(JumpKind::NotFinite)
             } else {
-                from.and_then(|from| velocity_jump(from, rate, given.is_some()))
+                let fastest =
+                    motion.history.as_ref().and_then(Reading::fastest).map(|rate| (rate * motion.value).abs());
+                from.and_then(|from| velocity_jump(from, rate, fastest, given.is_some()))
             };
             self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motion(k), how }));
         }
@@ -258,13 +260,15 @@ impl<'p> Rehearser<'p> {
             return;
         }
         let (state, before, jumps) = (&self.state, &self.before, &mut self.found.jumps);
+        let amplitudes = &self.model.amplitudes;
         self.model.each_motor(state, &mut |motor| {
             let to = motor.value * state.amplitude_rates[motor.amplitude][0];
             let from = match before {
                 Some(before) if !begins => motor.value * before.rates[motor.amplitude],
                 _ => motor.speed,
             };
-            let how = velocity_jump(from, to, begins);
+            let fastest = amplitudes[motor.amplitude].fastest().map(|rate| (rate * motor.value).abs());
+            let how = velocity_jump(from, to, fastest, begins);
             jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motor(motor.slot), how }));
         });
     }
@@ -341,8 +345,9 @@ fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
 }
 
 /// What initial motions give a motion that begins at rest is none of its business: the scene begins with the velocity of the motion.
-fn velocity_jump(from: f64, to: f64, begins: bool) -> Option<JumpKind> {
-    let jumps = differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);
+fn velocity_jump(from: f64, to: f64, fastest: Option<f64>, begins: bool) -> Option<JumpKind> {
+    let noticed = fastest.is_none_or(|fastest| (to - from).abs() > NOTICED * fastest);
+    let jumps = noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);
     jumps.then_some(JumpKind::Velocity { from, to })
 }
 

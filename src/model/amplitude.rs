@@ -127,6 +127,11 @@ impl Amplitude {
         self.stages.contains(stage)
     }
 
+    /// The largest rate of its history, if it is known.
+    pub fn fastest(&self) -> Option<f64> {
+        self.history.as_ref()?.fastest()
+    }
+
     /// Where the last stage has left it.
     pub fn reached(&self) -> f64 {
         self.reached

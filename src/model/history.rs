@@ -18,8 +18,13 @@ pub trait History: Send + Sync {
         None
     }
 
-    /// The first place behind `x` where its first derivative jumps, if it knows of one.
+    /// The first place behind `x` where its first derivative jumps noticeably, if it knows of one.
     fn next_kink(&self, _x: f64) -> Option<f64> {
+        None
+    }
+
+    /// The largest first derivative, if it is known.
+    fn fastest(&self) -> Option<f64> {
         None
     }
 }
@@ -111,6 +116,11 @@ impl Reading {
         self.next(time, |x| self.function.next_kink(x))
     }
 
+    /// The largest first derivative, if it is known.
+    pub fn fastest(&self) -> Option<f64> {
+        self.function.fastest()
+    }
+
     fn own_time(&self, time: f64) -> f64 {
         time - self.origin.unwrap_or(0.0)
     }
@@ -176,17 +186,22 @@ impl History for Table {
             return None;
         }
         let next = self.times.partition_point(|&t| t <= x);
+        let noticed = NOTICED * self.fastest()?;
         let is_kink = |&k: &usize| {
             let before = if k == 0 { 0.0 } else { self.slope(k - 1) };
             let behind = if k + 1 == self.times.len() { 0.0 } else { self.slope(k) };
-            (behind - before).abs() > SAME_SLOPE * before.abs().max(behind.abs())
+            (behind - before).abs() > noticed
         };
         (next..self.times.len()).find(is_kink).map(|k| self.times[k])
     }
+
+    fn fastest(&self) -> Option<f64> {
+        (0..self.times.len() - 1).map(|k| self.slope(k).abs()).reduce(f64::max)
+    }
 }
 
-/// Slopes that agree to this part of the larger one are the same.
-const SAME_SLOPE: f64 = 1e-9;
+/// A velocity that jumps by less than this part of the largest one is that of a smooth motion as a table samples it.
+pub const NOTICED: f64 = 0.05;
 
 impl Table {
     /// The slope of an interval of a table that is not smooth.
@@ -232,6 +247,10 @@ mod tests {
         };
         assert_eq!(kinks(&table(false)), [0.0, 2.0]);
         assert!(kinks(&table(true)).is_empty());
+        // A sampled curve has none that anybody would notice.
+        let times: Vec<f64> = (0..=200).map(|k| f64::from(k) / 200.0).collect();
+        let values = times.iter().map(|t| t * t * t * (10.0 - t * (15.0 - 6.0 * t))).collect();
+        assert!(kinks(&Table { times, values, smooth: false }).is_empty());
         let slopes = [0.0, 0.5, 2.0, 2.5, 3.0, 4.0].map(|x| table(false).slope_before(x));
         assert_eq!(slopes, [2.0, 2.0, 2.0, 0.0, 0.0, 0.0]);
     }

@@ -13,7 +13,7 @@ pub use crate::system::{StageContext, StageKind, StageSet};
 pub use amplitude::Amplitude;
 pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
-pub use history::{History, Reading, Table};
+pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
 pub use share::Share;
 

@@ -1,7 +1,7 @@
 //! What can be told of a deck's stages before anything is computed, with the places in its text.
 
 use super::compose::DrivenTable;
-use crate::deck::{Deck, Diagnostic, Span};
+use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
 use crate::drive::{Driven, HistoryJump, JumpKind, Plan, refusal, refusal_help, rehearse};
 use crate::model::{StageError, StageKind};
 
@@ -55,6 +55,10 @@ struct Warned<'a> {
     history: Option<&'a str>,
     others: usize,
 }
+
+const SMOOTH: &str = "`smooth = true` makes velocity and acceleration continuous";
+/// A smooth table stands still at each of its times.
+const SAMPLED: &str = "an `expr`, or a table of more points, has none (`smooth = true` has none either, but stands still at each of its times)";
 
 struct Teller<'a> {
     deck: &'a Deck,
@@ -117,9 +121,20 @@ impl Teller<'_> {
                     "the history{name} of this {what} has kinks: velocities jump there, first at time {time}{more}"
                 );
                 let diagnostic = Diagnostic::warning(message, table.span.clone());
-                diagnostic.help("`smooth = true` makes velocity and acceleration continuous")
+                diagnostic.help(self.help_of_kinks(*history))
             }
         }
+    }
+
+    /// What takes the kinks out of a history.
+    fn help_of_kinks(&self, history: Option<&str>) -> &'static str {
+        let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
+        let Some(HistoryBody::Table { values, .. }) = self.deck.histories.iter().find(named).map(|table| &table.body)
+        else {
+            return SMOOTH;
+        };
+        let goes_on = |w: &[f64]| (w[1] - w[0]) * (w[2] - w[1]) > 0.0;
+        if values.windows(3).any(goes_on) { SAMPLED } else { SMOOTH }
     }
 
     /// What makes a history go on where the stage before has left it.
