@@ -93,6 +93,8 @@ warning_kinds! {
     NoStartAccelerations: "no_start_accelerations", Time;
     /// A motion begins with a velocity.
     VelocityJump: "velocity_jump", Time;
+    /// A history jumps from one stage to the next.
+    HistoryJump: "history_jump", Time;
     /// The history of a motion has kinks, at which velocities jump.
     HistoryKinks: "history_kinks", Time;
     /// An element turns far from node to node.
@@ -111,6 +113,8 @@ warning_kinds! {
     UndampedMultipliers: "undamped_multipliers", Deck;
     /// Two points at one place are not joined.
     EqualPlaces: "equal_places", Deck;
+    /// Beams of a section have no mass where only bodies have.
+    MasslessSection: "massless_section", Deck;
     /// `step_tolerance` stands in a stage of fixed steps.
     IdleStepTolerance: "idle_step_tolerance", Deck;
     /// A key of `[cost]` varies what the deck has nothing of.

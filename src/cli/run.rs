@@ -314,7 +314,7 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
             if !matches!(failure, Failure::Io(_)) {
                 say::line(&format!("  what was reached: {}", folder.join("history.partial.csv").display()));
             }
-            if let Some(hint) = failure.hint() {
+            if let Some(hint) = failure.hint(&scene.plan) {
                 say::note(&format!("hint: {hint}"));
             }
         }

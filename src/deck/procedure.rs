@@ -362,7 +362,7 @@ fn read_dynamic(table: &Table) -> Option<StageBody> {
 }
 
 /// The coefficients that each scheme has.
-const COEFFICIENTS: [(&str, &[&str]); 4] = [
+pub(super) const COEFFICIENTS: [(&str, &[&str]); 4] = [
     ("beta", &["newmark"]),
     ("gamma", &["newmark"]),
     ("alpha", &["hht"]),

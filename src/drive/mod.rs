@@ -9,10 +9,12 @@ mod findings;
 mod grid;
 mod guard;
 mod handover;
+mod hint;
 mod ledger;
 mod levels;
 mod modal;
 mod path;
+mod rehearsal;
 mod rigid;
 mod run;
 mod space;
@@ -20,10 +22,11 @@ mod start;
 mod statics;
 mod warnings;
 
-pub use failure::{Failure, Moment, Place};
+pub use failure::{Failure, Moment, Place, refusal, refusal_help};
 pub use findings::{Findings, StabilityVerdict, StageStability, Warning};
 pub use ledger::Ledger;
 pub use levels::Approach;
+pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use run::{
     Counters, CriticalKind, CriticalLoad, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage,
     StageWork, Until,

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::rigid::rigid_motions;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
-use crate::model::Model;
+use crate::model::{Model, StageError};
 use crate::solve::{Convergence, Matrices, ModeSearch, SmallMotion, Tangent, Verdict, mechanism, timed};
 use crate::system::System;
 use crate::tensor::Vec3;
@@ -106,7 +106,7 @@ impl Run<'_> {
         modes: usize,
     ) -> Result<Found, Failure> {
         if matrices.mass.iter().all(|&m| m == 0.0) {
-            return Err(Failure::Deck("a modal stage needs mass: nothing that is free to move has any".into()));
+            return Err(self.describe(StageError::NoMass));
         }
         let mut shift = FIRST_SHIFT * matrices.softest_frequency(&workshop.assembly.system);
         if shift == 0.0 || !shift.is_finite() {

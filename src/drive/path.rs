@@ -14,7 +14,7 @@ use super::direction::Direction;
 use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
-use crate::model::{SlotKind, charts};
+use crate::model::{SlotKind, StageError, StageKind, charts};
 use crate::solve::{self, NewtonFailure, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
@@ -109,8 +109,7 @@ impl Run<'_> {
     pub(super) fn run_path(&mut self, workshop: &mut Workshop, steps: usize, max_steps: usize) -> Result<(), Failure> {
         self.start_static(workshop)?;
         let Some(mut path) = Path::new(self, workshop, steps)? else {
-            let message = "control = \"arc_length\" needs a load or a motion that grows with the load factor";
-            return Err(Failure::Deck(message.into()));
+            return Err(self.describe(StageError::NothingGrows(StageKind::Static)));
         };
         let bounds = Bounds { increments: max_steps, patience: max_steps };
         if self.go_along(workshop, &mut path, 1.0, bounds)? == Arrival::OutOfSteps {

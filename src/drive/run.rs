@@ -1,14 +1,15 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
-use super::failure::{Failure, Moment, Tried, place};
+use super::failure::{Failure, Moment, Tried, place, refusal, refusal_help};
 use super::findings::{Findings, Warning};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use super::levels::Approach;
+use super::rehearsal::lacking;
 use super::space::Space;
 use super::warnings::Told;
 use crate::integrate::{Increments, Scheme, Trend};
-use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
+use crate::model::{Assembly, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, Plane, Slot, State, System};
 use crate::tensor::Vec3;
@@ -433,6 +434,10 @@ impl<'o> Run<'o> {
         self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
+        let fading = !self.state.fading.is_empty();
+        if let Some(error) = lacking(&self.model, stage, self.stage, fading, || Some(equations.clone())) {
+            return Err(self.describe(error));
+        }
         self.plane = equations.plane().copied();
         self.warn_of_space(kind);
         let assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
@@ -643,17 +648,7 @@ impl<'o> Run<'o> {
                 residual: residual.value.norm(),
                 force: residual.force,
                 history,
-                tried: Tried {
-                    cutbacks: self.counters.cutbacks - self.cutbacks_before,
-                    path: matches!(self.plan.stages[self.stage].work, StageWork::Path { .. }),
-                    nonlinear: matches!(
-                        self.plan.stages[self.stage].work,
-                        StageWork::Static { approach: Approach::Parts, .. }
-                    ),
-                    dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
-                    soft: self.soft,
-                    beams: self.model.elements > 0,
-                },
+                tried: Tried { cutbacks: self.counters.cutbacks - self.cutbacks_before, soft: self.soft },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {
                 Failure::StepTooSmall { at, place: place(&self.model, slot, Vec3::ZERO), error, share }
@@ -678,24 +673,8 @@ impl<'o> Run<'o> {
     }
 
     pub(super) fn describe(&self, error: StageError) -> Failure {
-        let node = |slot: u32| self.model.node_at(slot as usize);
-        let stage = self.stage + 1;
-        Failure::Deck(match error {
-            StageError::Conflict(conflict) => format!(
-                "stage {stage}: constraints on node \"{}\" act along directions that are neither the same nor orthogonal",
-                node(conflict.slot)
-            ),
-            StageError::Jump(Jump { motion, from, to }) => format!(
-                "stage {stage}: motion {} of node \"{}\" would have to jump from {from} to {to}, or from another axis; give it \
-                 a `history` that starts where the node is",
-                motion + 1,
-                node(self.model.motions[motion].slot)
-            ),
-            StageError::TurnedHinge(slot) => format!(
-                "stage {stage}: a support takes hold of single rotation components of node \"{}\", which has already \
-                 turned; hold all three, or hold them from the first stage on",
-                node(slot)
-            ),
-        })
+        let message = format!("stage {}: {}", self.stage + 1, refusal(&error, &self.model));
+        let help = refusal_help(&error, &self.model, self.stage);
+        Failure::Deck(help.map_or(message.clone(), |help| format!("{message}; {help}")))
     }
 }

@@ -106,7 +106,7 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         record["accuracy"] = json!({ "columns": columns, "settings": settings, "runs": runs, "seconds": seconds });
     }
     if let Err(failure) = outcome.result {
-        record["failure"] = numbers(failure);
+        record["failure"] = numbers(failure, scene);
     }
     record
 }
@@ -162,9 +162,9 @@ fn counters(counters: &Counters) -> Value {
 }
 
 /// The numbers of a failure.
-fn numbers(failure: &Failure) -> Value {
+fn numbers(failure: &Failure, scene: &Scene) -> Value {
     let mut record = json!({ "name": failure.name(), "message": failure.to_string() });
-    if let Some(hint) = failure.hint() {
+    if let Some(hint) = failure.hint(&scene.plan) {
         record["hint"] = json!(hint);
     }
     let when = |at: &Moment, record: &mut Value| {

@@ -11,6 +11,7 @@ mod names;
 mod output;
 mod path;
 mod planar;
+mod rehearsal;
 mod section;
 
 pub use compose::Reason;
@@ -28,6 +29,7 @@ use crate::probe::{Figure, Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
 use crate::warning::WarningKind;
+use constraints::SceneConstraints;
 use output::Columns;
 use std::sync::Arc;
 
@@ -209,7 +211,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let mut found = Vec::new();
     let connections = joints::find(deck, &mesh, &mut found);
     let composition = compose::compose(deck, &mesh, &histories, &connections, &mut found);
-    let (supports, motions) = constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
+    let SceneConstraints { supports, motions, driven } =
+        constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
     let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
     let probes = columns.written(&mut found);
     let stages = stages(deck, &columns, &mut found);
@@ -253,17 +256,22 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
+    let plan = Plan {
+        energy: expected || watched || probes.iter().any(energy),
+        continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
+        model,
+        initial,
+        places: places(&mesh, &stages),
+        stages,
+        interval: deck.output.interval,
+    };
+    // Of a deck that could be read in part the stages may be others.
+    if plan.stages.len() == deck.stage_count && diagnostics.iter().all(Diagnostic::is_warning) {
+        rehearsal::tell(deck, &plan, &[composition.driven, driven].concat(), diagnostics);
+    }
     Some(Scene {
         title: deck.title.clone(),
-        plan: Plan {
-            energy: expected || watched || probes.iter().any(energy),
-            continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
-            model,
-            initial,
-            places: places(&mesh, &stages),
-            stages,
-            interval: deck.output.interval,
-        },
+        plan,
         probes,
         every: deck.output.every,
         vtk: deck.output.vtk,

@@ -29,6 +29,7 @@ mod rotations;
 mod scenes;
 mod schemes;
 mod solvers;
+mod stages;
 mod statics;
 mod sweep;
 mod tangents;
