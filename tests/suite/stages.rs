@@ -265,8 +265,12 @@ fn hints_know_the_deck() {
     assert!(damped.contains("a smaller `rho_inf`") && !damped.contains("scheme ="), "{damped}");
     let most = with("scheme = \"generalized_alpha\"\nrho_inf = 0");
     assert!(!most.contains("rho_inf") && most.contains("a smaller `step`"), "{most}");
-    // What only its loads hold may have been let fall already.
-    let loose = format!("{ARM}[[support]]\nat = \"root\"\nfix = \"pin\"\n");
-    let first = attempt(&format!("{loose}{STATIC}")).hint.unwrap_or_default();
-    assert!(first.contains("`[damping]`"), "{first}");
+    // A hinged arm falls to where its loads hold it; a rod that spins about its own axis comes to rest nowhere.
+    let hinge = "[[support]]\nat = \"root\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"ry\"]\n[damping]\nmass = 1\n";
+    let loose = |stages: &str| attempt(&format!("{ARM}{hinge}{stages}{STATIC}")).hint.unwrap_or_default();
+    assert!(loose("").contains("comes to rest in a dynamic stage with `[damping]`"), "{}", loose(""));
+    assert!(!loose(&dynamic(0.1)).contains("comes to rest"), "{}", loose(&dynamic(0.1)));
+    let spins = "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[support]]\nat = \"tip\"\nfix = [\"uy\", \"uz\"]\n";
+    let spun = attempt(&format!("{ARM}{spins}{STATIC}")).hint.unwrap_or_default();
+    assert_eq!(spun, "add a support, a spring or a joint that holds this direction");
 }
