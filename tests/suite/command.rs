@@ -737,6 +737,6 @@ fn equal_warnings_are_said_once() {
     );
     let output = folder.beamsim(&["run", "many.toml"]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(said.matches("warning: this motion begins with a velocity").count(), 1, "{said}");
+    assert_eq!(said.matches("warning[velocity_jump]: this motion begins with a velocity").count(), 1, "{said}");
     assert!(said.contains("the same warning holds of lines "), "{said}");
 }

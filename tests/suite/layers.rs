@@ -13,7 +13,7 @@ const ORDER: [&str; 18] = [
 /// Crates that only some places may use; a place is a file or a folder.
 const CRATES: [(&str, &[&str]); 14] = [
     ("rayon", &["src/threads.rs"]),
-    ("faer", &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/pivots.rs", "src/solve/block/order.rs"]),
+    ("faer", &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/krylov.rs", "src/solve/block/order.rs"]),
     ("toml", &["src/deck/"]),
     ("toml_edit", &["src/deck/"]),
     ("annotate_snippets", &["src/deck/"]),
