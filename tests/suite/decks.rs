@@ -85,6 +85,11 @@ fn modes_hold() {
 }
 
 #[test]
+fn stability_holds() {
+    all_hold("decks/stability", 16);
+}
+
+#[test]
 fn joints_hold() {
     all_hold("decks/joints", 25);
 }
