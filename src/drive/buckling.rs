@@ -184,22 +184,21 @@ impl Run<'_> {
     /// load with `before` others below it; `None` where nothing is seen.
     fn extrapolate(&mut self, workshop: &mut Workshop, first: f64, before: usize) -> Result<Option<f64>, Failure> {
         let way = (first - self.state.load).signum();
-        let (mut seen, mut steadiest): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+        let mut last: Option<Sight> = None;
+        let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
         for _ in 0..MOST_EXTRAPOLATIONS {
             let load = self.state.load;
             let ahead = self.critical_loads(workshop, before + 4)?;
             let Some(critical) = ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before) else {
                 break;
             };
-            if let Some((from, last)) = seen {
-                let drift = ((critical - last) / (load - from)).abs();
-                if steadiest.is_none_or(|(least, _)| drift < least) {
-                    steadiest = Some((drift, 0.5 * (critical + last)));
-                }
-            } else {
-                steadiest = Some((f64::INFINITY, critical));
+            let now = Sight { from: load, critical };
+            let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
+            if drift < least_drift {
+                least_drift = drift;
+                steadiest = Some(last.map_or(critical, |last| 0.5 * (critical + last.critical)));
             }
-            seen = Some((load, critical));
+            last = Some(now);
             if (critical - load).abs() < NEAREST_EXTRAPOLATION * critical.abs() {
                 break;
             }
@@ -211,7 +210,7 @@ impl Run<'_> {
                 break;
             }
         }
-        Ok(steadiest.map(|(_, critical)| critical))
+        Ok(steadiest)
     }
 
     /// Whether the state is on another branch than one before it: it has moved much further than the path goes there, or does not
@@ -372,6 +371,19 @@ impl Run<'_> {
         };
         let (after, before) = (tangent(reach), tangent(-reach));
         after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * reach)).collect()
+    }
+}
+
+/// What a critical load looks like from a load.
+struct Sight {
+    from: f64,
+    critical: f64,
+}
+
+impl Sight {
+    /// How fast it moves with the load from which it is seen.
+    fn drift_since(&self, last: &Self) -> f64 {
+        ((self.critical - last.critical) / (self.from - last.from)).abs()
     }
 }
 

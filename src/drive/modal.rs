@@ -281,11 +281,12 @@ fn add_new(motions: &mut Vec<SmallMotion>, more: impl Iterator<Item = SmallMotio
 /// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones behind them.
 fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
     let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
-    let mut stable: Vec<SmallMotion> = found.motions.iter().cloned().filter(|motion| !grows(motion)).collect();
+    let mut stable: Vec<SmallMotion> = found.motions.iter().filter(|motion| !grows(motion)).cloned().collect();
     stable.extend(std::iter::repeat_n(rigid, found.rigid));
     stable.sort_by(|a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
     stable.truncate(modes);
-    let mut all: Vec<SmallMotion> = found.motions.iter().cloned().filter(grows).chain(stable).collect();
+    let mut all: Vec<SmallMotion> =
+        found.motions.iter().filter(|motion| grows(motion)).cloned().chain(stable).collect();
     sort(&mut all);
     let number = std::cell::Cell::new(0);
     all.retain(|motion| {

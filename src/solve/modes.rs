@@ -283,7 +283,7 @@ impl<'a> ModeSearch<'a> {
         let is_free = exponent.norm() <= FREE * self.shift;
         // s goes with the root of K.
         let uncertainty = if is_free { 0.0 } else { 0.5 * uncertainty };
-        let shape = (self.form == Form::Symmetric && uncertainty > UNCERTAIN).then(|| (re, mass.re));
+        let shape = (self.form == Form::Symmetric && uncertainty > UNCERTAIN).then_some((re, mass.re));
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
 
