@@ -11,7 +11,7 @@ use crate::tensor::Vec3;
 
 /// Solves with tangents of one pattern.
 ///
-/// Blocks serve what is not too much of a net; multipliers of joints are made ready for them ([`Constraints`]). Tangents whose pivots fail
+/// Blocks serve what is not too much of a net; multipliers of joints are made ready for them (`solve/constraints.rs`). Tangents whose pivots fail
 /// across blocks are left to LU with partial pivoting. Factors take the place of a tangent that may go as long
 /// as that is sure to lose no digits; else they stand beside it, and what they solve is looked at.
 pub struct LinearSolver {
