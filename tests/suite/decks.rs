@@ -86,7 +86,7 @@ fn modes_hold() {
 
 #[test]
 fn stability_holds() {
-    all_hold("decks/stability", 16);
+    all_hold("decks/stability", 17);
 }
 
 #[test]
