@@ -77,7 +77,7 @@ warning_kinds! {
     LoadControlResumed: "load_control_resumed", Path;
     /// A path ended after `max_steps` increments.
     PathEnds: "path_ends", Path;
-    /// A buckling load could not be closed in.
+    /// A buckling load is an estimate: no critical point was found.
     BucklingEstimate: "buckling_estimate", Path;
     /// Unstable modes exist that a modal stage has not found.
     MissingModes: "missing_modes", Path;

@@ -6,7 +6,7 @@
 
 use super::direction::Direction;
 use super::failure::Failure;
-use super::levels::{NO_MOTION, distance};
+use super::levels::{LARGEST_CONTRACTION, NO_MOTION, distance};
 use super::run::{CriticalKind, CriticalLoad, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
@@ -37,8 +37,6 @@ const SAME: f64 = 1e-5;
 /// A step along the path moves nothing further than this, in lengths of the scene and radians: a longer one may come down on
 /// another branch.
 const STRIDE: f64 = 0.5;
-/// A step whose corrections grow may come down on another branch, too.
-const LARGEST_CONTRACTION: f64 = 1.0;
 /// Where the tangent is extrapolated, so much of the way to where it would be singular lies between two looks,
 const STRIDE_AHEAD: f64 = 0.15;
 /// so near is the last one,
@@ -267,13 +265,13 @@ impl Run<'_> {
     fn warn_of_estimate(&mut self, from: f64, ended: Option<Walked>) {
         let coarse = ended == Some(Walked::TooCoarse);
         let why = if coarse {
-            "since the mesh does not tell the shape there: use more `elements`"
+            "beyond it the mesh is too coarse for the shape: use more `elements`"
         } else {
-            "as where an imperfection makes the structure turn aside without a critical point"
+            "a structure with a small imperfection bends aside and has none"
         };
         let message = format!(
-            "a buckling load is an estimate, extrapolated from smaller loads: the path was followed to load factor {from} and no critical \
-             point was closed in, {why}"
+            "a buckling load is an estimate, extrapolated from smaller loads: no critical point was found on the path up to load factor \
+             {from} ({why})"
         );
         self.warn(WarningKind::BucklingEstimate, message);
     }

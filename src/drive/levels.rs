@@ -26,6 +26,13 @@ const CLOSE: f64 = 1.0 / 256.0;
 /// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
 const JUMP: f64 = 8.0;
 
+/// A step whose corrections grow has left the neighbourhood of the path: where they do not contract, it was too long (Deuflhard 2011, Newton
+/// Methods for Nonlinear Problems, 5.1).
+pub(super) const LARGEST_CONTRACTION: f64 = 1.0;
+
+/// The same where no pivots tell whether it ended on another branch.
+const LARGEST_UNCOUNTED: f64 = 0.5;
+
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.
 const BACK: f64 = -0.5;
 
@@ -136,6 +143,15 @@ impl Levels {
     /// Load control begins anew.
     pub fn restart(&mut self) {
         self.increment = self.level;
+    }
+
+    /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points
+    /// at once, of which each may have a branch that the path turns into.
+    pub fn may_have_strayed(&self, contraction: f64, negative: Option<usize>) -> bool {
+        match self.stability.negative.zip(negative) {
+            Some((before, after)) => contraction > LARGEST_CONTRACTION || before.abs_diff(after) > 1,
+            None => contraction > LARGEST_UNCOUNTED,
+        }
     }
 
     /// Whether a step may have gone to another branch: it went back against the `first` correction, or it changed the number of

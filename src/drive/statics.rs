@@ -15,13 +15,6 @@ use crate::warning::WarningKind;
 /// Load increments whose length a detour by arc length begins with.
 const DETOUR: (f64, f64) = (0.01, 0.05);
 
-/// A level whose corrections grow has left the neighbourhood of the path: where they do not contract, the step was too long (Deuflhard 2011,
-/// Newton Methods for Nonlinear Problems, 5.1).
-const LARGEST_CONTRACTION: f64 = 1.0;
-
-/// The same where no pivots tell whether it ended on another branch.
-const LARGEST_UNCOUNTED: f64 = 0.5;
-
 /// What came of a step.
 enum Tried {
     /// Balance, with so many negative pivots
@@ -153,9 +146,7 @@ impl Run<'_> {
         let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, negative);
         match jumped {
             true => Tried::Jumped(negative),
-            false if !self.soft && has_strayed(newton.contraction, levels.stability.negative, negative) => {
-                Tried::Strayed(negative)
-            }
+            false if !self.soft && levels.may_have_strayed(newton.contraction, negative) => Tried::Strayed(negative),
             false => Tried::Good(negative),
         }
     }
@@ -253,14 +244,5 @@ impl Run<'_> {
 
     pub(super) fn static_progress(&self, load: f64) -> f64 {
         (self.stage as f64 + load) / self.plan.stages.len() as f64
-    }
-}
-
-/// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points at
-/// once, of which each may have a branch that the path turns into.
-fn has_strayed(contraction: f64, before: Option<usize>, after: Option<usize>) -> bool {
-    match before.zip(after) {
-        Some((before, after)) => contraction > LARGEST_CONTRACTION || before.abs_diff(after) > 1,
-        None => contraction > LARGEST_UNCOUNTED,
     }
 }

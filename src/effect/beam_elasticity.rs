@@ -196,8 +196,11 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 }
 
-/// Axial strains below this leave a beam its stiffness against bending, as round-off does.
-const UNSTRESSED: f64 = 1e-14;
+/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the stiffness against bending by 1e-7 of itself.
+const UNSTRAINED: f64 = 1e-14;
+
+/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000 elements they add up to 1e-8.
+const UNBENT: f64 = 1e-12;
 
 /// The largest round-off of the forces of some elements.
 fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> Noise {
@@ -439,11 +442,11 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
         let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
-        let free = self.free_amplitude(at);
+        let (free, length) = (self.free_amplitude(at), self.points().iter().map(|point| point.weight).sum::<f64>());
         let at_point = |point: &StiffnessPoint<N>| {
-            let (_, stress) = point.strain_and_stress(view.nodes(), free);
-            let axial = point.stiffness.stress(&Strain { gamma: Vec3::UNIT[0], kappa: Vec3::ZERO }).n.norm();
-            if stress.n.norm() > UNSTRESSED * axial {
+            let (strain, _) = point.strain_and_stress(view.nodes(), free);
+            let elastic = point.elastic_part(&strain, free);
+            if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
                 return None;
             }
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
