@@ -5,7 +5,7 @@ use super::rigid::rigid_motions;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Model, StageError};
-use crate::solve::{Convergence, Matrices, ModeSearch, SmallMotion, Tangent, Verdict, mechanism, timed};
+use crate::solve::{Convergence, Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, Verdict, mechanism, timed};
 use crate::system::System;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
@@ -21,6 +21,10 @@ const NEAR_SHIFT: f64 = 0.5;
 const MOST_LOOKS: usize = 6;
 /// More than asked for are searched where the number of unstable ones is not known.
 const SPARE: usize = 24;
+/// Shifts further out from which unstable modes are searched then, times the first
+const FURTHER: [f64; 2] = [10.0, 100.0];
+/// Times that a shift is moved up until nothing grows faster
+const MOST_DOUBLINGS: usize = 64;
 /// Times that more modes are searched where some are missing.
 const MOST_SEARCHES: usize = 4;
 /// Two frequencies that agree to this are one, and the more unstable mode comes first.
@@ -42,6 +46,12 @@ struct Found {
     rigid: usize,
     /// Unstable modes that are known to be there and were not found
     missing: usize,
+}
+
+impl Found {
+    fn growing(&self) -> usize {
+        self.motions.iter().filter(|motion| grows(motion)).count()
+    }
 }
 
 impl Run<'_> {
@@ -120,7 +130,6 @@ impl Run<'_> {
         for look in 0..MOST_LOOKS {
             let done = 0.5 * look as f64 / MOST_LOOKS as f64;
             self.observer.progress(self.moment(), self.static_progress(done))?;
-            self.counters.work.factorisations += 1;
             let sizes = search.factorise(shift).then(|| search.roughly_nearest()).flatten().ok_or_else(failed)?;
             let Some(lowest) = lowest(&sizes) else { break };
             if look > 0 && shift <= NEAR_SHIFT * lowest {
@@ -129,7 +138,9 @@ impl Run<'_> {
             shift = SHIFT * lowest;
         }
         self.observer.progress(self.moment(), self.static_progress(0.5))?;
-        self.search(&mut search, shift, modes).ok_or_else(failed)
+        let found = timed(&mut self.counters.work.solve_seconds, || find_all(&mut search, shift, modes));
+        self.counters.work.factorisations += search.factorisations;
+        found.ok_or_else(failed)
     }
 
     /// What neither stiffness nor mass holds.
@@ -147,87 +158,12 @@ impl Run<'_> {
         if done && loose.is_none() { Ok(()) } else { Err(self.name_mechanism(loose, &workshop.assembly.system)) }
     }
 
-    /// The motions nearest to a shift; `None` where a solution fails.
-    fn look(&mut self, search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
-        let work = &mut self.counters.work;
-        work.factorisations += 1;
-        timed(&mut work.solve_seconds, || if search.factorise(shift) { search.nearest(wanted) } else { None })
-    }
-
-    /// All modes that are asked for, and all unstable ones: where pivots count them, until they are complete; else among more than are
-    /// asked for, and from shifts further out.
-    fn search(&mut self, search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
-        let mut found = Found { rigid: search.rigid(), ..Found::default() };
-        self.counters.work.factorisations += 1;
-        if !search.factorise(shift) {
-            return None;
-        }
-        let Some(unstable) = search.growing() else {
-            found.motions = self.look(search, shift, modes + SPARE)?;
-            let further = if search.is_held() { &[][..] } else { &[10.0, 100.0] };
-            for further in further.iter().map(|times| times * shift) {
-                // What was found before is not lost where a shift hits a motion.
-                let further = self.look(search, further, SPARE).unwrap_or_default();
-                add_new(&mut found.motions, further.into_iter().filter(grows));
-            }
-            return Some(found);
-        };
-        let mut wanted = modes + unstable + 2;
-        for _ in 0..MOST_SEARCHES {
-            found.motions = self.look(search, shift, wanted)?;
-            found.missing = unstable.saturating_sub(found.motions.iter().filter(|motion| grows(motion)).count());
-            if found.missing > 0 {
-                self.find_growing(search, shift, &mut found, unstable);
-            }
-            if found.missing == 0 && self.is_complete(search, &found, modes) {
-                break;
-            }
-            wanted *= 2;
-        }
-        Some(found)
-    }
-
-    /// From above: at a shift behind which nothing grows any faster.
-    fn find_growing(&mut self, search: &mut ModeSearch, shift: f64, found: &mut Found, unstable: usize) {
-        let mut above = shift;
-        for _ in 0..64 {
-            above *= 4.0;
-            self.counters.work.factorisations += 1;
-            match search.factorise(above).then(|| search.growing()).flatten() {
-                Some(0) => break,
-                Some(_) => {}
-                None => return,
-            }
-        }
-        let fastest = self.look(search, above, unstable + 2).unwrap_or_default();
-        add_new(&mut found.motions, fastest.into_iter().filter(grows));
-        found.missing = unstable.saturating_sub(found.motions.iter().filter(|motion| grows(motion)).count());
-    }
-
-    /// Whether no mode is missing among those that are asked for: as many pivots are negative at a frequency behind them.
-    fn is_complete(&mut self, search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
-        let mut omegas: Vec<f64> =
-            found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
-        omegas.sort_by(f64::total_cmp);
-        let growing = found.motions.len() - omegas.len();
-        let first = modes.saturating_sub(found.rigid + growing).max(1);
-        // The widest gap behind the last mode that is asked for.
-        let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));
-        let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { return true };
-        let at = omegas[behind] - 0.5 * gap;
-        if gap <= SAME * at {
-            return true;
-        }
-        self.counters.work.factorisations += 1;
-        search.slower(at).is_none_or(|count| count == found.rigid + growing + behind)
-    }
-
     /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has lost are there again, as far as the
     /// shape is right.
     fn refine(&mut self, workshop: &mut Workshop, motion: &mut SmallMotion) {
-        let Some((shape, mass)) = motion.shape.take() else { return };
+        let Some(ModeShape { unknowns, mass }) = motion.shape.take() else { return };
         let mut field = vec![Vec3::ZERO; self.state.q.len()];
-        workshop.assembly.system.pattern.equations.scatter(&shape, None, &mut field);
+        workshop.assembly.system.pattern.equations.scatter(&unknowns, None, &mut field);
         let Some(stiffness) = workshop.assembly.stiffness_along(&self.state, &field) else { return };
         let square = -stiffness / mass;
         motion.exponent = match square < 0.0 {
@@ -258,6 +194,78 @@ impl Run<'_> {
     }
 }
 
+/// All modes that are asked for, and all unstable ones: where pivots count them, until they are complete; else among more than are asked
+/// for, and from shifts further out. `None` where a solution fails.
+fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
+    let mut found = Found { rigid: search.rigid(), ..Found::default() };
+    if !search.factorise(shift) {
+        return None;
+    }
+    let Some(unstable) = search.growing() else {
+        let is_held = search.is_held();
+        found.motions = search.nearest(modes + SPARE)?;
+        for times in FURTHER.into_iter().filter(|_| !is_held) {
+            add_new(&mut found.motions, growing_from(search, times * shift, SPARE));
+        }
+        return Some(found);
+    };
+    let mut wanted = modes + unstable + 2;
+    for _ in 0..MOST_SEARCHES {
+        found.motions = look(search, shift, wanted)?;
+        if found.growing() < unstable {
+            find_growing(search, shift, &mut found, unstable);
+        }
+        found.missing = unstable.saturating_sub(found.growing());
+        if found.missing == 0 && is_complete(search, &found, modes) {
+            break;
+        }
+        wanted *= 2;
+    }
+    Some(found)
+}
+
+/// The motions nearest to a shift; `None` where a solution fails.
+fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
+    if search.factorise(shift) { search.nearest(wanted) } else { None }
+}
+
+/// Of these the ones that grow; none where a shift hits a motion.
+fn growing_from(search: &mut ModeSearch, shift: f64, wanted: usize) -> Vec<SmallMotion> {
+    look(search, shift, wanted).unwrap_or_default().into_iter().filter(grows).collect()
+}
+
+/// From above: at a shift behind which nothing grows any faster. All of them are there then, or those that are new are added.
+fn find_growing(search: &mut ModeSearch, shift: f64, found: &mut Found, unstable: usize) {
+    let mut above = shift;
+    for _ in 0..MOST_DOUBLINGS {
+        above *= 4.0;
+        match search.factorise(above).then(|| search.growing()).flatten() {
+            Some(0) => break,
+            Some(_) => {}
+            None => return,
+        }
+    }
+    let fastest = growing_from(search, above, unstable + 2);
+    if fastest.len() >= unstable {
+        found.motions.retain(|motion| !grows(motion));
+        found.motions.extend(fastest);
+    } else {
+        add_new(&mut found.motions, fastest);
+    }
+}
+
+/// Whether no mode is missing among those that are asked for: as many pivots are negative at a frequency behind them.
+fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
+    let mut omegas: Vec<f64> = found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
+    omegas.sort_by(f64::total_cmp);
+    let first = modes.saturating_sub(found.rigid + found.growing()).max(1);
+    // The widest gap behind the last mode that is asked for.
+    let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));
+    let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { return true };
+    let at = omegas[behind] - 0.5 * gap;
+    gap <= SAME * at || search.slower(at).is_none_or(|count| count == found.rigid + found.growing() + behind)
+}
+
 /// The slowest motion that something holds.
 fn lowest(sizes: &[f64]) -> Option<f64> {
     let highest = sizes.iter().copied().fold(0.0, f64::max);
@@ -269,7 +277,7 @@ fn grows(motion: &SmallMotion) -> bool {
 }
 
 /// Adds motions that are not known yet.
-fn add_new(motions: &mut Vec<SmallMotion>, more: impl Iterator<Item = SmallMotion>) {
+fn add_new(motions: &mut Vec<SmallMotion>, more: Vec<SmallMotion>) {
     for motion in more {
         let same = |known: &SmallMotion| (known.exponent - motion.exponent).norm() <= SAME * motion.exponent.norm();
         if !motions.iter().any(same) {
@@ -288,12 +296,8 @@ fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
     let mut all: Vec<SmallMotion> =
         found.motions.iter().filter(|motion| grows(motion)).cloned().chain(stable).collect();
     sort(&mut all);
-    let number = std::cell::Cell::new(0);
-    all.retain(|motion| {
-        number.set(number.get() + 1);
-        number.get() <= modes || grows(motion)
-    });
-    all
+    let is_listed = |(number, motion): &(usize, SmallMotion)| *number < modes || grows(motion);
+    all.into_iter().enumerate().filter(is_listed).map(|(_, motion)| motion).collect()
 }
 
 fn mode(motion: &SmallMotion) -> Mode {

@@ -14,6 +14,7 @@ use crate::rotation::Rotation;
 use crate::system::{Node, State, System};
 use crate::tensor::Vec3;
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 
 /// A motion is held where it moves a held direction by more than this part of itself.
 const HELD: f64 = 1e-7;
@@ -21,12 +22,19 @@ const HELD: f64 = 1e-7;
 /// Forces against a motion that are smaller than this part of their terms are round-off.
 const NO_FORCE: f64 = 1e-11;
 
+/// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid motions are found as other slow modes are.
+const MOST_PARTS: usize = 64;
+
 /// Directions of motion of one free part.
 const MOTIONS: usize = 6;
 
 /// The rigid motions of all free parts, one number an equation each. The system holds forces and stiffness of the state.
 pub(super) fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
-    parts(system, places).iter().flat_map(|part| motions_of(part, system, model, state)).collect()
+    let parts = parts(system, places);
+    if parts.len() > MOST_PARTS {
+        return Vec::new();
+    }
+    parts.iter().flat_map(|part| motions_of(part, system, model, state)).collect()
 }
 
 /// Nodes that are connected, by what acts between them.
@@ -49,15 +57,11 @@ fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
     }
     // Nodes that share a displacement are one part.
     places.iter().for_each(|(node, _)| join(groups.of(node.u).0, groups.of(node.p).0));
-    let mut parts: Vec<(usize, Vec<(Node, Vec3)>)> = Vec::new();
+    let mut parts: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
     for &(node, place) in places {
-        let own = root(&mut part_of, groups.of(node.u).0);
-        match parts.iter_mut().find(|(part, _)| *part == own) {
-            Some((_, nodes)) => nodes.push((node, place)),
-            None => parts.push((own, vec![(node, place)])),
-        }
+        parts.entry(root(&mut part_of, groups.of(node.u).0)).or_default().push((node, place));
     }
-    parts.into_iter().map(|(_, nodes)| nodes).collect()
+    parts.into_values().collect()
 }
 
 /// A rigid motion of a node: of its displacement and of its rotation vector.
@@ -102,15 +106,7 @@ fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &Sta
         out
     };
     let fields: Vec<Vec<f64>> = (0..MOTIONS).map(field).collect();
-    let combined: Vec<Vec<f64>> = (0..allowed.ncols())
-        .map(|k| {
-            let mut sum = vec![0.0; equations.count()];
-            for (number, field) in fields.iter().enumerate() {
-                sum.iter_mut().zip(field).for_each(|(sum, v)| *sum += allowed[(number, k)] * v);
-            }
-            sum
-        })
-        .collect();
+    let combined = combine(&fields, &allowed);
     let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
     let mut scale = vec![0.0_f64; equations.count()];
     let mut forces: Vec<Vec<f64>> = Vec::new();
@@ -132,14 +128,19 @@ fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &Sta
         }
     }
     let Some(free) = null_space(resisted, NO_FORCE * NO_FORCE) else { return Vec::new() };
-    let motion = |k: usize| {
-        let mut sum = vec![0.0; equations.count()];
-        for (number, field) in combined.iter().enumerate() {
-            sum.iter_mut().zip(field).for_each(|(sum, v)| *sum += free[(number, k)] * v);
+    combine(&combined, &free)
+}
+
+/// The sums of fields with the coefficients of each column.
+fn combine(fields: &[Vec<f64>], coefficients: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let sum = |column: usize| {
+        let mut sum = vec![0.0; fields[0].len()];
+        for (number, field) in fields.iter().enumerate() {
+            sum.iter_mut().zip(field).for_each(|(sum, v)| *sum += coefficients[(number, column)] * v);
         }
         sum
     };
-    (0..free.ncols()).map(motion).collect()
+    (0..coefficients.ncols()).map(sum).collect()
 }
 
 /// How the forces on a part change where they turn with it; one number an equation.

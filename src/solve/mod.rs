@@ -23,7 +23,7 @@ pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues};
 pub use linear::LinearSolver;
 pub use mechanism::{Limp, mechanism};
-pub use modes::{Matrices, ModeSearch, SmallMotion};
+pub use modes::{Matrices, ModeSearch, ModeShape, SmallMotion};
 pub use newton::{Newton, NewtonFailure, Work, timed};
 pub use pivots::is_symmetric;
 pub use softest::NullVector;

@@ -45,8 +45,17 @@ pub struct SmallMotion {
     pub exponent: Complex<f64>,
     /// The part of |s| that round-off in the stiffness may have taken
     pub uncertainty: f64,
-    /// Of motions without damping that are uncertain, the unknowns, one number an equation, and x.M x
-    pub shape: Option<(Vec<f64>, f64)>,
+    /// Of motions without damping that are uncertain
+    pub shape: Option<ModeShape>,
+}
+
+/// What moves in a small motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModeShape {
+    /// One number an equation
+    pub unknowns: Vec<f64>,
+    /// x.M x
+    pub mass: f64,
 }
 
 /// What is known of the matrices.
@@ -82,8 +91,12 @@ pub struct ModeSearch<'a> {
     /// Rigid motions of free parts, and M times each: orthonormal, and taken out of everything
     rigid: Vec<[Vec<f64>; 2]>,
     shift: f64,
+    /// Whether the system and its factors are those of the shift
+    is_ready: bool,
     /// Negative pivots of K + shift^2 M, where K is symmetric
     negative: Option<usize>,
+    /// Factorisations so far
+    pub factorisations: u64,
 }
 
 impl Matrices {
@@ -137,7 +150,17 @@ impl<'a> ModeSearch<'a> {
             (true, true) if is_skew(system, &matrices.damping) => Form::Gyroscopic,
             _ => Form::General,
         };
-        let mut search = Self { system, solver, matrices, form, rigid: Vec::new(), shift: 0.0, negative: None };
+        let mut search = Self {
+            system,
+            solver,
+            matrices,
+            form,
+            rigid: Vec::new(),
+            shift: 0.0,
+            is_ready: false,
+            negative: None,
+            factorisations: 0,
+        };
         rigid.into_iter().for_each(|motion| search.take_out(motion));
         search
     }
@@ -168,9 +191,13 @@ impl<'a> ModeSearch<'a> {
         }
     }
 
-    /// Factorises at a shift; `false` where that cannot be done.
+    /// Factorises at a shift, unless that was done last; `false` where it cannot be done.
     pub fn factorise(&mut self, shift: f64) -> bool {
+        if self.is_ready && self.shift == shift {
+            return true;
+        }
         self.shift = shift;
+        self.factorisations += 1;
         if matches!(self.form, Form::Gyroscopic | Form::General) {
             self.matrices.combine_squared(shift * shift, &mut self.system.values);
             self.negative = self.solver.negative_beside(self.system);
@@ -181,6 +208,7 @@ impl<'a> ModeSearch<'a> {
         if self.form == Form::Symmetric {
             self.negative = self.count(done);
         }
+        self.is_ready = done;
         done
     }
 
@@ -208,6 +236,8 @@ impl<'a> ModeSearch<'a> {
         if self.form != Form::Symmetric {
             return None;
         }
+        self.is_ready = false;
+        self.factorisations += 1;
         let done = self.solver.factorise(self.system);
         self.count(done)
     }
@@ -248,6 +278,7 @@ impl<'a> ModeSearch<'a> {
             }
         }
         // What follows asks for K alone.
+        self.is_ready = false;
         self.system.values.copy_from_slice(&self.matrices.stiffness);
         self.system.revision += 1;
         let mut motions = Vec::new();
@@ -283,7 +314,8 @@ impl<'a> ModeSearch<'a> {
         let is_free = exponent.norm() <= FREE * self.shift;
         // s goes with the root of K.
         let uncertainty = if is_free { 0.0 } else { 0.5 * uncertainty };
-        let shape = (self.form == Form::Symmetric && uncertainty > UNCERTAIN).then_some((re, mass.re));
+        let is_asked_for = self.form == Form::Symmetric && uncertainty > UNCERTAIN;
+        let shape = is_asked_for.then_some(ModeShape { unknowns: re, mass: mass.re });
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
 
