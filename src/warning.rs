@@ -75,6 +75,8 @@ warning_kinds! {
     ArcLengthDetour: "arc_length_detour", Path;
     /// Load control goes on after a detour by arc length.
     LoadControlResumed: "load_control_resumed", Path;
+    /// A state of rest was found by a motion against an artificial resistance.
+    CameToRest: "came_to_rest", Path;
     /// A path ended after `max_steps` increments.
     PathEnds: "path_ends", Path;
     /// A buckling load is an estimate: no critical point was found.

@@ -31,7 +31,7 @@ const JUMP: f64 = 8.0;
 pub(super) const LARGEST_CONTRACTION: f64 = 1.0;
 
 /// The same where no pivots tell whether it ended on another branch.
-const LARGEST_UNCOUNTED: f64 = 0.5;
+pub(super) const LARGEST_UNCOUNTED: f64 = 0.5;
 
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.
 const BACK: f64 = -0.5;
@@ -103,14 +103,22 @@ pub(super) struct Levels {
     pub level: f64,
     pub approach: Approach,
     pub stability: Stability,
+    /// What nothing holds before the first level
+    pub loose: Option<Failure>,
     increment: f64,
 }
 
 impl Levels {
     /// From the run's state on.
-    pub fn new(run: &mut Run, workshop: &mut Workshop, steps: usize, approach: Approach) -> Self {
+    pub fn new(
+        run: &mut Run,
+        workshop: &mut Workshop,
+        steps: usize,
+        approach: Approach,
+        loose: Option<Failure>,
+    ) -> Self {
         let (start, level) = (run.state.kept(), 1.0 / steps as f64);
-        Self { start, level, approach, stability: Stability::new(run, workshop), increment: level }
+        Self { start, level, approach, stability: Stability::new(run, workshop), loose, increment: level }
     }
 
     /// The next load factor between `load` and `target`.

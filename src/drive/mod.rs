@@ -15,6 +15,7 @@ mod levels;
 mod modal;
 mod path;
 mod rehearsal;
+mod rest;
 mod rigid;
 mod run;
 mod space;

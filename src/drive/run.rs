@@ -506,17 +506,34 @@ impl<'o> Run<'o> {
 
     /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
     pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+        self.continue_to_state()?;
+        self.judge_mesh()?;
+        self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
+        if self.keeps_account(workshop) {
+            self.bookkeeper.add_step(&self.model, &self.state, &workshop.assembly.system);
+        }
+        Ok(())
+    }
+
+    /// Continues from the last good state what goes on without jumps: turns of nodes and of joints.
+    fn continue_to_state(&mut self) -> Result<(), Failure> {
         self.refuse_infinities()?;
         if let Some(plane) = &self.plane {
             self.model.flatten(plane, &mut self.state);
         }
         self.wind()?;
         self.model.remember(&mut self.state);
-        self.judge_mesh()?;
-        self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
-        if self.keeps_account(workshop) {
-            self.bookkeeper.add_step(&self.model, &self.state, &workshop.assembly.system);
+        Ok(())
+    }
+
+    /// What follows a state on the way to a balance: it becomes the good one, turns are counted, and the work of its forces is booked. No row.
+    pub(super) fn pass_through(&mut self, system: &System) -> Result<(), Failure> {
+        self.state.anchor = None;
+        self.continue_to_state()?;
+        if self.plan.energy {
+            self.bookkeeper.add_step(&self.model, &self.state, system);
         }
+        self.good.copy_all_but_rates(&self.state);
         Ok(())
     }
 
@@ -629,7 +646,7 @@ impl<'o> Run<'o> {
         }
     }
 
-    fn count_evaluations(&mut self, assembly: &Assembly) {
+    pub(super) fn count_evaluations(&mut self, assembly: &Assembly) {
         for &(name, count) in &assembly.evaluations {
             match self.counters.evaluations.iter_mut().find(|(known, _)| *known == name) {
                 Some((_, sum)) => *sum += count,

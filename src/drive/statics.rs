@@ -7,7 +7,7 @@ use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Limp, NewtonFailure, Tangent};
+use crate::solve::{Limp, NewtonFailure, Tangent, mechanism};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
@@ -50,8 +50,8 @@ impl Run<'_> {
         steps: usize,
         approach: Approach,
     ) -> Result<(), Failure> {
-        self.start_static(workshop)?;
-        let mut levels = Levels::new(self, workshop, steps, approach);
+        let loose = self.begin_static(workshop)?;
+        let mut levels = Levels::new(self, workshop, steps, approach, loose);
         let at_start = levels.stability.negative;
         self.good.copy_from(&self.state);
         for number in 1..=steps {
@@ -71,6 +71,11 @@ impl Run<'_> {
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
     pub(super) fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        self.begin_static(workshop)?.map_or(Ok(()), Err)
+    }
+
+    /// The same, but what nothing holds as long as nothing is loaded is only named.
+    fn begin_static(&mut self, workshop: &mut Workshop) -> Result<Option<Failure>, Failure> {
         self.stand_still();
         let time = self.state.time;
         let held = self.state.q.clone();
@@ -93,7 +98,13 @@ impl Run<'_> {
         // What cannot be factorised as long as nothing is loaded may be held by what the first step brings.
         if let Some(limp) = limp.filter(|limp| !limp.vector.broke_down) {
             if limp.is_loose() {
-                return Err(self.name_mechanism(Some(limp.vector), &assembly.system));
+                let named = self.name_mechanism(Some(limp.vector), &assembly.system);
+                // Conditions that joints say twice no load makes one.
+                if matches!(&named, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
+                    return Err(named);
+                }
+                self.open_account(workshop)?;
+                return Ok(Some(named));
             }
             if limp.is_soft() {
                 self.warn_of_softness();
@@ -105,8 +116,9 @@ impl Run<'_> {
                 self.warn(WarningKind::HeldByStress, message);
             }
         }
-        self.refuse_loose_in_space(workshop, Weights::STIFFNESS)?;
-        self.open_account(workshop)
+        let loose = self.refuse_loose_in_space(workshop, Weights::STIFFNESS).err();
+        self.open_account(workshop)?;
+        Ok(loose)
     }
 
     /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or along the path.
@@ -115,6 +127,9 @@ impl Run<'_> {
             self.state.q == self.good.q && self.state.load == self.good.load,
             "the last state is not the good one"
         );
+        if let Some(loose) = levels.loose.take() {
+            return self.rest_at(workshop, target, loose, levels);
+        }
         while self.good.load < target {
             let next = levels.next(self.good.load, target);
             self.observer.progress(self.moment(), self.static_progress(next))?;
@@ -134,6 +149,46 @@ impl Run<'_> {
             }
         }
         Ok(Reached::Level)
+    }
+
+    /// A level is reached by a motion to a state of rest, where there is one that its loads hold; else the stage ends with `failure`.
+    fn rest_at(
+        &mut self,
+        workshop: &mut Workshop,
+        target: f64,
+        failure: Failure,
+        levels: &mut Levels,
+    ) -> Result<Reached, Failure> {
+        if self.is_linear() || !self.come_to_rest(workshop, target)? {
+            return Err(failure);
+        }
+        self.refuse_loose_at_rest(workshop, failure.clone())?;
+        let at = self.moment();
+        let why = match &failure {
+            Failure::Singular { place: Some(place), .. } => format!("nothing but its loads holds {place}"),
+            _ => "load levels lead to no balance".into(),
+        };
+        let message = format!(
+            "{why}: the state at {at} is where the structure came to rest, moved by all forces against an artificial resistance; it is in \
+             balance without that"
+        );
+        self.warn(WarningKind::CameToRest, message);
+        levels.stability.negative = levels.stability.count(self, workshop);
+        self.take_step(workshop, levels.stability.negative, levels)?;
+        Ok(Reached::Level)
+    }
+
+    /// A state of rest may leave what no load holds: then the stage ends with `failure`.
+    fn refuse_loose_at_rest(&mut self, workshop: &mut Workshop, failure: Failure) -> Result<(), Failure> {
+        let Workshop { assembly, newton, .. } = &mut *workshop;
+        assembly.forget();
+        assembly.evaluate(&self.state, Weights::STIFFNESS, None);
+        self.counters.work.factorisations += 1;
+        let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
+        if mechanism(&mut newton.solver, &mut tangent, &self.model).is_some() {
+            return Err(failure);
+        }
+        self.refuse_loose_in_space(workshop, Weights::STIFFNESS)
     }
 
     fn try_step(&mut self, workshop: &mut Workshop, next: f64, levels: &mut Levels) -> Tried {
@@ -181,7 +236,8 @@ impl Run<'_> {
         self.state.copy_from(&self.good);
         let hopeless = levels.approach != Approach::Path || self.soft;
         match named {
-            Some(named) if hopeless || !named.is_of_balance() => return Err(named),
+            Some(named) if levels.approach == Approach::Straight || !named.is_of_balance() => return Err(named),
+            Some(named) if hopeless => return self.rest_at(workshop, target, named, levels),
             _ => {}
         }
         let (at, steps) = (self.moment(), self.counters.steps);
@@ -203,10 +259,10 @@ impl Run<'_> {
                 Ok(Reached::Along)
             }
             Ok(Arrival::OutOfSteps) => Err(limit),
-            Ok(Arrival::Nowhere) => Err(named.unwrap_or(limit)),
+            Ok(Arrival::Nowhere) => self.rest_at(workshop, target, named.unwrap_or(limit), levels),
             Err(failure) if !failure.is_of_balance() => Err(failure),
-            Err(_) if increments > 0 => Err(limit),
-            Err(failure) => Err(named.unwrap_or(failure)),
+            Err(_) if increments > 0 => self.rest_at(workshop, target, limit, levels),
+            Err(failure) => self.rest_at(workshop, target, named.unwrap_or(failure), levels),
         }
     }
 
@@ -225,6 +281,16 @@ impl Run<'_> {
     /// state and handed to Newton as increments.
     pub(super) fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
         let Workshop { assembly, newton, lift, .. } = workshop;
+        let moves = self.set_load(lift, load)?;
+        let moved = moves.then_some(&lift[..]);
+        let work = &mut self.counters.work;
+        newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
+        self.refuse_leaps()?;
+        self.refuse_windings()
+    }
+
+    /// Sets the load factor; `lift` takes the increments of prescribed motions, which are not in the state yet. Whether there are any.
+    pub(super) fn set_load(&mut self, lift: &mut Vec<Vec3>, load: f64) -> Result<bool, NewtonFailure> {
         threads::copy(lift, if self.model.motions.is_empty() { &[] } else { &self.state.q });
         let time = self.state.time;
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
@@ -235,11 +301,7 @@ impl Run<'_> {
             *lift = *q - before;
             *q = before;
         }
-        let moved = lift.iter().any(|&v| v != Vec3::ZERO).then_some(&lift[..]);
-        let work = &mut self.counters.work;
-        newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
-        self.refuse_leaps()?;
-        self.refuse_windings()
+        Ok(lift.iter().any(|&v| v != Vec3::ZERO))
     }
 
     pub(super) fn static_progress(&self, load: f64) -> f64 {

@@ -15,6 +15,7 @@ pub mod mass_damping;
 pub mod node_load;
 pub mod planar_elasticity;
 pub mod planar_inertia;
+pub mod resistance;
 pub mod rigid_body;
 pub mod rotary_inertia;
 pub mod rotating_frame;

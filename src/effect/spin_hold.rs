@@ -1,44 +1,58 @@
-//! Holds spins that nothing resists: a straight beam without rotary inertia may spin about its own axis in a dynamic stage without
-//! any force, and then round-off alone would tell by how much.
+//! Holds spins that nothing resists: a straight part between ball joints may spin about its own axis without any force, in statics
+//! always and in a dynamic stage without rotary inertia; then round-off alone would tell by how much.
 
 use super::Effect;
 use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
 use crate::tensor::Vec3;
 
-/// One beam.
+/// One straight part: beams that are joined rigidly along a line.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// The node in its middle
+    /// A node in the middle of a beam
     pub node: Node,
     /// All its nodes
     pub nodes: Vec<Node>,
-    /// The axis of the beam, a unit vector
+    /// The axis at the start, a unit vector
     pub axis: Vec3,
     /// GJ/L, moment per angle
     pub stiffness: f64,
 }
 
-/// The hold in time steps, as part of GJ/L: residuals that Newton tolerates may not turn the beam by much, and the swing of a
+/// The hold in load levels and time steps, as part of GJ/L: residuals that Newton tolerates may not turn the beam by much, and the swing of a
 /// beam that sags must not notice.
 const HOLD: f64 = 1e-3;
 
 /// The same where no mass stands beside it: modes must not notice at all.
 const HOLD_IN_MODES: f64 = 1e-8;
 
-/// All such beams.
+/// The stages in which spins are held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldIn {
+    /// Dynamic and modal ones
+    Motion,
+    /// Static ones, and searches for critical loads
+    Statics,
+}
+
+/// All such parts.
 ///
 /// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness against corrections
 /// t.T dP about the axis t, and keeps predictions from carrying spins on, so that what no force asks for does not happen.
 #[derive(Clone, Debug)]
 pub struct SpinHold {
-    /// The beams
-    pub beams: Vec<Instance>,
+    /// The parts
+    pub parts: Vec<Instance>,
+    /// Where
+    pub held_in: HeldIn,
 }
 
 impl Effect for SpinHold {
     fn name(&self) -> &'static str {
-        "hold of spins without inertia"
+        match self.held_in {
+            HeldIn::Motion => "hold of spins without inertia",
+            HeldIn::Statics => "hold of free spins",
+        }
     }
 
     fn category(&self) -> Category {
@@ -47,7 +61,7 @@ impl Effect for SpinHold {
 
     fn cliques(&self) -> Cliques {
         let mut cliques = Cliques::default();
-        self.beams.iter().for_each(|beam| cliques.push([beam.node.p]));
+        self.parts.iter().for_each(|part| cliques.push([part.node.p]));
         cliques
     }
 
@@ -56,32 +70,40 @@ impl Effect for SpinHold {
     }
 
     fn acts(&self, stage: &StageContext) -> bool {
-        matches!(stage.kind, StageKind::Dynamic | StageKind::Modal)
+        match stage.kind {
+            StageKind::Dynamic | StageKind::Modal => self.held_in == HeldIn::Motion,
+            StageKind::Static | StageKind::Buckling => self.held_in == HeldIn::Statics,
+        }
     }
 
     fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.beams.iter().for_each(|beam| show(Aspect::Line(beam.axis)));
+        self.parts.iter().for_each(|part| show(Aspect::Line(part.axis)));
     }
 
     fn steady(&self, at: &mut State) {
-        for beam in &self.beams {
-            for node in &beam.nodes {
+        for part in &self.parts {
+            for node in &part.nodes {
                 let (rotation, p) = (at.rotation(node.p), node.p as usize);
-                let about = rotation.t_inverse() * beam.axis;
+                let about = rotation.t_inverse() * part.axis;
                 for rate in [&mut at.v[p], &mut at.a[p]] {
-                    *rate -= about * beam.axis.dot(rotation.t * *rate);
+                    *rate -= about * part.axis.dot(rotation.t * *rate);
                 }
             }
         }
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
-        let hold = weights.stiffness * if weights.mass == 0.0 { HOLD_IN_MODES } else { HOLD };
+        // An artificial resistance holds spins by itself, with a force that tells by how much.
+        if at.anchor.is_some() {
+            return;
+        }
+        let among_modes = self.held_in == HeldIn::Motion && weights.mass == 0.0;
+        let hold = weights.stiffness * if among_modes { HOLD_IN_MODES } else { HOLD };
         let mut system = ElementSystem::new(1);
-        for (k, beam) in self.beams.iter().enumerate() {
+        for (k, part) in self.parts.iter().enumerate() {
             system.clear();
-            let about = at.rotation(beam.node.p).t.transpose_mul(beam.axis);
-            system.add_tangent(0, 0, about.outer(about).scale(beam.stiffness * hold));
+            let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
+            system.add_tangent(0, 0, about.outer(about).scale(part.stiffness * hold));
             out.add(k, &system);
         }
     }

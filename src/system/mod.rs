@@ -23,5 +23,5 @@ pub use plane::{Aspect, Plane, rounded};
 pub use regions::{Region, most as most_regions};
 pub use sink::{Part, Sink};
 pub use stage::{StageContext, StageKind, StageSet};
-pub use state::{Fading, Memory, Node, RotationRate, Slot, State};
+pub use state::{Anchor, Fading, Memory, Node, RotationRate, Slot, State};
 pub use storage::{Own, Tiles, upper_entry, upper_start};

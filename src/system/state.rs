@@ -32,6 +32,15 @@ pub struct Fading {
     pub at: Vec3,
 }
 
+/// What an artificial resistance pulls a state back to, see [`crate::effect::resistance`].
+#[derive(Clone, Debug)]
+pub struct Anchor {
+    /// Force per displacement at every node
+    pub resistance: f64,
+    /// The unknowns to which it pulls
+    pub q: Vec<Vec3>,
+}
+
 /// Everything that changes in a run. Effects are functions of it.
 #[derive(Clone, Debug)]
 pub struct State {
@@ -61,6 +70,8 @@ pub struct State {
     pub amplitude_rates: Vec<[f64; 2]>,
     /// For each slot what inertia and damping did when a motion ended in a static stage; empty where none did.
     pub fading: Arc<Vec<Fading>>,
+    /// What an artificial resistance pulls to, while a static stage looks for a state of rest.
+    pub anchor: Option<Arc<Anchor>>,
     /// The angle of each sprung joint, continued without jumps; valid at the last converged state.
     pub angles: Vec<f64>,
     /// For each rotation slot the step it is in, while a step is iterated whose unknowns are increments. Then `q` holds the
@@ -84,6 +95,7 @@ impl State {
             wound: Vec::new(),
             amplitude_rates: vec![[0.0; 2]; amplitudes],
             fading: Arc::default(),
+            anchor: None,
             angles: vec![0.0; angles],
             turns: Vec::new(),
         }
@@ -103,6 +115,7 @@ impl State {
             wound: self.wound.clone(),
             amplitude_rates: self.amplitude_rates.clone(),
             fading: self.fading.clone(),
+            anchor: self.anchor.clone(),
             angles: self.angles.clone(),
             turns: self.turns.clone(),
         }
@@ -160,6 +173,7 @@ impl State {
         threads::copy(&mut self.wound, &other.wound);
         self.amplitude_rates.copy_from_slice(&other.amplitude_rates);
         self.fading.clone_from(&other.fading);
+        self.anchor.clone_from(&other.anchor);
         self.angles.copy_from_slice(&other.angles);
         self.turns.clone_from(&other.turns);
     }

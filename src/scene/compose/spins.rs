@@ -1,58 +1,138 @@
-//! Straight beams whose spin about their own axis nothing resists: no inertia, no support, no other beam.
+//! Straight parts whose spin about their own axis nothing resists.
 
 use super::Composer;
-use crate::deck::{EffectWord, JointKind, MotionWhat, Spanned};
-use crate::effect::spin_hold::{Instance, SpinHold};
+use crate::deck::{EffectWord, JointKind, LoadTarget, MotionWhat, Spanned, StageBody};
+use crate::effect::Effect;
+use crate::effect::spin_hold::{HeldIn, Instance, SpinHold};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
-use crate::scene::section::SectionMatrices;
 use crate::system::Slot;
 use crate::tensor::{Mat3, Vec3};
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 /// What is nearer to a straight line is one, relative to its length.
 const STRAIGHT: f64 = 1e-9;
 
+/// No beam, in lists by slot.
+const NONE: usize = usize::MAX;
+
+/// Beams that are joined rigidly along one line.
+struct StraightPart<'m> {
+    beams: Vec<&'m MeshBeam>,
+    hold: Instance,
+}
+
 impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
-        let name = "hold of spins without inertia";
-        if !self.dynamic {
-            return self.reason(name, false, "no dynamic stage");
-        }
-        let resisted = self.resisted_rotations(connections);
-        let beams: Vec<Instance> = self.mesh.beams.iter().filter_map(|beam| self.spin_hold(beam, &resisted)).collect();
-        if beams.is_empty() {
-            return self.reason(name, false, "nothing spins about its own axis without any inertia");
-        }
-        let count = beams.len();
-        let reason = format!("{count} straight beam(s) without `rhoJ` whose spin about their own axis nothing resists");
-        self.push(SpinHold { beams }, reason);
+        let parts = self.straight_parts(&self.resisted_rotations(connections));
+        let rests = |body: &StageBody| {
+            matches!(body, StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Buckling { .. })
+        };
+        let rests = self.deck.stages.iter().any(|stage| rests(&stage.body));
+        let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<Instance> {
+            parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect()
+        };
+        let in_motion = holds(&|part| self.dynamic && !self.has_spin_inertia(part));
+        let in_statics = holds(&|part| rests && !self.feels_loads(part));
+        self.hold_spins(SpinHold { parts: in_motion, held_in: HeldIn::Motion }, "without inertia against it");
+        self.hold_spins(SpinHold { parts: in_statics, held_in: HeldIn::Statics }, "that no load feels: it stays as it is");
     }
 
-    fn spin_hold(&self, beam: &MeshBeam, resisted: &HashSet<Slot>) -> Option<Instance> {
-        let nodes: Vec<_> = beam.nodes.iter().map(|&node| &self.mesh.nodes[node]).collect();
-        let (first, last) = (nodes.first()?.place, nodes.last()?.place);
-        let axis = (last - first).normalized()?;
-        let length = (last - first).norm();
-        let aside = |place: Vec3| (place - first - axis * axis.dot(place - first)).norm();
-        let straight = nodes.iter().all(|node| aside(node.place) <= STRAIGHT * length);
-        let middle = nodes.len() / 2;
-        let SectionMatrices { stiffness, mass } = beam.section.at(beam.fractions[middle]);
-        let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
-        let own = mass.is_some_and(|mass| mass.offset != Vec3::ZERO || (rotary && mass.about_line.0[0][0] > 0.0));
-        if !straight || own || nodes.iter().any(|node| resisted.contains(&node.node.p)) {
+    fn hold_spins(&mut self, effect: SpinHold, which: &str) {
+        let (name, count) = (effect.name(), effect.parts.len());
+        match count {
+            0 => self.reason(name, false, format!("no straight part is free to spin about its own axis, {which}")),
+            _ => self.push(effect, format!("{count} straight part(s) free to spin about their own axis, {which}")),
+        }
+    }
+
+    /// Parts on a straight line whose rotation nothing takes hold of.
+    fn straight_parts(&self, resisted: &HashSet<Slot>) -> Vec<StraightPart<'_>> {
+        let beams = &self.mesh.beams;
+        let slot = |node: usize| self.mesh.nodes[node].node.p as usize;
+        let mut held = vec![false; self.mesh.slots()];
+        resisted.iter().for_each(|&slot| held[slot as usize] = true);
+        let is_held: Vec<bool> = beams.iter().map(|beam| beam.nodes.iter().any(|&node| held[slot(node)])).collect();
+        if is_held.iter().all(|&held| held) {
+            return Vec::new();
+        }
+        // Beams that share a rotation are one part, which is named after its first beam.
+        let mut part_of: Vec<usize> = (0..beams.len()).collect();
+        let mut beam_at = vec![NONE; self.mesh.slots()];
+        for (number, beam) in beams.iter().enumerate() {
+            for place in beam.nodes.iter().map(|&node| slot(node)) {
+                match std::mem::replace(&mut beam_at[place], number) {
+                    NONE => {}
+                    other => join(&mut part_of, number, other),
+                }
+            }
+        }
+        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        (0..beams.len()).for_each(|number| parts.entry(root(&part_of, number)).or_default().push(number));
+        let free = parts.into_values().filter(|part| !part.iter().any(|&number| is_held[number]));
+        free.filter_map(|part| self.straight_part(part.iter().map(|&number| &beams[number]).collect())).collect()
+    }
+
+    /// `None` where it is not straight.
+    fn straight_part<'m>(&'m self, beams: Vec<&'m MeshBeam>) -> Option<StraightPart<'m>> {
+        let nodes: Vec<_> =
+            beams.iter().flat_map(|beam| beam.nodes.iter().map(|&node| &self.mesh.nodes[node])).collect();
+        let first = nodes.first()?.place;
+        let farthest = |from: Vec3| {
+            let far = |a: &Vec3, b: &Vec3| (*a - from).squared().total_cmp(&(*b - from).squared());
+            nodes.iter().map(|node| node.place).max_by(far)
+        };
+        let start = farthest(first)?;
+        let end = farthest(start)?;
+        let (axis, length) = ((end - start).normalized()?, (end - start).norm());
+        let aside = |place: Vec3| (place - start - axis * axis.dot(place - start)).norm();
+        if nodes.iter().any(|node| aside(node.place) > STRAIGHT * length) {
             return None;
         }
-        let stiffness = stiffness[3][3] / length;
-        Some(Instance {
+        let (beam, middle) = (beams[0], beams[0].nodes.len() / 2);
+        let torsion = beam.section.at(beam.fractions[middle]).stiffness[3][3];
+        let hold = Instance {
             node: nodes[middle].node,
             nodes: nodes.iter().map(|node| node.node).collect(),
             axis,
-            stiffness,
-        })
+            stiffness: torsion / length,
+        };
+        Some(StraightPart { beams, hold })
     }
 
-    /// Rotations that supports, motions, joints, springs or bodies take part in, or more than one beam.
+    /// Whether something of it is turned by gravity, or resists a spin by its inertia.
+    fn has_spin_inertia(&self, part: &StraightPart) -> bool {
+        let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
+        let of_beam = |beam: &&MeshBeam| {
+            let mass = beam.section.at(beam.fractions[beam.nodes.len() / 2]).mass;
+            mass.is_some_and(|mass| mass.offset != Vec3::ZERO || (rotary && mass.about_line.0[0][0] > 0.0))
+        };
+        let of_body = self.deck.bodies.iter().filter(|body| body.inertia.is_some()).any(|body| self.is_on(part, &body.at));
+        part.beams.iter().any(of_beam) || of_body
+    }
+
+    /// Whether loads may turn it about its axis: moments, weight beside the axis, and in rotating frames all inertia.
+    fn feels_loads(&self, part: &StraightPart) -> bool {
+        let is_along = |name: &str| part.beams.iter().any(|beam| beam.name == name);
+        let turns = self.deck.loads.iter().filter(|load| load.moment.is_some()).any(|load| match &load.target {
+            LoadTarget::At(at) => self.is_on(part, at),
+            LoadTarget::Along(along) => is_along(&along.value),
+        });
+        let is_eccentric = |beam: &&MeshBeam| {
+            let mass = beam.section.at(beam.fractions[beam.nodes.len() / 2]).mass;
+            mass.is_some_and(|mass| mass.offset != Vec3::ZERO)
+        };
+        let rotates = self.deck.stages.iter().any(|stage| stage.frame.is_some());
+        turns || part.beams.iter().any(is_eccentric) || (rotates && self.has_spin_inertia(part))
+    }
+
+    /// Whether a node of a part has this name.
+    fn is_on(&self, part: &StraightPart, name: &Spanned<String>) -> bool {
+        let found = self.mesh.find_node(self.deck, name).ok();
+        found.is_some_and(|(number, _)| part.hold.nodes.contains(&self.mesh.nodes[number].node))
+    }
+
+    /// Rotations that supports, motions, joints, springs or bodies beside their node take part in.
     fn resisted_rotations(&self, connections: &[FoundJoint]) -> HashSet<Slot> {
         let slot = |number: usize| self.mesh.nodes[number].node.p;
         let named = |name: &Spanned<String>| self.mesh.find_node(self.deck, name).ok().map(|(number, _)| slot(number));
@@ -61,15 +141,25 @@ impl Composer<'_> {
         let joined = connections.iter().filter(|connection| connection.joint.kind != JointKind::Spherical);
         let aside = connections.iter().filter(|connection| connection.arms != [Vec3::ZERO; 2]);
         let sprung = self.out.springs.iter().filter(|s| s.rotation != Mat3::ZERO || s.rotation_damping != Mat3::ZERO);
-        let heavy = self.deck.bodies.iter().filter(|body| body.inertia.is_some() || body.offset != [0.0; 3]);
+        let heavy = self.deck.bodies.iter().filter(|body| body.offset != [0.0; 3]);
         let mut found: HashSet<Slot> = held.filter_map(|support| named(&support.at)).collect();
         found.extend(turned.filter_map(|motion| named(&motion.at)));
         found.extend(joined.chain(aside).flat_map(|connection| connection.nodes).flatten().map(slot));
         found.extend(sprung.map(|spring| spring.node.p));
         found.extend(heavy.filter_map(|body| named(&body.at)));
-        let mut once = HashSet::new();
-        found
-            .extend(self.mesh.beams.iter().flat_map(|beam| &beam.nodes).map(|&n| slot(n)).filter(|&p| !once.insert(p)));
         found
     }
+}
+
+/// The first of what is joined with a beam.
+fn root(part_of: &[usize], mut number: usize) -> usize {
+    while part_of[number] != number {
+        number = part_of[number];
+    }
+    number
+}
+
+fn join(part_of: &mut [usize], a: usize, b: usize) {
+    let (a, b) = (root(part_of, a), root(part_of, b));
+    part_of[a.max(b)] = a.min(b);
 }
