@@ -7,12 +7,14 @@
 use super::failure::Failure;
 use super::levels::{LARGEST_UNCOUNTED, distance};
 use super::run::{Run, Workshop};
+use super::space::Space;
 use crate::effect::resistance::Resistance;
 use crate::integrate::{Equilibrium, Method};
 use crate::kernel::Weights;
-use crate::model::{Assembly, SlotKind, charts};
-use crate::solve::{Convergence, LinearSolver, Newton, Tangent, Work, size};
+use crate::model::{Assembly, Model, SlotKind, charts};
+use crate::solve::{Convergence, Limp, LinearSolver, Newton, Tangent, Work, size};
 use crate::system::{Anchor, Slot, State};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// The first resistance lets the largest force move its node by this part of the length of the scene.
@@ -40,11 +42,23 @@ const AROUND: f64 = 0.1;
 /// What is unstable is pushed by this (lengths of the scene, radians).
 const PUSH: f64 = 1e-3;
 
+/// Steps after a push before balance is tried again: it has to grow.
+const STEPS_OF_PUSH: usize = 8;
+
+/// What has less stiffness than this part of the largest force over the length of the scene is held by nothing.
+const LOOSE: f64 = 1e-7;
+
 /// What moves further than so many lengths of the scene, nothing holds.
 const AWAY: f64 = 100.0;
 
 /// Steps in all, those that fail among them.
-const MOST_STEPS: usize = 500;
+const MOST_STEPS: usize = 2000;
+
+/// And at one load factor.
+const MOST_AT_ONCE: usize = 200;
+
+/// Prescribed motions begin with increments of this size (lengths of the scene, radians).
+const PACE: f64 = 0.02;
 
 /// The load is applied in parts; each that fails is tried again in so many.
 const DIVISOR: f64 = 4.0;
@@ -75,7 +89,7 @@ impl Run<'_> {
     pub(super) fn come_to_rest(&mut self, workshop: &mut Workshop, target: f64) -> Result<bool, Failure> {
         let start = self.good.kept();
         let mut resisted = self.resist()?;
-        let mut part = target - start.load;
+        let mut part = (target - start.load) * self.first_part(target);
         let mut arrived = true;
         while arrived && self.good.load < target {
             let rest = target - self.good.load;
@@ -95,6 +109,16 @@ impl Run<'_> {
             self.state.copy_all_but_rates(&start);
         }
         Ok(arrived)
+    }
+
+    /// The part of a load increment that prescribed motions begin with.
+    fn first_part(&mut self, target: f64) -> f64 {
+        let mut lift = Vec::new();
+        self.state.copy_all_but_rates(&self.good);
+        let moved = self.set_load(&mut lift, target).map(|moves| if moves { size(&self.model, &lift) } else { 0.0 });
+        self.state.copy_all_but_rates(&self.good);
+        // What turns too far at once tells no size.
+        PACE / moved.unwrap_or(PI).max(PACE)
     }
 
     fn resist(&self) -> Result<Resisted, Failure> {
@@ -129,8 +153,9 @@ impl Run<'_> {
             return Ok(false);
         }
         let mut resistance = gentle;
-        let mut lifts = true;
-        while gentle > 0.0 && resistance <= HARDEST * gentle && resisted.steps > 0 {
+        let (mut lifts, mut waiting) = (true, 0_usize);
+        let enough = resisted.steps.saturating_sub(MOST_AT_ONCE);
+        while gentle > 0.0 && resistance <= HARDEST * gentle && resisted.steps > enough {
             self.observer.progress(self.moment(), self.static_progress(start.load))?;
             resisted.steps -= 1;
             self.state.anchor = Some(Arc::new(Anchor { resistance, q: self.state.q.clone() }));
@@ -156,7 +181,8 @@ impl Run<'_> {
             if distance(&self.model, &start, &self.good) > AWAY {
                 return Ok(false);
             }
-            if moved >= NEAR {
+            waiting = waiting.saturating_sub(1);
+            if moved >= NEAR || waiting > 0 {
                 continue;
             }
             if !self.balances(workshop, load) {
@@ -168,7 +194,7 @@ impl Run<'_> {
             if self.count_unresisted(workshop) > Some(0) {
                 // Balance, but not at rest: what is unstable is pushed on its way.
                 self.push(resisted);
-                resistance *= HARDER;
+                waiting = STEPS_OF_PUSH;
                 continue;
             }
             self.good.copy_all_but_rates(&self.state);
@@ -213,4 +239,37 @@ impl Run<'_> {
         charts::carry(&mut self.state, &motion, &self.model.charted.rotations);
         Equilibrium.correct(&mut self.state, &motion);
     }
+
+    /// Refuses, with `failure`, a state of rest that leaves a motion which neither loads nor stiffness hold, in the plane of the stage or out
+    /// of it.
+    pub(super) fn refuse_loose_at_rest(&mut self, workshop: &mut Workshop, failure: Failure) -> Result<(), Failure> {
+        let Workshop { assembly, newton, .. } = &mut *workshop;
+        self.counters.work.factorisations += 1;
+        if is_loose_at_rest(assembly, &mut newton.solver, &self.model, &self.state) {
+            return Err(failure);
+        }
+        let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
+        self.counters.work.factorisations += 1;
+        match is_loose_at_rest(assembly, solver, &self.model, &self.state) {
+            true => Err(failure),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Whether the softest motion has no stiffness, but for what the tolerance of balance leaves: that of a motion that loads hold is a force
+/// over a length.
+fn is_loose_at_rest(assembly: &mut Assembly, solver: &mut LinearSolver, model: &Model, state: &State) -> bool {
+    assembly.forget();
+    assembly.evaluate(state, Weights::STIFFNESS, None);
+    let force = model.largest_force(&assembly.system);
+    let mut tangent = Tangent::that_may_go(assembly, state, Weights::STIFFNESS);
+    let Some(limp) = Limp::find(solver, &mut tangent, model, false) else { return false };
+    let system = tangent.look();
+    let motion = &limp.vector.motion;
+    let stiffness: f64 = system.multiply(&system.values, motion).iter().zip(motion).map(|(f, x)| f * x).sum();
+    let (_, by_slot) = limp.vector.by_slot(&system.pattern.equations, state.q.len());
+    let moves = by_slot.iter().zip(model.kinds.iter()).filter(|(_, kind)| **kind == SlotKind::Displacement);
+    let displaced = moves.map(|(u, _)| u.squared()).fold(0.0, f64::max);
+    limp.is_loose() || stiffness.abs() < LOOSE * force / model.length * displaced
 }

@@ -9,13 +9,13 @@ use crate::solve::{LinearSolver, Tangent, mechanism};
 
 /// A stage that is treated in a plane, as it is in space.
 pub(super) struct Space {
-    assembly: Assembly,
-    solver: LinearSolver,
+    pub assembly: Assembly,
+    pub solver: LinearSolver,
 }
 
 impl Run<'_> {
     /// The present stage in space, where it is treated in a plane: set up once, by the first look.
-    fn in_space<'w>(&self, workshop: &'w mut Workshop) -> Result<Option<&'w mut Space>, Failure> {
+    pub(super) fn in_space<'w>(&self, workshop: &'w mut Workshop) -> Result<Option<&'w mut Space>, Failure> {
         if workshop.space.is_none() && self.plane.is_some() {
             workshop.space = Some(self.set_up_in_space(workshop)?);
         }

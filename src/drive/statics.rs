@@ -7,7 +7,7 @@ use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Limp, NewtonFailure, Tangent, mechanism};
+use crate::solve::{Limp, NewtonFailure, Tangent};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
@@ -178,19 +178,6 @@ impl Run<'_> {
         Ok(Reached::Level)
     }
 
-    /// A state of rest may leave what no load holds: then the stage ends with `failure`.
-    fn refuse_loose_at_rest(&mut self, workshop: &mut Workshop, failure: Failure) -> Result<(), Failure> {
-        let Workshop { assembly, newton, .. } = &mut *workshop;
-        assembly.forget();
-        assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        self.counters.work.factorisations += 1;
-        let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
-        if mechanism(&mut newton.solver, &mut tangent, &self.model).is_some() {
-            return Err(failure);
-        }
-        self.refuse_loose_in_space(workshop, Weights::STIFFNESS)
-    }
-
     fn try_step(&mut self, workshop: &mut Workshop, next: f64, levels: &mut Levels) -> Tried {
         if let Err(failure) = self.attempt(workshop, next) {
             return Tried::Failed(failure);
@@ -242,12 +229,14 @@ impl Run<'_> {
         }
         let (at, steps) = (self.moment(), self.counters.steps);
         let motion = if self.state.fading.is_empty() { "" } else { IN_MOTION };
-        let message =
-            format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
-        self.warn(WarningKind::ArcLengthDetour, message);
         let increment = levels.level.clamp(DETOUR.0, DETOUR.1);
         let arrival = self.detour(workshop, &levels.start, target, increment, levels.level);
         let (end, increments) = (self.moment(), self.counters.steps - steps);
+        if increments > 0 {
+            let message =
+                format!("load control stood still at {at}: the path was followed by arc length from there{motion}");
+            self.warn_at(WarningKind::ArcLengthDetour, at, message);
+        }
         let limit = Failure::LimitPoint { at, goal: target, increments, end };
         match arrival {
             Ok(Arrival::Until) => {

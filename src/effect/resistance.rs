@@ -89,9 +89,8 @@ mod tests {
 
     #[test]
     fn moments_are_the_gradient_of_the_potential_in_every_chart() {
-        let potential = |p: Vec3, base: Vec3| {
-            0.5 * log(Rotation::new(base).r.transpose() * Rotation::new(p).r).squared()
-        };
+        let potential =
+            |p: Vec3, base: Vec3| 0.5 * log(Rotation::new(base).r.transpose() * Rotation::new(p).r).squared();
         let base = Vec3([0.4, 2.2, -1.1]);
         for p in [Vec3([0.9, 1.9, -0.6]), complement(Vec3([0.9, 2.9, -0.6])), base] {
             for axis in Vec3::UNIT {

@@ -191,7 +191,7 @@ fn check_tells_what_would_be_simulated() {
     folder.write("long.toml", &swinging(1e6));
     let text = String::from_utf8_lossy(&folder.beamsim(&["check", "long.toml"]).stdout).into_owned();
     assert!(text.contains(" of it led to stage 1, time "), "{text}");
-    folder.write("loose.toml", &GOOD.replace("fix = \"all\"", "fix = \"pin\""));
+    folder.write("loose.toml", &GOOD.replace("fix = \"all\"", "fix = [\"ux\", \"uz\", \"rx\", \"ry\", \"rz\"]"));
     let output = folder.beamsim(&["check", "loose.toml"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(status(&output) == 3 && !text.contains("run: about"), "{text}");

@@ -33,7 +33,8 @@ fn a_slender_rod_is_no_mechanism() {
 #[test]
 fn a_mechanism_of_many_elements_is_still_named() {
     let rest = format!(
-        "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[support]]\nat = \"tip\"\nfix = [\"uy\", \"uz\"]\n{STATIC}"
+        "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[support]]\nat = \"tip\"\nfix = [\"uy\", \"uz\"]\n\
+         [[load]]\nat = \"tip\"\nmoment = [1, 0, 0]\n{STATIC}"
     );
     for elements in [1, 10, 100, 1000] {
         let failure = attempt(&arm(elements, SECTION, &rest)).result.expect_err("it can spin about its axis");

@@ -90,6 +90,11 @@ fn stability_holds() {
 }
 
 #[test]
+fn states_of_rest_hold() {
+    all_hold("decks/rest", 6);
+}
+
+#[test]
 fn joints_hold() {
     all_hold("decks/joints", 25);
 }

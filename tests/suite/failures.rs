@@ -33,9 +33,10 @@ fn singular_place(text: &str) -> String {
 }
 
 #[test]
-fn a_beam_that_can_spin_is_a_mechanism() {
+fn a_beam_that_a_moment_spins_is_a_mechanism() {
     let place = singular_place(
         "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[support]]\nat = \"tip\"\nfix = [\"uy\", \"uz\"]\n\
+         [[load]]\nat = \"tip\"\nmoment = [1, 0, 0]\n\
          [[stage]]\nkind = \"static\"\nsteps = 1\n",
     );
     assert!(place.ends_with("rotation about x"), "{place}");
@@ -53,7 +54,7 @@ fn a_loose_part_is_named() {
 fn a_hinge_in_statics_is_a_mechanism() {
     let place = singular_place(
         "[[support]]\nat = \"root\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"ry\"]\n\
-         [[load]]\nat = \"tip\"\nforce = [0, 1, 0]\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
+         [[load]]\nat = \"tip\"\nforce = [0, 0, 1]\n[[stage]]\nkind = \"static\"\nsteps = 1\n",
     );
     assert!(place.contains("rotation about z") || place.contains("displacement along y"), "{place}");
 }

@@ -25,6 +25,7 @@ mod plot;
 mod random;
 mod relative;
 mod report;
+mod rest;
 mod rotations;
 mod scenes;
 mod schemes;

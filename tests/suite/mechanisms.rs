@@ -88,8 +88,11 @@ fn mechanism(kind: usize, random: &mut Random) -> Mechanism {
         0 => (String::new(), all, (0..3).flat_map(|k| [turns(origin, k), slides(k)]).collect()),
         // A pendulum.
         1 => (support("a", "pin", q), all, (0..3).map(|k| turns(origin, k)).collect()),
-        // Between two pins it spins about its axis.
-        2 => (support("a", "pin", q) + &support("b", "pin", q), all, vec![turns(origin, 0)]),
+        // Between two pins it spins about its axis, as a moment asks it to.
+        2 => {
+            let load = format!("[[load]]\nat = \"b\"\nmoment = {}\n", text(q.column(0)));
+            (support("a", "pin", q) + &support("b", "pin", q) + &load, all, vec![turns(origin, 0)])
+        }
         // Rollers that all roll the same way.
         3 => {
             let rollers = support("a", "\"uy\", \"uz\", \"rx\"", q) + &support("b", "\"uy\", \"uz\"", q);

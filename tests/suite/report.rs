@@ -123,7 +123,9 @@ fn a_run_that_fails_has_a_page_and_wrong_folders_are_told() {
     let folder = Folder::new("report_failed");
     folder.write(
         "deck.toml",
-        &DECK.replace("kind = \"dynamic\"\nend = 0.5\nstep = 0.01", "kind = \"static\"\nsteps = 2"),
+        &DECK
+            .replace("kind = \"dynamic\"\nend = 0.5\nstep = 0.01", "kind = \"static\"\nsteps = 2")
+            .replace("gravity = [0, 0, -10]", "gravity = [0, 0, 0]"),
     );
     assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--report", "--out", "r"])), 3);
     let data = data(&fs::read_to_string(folder.0.join("r/report.html")).unwrap());

@@ -35,7 +35,10 @@ impl Composer<'_> {
         let in_motion = holds(&|part| self.dynamic && !self.has_spin_inertia(part));
         let in_statics = holds(&|part| rests && !self.feels_loads(part));
         self.hold_spins(SpinHold { parts: in_motion, held_in: HeldIn::Motion }, "without inertia against it");
-        self.hold_spins(SpinHold { parts: in_statics, held_in: HeldIn::Statics }, "that no load feels: it stays as it is");
+        self.hold_spins(
+            SpinHold { parts: in_statics, held_in: HeldIn::Statics },
+            "that no load feels: it stays as it is",
+        );
     }
 
     fn hold_spins(&mut self, effect: SpinHold, which: &str) {
@@ -107,7 +110,8 @@ impl Composer<'_> {
             let mass = beam.section.at(beam.fractions[beam.nodes.len() / 2]).mass;
             mass.is_some_and(|mass| mass.offset != Vec3::ZERO || (rotary && mass.about_line.0[0][0] > 0.0))
         };
-        let of_body = self.deck.bodies.iter().filter(|body| body.inertia.is_some()).any(|body| self.is_on(part, &body.at));
+        let of_body =
+            self.deck.bodies.iter().filter(|body| body.inertia.is_some()).any(|body| self.is_on(part, &body.at));
         part.beams.iter().any(of_beam) || of_body
     }
 
