@@ -73,7 +73,7 @@ fn tell_time(loaded: &Loaded, reading: Duration) -> Result<f64, Failure> {
         None => format!("{} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}", duration(watched)),
     };
     match ended {
-        Some(Err(failure)) if !computed || matches!(failure, Failure::Deck(_) | Failure::Limit(_)) => {
+        Some(Err(failure)) if !computed || failure.is_of_start() => {
             return Err(failure);
         }
         Some(Err(failure)) => {

@@ -159,6 +159,23 @@ impl Failure {
         }
     }
 
+    /// Whether the deck itself asks for what cannot be: in a stage that cannot begin, or with a mechanism before anything is loaded.
+    pub fn is_of_start(&self) -> bool {
+        match self {
+            Self::Deck(_) | Self::Limit(_) => true,
+            Self::Singular { at, .. } => at.stage == 1 && at.time == 0.0 && at.load == 0.0,
+            Self::NotConverged { .. }
+            | Self::TurnsTooFar { .. }
+            | Self::LimitPoint { .. }
+            | Self::StepTooSmall { .. }
+            | Self::NonFinite { .. }
+            | Self::MeshTooCoarse { .. }
+            | Self::EnergyGrowth { .. }
+            | Self::Io(_)
+            | Self::Interrupted { .. } => false,
+        }
+    }
+
     /// Whether no balance was found: another way to it may find one.
     pub(super) fn is_of_balance(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::Singular { .. })

@@ -4,7 +4,7 @@ use super::failure::{Failure, Moment, Tried};
 use super::levels::Approach;
 use super::run::{Plan, Stage, StageWork};
 use crate::integrate::Scheme;
-use crate::model::{SlotKind, StageKind};
+use crate::model::StageKind;
 use crate::system::Category;
 
 /// Load levels beyond which more of them are no advice.
@@ -27,10 +27,7 @@ impl Failure {
                  spherical joint in place of a revolute one"
                     .into(),
             ),
-            Self::Singular { at, place } => {
-                let moves = place.as_ref().is_some_and(|place| place.kind == SlotKind::Displacement);
-                Some(has(at)?.hint_of_mechanism(moves))
-            }
+            Self::Singular { at, .. } => Some(has(at)?.hint_of_mechanism()),
             Self::MeshTooCoarse { .. } => Some("use more `elements` there".into()),
             Self::EnergyGrowth { at, .. } => {
                 let cures = [has(at)?.damping(), Some("take a smaller `step`".into())];
@@ -127,15 +124,14 @@ impl<'a> Has<'a> {
         format!("the path it is on does not come to this load (the rows follow it beyond its limit points): {cures}")
     }
 
-    /// `moves`: whether it is a displacement that nothing holds: loads may, in another place.
-    fn hint_of_mechanism(&self, moves: bool) -> String {
+    fn hint_of_mechanism(&self) -> String {
         let hold = "add a support, a spring or a joint that holds this direction";
-        match self.stage.work.kind() {
-            StageKind::Dynamic | StageKind::Modal => format!("{hold}, or give it mass"),
-            StageKind::Static if moves && !self.falls_before() => format!(
-                "{hold}; what only its loads hold comes to rest in a dynamic stage with `[damping]`, before this one"
-            ),
-            StageKind::Static | StageKind::Buckling => hold.into(),
+        match self.stage.work {
+            StageWork::Dynamic { .. } | StageWork::Modal { .. } => format!("{hold}, or give it mass"),
+            StageWork::Static { .. } => format!("{hold}: its loads do not, either"),
+            StageWork::Path { .. } | StageWork::Buckling { .. } => {
+                format!("{hold}; what its loads hold comes to rest in a static stage with load levels, before this one")
+            }
         }
     }
 

@@ -67,6 +67,11 @@ impl Bookkeeper {
         self.take(model, state);
     }
 
+    /// What an artificial resistance took on the way to a state of rest: all that is missing from the `total` before.
+    pub fn damp_to(&mut self, total: f64) {
+        self.ledger.damped += total - self.ledger.total();
+    }
+
     pub fn ledger(&self) -> Ledger {
         self.ledger
     }

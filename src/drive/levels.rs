@@ -50,6 +50,18 @@ pub enum Approach {
     Path,
 }
 
+/// How a stage has come to its last good state. Where levels lead on, one that is not reached is a limit of the path: the state of rest
+/// behind it is not looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Way {
+    /// It is that of its start.
+    Start,
+    /// By load levels
+    Levels,
+    /// By a motion to a state of rest, before or after levels
+    Rest,
+}
+
 /// Follows the number of negative pivots from step to step.
 pub(super) struct Stability {
     /// Whether there is something to follow
@@ -105,6 +117,7 @@ pub(super) struct Levels {
     pub stability: Stability,
     /// What nothing holds before the first level
     pub loose: Option<Failure>,
+    pub way: Way,
     increment: f64,
 }
 
@@ -118,7 +131,15 @@ impl Levels {
         loose: Option<Failure>,
     ) -> Self {
         let (start, level) = (run.state.kept(), 1.0 / steps as f64);
-        Self { start, level, approach, stability: Stability::new(run, workshop), loose, increment: level }
+        Self {
+            start,
+            level,
+            approach,
+            stability: Stability::new(run, workshop),
+            loose,
+            way: Way::Start,
+            increment: level,
+        }
     }
 
     /// The next load factor between `load` and `target`.

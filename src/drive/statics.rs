@@ -1,7 +1,7 @@
 //! Load control: equal levels, approached in smaller steps where Newton fails, and along the path where those fail too.
 
 use super::failure::Failure;
-use super::levels::{Approach, Levels};
+use super::levels::{Approach, Levels, Way};
 use super::path::Arrival;
 use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
@@ -159,7 +159,8 @@ impl Run<'_> {
         failure: Failure,
         levels: &mut Levels,
     ) -> Result<Reached, Failure> {
-        if self.is_linear() || !self.come_to_rest(workshop, target)? {
+        let total = self.bookkeeper.ledger().total();
+        if self.is_linear() || levels.way == Way::Levels || !self.come_to_rest(workshop, target)? {
             return Err(failure);
         }
         self.refuse_loose_at_rest(workshop, failure.clone())?;
@@ -174,7 +175,9 @@ impl Run<'_> {
         );
         self.warn(WarningKind::CameToRest, message);
         levels.stability.negative = levels.stability.count(self, workshop);
+        levels.way = Way::Rest;
         self.take_step(workshop, levels.stability.negative, levels)?;
+        self.bookkeeper.damp_to(total);
         Ok(Reached::Level)
     }
 
@@ -202,6 +205,7 @@ impl Run<'_> {
         self.accept(workshop)?;
         levels.stability.pass(self, workshop, negative)?;
         self.good.copy_all_but_rates(&self.state);
+        levels.way = levels.way.max(Way::Levels);
         // Where pivots were counted the stiffness is that of this state.
         if negative.is_some() {
             workshop.newton.begin_with(&workshop.assembly.system);

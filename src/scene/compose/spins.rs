@@ -34,18 +34,21 @@ impl Composer<'_> {
         };
         let in_motion = holds(&|part| self.dynamic && !self.has_spin_inertia(part));
         let in_statics = holds(&|part| rests && !self.feels_loads(part));
-        self.hold_spins(SpinHold { parts: in_motion, held_in: HeldIn::Motion }, "without inertia against it");
+        let parts = "straight part(s) free to spin about their own axis";
+        self.hold_spins(
+            SpinHold { parts: in_motion, held_in: HeldIn::Motion },
+            &format!("{parts}, without inertia against it"),
+        );
         self.hold_spins(
             SpinHold { parts: in_statics, held_in: HeldIn::Statics },
-            "that no load feels: it stays as it is",
+            &format!("{parts}, which no load feels: held as they are"),
         );
     }
 
     fn hold_spins(&mut self, effect: SpinHold, which: &str) {
-        let (name, count) = (effect.name(), effect.parts.len());
-        match count {
-            0 => self.reason(name, false, format!("no straight part is free to spin about its own axis, {which}")),
-            _ => self.push(effect, format!("{count} straight part(s) free to spin about their own axis, {which}")),
+        match effect.parts.len() {
+            0 => self.reason(effect.name(), false, format!("no {which}")),
+            count => self.push(effect, format!("{count} {which}")),
         }
     }
 
