@@ -362,6 +362,9 @@ impl<'o> Run<'o> {
             self.warn_of_round_off();
             self.warn_of_frame();
             self.warn_of_loss(&workshop);
+            if let Some(e) = &workshop.newton.time_error {
+                eprintln!("TE {:?}", e.largest());
+            }
             result?;
             self.hand_over(&mut workshop);
             self.model.end_stage(&self.state);

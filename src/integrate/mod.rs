@@ -3,10 +3,12 @@
 
 mod alpha;
 mod increments;
+mod time_error;
 mod trend;
 
 pub use alpha::{Rotations, Scheme, Step};
 pub use increments::Increments;
+pub use time_error::{Largest, TimeError};
 pub use trend::Trend;
 
 use crate::kernel::Weights;

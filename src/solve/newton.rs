@@ -8,11 +8,11 @@ use super::refinement::Refinement;
 use super::reuse::Reuse;
 use super::softest::NullVector;
 use super::tangent::Tangent;
-use crate::integrate::Method;
+use crate::integrate::{Increments, Method, TimeError};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
 use crate::real::Rough;
-use crate::system::{State, System};
+use crate::system::{Equations, State, System};
 use crate::tensor::{Vec3, zeros};
 use std::time::Instant;
 
@@ -110,6 +110,8 @@ pub struct Newton {
     pub first: Rough<3>,
     reuse: Reuse,
     foresight: Foresight,
+    /// What follows the error of time steps, where something does
+    pub time_error: Option<Box<TimeError>>,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
     given: Option<u64>,
 }
@@ -129,6 +131,7 @@ impl Newton {
             first: Rough::default(),
             reuse: Reuse::new(),
             foresight: Foresight::default(),
+            time_error: None,
             given: None,
         }
     }
@@ -185,7 +188,7 @@ impl Newton {
                     if residual.ratio > 0.0 {
                         self.polish(model, assembly, state, method, forms, work);
                     }
-                    self.end();
+                    self.end(assembly, state);
                     return Ok(());
                 }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
@@ -198,7 +201,7 @@ impl Newton {
                         self.reuse.forget();
                     } else if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
-                        self.end();
+                        self.end(assembly, state);
                         return Ok(());
                     }
                 }
@@ -220,6 +223,7 @@ impl Newton {
             } else {
                 self.reuse.keep();
             }
+            self.show_rates(assembly, state, method, work);
             let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
             if !self.find_correction(&mut tangent, lift.take(), work) {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, &mut tangent, model)));
@@ -251,9 +255,33 @@ impl Newton {
     }
 
     /// A solution is found.
-    fn end(&mut self) {
+    fn end(&mut self, assembly: &mut Assembly, state: &State) {
+        let Self { time_error, solver, dq, .. } = self;
+        if let Some(time_error) = time_error {
+            time_error.solve(solver, &mut assembly.system, state, dq);
+        }
         self.reuse.end();
         self.solver.succeeded();
+    }
+
+    /// What follows the error of a time step sees the state that a new tangent is that of.
+    fn show_rates(&mut self, assembly: &mut Assembly, state: &mut State, method: &dyn Method, work: &mut Work) {
+        let Self { time_error, solver, .. } = self;
+        if let Some(time_error) = time_error.as_mut().filter(|_| !solver.has_factorised(&assembly.system)) {
+            timed(&mut work.evaluation_seconds, || time_error.look(assembly, state, method.weights()));
+        }
+    }
+
+    /// The step that was solved last is taken from one state to another.
+    pub fn end_step(
+        &mut self,
+        equations: &Equations,
+        states: (&State, &State),
+        (method, increments): (&dyn Method, Option<&Increments>),
+    ) {
+        if let Some(time_error) = &mut self.time_error {
+            time_error.end(equations, &self.dq, states, (method.weights(), increments));
+        }
     }
 
     /// Forces and the tangent.
@@ -282,6 +310,7 @@ impl Newton {
         if !formed && !self.reuse.has_tangent() {
             self.form(assembly, state, method, work);
         }
+        self.show_rates(assembly, state, method, work);
         let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
         if self.substitute(&mut tangent, None, formed, work) && size(model, &self.dq) <= most {
             Self::add(model, state, method, &self.dq);
