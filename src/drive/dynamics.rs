@@ -99,7 +99,7 @@ impl Run<'_> {
                     if step.length < SMALLEST_PART * whole.length {
                         return Err(self.give_up(workshop, failure));
                     }
-                    self.warn_of_subdivision();
+                    self.note_failed_step();
                     self.state.copy_from(&self.good);
                     self.counters.cutbacks += 1;
                 }

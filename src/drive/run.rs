@@ -274,6 +274,8 @@ pub struct Run<'o> {
     pub(super) observer: &'o mut dyn Observer,
     pub(super) plan: Plan,
     pub(super) bookkeeper: Bookkeeper,
+    /// The total of the account where it was opened first
+    first_total: Option<f64>,
     pub(super) stage: usize,
     /// Whether loads act for the first time in this stage
     pub(super) fresh: bool,
@@ -319,6 +321,7 @@ impl<'o> Run<'o> {
             good: state.clone(),
             state,
             bookkeeper: Bookkeeper::default(),
+            first_total: None,
             model,
             plan,
             counters: Counters::default(),
@@ -361,10 +364,8 @@ impl<'o> Run<'o> {
             self.note_solver(workshop.newton.solver.name());
             self.warn_of_round_off();
             self.warn_of_frame();
-            self.warn_of_loss(&workshop);
-            if let Some(e) = &workshop.newton.time_error {
-                eprintln!("TE {:?}", e.largest());
-            }
+            self.warn_of_imbalance(&workshop);
+            self.warn_of_steps(&workshop);
             result?;
             self.hand_over(&mut workshop);
             self.model.end_stage(&self.state);
@@ -445,12 +446,14 @@ impl<'o> Run<'o> {
 
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
     pub(super) fn open_account(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+        let mut first = 0.0;
         if self.keeps_account(workshop) {
             self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
+            first = *self.first_total.get_or_insert(self.bookkeeper.ledger().total());
         }
         if let Some(guard) = &mut workshop.guard {
             let force = self.model.largest_force(&workshop.assembly.system);
-            guard.open(self.bookkeeper.ledger(), f64::EPSILON * force * self.model.length);
+            guard.open(self.bookkeeper.ledger(), first, f64::EPSILON * force * self.model.length);
         }
         if std::mem::replace(&mut self.started, true) {
             return Ok(());

@@ -1,13 +1,25 @@
 //! What a run tells its user beside its results, each thing once.
 
-use super::guard::EnergyGuard;
-use super::run::{Run, Workshop};
+use super::guard::{EnergyGuard, Imbalance};
+use super::run::{Run, StageWork, Workshop};
+use crate::integrate::{Largest, Rotations};
 use crate::model::{StageKind, charts};
 use crate::system::Slot;
+use std::f64::consts::PI;
 
 /// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
 /// their nodes: measured over 4000 orientations.
 const FRAME_ERROR: f64 = 0.0533;
+
+/// Of what moves, the estimated error of displacements that is told.
+const MOST: f64 = 0.05;
+/// The estimated error of rotations that is told, in radians: where displacements tell, too, and where nothing else moves.
+const MOST_BESIDE: f64 = 1.0;
+const MOST_ALONE: f64 = 0.3;
+/// What has gone less than this, over the length of the scene, does not move.
+const STILL: f64 = 1e-6;
+/// The error that a step is proposed for, over the one that is told.
+const AIM: f64 = 0.4;
 
 /// What has been told already.
 #[derive(Clone, Debug)]
@@ -22,7 +34,8 @@ pub(super) struct Told {
     frame: f64,
     soft: bool,
     axis: bool,
-    subdivision: bool,
+    /// In which stage steps failed, and how many
+    failed: (usize, usize),
     /// The stage in which the plane would be left
     pub unstable: Option<usize>,
 }
@@ -36,7 +49,7 @@ impl Default for Told {
             frame: 1e-2,
             soft: false,
             axis: false,
-            subdivision: false,
+            failed: (0, 0),
             unstable: None,
         }
     }
@@ -67,15 +80,60 @@ impl Run<'_> {
         }
     }
 
-    /// Energy that a scheme takes is a motion that its steps do not resolve.
-    pub(super) fn warn_of_loss(&mut self, workshop: &Workshop) {
-        if let Some(share) = workshop.guard.as_ref().and_then(EnergyGuard::loss) {
-            self.observer.warn(&format!(
-                "stage {}: the scheme has taken {:.0} % of the largest energy: its steps do not resolve part of the motion (a smaller \
-                 `step`, or less dissipation)",
-                self.stage + 1,
-                100.0 * share
-            ));
+    /// An account of the energy that does not close: steps do not resolve part of the motion.
+    pub(super) fn warn_of_imbalance(&mut self, workshop: &Workshop) {
+        let Some(Imbalance { share, is_own }) = workshop.guard.as_ref().and_then(EnergyGuard::imbalance) else { return };
+        let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
+        let failed = self.failed_steps();
+        self.observer.warn(&match () {
+            () if !is_own => format!(
+                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, most of it from the stages before: their work is \
+                 summed by the trapezoidal rule from load level to load level (more `steps` there)"
+            ),
+            () if share < 0.0 => format!(
+                "stage {stage}: the scheme has taken {percent:.0} % of the largest energy: its steps do not resolve part of the motion (a \
+                 smaller `step`, or less dissipation){failed}"
+            ),
+            () => format!(
+                "stage {stage}: the total energy is off by {percent:.0} % of the largest energy, which comes from nothing: the steps do not \
+                 resolve part of the motion (a smaller `step`, or a scheme that dissipates){failed}"
+            ),
+        });
+    }
+
+    /// Steps that are too long, by the estimate that runs along with them.
+    pub(super) fn warn_of_steps(&mut self, workshop: &Workshop) {
+        let StageWork::Dynamic { step, scheme, .. } = self.plan.stages[self.stage].work else { return };
+        let Some(error) = &workshop.newton.time_error else { return };
+        let Largest { displacement, rotation, moved } = error.largest();
+        // NaN, too, is more.
+        let is_large = |share: f64| !(share <= 1.0);
+        let of_displacements = if moved > 0.0 { displacement / moved } else { 0.0 };
+        let allowed = if moved > STILL * self.model.length { MOST_BESIDE } else { MOST_ALONE };
+        let (shares, what) = match () {
+            () if is_large(of_displacements / MOST) => {
+                (of_displacements / MOST, format!("displacements is {} of the largest motion", percent(of_displacements)))
+            }
+            () if is_large(rotation / allowed) => (rotation / allowed, format!("rotations is {}", radians(rotation))),
+            () => return,
+        };
+        // Beyond its own size an error that grows linearly tells no more.
+        let shares = if shares < 1.0 / MOST { shares } else { 1.0 / MOST };
+        let shorter = round_down(step * (AIM / shares).sqrt());
+        let turns = !is_large(of_displacements / MOST) && scheme.rotations == Rotations::Totals;
+        let other = if turns { ", or `scheme = \"lie_generalized_alpha\"`" } else { "" };
+        let (stage, failed) = (self.stage + 1, self.failed_steps());
+        self.observer.warn(&format!(
+            "stage {stage}: the time steps are too long: the estimated error of {what} (try `step = {shorter}`{other}){failed}"
+        ));
+    }
+
+    fn failed_steps(&self) -> String {
+        match self.told.failed {
+            (stage, count @ 1..) if stage == self.stage => {
+                format!("; {count} attempts at steps failed, and were taken in smaller ones")
+            }
+            _ => String::new(),
         }
     }
 
@@ -129,12 +187,13 @@ impl Run<'_> {
         }
     }
 
-    /// A fixed step fails, and is not the last that does.
-    pub(super) fn warn_of_subdivision(&mut self) {
-        if !std::mem::replace(&mut self.told.subdivision, true) {
-            let at = self.moment();
-            self.observer.warn(&format!("a step fails at {at} and is taken in smaller ones, as are others that fail"));
+    /// A fixed step fails, and is not the last that does: that matters where errors are large.
+    pub(super) fn note_failed_step(&mut self) {
+        let (stage, count) = &mut self.told.failed;
+        if std::mem::replace(stage, self.stage) != self.stage {
+            *count = 0;
         }
+        *count += 1;
     }
 
     /// A state that a stage ends in, and that the next begins with.
@@ -146,4 +205,22 @@ impl Run<'_> {
             ));
         }
     }
+}
+
+/// A share, of which more than the whole tells nothing.
+fn percent(share: f64) -> String {
+    if share < 1.0 { format!("{:.0} %", 100.0 * share) } else { "100 % or more".into() }
+}
+
+fn radians(angle: f64) -> String {
+    if angle < PI { format!("{angle:.1} rad") } else { "half a turn or more".into() }
+}
+
+/// One, two or five times a power of ten, not more than a number.
+fn round_down(x: f64) -> f64 {
+    let power = x.log10().floor();
+    let digit = x / 10.0_f64.powf(power);
+    let rounded = if digit < 2.0 { 1 } else if digit < 5.0 { 2 } else { 5 };
+    // As text, so that it is the number that is meant.
+    format!("{rounded}e{power}").parse().unwrap_or(x)
 }
