@@ -42,6 +42,11 @@ pub(super) struct Imbalance {
 /// An account that is off by more than this part of the largest energy is told.
 const UNBALANCED: f64 = 0.05;
 
+/// Whether an account that is off by a share of the largest energy is worth a warning.
+pub(super) fn is_unbalanced(share: f64) -> bool {
+    share.abs() > UNBALANCED
+}
+
 /// A stage that is off by more than this part of the whole is to blame.
 const TO_BLAME: f64 = 0.4;
 
@@ -67,6 +72,11 @@ impl EnergyGuard {
         self.balance = Balance { first, start: total, farthest: [total; 2], scale: 0.0 };
         self.balance.look(ledger);
         self.largest = size(ledger);
+    }
+
+    /// The largest kinetic + strain energy, or work from outside; zero where that is round-off.
+    pub fn scale(&self) -> f64 {
+        if self.largest > self.floor { self.balance.scale } else { 0.0 }
     }
 
     /// What the account of the run is off by.
@@ -101,7 +111,8 @@ impl Balance {
         let [of_run, of_stage] = self.farthest;
         let off = of_run - self.first;
         let is_own = (of_stage - self.start).abs() > TO_BLAME * off.abs();
-        (off.abs() > UNBALANCED * self.scale).then(|| Imbalance { share: off / self.scale, is_own })
+        let share = off / self.scale;
+        is_unbalanced(share).then_some(Imbalance { share, is_own })
     }
 }
 

@@ -275,7 +275,7 @@ pub struct Run<'o> {
     pub(super) plan: Plan,
     pub(super) bookkeeper: Bookkeeper,
     /// The total of the account where it was opened first
-    first_total: Option<f64>,
+    pub(super) first_total: Option<f64>,
     pub(super) stage: usize,
     /// Whether loads act for the first time in this stage
     pub(super) fresh: bool,

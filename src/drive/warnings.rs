@@ -1,6 +1,6 @@
 //! What a run tells its user beside its results, each thing once.
 
-use super::guard::{EnergyGuard, Imbalance};
+use super::guard::{Imbalance, is_unbalanced};
 use super::run::{Run, StageWork, Workshop};
 use crate::integrate::{Largest, Rotations};
 use crate::model::{StageKind, charts};
@@ -34,6 +34,10 @@ pub(super) struct Told {
     frame: f64,
     soft: bool,
     axis: bool,
+    /// The largest energy of dynamic stages
+    energy: f64,
+    /// That the account of the energy is off
+    unbalanced: bool,
     /// In which stage steps failed, and how many
     failed: (usize, usize),
     /// The stage in which the plane would be left
@@ -49,6 +53,8 @@ impl Default for Told {
             frame: 1e-2,
             soft: false,
             axis: false,
+            energy: 0.0,
+            unbalanced: false,
             failed: (0, 0),
             unstable: None,
         }
@@ -82,7 +88,10 @@ impl Run<'_> {
 
     /// An account of the energy that does not close: steps do not resolve part of the motion.
     pub(super) fn warn_of_imbalance(&mut self, workshop: &Workshop) {
-        let Some(Imbalance { share, is_own }) = workshop.guard.as_ref().and_then(EnergyGuard::imbalance) else { return };
+        let Some(guard) = &workshop.guard else { return self.warn_of_standstill() };
+        self.told.energy = self.told.energy.max(guard.scale());
+        let Some(Imbalance { share, is_own }) = guard.imbalance() else { return };
+        self.told.unbalanced = true;
         let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
         let failed = self.failed_steps();
         self.observer.warn(&match () {
@@ -99,6 +108,19 @@ impl Run<'_> {
                  resolve part of the motion (a smaller `step`, or a scheme that dissipates){failed}"
             ),
         });
+    }
+
+    /// A static stage takes kinetic energy away from what moved before.
+    fn warn_of_standstill(&mut self) {
+        let (Some(first), true) = (self.first_total, self.plan.energy && self.told.energy > 0.0) else { return };
+        let share = (self.bookkeeper.ledger().total() - first) / self.told.energy;
+        if is_unbalanced(share) && !std::mem::replace(&mut self.told.unbalanced, true) {
+            let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
+            self.observer.warn(&format!(
+                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy: what moved stands still since the stage began, and \
+                 works are summed by the trapezoidal rule from load level to load level"
+            ));
+        }
     }
 
     /// Steps that are too long, by the estimate that runs along with them.
