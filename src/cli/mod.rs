@@ -191,6 +191,8 @@ pub enum Status {
     GaveUp = 3,
     /// A file could not be read or written
     Io = 4,
+    /// An accuracy was not reached; the results are the best that were found
+    Missed = 5,
     /// SIGINT
     Interrupted = 130,
     /// SIGTERM

@@ -23,10 +23,12 @@ pub struct Outcome<'a> {
     pub text: &'a str,
 }
 
-/// An accuracy that was wanted and reached.
+/// An accuracy that was wanted, and what was reached.
 pub struct Reached {
     /// Columns with what was wanted of each and the estimated error, over the largest value of its kind
     pub columns: Vec<(String, f64, f64)>,
+    /// Whether all estimates are what was wanted
+    pub is_reached: bool,
     /// What was set in the deck for it
     pub settings: Vec<String>,
     /// Runs that it took to find
@@ -98,10 +100,16 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
             "solve": outcome.counters.work.solve_seconds,
         },
     });
-    if let Some(Reached { columns, settings, runs, seconds }) = outcome.reached {
+    if let Some(Reached { columns, is_reached, settings, runs, seconds }) = outcome.reached {
         let column = |(name, wanted, estimate): &(String, f64, f64)| (name.clone(), json!([wanted, estimate]));
         let columns: Map<String, Value> = columns.iter().map(column).collect();
-        record["accuracy"] = json!({ "columns": columns, "settings": settings, "runs": runs, "seconds": seconds });
+        record["accuracy"] = json!({
+            "reached": is_reached,
+            "columns": columns,
+            "settings": settings,
+            "runs": runs,
+            "seconds": seconds,
+        });
     }
     if let Err(failure) = outcome.result {
         record["failure"] = numbers(failure);

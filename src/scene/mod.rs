@@ -15,9 +15,12 @@ mod section;
 
 pub use compose::Reason;
 pub use mesh::{Mesh, MeshBeam, Rule};
+pub use names::Spot;
 pub use section::{MassPerLength, SectionMatrices};
 
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Spanned, StageBody};
+use crate::deck::{
+    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Spanned, StageBody,
+};
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
 use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;
@@ -254,6 +257,11 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
     })
+}
+
+/// Where a point is that stands in a deck by its name or its coordinates.
+pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Option<Vec3> {
+    names::place(deck, point).ok()
 }
 
 /// The rotations of all nodes, and the elements beam by beam.
