@@ -17,3 +17,4 @@ pub mod study;
 pub mod system;
 pub mod tensor;
 pub mod threads;
+pub mod warning;

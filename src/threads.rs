@@ -43,25 +43,25 @@ pub fn in_order<T: Send, R: Send>(
     if !are_given() {
         return items.for_each(|item| take(work(item)));
     }
-    let slots: Vec<Mutex<Slot<T, R>>> = items.map(|item| Mutex::new(Slot::Item(item))).collect();
-    at_once(slots.len(), &|number| {
-        let mut slot = slots[number].lock().unwrap_or_else(PoisonError::into_inner);
-        if let Slot::Item(item) = std::mem::replace(&mut *slot, Slot::Empty) {
-            *slot = Slot::Result(work(item));
+    let jobs: Vec<Mutex<Job<T, R>>> = items.map(|item| Mutex::new(Job::Waiting(item))).collect();
+    at_once(jobs.len(), &|number| {
+        let mut job = jobs[number].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Job::Waiting(item) = std::mem::replace(&mut *job, Job::Running) {
+            *job = Job::Done(work(item));
         }
     });
-    for slot in slots {
-        if let Slot::Result(result) = slot.into_inner().unwrap_or_else(PoisonError::into_inner) {
+    for job in jobs {
+        if let Job::Done(result) = job.into_inner().unwrap_or_else(PoisonError::into_inner) {
             take(result);
         }
     }
 }
 
 /// One item of work: before it is done, while it is done, and what came of it.
-enum Slot<T, R> {
-    Item(T),
-    Empty,
-    Result(R),
+enum Job<T, R> {
+    Waiting(T),
+    Running,
+    Done(R),
 }
 
 /// Does numbered work, one number at a time a thread. The machinery of rayon is compiled once, here, not once for each caller.

@@ -1,8 +1,9 @@
 //! `beamsim check`
 
 use super::load::Loaded;
+use super::run::status_of;
 use super::{Status, Verdict, json, load, on_threads, say, threads_of};
-use crate::drive::Moment;
+use crate::drive::{Failure, Moment, refusal};
 use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
@@ -24,9 +25,13 @@ pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
             Ok(loaded) => {
                 let reading = begun.elapsed();
                 say::line(&format!("{}: {}", path.display(), loaded.scene.title.as_deref().unwrap_or("(no title)")));
-                match tell(&loaded.scene) {
-                    Ok(()) => json::check(path, &loaded.scene, Some(tell_time(&loaded, reading))),
-                    Err(message) => verdict.fail(Status::Wrong, "deck", message),
+                let told = tell(&loaded.scene).map_err(Failure::Deck).and_then(|()| tell_time(&loaded, reading));
+                match told {
+                    Ok(seconds) => json::check(path, &loaded.scene, Some(seconds)),
+                    Err(failure) => {
+                        hint(&failure, &loaded.scene);
+                        verdict.fail(status_of(&failure), failure.name(), failure.to_string());
+                    }
                 }
             }
             Err(refusal) => verdict.refuse(refusal),
@@ -55,20 +60,39 @@ fn tell(scene: &Scene) -> Result<(), String> {
     size.map(|_| ())
 }
 
-/// How long a run will take. One that an accuracy is wanted of begins with a search among other meshes and steps.
-fn tell_time(loaded: &Loaded, reading: Duration) -> f64 {
+/// How long a run will take; `Err` where it ends before it has computed anything. One that an accuracy is wanted of begins with a search
+/// among other meshes and steps.
+fn tell_time(loaded: &Loaded, reading: Duration) -> Result<f64, Failure> {
     let count = threads_of(&loaded.scene, None);
-    let Forecast { seconds, watched, ended, at } = threads::on(count, || forecast(&loaded.scene, PATIENCE));
+    let Forecast { seconds, watched, ended, computed, at } = threads::on(count, || forecast(&loaded.scene, PATIENCE));
     let whole = duration(seconds + reading.as_secs_f64());
     let Moment { stage, time, load } = at;
-    let how = match ended {
+    let how = match &ended {
         Some(Ok(())) => "it was run to its end".into(),
-        Some(Err(failure)) => format!("it was run, and ends with `{}`", failure.name()),
+        Some(Err(_)) => "it was run, and fails".into(),
         None => format!("{} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}", duration(watched)),
     };
+    match ended {
+        Some(Err(failure)) if !computed || matches!(failure, Failure::Deck(_) | Failure::Limit(_)) => {
+            return Err(failure);
+        }
+        Some(Err(failure)) => {
+            say::note(&format!("warning: a run ends as `{}`: {failure}", failure.name()));
+            hint(&failure, &loaded.scene);
+            say::count_warnings(1);
+        }
+        _ => {}
+    }
     let own = if loaded.deck.accuracy.is_some() { ", with its own elements and steps" } else { "" };
     say::line(&format!("run: about {whole} on this machine{}{own} ({how})", on_threads(count)));
-    seconds + reading.as_secs_f64()
+    Ok(seconds + reading.as_secs_f64())
+}
+
+/// What to try after a failure.
+fn hint(failure: &Failure, scene: &Scene) {
+    if let Some(hint) = failure.hint(&scene.plan) {
+        say::note(&format!("hint: {hint}"));
+    }
 }
 
 /// In few digits: more are not known.
@@ -82,13 +106,18 @@ fn duration(seconds: f64) -> String {
     }
 }
 
+/// A number, with a power of ten where it is very large or very small.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e16).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
 fn tell_beams(mesh: &Mesh) {
     for beam in &mesh.beams {
         let count = beam.elements.len();
         say::line(&format!(
             "beam {}: length {}, {count} elements of order {}, {} nodes",
             beam.name,
-            beam.line.length,
+            number(beam.line.length),
             beam.order,
             beam.nodes.len()
         ));
@@ -104,7 +133,12 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
     let k = section.stiffness;
     say::line(&format!(
         "  section{place}: EA {} GA [{}, {}] GJ {} EI [{}, {}]",
-        k[0][0], k[1][1], k[2][2], k[3][3], k[4][4], k[5][5]
+        number(k[0][0]),
+        number(k[1][1]),
+        number(k[2][2]),
+        number(k[3][3]),
+        number(k[4][4]),
+        number(k[5][5])
     ));
     let coupled = (0..6).any(|i| (0..i).any(|j| k[i][j] != 0.0));
     if coupled {
@@ -114,18 +148,26 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
         let j = mass.about_line.0;
         say::line(&format!(
             "  rhoA {} rhoJ [{}, {}, {}] mass centre {:?}",
-            mass.mass, j[0][0], j[1][1], j[2][2], mass.offset.0
+            number(mass.mass),
+            number(j[0][0]),
+            number(j[1][1]),
+            number(j[2][2]),
+            mass.offset.0
         ));
     }
 }
 
-/// Mass, centre and inertia about the centre, in the initial placement.
+/// Mass, centre and inertia about the centre, in the initial placement. Moments are taken about a node: far from the origin those about it
+/// are differences of large numbers.
 fn tell_mass(scene: &Scene) {
-    let (mut mass, mut first, mut about_origin) = (0.0, Vec3::ZERO, Mat3::ZERO);
+    let own = scene.mesh.nodes.first().map(|node| node.place);
+    let about = own.or_else(|| scene.bodies.first().map(|body| body.place)).unwrap_or(Vec3::ZERO);
+    let (mut mass, mut first, mut second) = (0.0, Vec3::ZERO, Mat3::ZERO);
     let mut add = |m: f64, centre: Vec3, own: Mat3| {
+        let arm = centre - about;
         mass += m;
-        first += centre * m;
-        about_origin += own + (Mat3::diagonal([centre.squared(); 3]) - centre.outer(centre)) * m;
+        first += arm * m;
+        second += own + steiner(arm, m);
     };
     for beam in &scene.mesh.beams {
         for element in scene.mesh.elements_of(beam) {
@@ -134,23 +176,30 @@ fn tell_mass(scene: &Scene) {
                 let inertia = section.turned(station.axes);
                 let place = element.between(&station.shape);
                 let d = inertia.offset;
-                let about_line = inertia.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * inertia.mass;
+                let about_line = inertia.about_node - steiner(d, inertia.mass);
                 add(inertia.mass * station.weight, place + d, about_line * station.weight);
             }
         }
     }
     for body in &scene.bodies {
         let d = body.inertia.offset;
-        let own = body.inertia.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.inertia.mass;
-        add(body.inertia.mass, body.place + d, own);
+        add(body.inertia.mass, body.place + d, body.inertia.about_node - steiner(d, body.inertia.mass));
     }
     if mass == 0.0 {
         return say::line("mass: none given");
     }
-    let centre = first * (1.0 / mass);
-    let inertia = about_origin - (Mat3::diagonal([centre.squared(); 3]) - centre.outer(centre)) * mass;
-    say::line(&format!("mass {mass}, centre {:?}", centre.0));
+    let arm = first * (1.0 / mass);
+    let inertia = second - steiner(arm, mass);
+    if !(mass.is_finite() && arm.is_finite() && inertia.max_abs().is_finite()) {
+        return say::line("mass: its sums are beyond the range of floating-point numbers");
+    }
+    say::line(&format!("mass {}, centre {:?}", number(mass), (about + arm).0));
     say::line(&format!("inertia about the centre {:?}", inertia.0));
+}
+
+/// What a mass off an axis adds to the inertia.
+fn steiner(arm: Vec3, mass: f64) -> Mat3 {
+    (Mat3::diagonal([arm.squared(); 3]) - arm.outer(arm)) * mass
 }
 
 /// States, forces, mesh, elements and the places of their blocks: as much as so many vectors a slot, as measured for chains of a million
@@ -169,7 +218,7 @@ fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
     let begun = model.begin_stage(0, kind, &state);
-    let equations = begun.map_err(|error| format!("the first stage cannot begin: {error:?}"))?;
+    let equations = begun.map_err(|error| format!("stage 1: {}", refusal(&error, &model)))?;
     let (free, slots) = (equations.count(), model.slots());
     let context = scene.plan.stages[0].context(0);
     let shares = model.shares(&context, &equations);

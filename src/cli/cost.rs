@@ -125,7 +125,7 @@ fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path)
         json::wrote("cost", &folder.join(file));
     }
     if let Some(error) = journal.trouble() {
-        say::note(&format!("warning: runs were not kept for another time: {error}"));
+        say::note(&format!("warning[io]: runs were not kept for another time: {error}"));
     }
     let whole = |run: &Run| run.trial.is_some() && (!run.frontier || run.timing.alone > 0);
     if found.runs.iter().all(whole) { journal.close().map_err(io) } else { Ok(()) }

@@ -2,7 +2,7 @@
 
 use super::say;
 use crate::deck::EffectWord;
-use crate::output::Record;
+use crate::output::{Record, warnings};
 use crate::scene::Scene;
 use crate::study::ablation::{Ablation, Variant};
 use crate::study::{Comparison, Judgement};
@@ -41,6 +41,7 @@ pub fn check(deck: &Path, scene: &Scene, seconds: Option<f64>) {
             "unknowns": scene.plan.model.slots() * 3,
             "effects": effects,
             "seconds": seconds,
+            "warnings": warnings(scene.warnings.iter()),
         }),
     );
 }

@@ -85,8 +85,9 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Refu
             )
         });
     }
-    if !warnings.is_empty() {
-        say::note(&render(&label, &text, &warnings));
+    let new: Vec<Diagnostic> = warnings.into_iter().filter(|warning| say::is_new(path, &warning.message)).collect();
+    if !new.is_empty() {
+        say::note(&render(&label, &text, &new));
     }
     Ok(Loaded { text, deck, scene })
 }
@@ -123,16 +124,44 @@ pub fn text(path: &Path) -> Result<String, Refusal> {
 fn expected_failures(deck: &Deck) -> Vec<String> {
     let name = |expect: &deck::Expect| match &expect.body {
         ExpectBody::Fails(name) => Some(name.value.clone()),
-        ExpectBody::Column { .. } => None,
+        ExpectBody::Column { .. } | ExpectBody::Warns(_) | ExpectBody::Quiet => None,
     };
     deck.expects.iter().filter_map(name).collect()
 }
 
-/// Messages as the user sees them.
+/// Messages as the user sees them; of warnings that differ in names and numbers only the first is shown, with the lines of the others.
 pub fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));
-    sorted.iter().map(|d| d.render(path, text, say::styled()) + "\n").collect::<Vec<_>>().join("\n")
+    let mut shown: Vec<(&Diagnostic, Vec<usize>)> = Vec::new();
+    for diagnostic in sorted {
+        let same = |(first, _): &&mut (&Diagnostic, Vec<usize>)| {
+            diagnostic.is_warning() && first.is_warning() && bare(&first.message) == bare(&diagnostic.message)
+        };
+        let line = diagnostic.span.as_ref().map(|span| {
+            text.as_bytes()[..span.start.min(text.len())].iter().filter(|byte| **byte == b'\n').count() + 1
+        });
+        match (shown.iter_mut().find(same), line) {
+            (Some((_, others)), Some(line)) => others.push(line),
+            _ => shown.push((diagnostic, Vec::new())),
+        }
+    }
+    let one = |(diagnostic, others): &(&Diagnostic, Vec<usize>)| {
+        let lines: Vec<String> = others.iter().map(usize::to_string).collect();
+        let others = match &lines[..] {
+            [] => String::new(),
+            [line] => format!("the same warning holds of line {line}\n"),
+            lines => format!("the same warning holds of lines {}\n", lines.join(", ")),
+        };
+        format!("{}\n{others}", diagnostic.render(path, text, say::styled()))
+    };
+    shown.iter().map(one).collect::<Vec<_>>().join("\n")
+}
+
+/// A message without names and numbers.
+fn bare(message: &str) -> String {
+    let words = message.split('`').step_by(2).collect::<String>();
+    words.chars().filter(|c| !c.is_ascii_digit() && !['.', '-'].contains(c)).collect()
 }
 
 /// The name of a deck: its file without the extension.

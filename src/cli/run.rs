@@ -3,7 +3,7 @@
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
 use super::{Status, Verdict, json, load, on_threads, report, say, signals, threads_of};
-use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot};
+use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Row, RowCounter, Rows,
     remove_fields, remove_if_there,
@@ -139,7 +139,7 @@ impl Watcher<'_> {
 
     /// Tells of a run that is over.
     fn retell(&mut self, outcome: study::Outcome) -> (Result<(), Failure>, Counters) {
-        outcome.warnings.iter().for_each(|message| self.warn(message));
+        outcome.counters.findings.warnings.iter().for_each(|warning| self.warn(warning));
         let written = outcome.history().try_for_each(|(at, values)| self.write(at, values).map(|_| ()));
         self.modes = outcome.found;
         (written.and(outcome.ended), outcome.counters)
@@ -167,15 +167,15 @@ impl Observer for Watcher<'_> {
         Ok(())
     }
 
-    fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.modes.push_loads(stage, loads);
         Ok(())
     }
 
-    fn warn(&mut self, message: &str) {
+    fn warn(&mut self, warning: &Warning) {
         say::count_warnings(1);
-        self.progress.note(&format!("warning: {message}"));
+        self.progress.note(&warning.to_string());
     }
 
     fn progress(&mut self, at: Moment, done: f64) -> Result<(), Failure> {
@@ -316,7 +316,7 @@ fn summarise(name: &str, scene: &Scene, finished: &Finished, folder: &Path) {
             if !matches!(failure, Failure::Io(_)) {
                 say::line(&format!("  what was reached: {}", folder.join("history.partial.csv").display()));
             }
-            if let Some(hint) = failure.hint() {
+            if let Some(hint) = failure.hint(&scene.plan) {
                 say::note(&format!("hint: {hint}"));
             }
         }

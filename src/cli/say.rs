@@ -1,9 +1,11 @@
 //! Words to the user. A closed pipe is a quiet end.
 
+use std::collections::BTreeSet;
 use std::io::{self, IsTerminal, Write};
 use std::num::NonZero;
-use std::sync::OnceLock;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How the user wants to be spoken to.
@@ -50,6 +52,13 @@ pub fn denies_warnings() -> bool {
 /// Takes note of warnings that were said.
 pub fn count_warnings(count: usize) {
     WARNINGS.fetch_add(count, Ordering::Relaxed);
+}
+
+/// Whether a message about a file is said for the first time.
+pub fn is_new(file: &Path, message: &str) -> bool {
+    static SAID: Mutex<BTreeSet<(PathBuf, String)>> = Mutex::new(BTreeSet::new());
+    let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
+    said.insert((file.into(), message.into()))
 }
 
 /// How many there were.

@@ -33,8 +33,8 @@ pub struct Motion {
     pub what: MotionWhat,
     /// What the directions mean
     pub axes: Option<Axes>,
-    /// The name of the history
-    pub history: Option<Spanned<String>>,
+    /// Its history
+    pub history: Option<HistoryUse>,
     /// Stages from 1
     pub stages: Option<Vec<usize>>,
     /// Where the table stands
@@ -74,7 +74,7 @@ pub struct Joint {
     /// About or along the axis
     pub damping: f64,
     /// A prescribed angle or displacement, with its history
-    pub motor: Option<(f64, Option<Spanned<String>>)>,
+    pub motor: Option<(f64, Option<HistoryUse>)>,
     /// Where the table stands
     pub span: Span,
 }
@@ -208,8 +208,8 @@ pub struct Load {
     pub moment: Option<LoadVector>,
     /// Of its components
     pub frame: Frame,
-    /// The name of the history
-    pub history: Option<Spanned<String>>,
+    /// Its history
+    pub history: Option<HistoryUse>,
     /// Stages from 1
     pub stages: Option<Vec<usize>>,
     /// Where the table stands
@@ -240,6 +240,22 @@ pub struct Initial {
     pub about: Option<Spanned<super::PointRef>>,
     /// Where the table stands
     pub span: Span,
+}
+
+/// `history = "h"`, or `history = { name = "h", stages = [2] }`
+#[derive(Clone, Debug)]
+pub struct HistoryUse {
+    /// The name of the history
+    pub name: Spanned<String>,
+    /// The stages that it belongs to, from 1: in others it stands still. Left out: it is read in all.
+    pub stages: Option<Vec<usize>>,
+}
+
+impl HistoryUse {
+    /// Whether it is read in a stage, from 1.
+    pub fn goes_on_in(&self, stage: usize) -> bool {
+        self.stages.as_ref().is_none_or(|stages| stages.contains(&stage))
+    }
 }
 
 /// `[history.NAME]`
@@ -370,12 +386,32 @@ fn read_stages(table: &Table) -> Option<Option<Vec<usize>>> {
     Some(Some(numbers.into_iter().collect::<Option<_>>()?))
 }
 
+/// The history that a table names; `None` where it names none, or a wrong one, which is reported. `acting`: the stages in
+/// which the table itself acts, where it does not in all.
+pub(super) fn read_history_use(table: &Table, acting: Option<&Vec<usize>>) -> Option<HistoryUse> {
+    let (context, item) = (table.context, table.get("history")?);
+    if !matches!(item.get_ref(), DeValue::Table(_)) {
+        return Some(HistoryUse { name: context.text(item)?, stages: None });
+    }
+    let named = Table::new(context, item, "`history`", &["name", "stages"])?;
+    let (name, stages) = (required_text(&named, "name"), read_stages(&named)?);
+    let (name, stages) = (name?, stages);
+    let idle = |stage: &&usize| acting.is_some_and(|acting| !acting.contains(stage));
+    if let Some(stage) = stages.iter().flatten().find(idle) {
+        let message =
+            format!("the history `{}` belongs to stage {stage}, in which {} does not act", name.value, table.what);
+        context.report(Diagnostic::error(message, named.key_span("stages")));
+    }
+    Some(HistoryUse { name, stages })
+}
+
 pub(super) fn read_motion<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Motion> {
     let keys = ["at", "ux", "uy", "uz", "rotate", "angle", "axes", "history", "stages"];
     let table = Table::new(context, item, "[[motion]]", &keys)?;
     let at = required_text(&table, "at");
     let what = read_motion_what(&table);
-    let (axes, stages, history) = (read_axes(&table), read_stages(&table), table.text("history"));
+    let (axes, stages) = (read_axes(&table), read_stages(&table));
+    let history = read_history_use(&table, stages.iter().flatten().next());
     Some(Motion { at: at?, what: what?, axes: axes?, history, stages: stages?, span: table.span.clone() })
 }
 
@@ -437,7 +473,7 @@ pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
     let motor = ["angle", "displacement"].into_iter().find(|key| table.has(key));
     let motor = match motor {
         None => None,
-        Some(key) => Some((table.number(key)?.value, table.text("history"))),
+        Some(key) => Some((table.number(key)?.value, read_history_use(&table, None))),
     };
     if motor.is_none() && table.has("history") {
         let message = "`history` of a joint belongs to `angle` or `displacement`";
@@ -647,7 +683,8 @@ pub(super) fn read_load<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     } else {
         Some(Frame::Space)
     };
-    let (stages, history) = (read_stages(&table), table.text("history"));
+    let stages = read_stages(&table);
+    let history = read_history_use(&table, stages.iter().flatten().next());
     Some(Load {
         target: target?,
         force: force?,

@@ -4,6 +4,7 @@ use super::diagnostic::{Diagnostic, Spanned};
 use super::geometry::InterpolationWord;
 use super::reader::{Context, Item, Table, choose};
 use super::{Deck, StageBody};
+use crate::warning::WarningKind;
 use toml::de::DeValue;
 
 /// `[cost]`; what is left out is chosen by the study.
@@ -101,7 +102,7 @@ pub fn warn_of_idle_keys(top: &Table, deck: &Deck) {
             "step" | "step_tolerance" | "scheme" if !moves => "there is no dynamic stage whose steps could vary",
             _ => continue,
         };
-        top.context.report(Diagnostic::warning(message, key.span()));
+        top.context.report(Diagnostic::warning(WarningKind::IdleCostKey, message, key.span()));
     }
 }
 

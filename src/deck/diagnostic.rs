@@ -1,5 +1,6 @@
 //! What is wrong with a deck, where, and what was probably meant.
 
+use crate::warning::WarningKind;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::ops::Range;
 
@@ -45,7 +46,7 @@ pub struct Diagnostic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The run goes on.
-    Warning,
+    Warning(WarningKind),
     /// Something in the text
     Error,
     /// Larger than the stated bounds
@@ -72,8 +73,8 @@ impl Diagnostic {
     }
 
     /// A warning at a place.
-    pub fn warning(message: impl Into<String>, span: Span) -> Self {
-        Self { severity: Severity::Warning, ..Self::error(message, span) }
+    pub fn warning(kind: WarningKind, message: impl Into<String>, span: Span) -> Self {
+        Self { severity: Severity::Warning(kind), ..Self::error(message, span) }
     }
 
     /// A number beyond the stated bounds.
@@ -83,7 +84,7 @@ impl Diagnostic {
 
     /// Whether the run goes on.
     pub fn is_warning(&self) -> bool {
-        self.severity == Severity::Warning
+        matches!(self.severity, Severity::Warning(_))
     }
 
     /// With a word at the caret.
@@ -106,8 +107,10 @@ impl Diagnostic {
 
     /// The diagnostic as text, with the lines it speaks of.
     pub fn render(&self, path: &str, text: &str, styled: bool) -> String {
-        let level = if self.is_warning() { Level::WARNING } else { Level::ERROR };
-        let title = level.primary_title(&self.message);
+        let title = match self.severity {
+            Severity::Warning(kind) => Level::WARNING.primary_title(&self.message).id(kind.name()),
+            Severity::Error | Severity::Limit => Level::ERROR.primary_title(&self.message),
+        };
         let mut group = match &self.span {
             Some(span) => {
                 let mut snippet = Snippet::source(text).path(path);

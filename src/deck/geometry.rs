@@ -1,5 +1,6 @@
 //! Points, materials, sections and beams.
 
+use super::action::{HistoryUse, read_history_use};
 use super::diagnostic::{Diagnostic, Span, Spanned};
 use super::reader::{Context, Item, Table, choose, kind_of};
 use toml::de::DeValue;
@@ -125,7 +126,7 @@ pub struct FreeStrain {
     /// Gamma1 Gamma2 Gamma3 K1 K2 K3 in section axes
     pub strain: [f64; 6],
     /// How it goes; without one it ramps like a load
-    pub history: Option<Spanned<String>>,
+    pub history: Option<HistoryUse>,
 }
 
 /// `[[beam]]`
@@ -419,7 +420,7 @@ fn read_free_strain(table: &Table) -> Option<Option<FreeStrain>> {
         return Some(None);
     };
     let strain = table.context.vector::<6>(item)?;
-    Some(Some(FreeStrain { strain: strain.value, history: table.text("history") }))
+    Some(Some(FreeStrain { strain: strain.value, history: read_history_use(table, None) }))
 }
 
 fn read_sections(context: &Context, item: &Item) -> Option<Vec<Spanned<String>>> {

@@ -1,6 +1,7 @@
 //! `--set key=value`: changes a deck before it is read.
 
-use toml_edit::{DocumentMut, Item, Key, Table, Value};
+use super::procedure::COEFFICIENTS;
+use toml_edit::{DocumentMut, Item, Key, Table, TableLike, Value};
 
 /// Applies `key=value` pairs to the text of a deck and gives the changed text.
 ///
@@ -12,6 +13,7 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
     }
     // A deck that is no TOML is reported when it is read, with the line.
     let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(text.to_string()) };
+    let mut given = Vec::new();
     for setting in settings {
         let Some((path, value)) = setting.split_once('=') else {
             return Err(format!("--set {setting}: expected KEY=VALUE"));
@@ -19,8 +21,38 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
         let keys = Key::parse(path.trim()).map_err(|_| format!("--set {setting}: `{path}` is no key"))?;
         set(document.as_item_mut(), &keys, read_value(value.trim()))
             .map_err(|why| format!("--set {setting}: {why}"))?;
+        given.push(keys.iter().map(|key| key.get().to_string()).collect::<Vec<_>>());
+    }
+    for path in &given {
+        if let [list, number, key] = &path[..]
+            && (list.as_str(), key.as_str()) == ("stage", "scheme")
+        {
+            let is_given = |key: &str| given.iter().any(|path| path[..] == ["stage", number, key]);
+            drop_coefficients(&mut document, number, is_given);
+        }
     }
     Ok(document.to_string())
+}
+
+/// Takes the coefficients of the scheme that a stage had before out of it, unless they are given as well.
+fn drop_coefficients(document: &mut DocumentMut, number: &str, is_given: impl Fn(&str) -> bool) {
+    let Ok(number) = number.parse::<usize>() else { return };
+    let stage: Option<&mut dyn TableLike> = match document.get_mut("stage") {
+        Some(Item::ArrayOfTables(stages)) => stages.get_mut(number).map(|stage| stage as &mut dyn TableLike),
+        Some(Item::Value(Value::Array(stages))) => {
+            stages.get_mut(number).and_then(Value::as_inline_table_mut).map(|stage| stage as &mut dyn TableLike)
+        }
+        _ => None,
+    };
+    let Some(stage) = stage else { return };
+    let Some(scheme) = stage.get("scheme").and_then(Item::as_str).map(str::to_string) else { return };
+    // A scheme that there is not is told when the deck is read.
+    let known = COEFFICIENTS.iter().any(|(_, owners)| owners.contains(&scheme.as_str()));
+    for (key, owners) in COEFFICIENTS {
+        if known && !owners.contains(&scheme.as_str()) && !is_given(key) {
+            stage.remove(key);
+        }
+    }
 }
 
 fn read_value(text: &str) -> Value {
@@ -139,6 +171,23 @@ mod tests {
         assert!(with("at.load=1").contains("{ load = 1 }"));
         assert!(with("output.every=2").contains("[output]\nevery = 2"));
         assert!(with("history.h.expr=t").contains("expr = \"t\""));
+    }
+
+    #[test]
+    fn another_scheme_has_other_coefficients() {
+        let tables = "[[stage]]\nscheme = \"generalized_alpha\"\nrho_inf = 0.5\nstep = 1\n";
+        let inline = "stage = [{ scheme = \"newmark\", beta = 0.3, gamma = 0.6, step = 1 }]\n";
+        let with = |deck: &str, settings: &[&str]| {
+            apply(deck, &settings.iter().map(|s| s.to_string()).collect::<Vec<_>>()).unwrap()
+        };
+        let newmark = with(tables, &["stage.0.scheme=newmark"]);
+        assert!(!newmark.contains("rho_inf") && newmark.contains("scheme = \"newmark\"") && newmark.contains("step"));
+        // The same coefficient, and what is said to be wanted, stay.
+        assert!(with(tables, &["stage.0.scheme=lie_generalized_alpha"]).contains("rho_inf = 0.5"));
+        assert!(with(tables, &["stage.0.scheme=newmark", "stage.0.rho_inf=0.8"]).contains("rho_inf = 0.8"));
+        assert!(with(tables, &["stage.0.scheme=newmerk"]).contains("rho_inf"));
+        let hht = with(inline, &["stage.0.alpha=0.1", "stage.0.scheme=hht"]);
+        assert!(!hht.contains("beta") && !hht.contains("gamma") && hht.contains("alpha = 0.1"), "{hht}");
     }
 
     #[test]

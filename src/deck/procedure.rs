@@ -4,6 +4,7 @@ use super::cost::SCHEMES;
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
 use super::geometry::{PointRef, read_point};
 use super::reader::{Context, Item, Table, kind_of};
+use crate::warning::WarningKind;
 use toml::de::DeValue;
 
 /// `[[stage]]`
@@ -142,6 +143,10 @@ pub enum ExpectBody {
     },
     /// A failure of this name
     Fails(Spanned<String>),
+    /// A warning of this kind
+    Warns(WarningKind),
+    /// No warning that puts an answer in doubt
+    Quiet,
 }
 
 /// Which rows an expectation looks at.
@@ -357,7 +362,7 @@ fn read_dynamic(table: &Table) -> Option<StageBody> {
 }
 
 /// The coefficients that each scheme has.
-const COEFFICIENTS: [(&str, &[&str]); 4] = [
+pub(super) const COEFFICIENTS: [(&str, &[&str]); 4] = [
     ("beta", &["newmark"]),
     ("gamma", &["newmark"]),
     ("alpha", &["hht"]),
@@ -406,7 +411,10 @@ fn read_step_tolerance(table: &Table) -> Option<Option<f64>> {
         let (message, span) = ("`step_tolerance` belongs to adaptive = true", table.key_span("step_tolerance"));
         // Where steps are said to be fixed, the tolerance waits for another day: studies turn the one without the other.
         let said = table.has("adaptive");
-        table.context.report(if said { Diagnostic::warning(message, span) } else { Diagnostic::error(message, span) });
+        table.context.report(match said {
+            true => Diagnostic::warning(WarningKind::IdleStepTolerance, message, span),
+            false => Diagnostic::error(message, span),
+        });
     }
     Some(None)
 }
@@ -451,21 +459,54 @@ pub(super) fn read_output(top: &Table) -> Output {
     }
 }
 
-const EXPECT_KEYS: [&str; 10] =
-    ["column", "at", "reduce", "value", "rtol", "atol", "below", "above", "source", "fails"];
+const EXPECT_KEYS: [&str; 11] =
+    ["column", "at", "reduce", "value", "rtol", "atol", "below", "above", "source", "fails", "warns"];
 
 pub(super) fn read_expect<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Expect> {
     let table = Table::new(context, item, "[[expect]]", &EXPECT_KEYS)?;
     let source = table.text("source").map(|t| t.value);
-    let body = if table.has("fails") { read_fails(&table) } else { read_column(&table) };
+    let body = if table.has("fails") {
+        read_fails(&table)
+    } else if table.has("warns") {
+        read_warns(&table)
+    } else {
+        read_column(&table)
+    };
     Some(Expect { body: body?, source, span: table.span.clone() })
+}
+
+/// Reports the first key beside `own` that an expectation of a whole run has no use for.
+fn refuse_keys_beside(table: &Table, own: &str, what: &str) -> Option<()> {
+    match EXPECT_KEYS.into_iter().find(|key| ![own, "source"].contains(key) && table.has(key)) {
+        Some(key) => table.context.wrong(table.key_span(key), format!("{what} has no `{key}`")),
+        None => Some(()),
+    }
+}
+
+fn read_warns(table: &Table) -> Option<ExpectBody> {
+    let context = table.context;
+    refuse_keys_beside(table, "warns", "an expected warning")?;
+    let item = table.get("warns")?;
+    let name = match item.get_ref() {
+        DeValue::Boolean(false) => return Some(ExpectBody::Quiet),
+        DeValue::String(name) => name,
+        _ => return context.wrong(item.span(), "`warns` is the name of a warning, or false"),
+    };
+    if let Some(kind) = WarningKind::of(name) {
+        return Some(ExpectBody::Warns(kind));
+    }
+    let names = WarningKind::ALL.iter().map(|kind| kind.name());
+    let diagnostic = Diagnostic::error(format!("there is no warning `{name}`"), item.span());
+    context.report(match nearest(name, names) {
+        Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
+        None => diagnostic.help("`beamsim explain expect.warns` lists the warnings"),
+    });
+    None
 }
 
 fn read_fails(table: &Table) -> Option<ExpectBody> {
     let context = table.context;
-    if let Some(key) = EXPECT_KEYS.into_iter().find(|key| !["fails", "source"].contains(key) && table.has(key)) {
-        return context.wrong(table.key_span(key), format!("an expected failure has no `{key}`"));
-    }
+    refuse_keys_beside(table, "fails", "an expected failure")?;
     let name = table.text("fails")?;
     if FAILURES.contains(&name.value.as_str()) {
         return Some(ExpectBody::Fails(name));
@@ -491,7 +532,7 @@ fn read_column(table: &Table) -> Option<ExpectBody> {
             return context.wrong(table.key_span(key), format!("`{key}` belongs to a `value`"));
         }
         if !table.has("below") && !table.has("above") {
-            return context.wrong(table.span.clone(), "[[expect]] needs `value`, `below`, `above` or `fails`");
+            return context.wrong(table.span.clone(), "[[expect]] needs `value`, `below`, `above`, `fails` or `warns`");
         }
         None
     };

@@ -6,13 +6,14 @@
 
 use super::direction::Direction;
 use super::failure::Failure;
-use super::levels::{NO_MOTION, distance};
-use super::run::{Run, Workshop};
+use super::levels::{LARGEST_CONTRACTION, NO_MOTION, distance};
+use super::run::{CriticalKind, CriticalLoad, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
 use crate::system::{State, System};
 use crate::tensor::Vec3;
+use crate::warning::WarningKind;
 use nalgebra::Complex;
 
 /// How far the state is moved along the path to see the tangent vary: lengths of the scene, and radians.
@@ -27,11 +28,21 @@ const NEAR: f64 = 1e-4;
 const SEEN: f64 = 1e-3;
 /// A state that has moved so many times further than the tangent said has come down on another branch.
 const LEAP: f64 = 8.0;
+/// Just before a limit point a unit of load moves the scene so many times further than at the start: by the root of one over [`CLOSED`].
+const RUNS_AWAY: f64 = 50.0;
+/// States on both sides of a critical load that are further apart than this do not lie on one path.
+const APART: f64 = 1e-3;
 /// States of one load that lie nearer together than this are one.
 const SAME: f64 = 1e-5;
 /// A step along the path moves nothing further than this, in lengths of the scene and radians: a longer one may come down on
 /// another branch.
 const STRIDE: f64 = 0.5;
+/// Where the tangent is extrapolated, so much of the way to where it would be singular lies between two looks,
+const STRIDE_AHEAD: f64 = 0.15;
+/// so near is the last one,
+const NEAREST_EXTRAPOLATION: f64 = 5e-3;
+/// and there are so many.
+const MOST_EXTRAPOLATIONS: usize = 48;
 /// The path is not followed in steps smaller than this part of the way.
 const SMALLEST_PART: f64 = 1e-4;
 /// Imaginary part up to which a critical load counts as real, relative; double ones come apart a little.
@@ -51,13 +62,16 @@ impl Run<'_> {
         self.change_charts(None);
         self.open_account(workshop)?;
         self.warn_out_of_balance(workshop);
-        let mut loads = self.critical_loads(workshop, modes)?;
+        let loads = self.critical_loads(workshop, modes)?;
         if loads.is_empty() {
             return Err(Failure::Deck("no load of this scene takes stiffness away: nothing can buckle (under following loads it may flutter: \
                  see a modal stage)".into()));
         }
         let start = self.state.clone();
+        // Next to a critical load round-off moves the scene along; the load itself is closed in by pivots.
+        let uncertainty = self.counters.work.uncertainty;
         let mut passed = [0, 0];
+        let mut found = Vec::new();
         for number in 0..loads.len() {
             let back = loads[number] < load;
             // Of the loads on this side of the present one it is number `before`.
@@ -66,13 +80,20 @@ impl Run<'_> {
             // The look from the start is as much work as a search.
             let count = loads.len() as f64;
             let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
-            loads[number] = self.follow(workshop, loads[number], before, &done)?;
+            let mut critical = self.follow(workshop, loads[number], before, &done)?;
             self.state.copy_from(&start);
             self.good.copy_from(&start);
+            if critical.kind == CriticalKind::Estimate {
+                critical.load = self.extrapolate(workshop, loads[number], before)?.unwrap_or(critical.load);
+                self.state.copy_from(&start);
+                self.good.copy_from(&start);
+            }
+            found.push(critical);
         }
-        loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
+        self.counters.work.uncertainty = uncertainty;
+        found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.count_steps();
-        self.observer.buckling(self.stage + 1, &loads)
+        self.observer.buckling(self.stage + 1, &found)
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the
@@ -84,17 +105,28 @@ impl Run<'_> {
         estimate: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<f64, Failure> {
+    ) -> Result<CriticalLoad, Failure> {
         let way = (estimate - self.state.load).signum();
+        let start_rate = self.size_of_rate(workshop)?;
         let none = self.negative_pivots(workshop);
-        let mut search =
-            Search { here: self.state.clone(), beyond: None, estimate, stretch: 1.0, way, seen: estimate, ended: None };
+        let mut search = Search {
+            here: self.state.clone(),
+            beyond: None,
+            behind: None,
+            estimate,
+            stretch: 1.0,
+            way,
+            seen: estimate,
+            ended: None,
+        };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
-                if search.is_a_limit(found) {
+                let is_apart = |behind: &State| distance(&self.model, &search.here, behind) > APART;
+                if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.state.copy_from(&search.here);
                     self.judge_mesh()?;
-                    return Ok(found);
+                    let kind = self.kind_of_critical(workshop, start_rate)?;
+                    return Ok(CriticalLoad { load: found, kind });
                 }
                 break;
             }
@@ -117,6 +149,7 @@ impl Run<'_> {
             };
             if passed > before {
                 search.beyond = Some(target);
+                search.behind = Some(self.state.clone());
                 search.ended = None;
                 search.stretch = 1.0;
             } else {
@@ -127,8 +160,55 @@ impl Run<'_> {
                 );
             }
         }
-        self.warn_of_estimate(search.estimate, search.here.load, search.ended);
-        Ok(search.estimate)
+        self.warn_of_estimate(search.here.load, search.ended);
+        Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+    }
+
+    /// What lies just ahead of the present state: towards a limit point the path moves without bounds.
+    fn kind_of_critical(&mut self, workshop: &mut Workshop, start_rate: f64) -> Result<CriticalKind, Failure> {
+        let runs_away = self.size_of_rate(workshop)? > RUNS_AWAY * start_rate;
+        Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
+    }
+
+    /// How far a unit of load moves the scene at the present state, in lengths of it and radians.
+    fn size_of_rate(&mut self, workshop: &mut Workshop) -> Result<f64, Failure> {
+        let Some(Direction { rate, .. }) = self.path_direction(workshop)? else { return Ok(0.0) };
+        let sizes = rate.iter().zip(self.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+        Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.model.length)).fold(0.0, f64::max))
+    }
+
+    /// A structure that an imperfection lets turn aside has no critical point. From smaller loads its tangent looks like that of the perfect one:
+    /// there the load at which it seems to be singular does not move, until the imperfection is felt. That load, of the critical
+    /// load with `before` others below it; `None` where nothing is seen.
+    fn extrapolate(&mut self, workshop: &mut Workshop, first: f64, before: usize) -> Result<Option<f64>, Failure> {
+        let way = (first - self.state.load).signum();
+        let mut last: Option<Sight> = None;
+        let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
+        for _ in 0..MOST_EXTRAPOLATIONS {
+            let load = self.state.load;
+            let ahead = self.critical_loads(workshop, before + 4)?;
+            let Some(critical) = ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before) else {
+                break;
+            };
+            let now = Sight { from: load, critical };
+            let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
+            if drift < least_drift {
+                least_drift = drift;
+                steadiest = Some(last.map_or(critical, |last| 0.5 * (critical + last.critical)));
+            }
+            last = Some(now);
+            if (critical - load).abs() < NEAREST_EXTRAPOLATION * critical.abs() {
+                break;
+            }
+            let none = self.negative_pivots(workshop);
+            self.good.copy_from(&self.state);
+            if self.continue_path(workshop, load + STRIDE_AHEAD * (critical - load)) != Walked::There
+                || self.negative_pivots(workshop) != none
+            {
+                break;
+            }
+        }
+        Ok(steadiest)
     }
 
     /// Whether the state is on another branch than one before it: it has moved much further than the path goes there, or does not
@@ -159,7 +239,7 @@ impl Run<'_> {
         mut critical: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
-    ) -> Result<f64, Failure> {
+    ) -> Result<CriticalLoad, Failure> {
         let mut walked = Walked::There;
         for _ in 0..MOST_LOOKS {
             self.observer.progress(self.moment(), self.static_progress(done(0.0)))?;
@@ -170,7 +250,7 @@ impl Run<'_> {
             let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
             critical = next;
             if (critical - from).abs() <= NEAR * critical.abs() {
-                return Ok(critical);
+                return Ok(CriticalLoad { load: critical, kind: CriticalKind::Branch });
             }
             let target = critical - 0.5 * NEAR * (critical - self.state.load).signum() * critical.abs();
             walked = self.continue_path(workshop, target);
@@ -178,17 +258,22 @@ impl Run<'_> {
                 break;
             }
         }
-        self.warn_of_estimate(critical, self.state.load, Some(walked));
-        Ok(critical)
+        self.warn_of_estimate(self.state.load, Some(walked));
+        Ok(CriticalLoad { load: critical, kind: CriticalKind::Estimate })
     }
 
-    fn warn_of_estimate(&mut self, critical: f64, from: f64, ended: Option<Walked>) {
+    fn warn_of_estimate(&mut self, from: f64, ended: Option<Walked>) {
         let coarse = ended == Some(Walked::TooCoarse);
-        let why = if coarse { ", since the mesh does not tell the shape there: use more `elements`" } else { "" };
+        let why = if coarse {
+            "beyond it the mesh is too coarse for the shape: use more `elements`"
+        } else {
+            "a structure with a small imperfection bends aside and has none"
+        };
         let message = format!(
-            "the buckling load {critical} is an estimate from load factor {from}: the path could not be followed to it{why}"
+            "a buckling load is an estimate, extrapolated from smaller loads: no critical point was found on the path up to load factor \
+             {from} ({why})"
         );
-        self.observer.warn(&message);
+        self.warn(WarningKind::BucklingEstimate, message);
     }
 
     /// Of the tangent at the present state, where it is symmetric.
@@ -232,6 +317,9 @@ impl Run<'_> {
     /// One step along the path: how far it moved, where it came down near by.
     fn step_along(&mut self, workshop: &mut Workshop, load: f64) -> Option<f64> {
         self.attempt(workshop, load).ok()?;
+        if workshop.newton.contraction > LARGEST_CONTRACTION && !self.is_linear() {
+            return None;
+        }
         let moved = distance(&self.model, &self.good, &self.state);
         (self.is_linear() || moved <= STRIDE).then_some(moved)
     }
@@ -258,7 +346,7 @@ impl Run<'_> {
         let symmetric = stable && self.model.multipliers.is_empty();
         let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
         let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
-        let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default();
+        let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default().values;
         let load = self.state.load;
         let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
         let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();
@@ -284,10 +372,25 @@ impl Run<'_> {
     }
 }
 
+/// What a critical load looks like from a load.
+struct Sight {
+    from: f64,
+    critical: f64,
+}
+
+impl Sight {
+    /// How fast it moves with the load from which it is seen.
+    fn drift_since(&self, last: &Self) -> f64 {
+        ((self.critical - last.critical) / (self.from - last.from)).abs()
+    }
+}
+
 /// A critical load between a state that lies before it and a load that lies beyond.
 struct Search {
     here: State,
     beyond: Option<f64>,
+    /// The state at the load that lies beyond, where load control comes to it
+    behind: Option<State>,
     /// What it looks like from here
     estimate: f64,
     /// How much farther than the estimate the next look goes: it may fall short again and again
@@ -329,6 +432,7 @@ impl Search {
     /// The path by load control ends before this load.
     fn end_at(&mut self, load: f64, walked: Walked) {
         self.beyond = Some(load);
+        self.behind = None;
         self.ended = Some(walked);
         self.stretch = 1.0;
         self.estimate = 0.5 * (self.here.load + load);

@@ -99,7 +99,7 @@ impl Run<'_> {
                     if step.length < SMALLEST_PART * whole.length {
                         return Err(self.give_up(workshop, failure));
                     }
-                    self.note_failed_step();
+                    self.warn_of_subdivision();
                     self.state.copy_from(&self.good);
                     self.counters.cutbacks += 1;
                 }

@@ -1,6 +1,6 @@
 //! What a run can end with, by name and with its numbers.
 
-use crate::model::{Model, SlotKind};
+use crate::model::{Jump, Model, MotionKind, MotorJump, Reading, SlotKind, StageError, StageKind};
 use crate::tensor::Vec3;
 use std::fmt;
 
@@ -31,46 +31,8 @@ pub struct Place {
 pub struct Tried {
     /// Attempts that were taken back
     pub cutbacks: u64,
-    /// Whether it was a time step
-    pub dynamic: bool,
-    /// Whether it was an increment of arc length
-    pub path: bool,
-    /// Whether it was a load level that is not linear in the load factor, so that arc length could not follow
-    pub nonlinear: bool,
     /// Whether round-off takes the stiffness of the softest motion
     pub soft: bool,
-    /// Whether there are beams, whose mesh may be too coarse
-    pub beams: bool,
-}
-
-impl Tried {
-    fn hint(&self) -> &'static str {
-        match self {
-            Self { soft: true, .. } => {
-                "round-off takes the stiffness of the softest motion (see the warning): use fewer elements of a higher order"
-            }
-            Self { dynamic: true, beams: true, .. } => {
-                "smaller steps were tried: damp what the step does not resolve (`generalized_alpha` with a smaller `rho_inf`), take a smaller `step`, or more \
-                 elements where it turns most"
-            }
-            Self { dynamic: true, .. } => {
-                "smaller steps were tried: damp what the step does not resolve (`generalized_alpha` with a smaller `rho_inf`), or take a smaller `step`"
-            }
-            Self { path: true, .. } => {
-                "shorter increments were tried: the mesh may be too coarse where it turns most, or a branch cross the path (a small side \
-                 force chooses one)"
-            }
-            Self { nonlinear: true, cutbacks: 1.., .. } => {
-                "smaller load levels were tried: a limit load may lie just ahead, around which only arc length leads, and that follows no \
-                 `history` and no `frame` (load and unload in stages of their own, with `stages = [1]` in a load)"
-            }
-            Self { cutbacks: 1.., .. } => {
-                "smaller load levels and arc length were tried: the mesh may be too coarse where it turns most, or a buckling load \
-                 lie just ahead (a small side force chooses a branch)"
-            }
-            _ => "let the stage take smaller levels: `adaptive`, or more `steps`",
-        }
-    }
 }
 
 /// A failure of a run. The names are part of the contract with users.
@@ -201,40 +163,6 @@ impl Failure {
     pub(super) fn is_of_balance(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::Singular { .. })
     }
-
-    /// What to try.
-    pub fn hint(&self) -> Option<&'static str> {
-        match self {
-            Self::NotConverged { tried, .. } => Some(tried.hint()),
-            Self::TurnsTooFar { .. } => Some(
-                "use smaller steps; in a dynamic stage in which nothing should turn so fast the step does not resolve the motion: damp \
-                 what it cannot resolve (a smaller `rho_inf`)",
-            ),
-            Self::LimitPoint { .. } => Some(
-                "the path it is on does not come to this load (the rows follow it beyond its limit points): more `steps` may keep it on another; else \
-                 load it less, \
-                 prescribe a motion in place of the load, or let it move in a dynamic stage",
-            ),
-            Self::StepTooSmall { .. } => Some(
-                "accelerations jump there from step to step: let the scheme damp them (a smaller `rho_inf`), take fixed steps, or a larger \
-                 `step_tolerance`",
-            ),
-            Self::Singular { place: Some(place), .. } if place.is_joint() => Some(
-                "a support, another joint or a loop of rigid parts holds the same already: release one of them, for example by a \
-                 spherical joint in place of a revolute one",
-            ),
-            Self::Singular { .. } => {
-                Some("add a support, a spring or a joint that holds this direction, or give it mass")
-            }
-            Self::MeshTooCoarse { .. } => Some("use more `elements` there"),
-            Self::EnergyGrowth { .. } => Some(
-                "the time step does not resolve the motion: damp what it cannot resolve (scheme = \"generalized_alpha\", or a smaller \
-                 `rho_inf` where it is that already), or take a smaller `step`; where the growth is meant, raise `energy_limit`",
-            ),
-            Self::NonFinite { .. } => Some("look for values near the limits of floating-point numbers in the deck"),
-            Self::Deck(_) | Self::Limit(_) | Self::Io(_) | Self::Interrupted { .. } => None,
-        }
-    }
 }
 
 impl fmt::Display for Moment {
@@ -322,5 +250,88 @@ pub(super) fn place(model: &Model, slot: usize, direction: Vec3) -> Place {
         node: model.node_at(slot),
         kind: model.kinds[slot],
         direction: direction.normalized().unwrap_or(Vec3::ZERO),
+    }
+}
+
+/// Why a stage cannot begin.
+pub fn refusal(error: &StageError, model: &Model) -> String {
+    let node = |slot: u32| model.node_at(slot as usize);
+    match error {
+        StageError::Conflict(conflict) => format!(
+            "constraints on node \"{}\" act along directions that are neither the same nor orthogonal",
+            node(conflict.slot)
+        ),
+        StageError::Jump(Jump { motion, from, to }) => {
+            let motion = &model.motions[*motion];
+            let turns = motion.kind == MotionKind::Rotation;
+            let name = node(motion.slot);
+            if from == to {
+                return format!("the motion of node \"{name}\" turns it about another axis than it has turned about");
+            }
+            let (from, to) = (size(*from, turns), size(*to, turns));
+            format!("the motion of node \"{name}\" would have to jump from {from} to {to}")
+        }
+        StageError::TurnedHinge(slot) => format!(
+            "a support takes hold of single rotation components of node \"{}\", which has already turned",
+            node(*slot)
+        ),
+        StageError::MotorJump(MotorJump { slot, turns, from, to, .. }) => {
+            let (from, to) = (size(*from, *turns), size(*to, *turns));
+            format!("the motor of the {} would have to jump from {from} to {to}", node(*slot))
+        }
+        StageError::NothingGrows(StageKind::Buckling) => {
+            "no load and no motion grows with the load factor: nothing can buckle".into()
+        }
+        StageError::NothingGrows(_) => {
+            "control = \"arc_length\" needs a load or a motion that grows with the load factor".into()
+        }
+        StageError::NoMass => "a modal stage needs mass: nothing that is free to move has any".into(),
+    }
+}
+
+/// What helps where stage number `stage` (from 0) cannot begin.
+pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<String> {
+    let driven = |own_stages: Option<bool>| match own_stages {
+        None if stage == 0 => {
+            "a dynamic stage starts where the scene is: give it a `history` that begins with 0".into()
+        }
+        None => "give it a `history` that begins there".into(),
+        Some(false) => format!(
+            "a history is read over the load factor in static stages and over the clock in dynamic ones: `history = {{ name = …, \
+             stages = [{}] }}` begins with this stage and holds its first value before",
+            stage + 1
+        ),
+        Some(true) => "its history must begin where the stages before have left it".into(),
+    };
+    match error {
+        StageError::Jump(Jump { from, to, .. }) if from == to => None,
+        StageError::Jump(jump) => {
+            let history = model.motions[jump.motion].history.as_ref();
+            // At the very start there is no stage before that could hold anything.
+            match history.map(Reading::has_own_stages) {
+                Some(false) if stage == 0 => Some(START.into()),
+                own_stages => Some(driven(own_stages)),
+            }
+        }
+        StageError::MotorJump(jump) => match model.amplitudes[jump.amplitude].has_own_stages() {
+            Some(_) if stage == 0 => Some(START.into()),
+            own_stages => Some(driven(own_stages)),
+        },
+        StageError::TurnedHinge(_) => Some("hold all three, or hold them from the first stage on".into()),
+        StageError::Conflict(_) | StageError::NothingGrows(_) | StageError::NoMass => None,
+    }
+}
+
+/// What helps where the first stage is dynamic.
+const START: &str =
+    "a dynamic stage starts where the scene is: its history must begin with 0 there, or a static stage come before it";
+
+/// A displacement, or an angle in radians and degrees.
+fn size(value: f64, turns: bool) -> String {
+    let short = (value * 1e4).round() / 1e4;
+    match turns {
+        true if value == 0.0 => "0".into(),
+        true => format!("{short} rad ({:.1}°)", value.to_degrees()),
+        false => value.to_string(),
     }
 }

@@ -14,6 +14,9 @@ use crate::threads;
 /// A level is not approached in smaller parts than this.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
 
+/// Nor, in parts of the stage, where it has few levels.
+const SMALLEST_OF_STAGE: f64 = 1.0 / 65536.0;
+
 /// Where round-off takes the stiffness smaller parts hardly help.
 const SMALLEST_SOFT_PART: f64 = 1.0 / 16.0;
 
@@ -22,6 +25,13 @@ const CLOSE: f64 = 1.0 / 256.0;
 
 /// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
 const JUMP: f64 = 8.0;
+
+/// A step whose corrections grow has left the neighbourhood of the path: where they do not contract, it was too long (Deuflhard 2011, Newton
+/// Methods for Nonlinear Problems, 5.1).
+pub(super) const LARGEST_CONTRACTION: f64 = 1.0;
+
+/// The same where no pivots tell whether it ended on another branch.
+const LARGEST_UNCOUNTED: f64 = 0.5;
 
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.
 const BACK: f64 = -0.5;
@@ -116,8 +126,11 @@ impl Levels {
     /// Takes the next step half as long; `false` where it may not be. `soft`: round-off takes the stiffness of the softest motion.
     pub fn halve(&mut self, soft: bool) -> bool {
         let smaller = 0.5 * self.increment;
-        let smallest = if soft { SMALLEST_SOFT_PART } else { SMALLEST_PART };
-        let may = self.approach != Approach::Straight && smaller >= smallest * self.level;
+        let smallest = match soft {
+            true => SMALLEST_SOFT_PART * self.level,
+            false => (SMALLEST_PART * self.level).min(SMALLEST_OF_STAGE),
+        };
+        let may = self.approach != Approach::Straight && smaller >= smallest;
         self.increment = if may { smaller } else { self.increment };
         may
     }
@@ -130,6 +143,15 @@ impl Levels {
     /// Load control begins anew.
     pub fn restart(&mut self) {
         self.increment = self.level;
+    }
+
+    /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points
+    /// at once, of which each may have a branch that the path turns into.
+    pub fn may_have_strayed(&self, contraction: f64, negative: Option<usize>) -> bool {
+        match self.stability.negative.zip(negative) {
+            Some((before, after)) => contraction > LARGEST_CONTRACTION || before.abs_diff(after) > 1,
+            None => contraction > LARGEST_UNCOUNTED,
+        }
     }
 
     /// Whether a step may have gone to another branch: it went back against the `first` correction, or it changed the number of

@@ -5,22 +5,29 @@ mod control;
 mod direction;
 mod dynamics;
 mod failure;
+mod findings;
 mod grid;
 mod guard;
 mod handover;
+mod hint;
 mod ledger;
 mod levels;
 mod modal;
 mod path;
+mod rehearsal;
+mod rigid;
 mod run;
 mod space;
 mod start;
 mod statics;
 mod warnings;
 
-pub use failure::{Failure, Moment, Place};
+pub use failure::{Failure, Moment, Place, refusal, refusal_help};
+pub use findings::{Findings, StabilityVerdict, StageStability, Warning};
 pub use ledger::Ledger;
 pub use levels::Approach;
+pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use run::{
-    Counters, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage, StageWork, Until,
+    Counters, CriticalKind, CriticalLoad, Event, EventKind, InitialMotion, Mode, Observer, Plan, Run, Snapshot, Stage,
+    StageWork, Until,
 };

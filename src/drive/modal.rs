@@ -1,26 +1,61 @@
 //! Small motions about the state that was reached: (s^2 M + s C + K) x = 0.
 
 use super::failure::Failure;
+use super::rigid::rigid_motions;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
-use crate::model::Model;
-use crate::solve::{
-    Convergence, LinearSolver, Operator, Tangent, Verdict, is_symmetric, largest_eigenvalues, mechanism, timed,
-};
+use crate::model::{Model, StageError};
+use crate::solve::{Convergence, Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, Verdict, mechanism, timed};
 use crate::system::System;
+use crate::tensor::Vec3;
+use crate::warning::WarningKind;
 use nalgebra::Complex;
 
 /// Part of the lowest frequencies at which the first look is taken.
 const FIRST_SHIFT: f64 = 1e-4;
-/// Part of the lowest frequency found at which the second is taken: near enough to tell rigid motions from elastic ones.
-const SECOND_SHIFT: f64 = 0.3;
+/// Part of the lowest frequency found at which the others are taken: near enough to tell rigid motions from elastic ones.
+const SHIFT: f64 = 0.3;
+/// A shift is near enough if it is not larger than this part of the lowest frequency.
+const NEAR_SHIFT: f64 = 0.5;
+/// Looks until the shift is near enough
+const MOST_LOOKS: usize = 6;
+/// More than asked for are searched where the number of unstable ones is not known.
+const SPARE: usize = 24;
+/// Shifts further out from which unstable modes are searched then, times the first
+const FURTHER: [f64; 2] = [10.0, 100.0];
+/// Times that a shift is moved up until nothing grows faster
+const MOST_DOUBLINGS: usize = 64;
+/// Times that more modes are searched where some are missing.
+const MOST_SEARCHES: usize = 4;
 /// Two frequencies that agree to this are one, and the more unstable mode comes first.
 const SAME_FREQUENCY: f64 = 1e-7;
-/// Damping forces below this part of inertia and stiffness forces are none.
-const NO_DAMPING: f64 = 1e-14;
+/// Exponents that agree to this, relative, are one that two looks have found.
+const SAME: f64 = 1e-6;
+/// Growth above this part of |s| is no round-off.
+const GROWS: f64 = 1e-6;
+/// Motions slower than this part of the others tell nothing of their frequencies.
+const FREE: f64 = 1e-4;
+/// Uncertainty of a frequency that is told.
+const TOLD: f64 = 1e-3;
+
+/// The modes of a stage, and what is known about them.
+#[derive(Default)]
+struct Found {
+    motions: Vec<SmallMotion>,
+    /// Rigid motions of free parts
+    rigid: usize,
+    /// Unstable modes that are known to be there and were not found
+    missing: usize,
+}
+
+impl Found {
+    fn growing(&self) -> usize {
+        self.motions.iter().filter(|motion| grows(motion)).count()
+    }
+}
 
 impl Run<'_> {
-    /// The modes with the lowest frequencies.
+    /// The modes with the lowest frequencies, and all unstable ones.
     pub(super) fn run_modal(&mut self, workshop: &mut Workshop, modes: usize) -> Result<(), Failure> {
         self.observer.progress(self.moment(), self.static_progress(0.0))?;
         let moving = self.state.clone();
@@ -31,11 +66,16 @@ impl Run<'_> {
         self.open_account(workshop)?;
         self.warn_out_of_balance(workshop);
         let matrices = self.matrices(workshop);
-        let found = self.find_modes(workshop, &matrices, modes)?;
+        let rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);
+        let found = self.find_modes(workshop, &matrices, rigid, modes)?;
+        let mut listed = listed(&found, modes);
+        listed.iter_mut().for_each(|motion| self.refine(workshop, motion));
+        self.warn_of_modes(&found, &listed);
         self.count_steps();
         // What moved moves on.
         self.state.copy_rates(&moving);
-        self.observer.modes(self.stage + 1, &found)
+        let listed: Vec<Mode> = listed.iter().map(mode).collect();
+        self.observer.modes(self.stage + 1, &listed)
     }
 
     /// No velocities: modes and paths are looked at from rest.
@@ -50,11 +90,12 @@ impl Run<'_> {
         let loose = Convergence { tolerance: 1e-5 };
         let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, noise, None);
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
-            self.observer
-                .warn("the state of a modal or buckling stage is not in balance: let a static stage come before it");
+            let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
+            self.warn(WarningKind::OutOfBalance, message);
         }
     }
 
+    /// K, C and M; the system is left with K and the forces.
     fn matrices(&mut self, workshop: &mut Workshop) -> Matrices {
         let assembly = &mut workshop.assembly;
         let mut part = |weights: Weights| {
@@ -66,75 +107,201 @@ impl Run<'_> {
         Matrices { stiffness, damping, mass }
     }
 
-    /// Twice: the second time about a shift that suits the frequencies themselves.
-    fn find_modes(&mut self, workshop: &mut Workshop, matrices: &Matrices, modes: usize) -> Result<Vec<Mode>, Failure> {
-        let moment = self.moment();
-        // Two looks, which take most of the stage.
-        let ends = [0.5, 1.0].map(|done| self.static_progress(done));
-        let Workshop { assembly, newton, .. } = workshop;
-        let [stiffest, heaviest, dampest] =
-            [&matrices.stiffness, &matrices.mass, &matrices.damping].map(|v| largest(v));
-        if heaviest == 0.0 {
-            return Err(Failure::Deck("a modal stage needs mass: nothing that is free to move has any".into()));
+    /// A few looks place the shift below the lowest frequency; then all modes are searched from there.
+    fn find_modes(
+        &mut self,
+        workshop: &mut Workshop,
+        matrices: &Matrices,
+        rigid: Vec<Vec<f64>>,
+        modes: usize,
+    ) -> Result<Found, Failure> {
+        if matrices.mass.iter().all(|&m| m == 0.0) {
+            return Err(self.describe(StageError::NoMass));
         }
-        let mut shift = FIRST_SHIFT * softest_ratio(&assembly.system, matrices).unwrap_or(stiffest / heaviest).sqrt();
-        if shift == 0.0 {
+        let mut shift = FIRST_SHIFT * matrices.softest_frequency(&workshop.assembly.system);
+        if shift == 0.0 || !shift.is_finite() {
             // Nothing holds anything: every mode is a free motion.
             shift = 1.0;
         }
-        let damped = dampest > NO_DAMPING * (stiffest * heaviest).sqrt();
-        let mut found = Vec::new();
-        for (look, end) in ends.into_iter().enumerate() {
-            self.observer.progress(moment, end)?;
-            matrices.combine(shift, &mut assembly.system.values);
-            self.counters.work.factorisations += 1;
-            let done = newton.solver.factorise_surely(&assembly.system);
-            let loose = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, &self.state), &self.model);
-            if !done || loose.is_some() {
-                // Rigid motions are no zeros but round-off: a shift by a part of that leaves nothing to solve with, and the first look stands.
-                if look > 0 {
-                    break;
-                }
-                return Err(self.name_mechanism(loose, &assembly.system));
+        self.refuse_massless_mechanisms(workshop, matrices, shift)?;
+        let failed = || Failure::Limit("the modes could not be found: a solve with the tangent failed".into());
+        let Workshop { assembly, newton, .. } = workshop;
+        let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid);
+        for look in 0..MOST_LOOKS {
+            let done = 0.5 * look as f64 / MOST_LOOKS as f64;
+            self.observer.progress(self.moment(), self.static_progress(done))?;
+            let sizes = search.factorise(shift).then(|| search.roughly_nearest()).flatten().ok_or_else(failed)?;
+            let Some(lowest) = lowest(&sizes) else { break };
+            if look > 0 && shift <= NEAR_SHIFT * lowest {
+                break;
             }
-            let system = &assembly.system;
-            let symmetric = !damped && is_symmetric(&system.pattern, &matrices.stiffness);
-            let mut operator = Motions { system, matrices, solver: &mut newton.solver, shift, symmetric };
-            let wanted = if symmetric { modes } else { 2 * modes + 2 };
-            let found_values =
-                timed(&mut self.counters.work.solve_seconds, || largest_eigenvalues(&mut operator, wanted));
-            let Some(values) = found_values else {
-                return Err(Failure::Limit("the modes could not be found: a solve with the tangent failed".into()));
-            };
-            found = if symmetric { undamped(&values, shift) } else { damped_modes(&values, shift) };
-            sort(&mut found);
-            found.truncate(modes);
-            // Rigid motions are those that the first look finds far below the others.
-            let highest = found.iter().map(Mode::size).fold(0.0, f64::max);
-            let lowest = found.iter().map(Mode::size).filter(|&size| size > 1e-4 * highest).fold(highest, f64::min);
-            if look == 0 && lowest > 0.0 {
-                shift = SECOND_SHIFT * lowest;
-            }
+            shift = SHIFT * lowest;
         }
-        Ok(found)
+        self.observer.progress(self.moment(), self.static_progress(0.5))?;
+        let found = timed(&mut self.counters.work.solve_seconds, || find_all(&mut search, shift, modes));
+        self.counters.work.factorisations += search.factorisations;
+        found.ok_or_else(failed)
+    }
+
+    /// What neither stiffness nor mass holds.
+    fn refuse_massless_mechanisms(
+        &mut self,
+        workshop: &mut Workshop,
+        matrices: &Matrices,
+        shift: f64,
+    ) -> Result<(), Failure> {
+        let Workshop { assembly, newton, .. } = workshop;
+        matrices.combine(shift, &mut assembly.system.values);
+        self.counters.work.factorisations += 1;
+        let done = newton.solver.factorise_surely(&assembly.system);
+        let loose = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, &self.state), &self.model);
+        if done && loose.is_none() { Ok(()) } else { Err(self.name_mechanism(loose, &workshop.assembly.system)) }
+    }
+
+    /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has lost are there again, as far as the
+    /// shape is right.
+    fn refine(&mut self, workshop: &mut Workshop, motion: &mut SmallMotion) {
+        let Some(ModeShape { unknowns, mass }) = motion.shape.take() else { return };
+        let mut field = vec![Vec3::ZERO; self.state.q.len()];
+        workshop.assembly.system.pattern.equations.scatter(&unknowns, None, &mut field);
+        let Some(stiffness) = workshop.assembly.stiffness_along(&self.state, &field) else { return };
+        let square = -stiffness / mass;
+        motion.exponent = match square < 0.0 {
+            true => Complex::new(0.0, (-square).sqrt()),
+            false => Complex::new(square.sqrt(), 0.0),
+        };
+        // What is wrong with the shape enters squared.
+        motion.uncertainty *= motion.uncertainty;
+    }
+
+    fn warn_of_modes(&mut self, found: &Found, listed: &[SmallMotion]) {
+        let stage = self.stage + 1;
+        if found.missing > 0 {
+            let missing = found.missing;
+            let message = format!("stage {stage}: {missing} more unstable mode(s) exist and were not found");
+            self.warn(WarningKind::MissingModes, message);
+        }
+        let worst = listed.iter().enumerate().max_by(|a, b| a.1.uncertainty.total_cmp(&b.1.uncertainty));
+        if let Some((number, motion)) = worst.filter(|(_, motion)| motion.uncertainty > TOLD) {
+            let message = format!(
+                "stage {stage}: round-off makes the frequency of mode {} uncertain by about {:.1} % (very slender beams on very \
+                 fine meshes lose digits: use fewer elements of a higher order)",
+                number + 1,
+                100.0 * motion.uncertainty
+            );
+            self.warn(WarningKind::LostDigits, message);
+        }
     }
 }
 
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |m, v| m.max(v.abs()))
+/// All modes that are asked for, and all unstable ones: where pivots count them, until they are complete; else among more than are asked
+/// for, and from shifts further out. `None` where a solution fails.
+fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
+    let mut found = Found { rigid: search.rigid(), ..Found::default() };
+    if !search.factorise(shift) {
+        return None;
+    }
+    let Some(unstable) = search.growing() else {
+        let is_held = search.is_held();
+        found.motions = search.nearest(modes + SPARE)?;
+        for times in FURTHER.into_iter().filter(|_| !is_held) {
+            add_new(&mut found.motions, growing_from(search, times * shift, SPARE));
+        }
+        return Some(found);
+    };
+    let mut wanted = modes + unstable + 2;
+    for _ in 0..MOST_SEARCHES {
+        found.motions = look(search, shift, wanted)?;
+        if found.growing() < unstable {
+            find_growing(search, shift, &mut found, unstable);
+        }
+        found.missing = unstable.saturating_sub(found.growing());
+        if found.missing == 0 && is_complete(search, &found, modes) {
+            break;
+        }
+        wanted *= 2;
+    }
+    Some(found)
 }
 
-/// The smallest K_ii / M_ii: no lowest frequency lies above it.
-fn softest_ratio(system: &System, matrices: &Matrices) -> Option<f64> {
-    let mut softest: Option<f64> = None;
-    system.pattern.each_diagonal(|_, place| {
-        let (stiffness, mass) = (matrices.stiffness[place], matrices.mass[place]);
-        if mass > 0.0 && stiffness != 0.0 {
-            let ratio = (stiffness / mass).abs();
-            softest = Some(softest.map_or(ratio, |softest| softest.min(ratio)));
+/// The motions nearest to a shift; `None` where a solution fails.
+fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
+    if search.factorise(shift) { search.nearest(wanted) } else { None }
+}
+
+/// Of these the ones that grow; none where a shift hits a motion.
+fn growing_from(search: &mut ModeSearch, shift: f64, wanted: usize) -> Vec<SmallMotion> {
+    look(search, shift, wanted).unwrap_or_default().into_iter().filter(grows).collect()
+}
+
+/// From above: at a shift behind which nothing grows any faster. All of them are there then, or those that are new are added.
+fn find_growing(search: &mut ModeSearch, shift: f64, found: &mut Found, unstable: usize) {
+    let mut above = shift;
+    for _ in 0..MOST_DOUBLINGS {
+        above *= 4.0;
+        match search.factorise(above).then(|| search.growing()).flatten() {
+            Some(0) => break,
+            Some(_) => {}
+            None => return,
         }
-    });
-    softest
+    }
+    let fastest = growing_from(search, above, unstable + 2);
+    if fastest.len() >= unstable {
+        found.motions.retain(|motion| !grows(motion));
+        found.motions.extend(fastest);
+    } else {
+        add_new(&mut found.motions, fastest);
+    }
+}
+
+/// Whether no mode is missing among those that are asked for: as many pivots are negative at a frequency behind them.
+fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
+    let mut omegas: Vec<f64> = found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
+    omegas.sort_by(f64::total_cmp);
+    let first = modes.saturating_sub(found.rigid + found.growing()).max(1);
+    // The widest gap behind the last mode that is asked for.
+    let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));
+    let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { return true };
+    let at = omegas[behind] - 0.5 * gap;
+    gap <= SAME * at || search.slower(at).is_none_or(|count| count == found.rigid + found.growing() + behind)
+}
+
+/// The slowest motion that something holds.
+fn lowest(sizes: &[f64]) -> Option<f64> {
+    let highest = sizes.iter().copied().fold(0.0, f64::max);
+    sizes.iter().copied().filter(|&size| size > FREE * highest).reduce(f64::min)
+}
+
+fn grows(motion: &SmallMotion) -> bool {
+    motion.exponent.re > GROWS * motion.exponent.norm()
+}
+
+/// Adds motions that are not known yet.
+fn add_new(motions: &mut Vec<SmallMotion>, more: Vec<SmallMotion>) {
+    for motion in more {
+        let same = |known: &SmallMotion| (known.exponent - motion.exponent).norm() <= SAME * motion.exponent.norm();
+        if !motions.iter().any(same) {
+            motions.push(motion);
+        }
+    }
+}
+
+/// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones behind them.
+fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
+    let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
+    let mut stable: Vec<SmallMotion> = found.motions.iter().filter(|motion| !grows(motion)).cloned().collect();
+    stable.extend(std::iter::repeat_n(rigid, found.rigid));
+    stable.sort_by(|a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
+    stable.truncate(modes);
+    let mut all: Vec<SmallMotion> =
+        found.motions.iter().filter(|motion| grows(motion)).cloned().chain(stable).collect();
+    sort(&mut all);
+    let is_listed = |(number, motion): &(usize, SmallMotion)| *number < modes || grows(motion);
+    all.into_iter().enumerate().filter(is_listed).map(|(_, motion)| motion).collect()
+}
+
+fn mode(motion: &SmallMotion) -> Mode {
+    Mode { omega: motion.exponent.im, growth: motion.exponent.re }
 }
 
 /// Multipliers have no mass.
@@ -150,100 +317,15 @@ fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
     }
 }
 
-/// K, C and M on the pattern of the tangent.
-struct Matrices {
-    stiffness: Vec<f64>,
-    damping: Vec<f64>,
-    mass: Vec<f64>,
-}
-
-impl Matrices {
-    /// K + shift C + shift^2 M
-    fn combine(&self, shift: f64, out: &mut [f64]) {
-        let parts = self.stiffness.iter().zip(&self.damping).zip(&self.mass);
-        for (out, ((k, c), m)) in out.iter_mut().zip(parts) {
-            *out = k + shift * (c + shift * m);
-        }
-    }
-}
-
-/// The motions with the smallest s as the eigenvectors with the largest 1/(s - shift): in K + shift^2 M and M alone where
-/// there is no damping and everything is symmetric, then with eigenvalues 1/(s^2 - … ) as below; else in x and s x.
-///
-/// ```text
-/// symmetric: (K + e^2 M)^-1 M x = x/(e^2 - s^2)
-/// general:   with z = (x, s x/e):   A z = z/(s - e),   from   Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
-/// ```
-struct Motions<'a> {
-    system: &'a System,
-    matrices: &'a Matrices,
-    solver: &'a mut LinearSolver,
-    shift: f64,
-    symmetric: bool,
-}
-
-impl Operator for Motions<'_> {
-    fn size(&self) -> usize {
-        let n = self.system.pattern.equations.count();
-        if self.symmetric { n } else { 2 * n }
-    }
-
-    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
-        let (n, e) = (self.system.pattern.equations.count(), self.shift);
-        if self.symmetric {
-            let mut out = self.system.multiply(&self.matrices.mass, x);
-            return self.solver.solve_once(self.system, &mut out).then_some(out);
-        }
-        let (r1, r2) = x.split_at(n);
-        let scaled: Vec<f64> = r1.iter().zip(r2).map(|(a, b)| e * a + e * b).collect();
-        let (mass, damping) =
-            (self.system.multiply(&self.matrices.mass, &scaled), self.system.multiply(&self.matrices.damping, r1));
-        let mut out: Vec<f64> = mass.iter().zip(&damping).map(|(m, c)| -(m + c)).collect();
-        if !self.solver.solve_once(self.system, &mut out) {
-            return None;
-        }
-        let second: Vec<f64> = out.iter().zip(r1).map(|(x, r)| x + r / e).collect();
-        out.extend(second);
-        Some(out)
-    }
-
-    fn weigh(&mut self, x: &[f64]) -> Vec<f64> {
-        if self.symmetric { self.system.multiply(&self.matrices.mass, x) } else { x.to_vec() }
-    }
-
-    fn is_symmetric(&self) -> bool {
-        self.symmetric
-    }
-}
-
-/// From eigenvalues 1/(e^2 - s^2): s^2 = e^2 - 1/theta, real.
-fn undamped(values: &[Complex<f64>], shift: f64) -> Vec<Mode> {
-    let mode = |theta: &Complex<f64>| {
-        let square = shift * shift - 1.0 / theta.re;
-        if square < 0.0 {
-            Mode { omega: (-square).sqrt(), growth: 0.0 }
-        } else {
-            Mode { omega: 0.0, growth: square.sqrt() }
-        }
-    };
-    values.iter().filter(|theta| theta.re != 0.0).map(mode).collect()
-}
-
-/// From eigenvalues 1/(s - e); of a conjugate pair one.
-fn damped_modes(values: &[Complex<f64>], shift: f64) -> Vec<Mode> {
-    let s = values.iter().filter(|theta| theta.norm() > 0.0).map(|theta| theta.inv() + shift);
-    let upper = s.filter(|s| s.im >= 0.0);
-    upper.map(|s| Mode { omega: s.im.abs(), growth: s.re }).collect()
-}
-
 /// By frequency; of equal frequencies the more unstable first.
-fn sort(modes: &mut [Mode]) {
-    modes.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+fn sort(motions: &mut [SmallMotion]) {
+    motions.sort_by(|a, b| a.exponent.im.total_cmp(&b.exponent.im));
     let mut start = 0;
-    for k in 1..=modes.len() {
-        let apart = k == modes.len() || modes[k].omega - modes[start].omega > SAME_FREQUENCY * modes[k].omega;
+    for k in 1..=motions.len() {
+        let apart = k == motions.len()
+            || motions[k].exponent.im - motions[start].exponent.im > SAME_FREQUENCY * motions[k].exponent.im;
         if apart {
-            modes[start..k].sort_by(|a, b| b.growth.total_cmp(&a.growth));
+            motions[start..k].sort_by(|a, b| b.exponent.re.total_cmp(&a.exponent.re));
             start = k;
         }
     }

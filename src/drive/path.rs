@@ -14,10 +14,11 @@ use super::direction::Direction;
 use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
-use crate::model::{SlotKind, charts};
+use crate::model::{SlotKind, StageError, StageKind, charts};
 use crate::solve::{self, NewtonFailure, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
+use crate::warning::WarningKind;
 
 /// Iterations after which the next step stays as long.
 const EASY: f64 = 5.0;
@@ -42,8 +43,12 @@ const MOST_LOOKS: usize = 40;
 const FLIGHT: f64 = 100.0;
 /// Relative length to which it is located.
 const LOCATED: f64 = 1e-9;
-/// Increments that a detour of load control may take.
+/// Increments that a detour of load control may take without coming to a higher load than before, at least.
 const LONGEST_DETOUR: usize = 1000;
+/// And for each level of the stage.
+const DETOUR_OF_LEVEL: f64 = 10.0;
+/// Increments of a path, times those that bring no higher load.
+const LONGEST_PATH: usize = 100;
 
 /// A point of the path and its unit tangent.
 #[derive(Clone)]
@@ -77,6 +82,15 @@ impl Target {
     }
 }
 
+/// How long a path is followed.
+#[derive(Clone, Copy)]
+struct Bounds {
+    /// Increments in all
+    increments: usize,
+    /// Increments one after the other that come to no higher load than those before
+    patience: usize,
+}
+
 /// How following a path ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arrival {
@@ -95,44 +109,50 @@ impl Run<'_> {
     pub(super) fn run_path(&mut self, workshop: &mut Workshop, steps: usize, max_steps: usize) -> Result<(), Failure> {
         self.start_static(workshop)?;
         let Some(mut path) = Path::new(self, workshop, steps)? else {
-            let message = "control = \"arc_length\" needs a load or a motion that grows with the load factor";
-            return Err(Failure::Deck(message.into()));
+            return Err(self.describe(StageError::NothingGrows(StageKind::Static)));
         };
-        if self.go_along(workshop, &mut path, 1.0, max_steps)? == Arrival::OutOfSteps {
+        let bounds = Bounds { increments: max_steps, patience: max_steps };
+        if self.go_along(workshop, &mut path, 1.0, bounds)? == Arrival::OutOfSteps {
             let at = self.moment();
-            self.observer.warn(&format!("the path ends after `max_steps` = {max_steps} increments at {at}"));
+            let message = format!("the path ends after `max_steps` = {max_steps} increments at {at}");
+            self.warn(WarningKind::PathEnds, message);
         }
-        self.warn_of_instability(path.here.negative);
-        if path.here.on_limit { Ok(()) } else { self.look_out_of_plane(workshop, path.here.negative) }
+        self.conclude_static(workshop, path.here.negative, path.here.on_limit)
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
-    /// cannot pass. `from` is a state further back on the path, `increment` a load increment that is easy there.
+    /// cannot pass. `from` is a state further back on the path, `increment` a load increment that is easy there, `level` that between levels.
     pub(super) fn detour(
         &mut self,
         workshop: &mut Workshop,
         from: &State,
         goal: f64,
         increment: f64,
+        level: f64,
     ) -> Result<Arrival, Failure> {
         let Some(mut path) = Path::onward(self, workshop, from, increment)? else { return Ok(Arrival::Nowhere) };
-        self.go_along(workshop, &mut path, goal, LONGEST_DETOUR)
+        let patience = LONGEST_DETOUR.max((DETOUR_OF_LEVEL / level).ceil() as usize);
+        self.go_along(workshop, &mut path, goal, Bounds { increments: LONGEST_PATH * patience, patience })
     }
 
-    /// Along a path until the load factor reaches `goal` from below, or `until`, or `max_steps`.
+    /// Along a path until the load factor reaches `goal` from below, or `until`, or a bound.
     fn go_along(
         &mut self,
         workshop: &mut Workshop,
         path: &mut Path,
         goal: f64,
-        max_steps: usize,
+        bounds: Bounds,
     ) -> Result<Arrival, Failure> {
+        let (mut highest, mut in_vain) = (self.state.load, 0);
         // The signs that were passed last: on a located point itself they are nobody's.
         let (mut rising, mut working) = (path.here.load_rate > 0.0, path.here.work_rate > 0.0);
         let goal = Target::Load(goal);
-        for number in 0..max_steps {
+        for number in 0..bounds.increments {
+            if in_vain >= bounds.patience {
+                break;
+            }
             let done = match self.plan.stages[self.stage].work {
-                StageWork::Path { .. } => number as f64 / max_steps as f64,
+                StageWork::Path { .. } => number as f64 / bounds.increments as f64,
                 _ => path.begun,
             };
             self.observer.progress(self.moment(), self.static_progress(done))?;
@@ -172,6 +192,8 @@ impl Run<'_> {
                 _ => {}
             }
             self.arrive(workshop, path, arrived, target)?;
+            in_vain = if self.state.load > highest { 0 } else { in_vain + 1 };
+            highest = highest.max(self.state.load);
             if self.is_over(workshop) {
                 return Ok(Arrival::Until);
             }
@@ -233,12 +255,15 @@ impl Run<'_> {
         let Some(kind) = kind else { return Ok(()) };
         let event = Event { at: self.moment(), kind, negative_pivots: after };
         match self.told.points {
-            0..MOST_TOLD => self.observer.warn(&event.to_string()),
-            MOST_TOLD => self.observer.warn("more limit and branch points follow: all stand as `events` in run.json"),
+            0..MOST_TOLD => self.warn(kind.warning(), event.to_string()),
+            MOST_TOLD => {
+                let message = "more limit and branch points follow: run.json lists all of them as `events`";
+                self.warn(WarningKind::MorePoints, message);
+            }
             _ => {}
         }
         self.told.points += 1;
-        self.counters.events.push(event);
+        self.counters.findings.events.push(event);
         if kind == EventKind::Limit { Ok(()) } else { self.look_out_of_plane(workshop, after) }
     }
 }
@@ -275,6 +300,8 @@ impl Path {
         }
         let secant = run.state.q.iter().zip(&from.q).map(|(q, before)| (*q - *before) * (1.0 / risen)).collect();
         let mut path = Self::with_measure(run, secant);
+        // Load control has come here from a lower load: onward is where the load grows.
+        path.here.tangent.fill(Vec3::ZERO);
         path.here = path.look(run, workshop, &path.here.clone())?;
         path.begin_with(run, std::f64::consts::SQRT_2 * increment).map(Some)
     }

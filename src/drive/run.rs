@@ -1,17 +1,20 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
-use super::failure::{Failure, Moment, Tried, place};
+use super::failure::{Failure, Moment, Tried, place, refusal, refusal_help};
+use super::findings::{Findings, Warning};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
 use super::levels::Approach;
+use super::rehearsal::lacking;
 use super::space::Space;
 use super::warnings::Told;
 use crate::integrate::{Increments, Scheme, Trend};
-use crate::model::{Assembly, Jump, Model, StageContext, StageError, StageKind, charts};
+use crate::model::{Assembly, Model, StageContext, StageError, StageKind, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
 use crate::system::{Node, Plane, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
+use crate::warning::WarningKind;
 use std::f64::consts::PI;
 use std::fmt;
 use std::sync::Arc;
@@ -34,6 +37,8 @@ pub struct Plan {
     pub energy: bool,
     /// Whether somebody looks at continued rotation vectors
     pub continued: bool,
+    /// The initial places of all nodes, where a modal stage asks for them
+    pub places: Vec<(Node, Vec3)>,
 }
 
 /// Velocities given to nodes: velocity + spin x (place - about).
@@ -84,6 +89,37 @@ impl Mode {
     /// |s|
     pub fn size(&self) -> f64 {
         self.omega.hypot(self.growth)
+    }
+}
+
+/// A load factor at which the tangent loses its stiffness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CriticalLoad {
+    /// The load factor
+    pub load: f64,
+    /// What lies there
+    pub kind: CriticalKind,
+}
+
+/// Kinds of critical loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CriticalKind {
+    /// Another branch begins; the path goes on.
+    Branch,
+    /// The load is stationary.
+    Limit,
+    /// The path has no critical point that was reached: the load at which the tangent, extrapolated from smaller loads, would be singular
+    Estimate,
+}
+
+impl CriticalKind {
+    /// Its name in buckling.csv
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Branch => "branch",
+            Self::Limit => "limit",
+            Self::Estimate => "estimate",
+        }
     }
 }
 
@@ -186,12 +222,12 @@ pub trait Observer {
     }
 
     /// The critical loads of a stage (from 1).
-    fn buckling(&mut self, _stage: usize, _loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, _stage: usize, _loads: &[CriticalLoad]) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// A remark that is not a failure.
-    fn warn(&mut self, _message: &str) {}
+    /// Something that is not a failure.
+    fn warn(&mut self, _warning: &Warning) {}
 
     /// How far the run has come, from 0 to 1; called at each attempt. It may end the run.
     fn progress(&mut self, _at: Moment, _done: f64) -> Result<(), Failure> {
@@ -230,6 +266,15 @@ impl EventKind {
             Self::Branch => "branch or limit point passed",
         }
     }
+
+    /// The warning that tells of it.
+    pub(super) fn warning(self) -> WarningKind {
+        match self {
+            Self::Limit => WarningKind::LimitPoint,
+            Self::Turning => WarningKind::TurningPoint,
+            Self::Branch => WarningKind::BranchPoint,
+        }
+    }
 }
 
 impl fmt::Display for Event {
@@ -245,7 +290,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// Work done in a run.
+/// Work done in a run, and what it found out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counters {
     /// Converged levels and time steps
@@ -254,8 +299,8 @@ pub struct Counters {
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,
-    /// Limit, turning and branch points of static paths
-    pub events: Vec<Event>,
+    /// Events, stability, warnings
+    pub findings: Findings,
     /// Iterations, factorisations, chart switches, seconds
     pub work: Work,
     /// Evaluations of instances by effect
@@ -393,6 +438,10 @@ impl<'o> Run<'o> {
         self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
         let equations = begun.map_err(|error| self.describe(error))?;
+        let fading = !self.state.fading.is_empty();
+        if let Some(error) = lacking(&self.model, stage, self.stage, fading, || Some(equations.clone())) {
+            return Err(self.describe(error));
+        }
         self.plane = equations.plane().copied();
         self.warn_of_space(kind);
         let assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
@@ -552,7 +601,7 @@ impl<'o> Run<'o> {
             return Err(failure);
         }
         self.told.coarse = true;
-        self.observer.warn(&format!("{failure}: more elements would tell the shape better"));
+        self.warn(WarningKind::CoarseMesh, format!("{failure}: more elements would tell the shape better"));
         Ok(())
     }
 
@@ -605,17 +654,7 @@ impl<'o> Run<'o> {
                 residual: residual.value.norm(),
                 force: residual.force,
                 history,
-                tried: Tried {
-                    cutbacks: self.counters.cutbacks - self.cutbacks_before,
-                    path: matches!(self.plan.stages[self.stage].work, StageWork::Path { .. }),
-                    nonlinear: matches!(
-                        self.plan.stages[self.stage].work,
-                        StageWork::Static { approach: Approach::Parts, .. }
-                    ),
-                    dynamic: self.plan.stages[self.stage].work.kind() == StageKind::Dynamic,
-                    soft: self.soft,
-                    beams: self.model.elements > 0,
-                },
+                tried: Tried { cutbacks: self.counters.cutbacks - self.cutbacks_before, soft: self.soft },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {
                 Failure::StepTooSmall { at, place: place(&self.model, slot, Vec3::ZERO), error, share }
@@ -640,24 +679,8 @@ impl<'o> Run<'o> {
     }
 
     pub(super) fn describe(&self, error: StageError) -> Failure {
-        let node = |slot: u32| self.model.node_at(slot as usize);
-        let stage = self.stage + 1;
-        Failure::Deck(match error {
-            StageError::Conflict(conflict) => format!(
-                "stage {stage}: constraints on node \"{}\" act along directions that are neither the same nor orthogonal",
-                node(conflict.slot)
-            ),
-            StageError::Jump(Jump { motion, from, to }) => format!(
-                "stage {stage}: motion {} of node \"{}\" would have to jump from {from} to {to}, or from another axis; give it \
-                 a `history` that starts where the node is",
-                motion + 1,
-                node(self.model.motions[motion].slot)
-            ),
-            StageError::TurnedHinge(slot) => format!(
-                "stage {stage}: a support takes hold of single rotation components of node \"{}\", which has already \
-                 turned; hold all three, or hold them from the first stage on",
-                node(slot)
-            ),
-        })
+        let message = format!("stage {}: {}", self.stage + 1, refusal(&error, &self.model));
+        let help = refusal_help(&error, &self.model, self.stage);
+        Failure::Deck(help.map_or(message.clone(), |help| format!("{message}; {help}")))
     }
 }

@@ -1,6 +1,7 @@
 //! What a stage in a plane cannot see: whether the plane is left.
 
 use super::failure::Failure;
+use super::findings::StageStability;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Assembly;
@@ -42,13 +43,42 @@ impl Run<'_> {
         if self.told.unstable == Some(self.stage) {
             return Ok(());
         }
-        let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
+        if let Some(more @ 1..) = self.count_out_of_plane(workshop, in_plane)? {
+            self.warn_out_of_plane(more);
+        }
+        Ok(())
+    }
+
+    /// How many more pivots are negative in space than the `in_plane` ones of a stage that is treated in a plane; none where it is
+    /// treated in space, `None` where it is not known.
+    fn count_out_of_plane(&mut self, workshop: &mut Workshop, in_plane: usize) -> Result<Option<usize>, Failure> {
+        let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(Some(0)) };
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         self.counters.work.factorisations += 1;
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
         let in_space = solver.negative_pivots(&mut tangent);
-        if let Some(more) = in_space.and_then(|in_space| in_space.checked_sub(in_plane)).filter(|&more| more > 0) {
-            self.warn_out_of_plane(more);
+        Ok(in_space.and_then(|in_space| in_space.checked_sub(in_plane)))
+    }
+
+    /// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is not. `negative`: the number of negative
+    /// pivots, as the stage is treated, where it is known; `on_limit`: whether the state is a limit point, with the pivots behind it.
+    pub(super) fn conclude_static(
+        &mut self,
+        workshop: &mut Workshop,
+        negative: Option<usize>,
+        on_limit: bool,
+    ) -> Result<(), Failure> {
+        self.warn_of_instability(negative);
+        let aside = match negative {
+            None => None,
+            // There the look in space was taken behind it.
+            Some(_) if on_limit => (self.told.unstable != Some(self.stage)).then_some(0),
+            Some(in_plane) => self.count_out_of_plane(workshop, in_plane)?,
+        };
+        self.counters.findings.stability.push(StageStability::of_pivots(self.stage + 1, negative, aside));
+        match aside {
+            Some(more @ 1..) if self.told.unstable != Some(self.stage) => self.warn_out_of_plane(more),
+            _ => {}
         }
         Ok(())
     }

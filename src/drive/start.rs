@@ -4,16 +4,14 @@ use super::failure::Failure;
 use super::run::{InitialMotion, Run, Workshop};
 use crate::integrate::{Method, Step};
 use crate::kernel::Weights;
-use crate::model::{Model, SlotKind};
+use crate::model::{LARGEST_GAP, Model, SlotKind, StageError};
 use crate::rotation::Rotation;
 use crate::solve::{Limp, NewtonFailure, Tangent, mechanism};
 use crate::system::{Equations, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
+use crate::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
-
-/// What a joint may be open by when a dynamic stage begins, in radians or relative to the scene's length.
-const LARGEST_GAP: f64 = 1e-6;
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
@@ -27,8 +25,11 @@ impl Run<'_> {
             (start..).zip(part).for_each(|(slot, v)| *v -= equations.held_part(slot as Slot, *v));
         });
         self.state.a.fill(Vec3::ZERO);
-        let time = self.state.time;
+        let (time, amplitude) = (self.state.time, self.state.amplitude.clone());
         self.model.set_clock(&mut self.state, time, 1.0);
+        if let Some(jump) = self.model.motor_jumps(&amplitude, &self.state).into_iter().next() {
+            return Err(self.describe(StageError::MotorJump(jump)));
+        }
         self.change_charts(None);
         self.linearise(workshop)?;
         self.refuse_loose(workshop, step)?;
@@ -62,7 +63,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// A dynamic stage never jumps: neither do motors, nor joints that a stage before has left open.
+    /// A dynamic stage never jumps: neither do joints that a stage before has left open.
     fn refuse_open_joints(&self, workshop: &Workshop) -> Result<(), Failure> {
         for &slot in &self.model.multipliers {
             let kind = self.model.kinds[slot as usize];
@@ -71,7 +72,7 @@ impl Run<'_> {
             if gap > LARGEST_GAP * size {
                 let at = self.moment();
                 return Err(Failure::Deck(format!(
-                    "the {} would have to jump by {gap:.3e} ({at}); give its motor a `history` that starts where the joint is",
+                    "the {} is open by {gap:.3e} where the stage begins ({at}), and would have to jump",
                     self.model.node_at(slot as usize)
                 )));
             }
@@ -89,9 +90,10 @@ impl Run<'_> {
             return Err(self.name_failure(failure, &workshop.assembly.system));
         }
         let Some(solved) = self.solve_with_mass(workshop, &rates2)? else {
-            self.observer.warn(
-                "mass does not tell how the motion begins (a point mass with an offset and without inertia?): it begins without \
-                 accelerations",
+            self.warn(
+                WarningKind::NoStartAccelerations,
+                "mass does not determine the accelerations at the start (a point mass with an offset and without inertia?): the motion \
+                 begins without them",
             );
             workshop.assembly.evaluate(&self.state, Weights::NONE, None);
             return Ok(());
@@ -147,7 +149,7 @@ impl Run<'_> {
 }
 
 /// v = velocity + spin x (x - about), and the rate of P from the spin: Pd = T^-T w.
-fn set_in_motion(state: &mut State, motion: &InitialMotion) {
+pub(super) fn set_in_motion(state: &mut State, motion: &InitialMotion) {
     for &(node, place) in &motion.nodes {
         let (u, p) = (node.u as usize, node.p as usize);
         let x = place + state.q[u];

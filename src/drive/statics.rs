@@ -10,6 +10,7 @@ use crate::model::charts;
 use crate::solve::{Limp, NewtonFailure, Tangent};
 use crate::tensor::Vec3;
 use crate::threads;
+use crate::warning::WarningKind;
 
 /// Load increments whose length a detour by arc length begins with.
 const DETOUR: (f64, f64) = (0.01, 0.05);
@@ -20,6 +21,8 @@ enum Tried {
     Good(Option<usize>),
     /// Balance, perhaps on another branch
     Jumped(Option<usize>),
+    /// Balance, by an iteration that has not gone straight to it
+    Strayed(Option<usize>),
     /// None
     Failed(NewtonFailure),
 }
@@ -49,6 +52,7 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         self.start_static(workshop)?;
         let mut levels = Levels::new(self, workshop, steps, approach);
+        let at_start = levels.stability.negative;
         self.good.copy_from(&self.state);
         for number in 1..=steps {
             let reached = self.reach(workshop, number as f64 / steps as f64, &mut levels)?;
@@ -60,8 +64,9 @@ impl Run<'_> {
                 break;
             }
         }
-        self.warn_of_instability(levels.stability.negative);
-        self.look_out_of_plane(workshop, levels.stability.negative)
+        // What is linear keeps the tangent of its start.
+        let negative = if self.is_linear() { at_start } else { levels.stability.negative };
+        self.conclude_static(workshop, negative, false)
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
@@ -96,7 +101,8 @@ impl Run<'_> {
             // At the start of a run cables and strings are meant to be so.
             if limp.is_held_by_stress() {
                 let named = self.name_mechanism(Some(limp.vector), &assembly.system);
-                self.observer.warn(&format!("but for the stress it is under at the start of the stage: {named}"));
+                let message = format!("but for the stress it is under at the start of the stage: {named}");
+                self.warn(WarningKind::HeldByStress, message);
             }
         }
         self.refuse_loose_in_space(workshop, Weights::STIFFNESS)?;
@@ -119,6 +125,7 @@ impl Run<'_> {
                     self.state.copy_all_but_rates(&self.good);
                 }
                 // Nothing tells better.
+                Tried::Strayed(negative) => self.take_step(workshop, negative, levels)?,
                 Tried::Jumped(negative) if levels.approach != Approach::Path => {
                     self.take_step(workshop, negative, levels)?;
                 }
@@ -135,8 +142,13 @@ impl Run<'_> {
         }
         let negative = levels.stability.count(self, workshop);
         let states = [&self.good, &self.state];
-        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &workshop.newton.first, negative);
-        if jumped { Tried::Jumped(negative) } else { Tried::Good(negative) }
+        let newton = &workshop.newton;
+        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, negative);
+        match jumped {
+            true => Tried::Jumped(negative),
+            false if !self.soft && levels.may_have_strayed(newton.contraction, negative) => Tried::Strayed(negative),
+            false => Tried::Good(negative),
+        }
     }
 
     fn take_step(
@@ -174,13 +186,18 @@ impl Run<'_> {
         }
         let (at, steps) = (self.moment(), self.counters.steps);
         let motion = if self.state.fading.is_empty() { "" } else { IN_MOTION };
-        self.observer
-            .warn(&format!("load control stands still at {at}: the path is followed by arc length from there{motion}"));
-        let arrival = self.detour(workshop, &levels.start, target, levels.level.clamp(DETOUR.0, DETOUR.1));
+        let message =
+            format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
+        self.warn(WarningKind::ArcLengthDetour, message);
+        let increment = levels.level.clamp(DETOUR.0, DETOUR.1);
+        let arrival = self.detour(workshop, &levels.start, target, increment, levels.level);
         let (end, increments) = (self.moment(), self.counters.steps - steps);
         let limit = Failure::LimitPoint { at, goal: target, increments, end };
         match arrival {
-            Ok(Arrival::Until) => Ok(Reached::Over),
+            Ok(Arrival::Until) => {
+                levels.stability.negative = levels.stability.count(self, workshop);
+                Ok(Reached::Over)
+            }
             Ok(Arrival::Goal) => {
                 self.resume(workshop, target, increments, levels);
                 Ok(Reached::Along)
@@ -198,9 +215,10 @@ impl Run<'_> {
         self.good.copy_from(&self.state);
         levels.stability.negative = levels.stability.count(self, workshop);
         levels.restart();
-        self.observer.warn(&format!(
-            "load control goes on at load factor {target}, after {increments} increments of arc length"
-        ));
+        self.warn(
+            WarningKind::LoadControlResumed,
+            format!("load control goes on at load factor {target}, after {increments} increments of arc length"),
+        );
     }
 
     /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the

@@ -1,10 +1,13 @@
 //! What a run tells its user beside its results, each thing once.
 
+use super::failure::Moment;
+use super::findings::Warning;
 use super::guard::{Imbalance, is_unbalanced};
 use super::run::{Run, StageWork, Workshop};
 use crate::integrate::{Largest, Rotations};
 use crate::model::{StageKind, charts};
 use crate::system::Slot;
+use crate::warning::WarningKind;
 use std::f64::consts::PI;
 
 /// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
@@ -34,12 +37,11 @@ pub(super) struct Told {
     frame: f64,
     soft: bool,
     axis: bool,
+    subdivision: bool,
     /// The largest energy of dynamic stages
     energy: f64,
     /// That the account of the energy is off
     unbalanced: bool,
-    /// In which stage steps failed, and how many
-    failed: (usize, usize),
     /// The stage in which the plane would be left
     pub unstable: Option<usize>,
 }
@@ -53,25 +55,38 @@ impl Default for Told {
             frame: 1e-2,
             soft: false,
             axis: false,
+            subdivision: false,
             energy: 0.0,
             unbalanced: false,
-            failed: (0, 0),
             unstable: None,
         }
     }
 }
 
 impl Run<'_> {
+    /// Warns of something at the present moment.
+    pub(super) fn warn(&mut self, kind: WarningKind, message: impl Into<String>) {
+        self.warn_at(kind, self.moment(), message);
+    }
+
+    /// Warns of something that happened at some moment.
+    pub(super) fn warn_at(&mut self, kind: WarningKind, at: Moment, message: impl Into<String>) {
+        let warning = Warning { kind, at: Some(at), message: message.into() };
+        self.observer.warn(&warning);
+        self.counters.findings.warnings.push(warning);
+    }
+
     /// Says where the answer has fewer digits than it shows.
     pub(super) fn warn_of_round_off(&mut self) {
         let uncertainty = self.counters.work.uncertainty;
         if uncertainty > 10.0 * self.told.uncertainty {
             self.told.uncertainty = uncertainty;
-            self.observer.warn(&format!(
+            let message = format!(
                 "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
                  largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
                 16.0 + uncertainty.log10()
-            ));
+            );
+            self.warn(WarningKind::LostDigits, message);
         }
     }
 
@@ -79,7 +94,8 @@ impl Run<'_> {
     pub(super) fn warn_of_softness(&mut self) {
         self.soft = true;
         if !std::mem::replace(&mut self.told.soft, true) {
-            self.observer.warn(
+            self.warn(
+                WarningKind::LostStiffness,
                 "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
                  all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
             );
@@ -93,21 +109,25 @@ impl Run<'_> {
         let Some(Imbalance { share, is_own }) = guard.imbalance() else { return };
         self.told.unbalanced = true;
         let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
-        let failed = self.failed_steps();
-        self.observer.warn(&match () {
-            () if !is_own => format!(
+        if !is_own {
+            let message = format!(
                 "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, most of it from the stages before: their work is \
                  summed by the trapezoidal rule from load level to load level (more `steps` there)"
-            ),
-            () if share < 0.0 => format!(
+            );
+            self.warn(WarningKind::EnergyBalance, message);
+        } else if share < 0.0 {
+            let message = format!(
                 "stage {stage}: the scheme has taken {percent:.0} % of the largest energy: its steps do not resolve part of the motion (a \
-                 smaller `step`, or less dissipation){failed}"
-            ),
-            () => format!(
+                 smaller `step`, or less dissipation)"
+            );
+            self.warn(WarningKind::EnergyLoss, message);
+        } else {
+            let message = format!(
                 "stage {stage}: the total energy is off by {percent:.0} % of the largest energy, which comes from nothing: the steps do not \
-                 resolve part of the motion (a smaller `step`, or a scheme that dissipates){failed}"
-            ),
-        });
+                 resolve part of the motion (a smaller `step`, or a scheme that dissipates)"
+            );
+            self.warn(WarningKind::EnergyGain, message);
+        }
     }
 
     /// A static stage takes kinetic energy away from what moved before.
@@ -116,10 +136,11 @@ impl Run<'_> {
         let share = (self.bookkeeper.ledger().total() - first) / self.told.energy;
         if is_unbalanced(share) && !std::mem::replace(&mut self.told.unbalanced, true) {
             let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
-            self.observer.warn(&format!(
+            let message = format!(
                 "stage {stage}: energy.total is off by {percent:.0} % of the largest energy: what moved stands still since the stage began, and \
                  works are summed by the trapezoidal rule from load level to load level"
-            ));
+            );
+            self.warn(WarningKind::EnergyBalance, message);
         }
     }
 
@@ -144,19 +165,11 @@ impl Run<'_> {
         let shorter = round_down(step * (AIM / shares).sqrt());
         let turns = !is_large(of_displacements / MOST) && scheme.rotations == Rotations::Totals;
         let other = if turns { ", or `scheme = \"lie_generalized_alpha\"`" } else { "" };
-        let (stage, failed) = (self.stage + 1, self.failed_steps());
-        self.observer.warn(&format!(
-            "stage {stage}: the time steps are too long: the estimated error of {what} (try `step = {shorter}`{other}){failed}"
-        ));
-    }
-
-    fn failed_steps(&self) -> String {
-        match self.told.failed {
-            (stage, count @ 1..) if stage == self.stage => {
-                format!("; {count} attempts at steps failed, and were taken in smaller ones")
-            }
-            _ => String::new(),
-        }
+        let message = format!(
+            "stage {}: the time steps are too long: the estimated error of {what} (try `step = {shorter}`{other})",
+            self.stage + 1
+        );
+        self.warn(WarningKind::LongSteps, message);
     }
 
     /// Total rotation vectors are interpolated in charts that do not turn with the element: the strains of a turned scene differ.
@@ -169,12 +182,13 @@ impl Run<'_> {
         let error = FRAME_ERROR * angle * angle;
         if error > self.told.frame {
             self.told.frame = 2.0 * error;
-            self.observer.warn(&format!(
+            let message = format!(
                 "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
                  two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
                  the square of the element's length)",
                 100.0 * error
-            ));
+            );
+            self.warn(WarningKind::FrameDependence, message);
         }
     }
 
@@ -183,9 +197,10 @@ impl Run<'_> {
         let planar = self.model.plane.is_some() && matches!(kind, StageKind::Static | StageKind::Dynamic);
         if planar && self.plane.is_none() {
             let stage = self.stage + 1;
-            self.observer.warn(&format!(
+            let message = format!(
                 "stage {stage} is simulated in space: the state in which it begins is not in the plane of the scene to the last digits"
-            ));
+            );
+            self.warn(WarningKind::SimulatedInSpace, message);
         }
     }
 
@@ -193,38 +208,43 @@ impl Run<'_> {
     pub(super) fn warn_out_of_plane(&mut self, count: usize) {
         self.told.unstable = Some(self.stage);
         let at = self.moment();
-        self.observer.warn(&format!(
-            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in: what it would do is seen with a small load or imperfection out of the plane"
-        ));
+        let message = format!(
+            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in: \
+             what it would do is seen with a small load or imperfection out of the plane"
+        );
+        self.warn(WarningKind::UnstableOutOfPlane, message);
     }
 
     /// A node passed a whole turn aside of its axis.
     pub(super) fn warn_of_lost_axis(&mut self, slot: Slot) {
         if !std::mem::replace(&mut self.told.axis, true) {
             let (at, node) = (self.moment(), self.model.node_at(slot as usize));
-            self.observer.warn(&format!(
+            let message = format!(
                 "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
                  its increments from there on, and depends on the steps (`r` does not)"
-            ));
+            );
+            self.warn(WarningKind::LostAxis, message);
         }
     }
 
-    /// A fixed step fails, and is not the last that does: that matters where errors are large.
-    pub(super) fn note_failed_step(&mut self) {
-        let (stage, count) = &mut self.told.failed;
-        if std::mem::replace(stage, self.stage) != self.stage {
-            *count = 0;
+    /// A fixed step fails, and is not the last that does.
+    pub(super) fn warn_of_subdivision(&mut self) {
+        if !std::mem::replace(&mut self.told.subdivision, true) {
+            let at = self.moment();
+            let message = format!("a step fails at {at} and is taken in smaller ones, as are others that fail");
+            self.warn(WarningKind::StepSubdivided, message);
         }
-        *count += 1;
     }
 
-    /// A state that a stage ends in, and that the next begins with.
+    /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.
     pub(super) fn warn_of_instability(&mut self, negative: Option<usize>) {
         if let Some(count @ 1..) = negative {
             let stage = self.stage + 1;
-            self.observer.warn(&format!(
-                "stage {stage} ends in an unstable state, with {count} negative pivot(s): nothing real stays in it"
-            ));
+            let pivots = if count == 1 { "pivot" } else { "pivots" };
+            let message = format!(
+                "stage {stage} ends in an unstable equilibrium ({count} negative {pivots}): a real structure would leave it"
+            );
+            self.warn(WarningKind::Unstable, message);
         }
     }
 }

@@ -164,6 +164,14 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         largest
     }
 
+    fn stiffness_along(&self, at: &State, field: &[Vec3]) -> Option<f64> {
+        let mut sum = 0.0;
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            sum += element.stiffness_along::<I>(at, field)?;
+        });
+        Some(sum)
+    }
+
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element
@@ -187,6 +195,12 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         largest
     }
 }
+
+/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the stiffness against bending by 1e-7 of itself.
+const UNSTRAINED: f64 = 1e-14;
+
+/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000 elements they add up to 1e-8.
+const UNBENT: f64 = 1e-12;
 
 /// The largest round-off of the forces of some elements.
 fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> Noise {
@@ -423,6 +437,23 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
             strain.gamma.norm().max(strain.kappa.norm() * length)
         };
         self.points().iter().map(at_point).fold(0.0, f64::max)
+    }
+
+    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
+    fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
+        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
+        let (free, length) = (self.free_amplitude(at), self.points().iter().map(|point| point.weight).sum::<f64>());
+        let at_point = |point: &StiffnessPoint<N>| {
+            let (strain, _) = point.strain_and_stress(view.nodes(), free);
+            let elastic = point.elastic_part(&strain, free);
+            if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
+                return None;
+            }
+            let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
+            let stress = point.stiffness.stress(&strain);
+            Some(point.weight * (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)))
+        };
+        self.points().iter().map(at_point).sum()
     }
 
     /// Adds the element alone as instance `number`; its nodes may sit in different charts.

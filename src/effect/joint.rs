@@ -1,7 +1,7 @@
 //! Joints between two nodes, or a node and ground: a kind is a row of data, which gaps it keeps closed; see
 //! [`crate::kernel::joint`]. Springs, dampers and motors act on what a joint leaves free.
 
-use super::{Effect, Energy};
+use super::{Effect, Energy, MotorState};
 use crate::kernel::joint::{End, add_along, add_between, block, cosine, slides};
 use crate::kernel::{ElementSystem, Weights};
 use crate::real::{Jet, Real};
@@ -346,7 +346,7 @@ impl Coordinate {
 }
 
 /// The same angle in (-pi, pi].
-fn nearest_angle(angle: f64) -> f64 {
+pub fn nearest_angle(angle: f64) -> f64 {
     angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }
 
@@ -447,6 +447,17 @@ impl Effect for Joints {
                     rates[slot as usize] = rate;
                     rates2[slot as usize] = rate2;
                 }
+            }
+        }
+    }
+
+    fn motors(&self, at: &State, show: &mut dyn FnMut(MotorState)) {
+        for joint in &self.joints {
+            let turns = !joint.is_prismatic();
+            let slot = if turns { joint.between } else { joint.along };
+            if let (Some(Motor { value, amplitude }), Some(slot)) = (joint.drive.motor, slot) {
+                let speed = joint.rate(at, &joint.coordinate(at, &joint.ends(at))).rate;
+                show(MotorState { slot, value, amplitude, turns, speed });
             }
         }
     }

@@ -83,6 +83,21 @@ impl Noise {
     }
 }
 
+/// A motor of a joint in some state.
+#[derive(Clone, Copy, Debug)]
+pub struct MotorState {
+    /// The slot of its multiplier
+    pub slot: Slot,
+    /// The angle or displacement that its amplitude multiplies
+    pub value: f64,
+    /// The number of its amplitude
+    pub amplitude: usize,
+    /// Whether it turns, or slides
+    pub turns: bool,
+    /// How fast the joint turns or slides, as its nodes move
+    pub speed: f64,
+}
+
 /// One kind of physical effect with all its instances.
 pub trait Effect: Send + Sync {
     /// Its name in `check` and run.json.
@@ -153,6 +168,12 @@ pub trait Effect: Send + Sync {
         0.0
     }
 
+    /// x.K x of a field of increments, from the strains that it makes: no digits are lost between nodes that move alike. `None` where the
+    /// tangent alone tells, as under stress.
+    fn stiffness_along(&self, _at: &State, _field: &[Vec3]) -> Option<f64> {
+        None
+    }
+
     /// Mass and momenta.
     fn momentum(&self, _at: &State) -> Momentum {
         Momentum::default()
@@ -176,6 +197,9 @@ pub trait Effect: Send + Sync {
     /// First and second derivatives over time of the gaps that its multipliers close, for a motion without accelerations;
     /// by slot of the multipliers.
     fn drift(&self, _at: &State, _rates: &mut [Vec3], _rates2: &mut [Vec3]) {}
+
+    /// Shows its motors.
+    fn motors(&self, _at: &State, _show: &mut dyn FnMut(MotorState)) {}
 
     /// How far motors turn their nodes at once when amplitudes change: the slot that turns most, and radians.
     fn turned(&self, _from: &[f64], _to: &[f64]) -> Option<(Slot, f64)> {

@@ -1,8 +1,7 @@
 //! How strongly a load acts: through stages, along the load factor, over time.
 
-use super::history::History;
+use super::history::{Phase, Reading};
 use crate::system::{StageKind, StageSet};
-use std::sync::Arc;
 
 /// What an amplitude does in the present stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,10 +11,33 @@ enum Course {
     History(StageKind),
 }
 
+/// What leads a load or a motion through a stage in which it acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Goal {
+    /// Its full size, or that part of it with which its history will begin
+    Value(f64),
+    /// Its history
+    History,
+    /// Nothing: its history is over, or pauses.
+    Stay,
+}
+
+impl Goal {
+    /// Of what has this history in stage number `stage`.
+    pub fn of(history: Option<&Reading>, stage: usize) -> Self {
+        match history.map(|history| (history.phase(stage), history)) {
+            None => Self::Value(1.0),
+            Some((Phase::Before, history)) => Self::Value(history.first()),
+            Some((Phase::In, _)) => Self::History,
+            Some((Phase::Behind, _)) => Self::Stay,
+        }
+    }
+}
+
 /// The factor of a load.
 #[derive(Clone)]
 pub struct Amplitude {
-    history: Option<Arc<dyn History>>,
+    history: Option<Reading>,
     stages: StageSet,
     /// Switched at once instead of ramped: springs.
     switched: bool,
@@ -29,7 +51,7 @@ pub struct Amplitude {
 impl Amplitude {
     /// Of a load with this history, or the default one: up with the load factor of the first static stage in which it
     /// acts, then in full; in full from the start of a dynamic stage.
-    pub fn of_load(history: Option<Arc<dyn History>>, stages: StageSet) -> Self {
+    pub fn of_load(history: Option<Reading>, stages: StageSet) -> Self {
         Self {
             history,
             stages,
@@ -48,38 +70,71 @@ impl Amplitude {
 
     /// Whether it would ramp up for the first time in a static stage with this number.
     pub fn is_fresh(&self, stage: usize) -> bool {
-        self.stages.contains(stage) && !self.has_acted && !self.switched && self.history.is_none()
+        let grows = matches!(Goal::of(self.history.as_ref(), stage), Goal::Value(value) if value != 0.0);
+        self.stages.contains(stage) && !self.has_acted && !self.switched && grows
     }
 
-    /// Settles what it does in stage number `stage`. A buckling stage goes on where the last static one has stopped, unless
-    /// there are loads that are `fresh` in it: then these alone grow.
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, fresh: bool) {
+    /// Settles what it does in stage number `stage`, which begins at `time`. A buckling stage goes on where the last static one has
+    /// stopped, unless there are loads that are `fresh` in it: then these alone grow.
+    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, time: f64, fresh: bool) {
         let acts = self.stages.contains(stage);
         let grows = self.is_fresh(stage);
         // A modal stage only looks.
         self.has_acted |= acts && kind != StageKind::Modal;
-        self.course = match (acts, kind, &self.history) {
-            (true, StageKind::Modal, _) if !self.switched => Course::Hold(self.reached),
-            (true, StageKind::Buckling, _) if !self.switched => match (fresh, grows) {
-                (true, true) => Course::Ramp { from: 0.0, to: 1.0 },
-                (false, _) => self.grown.map_or(Course::Hold(self.reached), |(from, to)| Course::Ramp { from, to }),
-                (true, false) => Course::Hold(self.reached),
-            },
+        self.history.iter_mut().for_each(|history| history.begin_stage(stage, kind, time));
+        let goal = Goal::of(self.history.as_ref(), stage);
+        self.course = match (acts, kind, goal) {
             (true, ..) if self.switched => Course::Hold(1.0),
-            (true, kind, Some(_)) => Course::History(kind),
-            (true, StageKind::Static, None) => Course::Ramp { from: self.reached, to: 1.0 },
-            (true, _, None) => Course::Hold(1.0),
+            (true, StageKind::Modal, _) | (true, _, Goal::Stay) => Course::Hold(self.reached),
+            (true, StageKind::Buckling, goal) => match (fresh, grows, goal) {
+                (true, true, Goal::Value(to)) => Course::Ramp { from: 0.0, to },
+                (false, ..) => self.grown.map_or(Course::Hold(self.reached), |(from, to)| Course::Ramp { from, to }),
+                _ => Course::Hold(self.reached),
+            },
+            (true, kind, Goal::History) => Course::History(kind),
+            (true, StageKind::Static, Goal::Value(to)) => Course::Ramp { from: self.reached, to },
+            (true, _, Goal::Value(to)) => Course::Hold(to),
             (false, StageKind::Static, _) if !self.switched => Course::Ramp { from: self.reached, to: 0.0 },
             (false, ..) => Course::Hold(0.0),
         };
-        match self.course {
-            Course::Ramp { from, to } if from != to => self.grown = Some((from, to)),
+        match (self.course, goal) {
+            (Course::Ramp { from, to }, _) if from != to => self.grown = Some((from, to)),
             // In full from the start of a dynamic stage: in proportion to its load factor of 1.
-            Course::Hold(_) if acts && kind == StageKind::Dynamic && !self.switched => {
-                self.grown = self.grown.or(Some((0.0, 1.0)));
+            (Course::Hold(_), Goal::Value(to)) if acts && kind == StageKind::Dynamic && !self.switched => {
+                self.grown = self.grown.or(Some((0.0, to)));
             }
             _ => {}
         }
+    }
+
+    /// Whether it goes with the load factor in the present stage.
+    pub fn grows(&self) -> bool {
+        matches!(self.course, Course::Ramp { from, to } if from != to)
+    }
+
+    /// Whether it follows a history in the present stage.
+    pub fn follows_history(&self) -> bool {
+        matches!(self.course, Course::History(_))
+    }
+
+    /// Whether its history, if it has one, belongs to some stages only.
+    pub fn has_own_stages(&self) -> Option<bool> {
+        self.history.as_ref().map(Reading::has_own_stages)
+    }
+
+    /// Whether it acts in stage number `stage`.
+    pub fn acts_in(&self, stage: usize) -> bool {
+        self.stages.contains(stage)
+    }
+
+    /// The largest rate of its history, if it is known.
+    pub fn fastest(&self) -> Option<f64> {
+        self.history.as_ref()?.fastest()
+    }
+
+    /// Where the last stage has left it.
+    pub fn reached(&self) -> f64 {
+        self.reached
     }
 
     /// Remembers where the stage ended.
@@ -90,8 +145,24 @@ impl Amplitude {
     /// The first time behind `time` at which it takes another course.
     pub fn next_corner(&self, time: f64) -> Option<f64> {
         match self.course {
-            Course::History(kind) => self.history.as_ref()?.next_corner_in_stage(kind, time),
+            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_corner(time),
             _ => None,
+        }
+    }
+
+    /// The first time behind `time` at which its rate jumps.
+    pub fn next_kink(&self, time: f64) -> Option<f64> {
+        match self.course {
+            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_kink(time),
+            _ => None,
+        }
+    }
+
+    /// Its rate just before `time`.
+    pub fn rate_before(&self, time: f64) -> f64 {
+        match (self.course, &self.history) {
+            (Course::History(StageKind::Dynamic), Some(history)) => history.slope_before(time),
+            _ => 0.0,
         }
     }
 
@@ -100,7 +171,7 @@ impl Amplitude {
         match self.course {
             Course::Hold(value) => [value, 0.0, 0.0],
             Course::Ramp { from, to } => [from + (to - from) * load, 0.0, 0.0],
-            Course::History(kind) => self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.in_stage(kind, time, load)),
+            Course::History(kind) => self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.at(kind, time, load)),
         }
     }
 }
@@ -108,12 +179,14 @@ impl Amplitude {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Table;
     use StageKind::{Dynamic, Static};
+    use std::sync::Arc;
 
     /// The factor at the half of each stage, stage after stage.
     fn halves(mut amplitude: Amplitude, kinds: &[StageKind]) -> Vec<f64> {
         let half = |(stage, &kind): (usize, &StageKind)| {
-            amplitude.begin_stage(stage, kind, false);
+            amplitude.begin_stage(stage, kind, 0.0, false);
             let [value, ..] = amplitude.at(0.0, if kind == Static { 0.5 } else { 1.0 });
             amplitude.end_stage(0.0, 1.0);
             value
@@ -138,9 +211,9 @@ mod tests {
     #[test]
     fn a_load_whose_stage_ended_early_goes_on_from_there() {
         let mut load = Amplitude::of_load(None, StageSet::default());
-        load.begin_stage(0, Static, false);
+        load.begin_stage(0, Static, 0.0, false);
         load.end_stage(0.0, 0.4);
-        load.begin_stage(1, Static, false);
+        load.begin_stage(1, Static, 0.0, false);
         assert_eq!([load.at(0.0, 0.0)[0], load.at(0.0, 1.0)[0]], [0.4, 1.0]);
     }
 
@@ -149,6 +222,19 @@ mod tests {
         let first = || Amplitude::of_load(None, StageSet(Some(vec![0])));
         assert_eq!(halves(first(), &[Static, Static, Static]), [0.5, 0.5, 0.0]);
         assert_eq!(halves(first(), &[Static, Dynamic]), [0.5, 0.0]);
+    }
+
+    #[test]
+    fn a_history_of_later_stages_holds_its_first_value_before_and_its_last_behind() {
+        let ramp = Arc::new(Table { times: vec![0.0, 1.0], values: vec![2.0, 4.0], smooth: false });
+        let own = |stages: &[usize]| {
+            let history = Reading::new(ramp.clone(), StageSet(Some(stages.to_vec())));
+            Amplitude::of_load(Some(history), StageSet::default())
+        };
+        // The load factor brings the first value in.
+        assert_eq!(halves(own(&[2]), &[Static, Static, Static, Static]), [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(halves(own(&[1]), &[Dynamic, Static, Dynamic]), [2.0, 3.0, 4.0]);
+        assert_eq!(halves(own(&[0, 2]), &[Static, Static, Static]), [3.0, 4.0, 3.0]);
     }
 
     #[test]

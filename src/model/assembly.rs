@@ -234,6 +234,27 @@ impl Assembly {
         self.effects.iter().map(|acting| acting.effect.strain_of(state, field, length)).fold(0.0, f64::max)
     }
 
+    /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of the others; `None` where no effect does.
+    /// The tangent is used up.
+    pub fn stiffness_along(&mut self, state: &State, field: &[Vec3]) -> Option<f64> {
+        let told: Vec<Option<f64>> =
+            self.effects.iter().map(|acting| acting.effect.stiffness_along(state, field)).collect();
+        if told.iter().all(Option::is_none) || self.linear.is_some() {
+            return None;
+        }
+        self.system.clear(None);
+        for (number, acting) in self.effects.iter().enumerate().filter(|(k, a)| told[*k].is_none() && a.has_tangent) {
+            let category = acting.effect.category();
+            acting.add(state, Weights::STIFFNESS, &mut self.system.sink(number, category, true));
+        }
+        let equations = &self.system.pattern.equations;
+        let mut x = vec![0.0; equations.count()];
+        equations.gather(|slot| field[slot], &mut x);
+        let others = self.system.multiply(&self.system.values, &x);
+        let others: f64 = others.iter().zip(&x).map(|(a, b)| a * b).sum();
+        Some(told.iter().flatten().sum::<f64>() + others)
+    }
+
     /// The name of the first effect whose forces are not finite, and the slot.
     pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
         for (number, acting) in self.effects.iter().enumerate() {

@@ -1,11 +1,11 @@
 //! What acts on the state instead of the forces: supports and prescribed motions.
 
-use super::history::History;
+use super::amplitude::Goal;
+use super::history::Reading;
 use crate::system::{Aspect, Direction, Slot, State};
 use crate::system::{StageKind, StageSet};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 /// Directions of a node that are held where a stage finds them.
 #[derive(Clone, Debug)]
@@ -47,21 +47,21 @@ pub struct Motion {
     /// Displacement or angle that the history multiplies
     pub value: f64,
     /// Its history; without one it goes with the load factor.
-    pub history: Option<Arc<dyn History>>,
+    pub history: Option<Reading>,
     /// When it acts
     pub stages: StageSet,
     /// Present course
     course: Course,
     has_acted: bool,
-    /// Where the last ramp that went anywhere started
-    grown: Option<f64>,
+    /// The last ramp that went anywhere, over the load factor
+    grown: Option<(f64, f64)>,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Course {
     Off,
     Hold(f64),
-    Ramp { from: f64 },
+    Ramp { from: f64, to: f64 },
     History(StageKind),
 }
 
@@ -83,7 +83,7 @@ impl Motion {
         slot: Slot,
         axis: Vec3,
         value: f64,
-        history: Option<Arc<dyn History>>,
+        history: Option<Reading>,
         stages: StageSet,
     ) -> Self {
         Self { kind, slot, axis, value, history, stages, course: Course::Off, has_acted: false, grown: None }
@@ -100,42 +100,69 @@ impl Motion {
     ) -> Result<(), (f64, f64)> {
         let (from, aside) = self.reached(state);
         let grows = self.is_fresh(stage);
+        self.history.iter_mut().for_each(|history| history.begin_stage(stage, kind, state.time));
         if !self.stages.contains(stage) {
             self.course = Course::Off;
             return Ok(());
         }
-        self.course = match (kind, &self.history) {
-            (StageKind::Modal, _) => Course::Hold(from),
-            (StageKind::Buckling, _) => match (fresh, grows) {
-                (true, true) => Course::Ramp { from },
-                (false, _) => self.grown.map_or(Course::Hold(from), |from| Course::Ramp { from }),
-                (true, false) => Course::Hold(from),
+        let goal = Goal::of(self.history.as_ref(), stage);
+        let to = |factor: f64| self.value * factor;
+        self.course = match (kind, goal) {
+            (StageKind::Modal, _) | (_, Goal::Stay) => Course::Hold(from),
+            (StageKind::Buckling, goal) => match (fresh, grows, goal) {
+                (true, true, Goal::Value(factor)) => Course::Ramp { from, to: to(factor) },
+                (false, ..) => self.grown.map_or(Course::Hold(from), |(from, to)| Course::Ramp { from, to }),
+                _ => Course::Hold(from),
             },
-            (kind, Some(_)) => Course::History(kind),
-            (StageKind::Static, None) => Course::Ramp { from },
-            (StageKind::Dynamic, None) if self.has_acted => Course::Hold(from),
-            (StageKind::Dynamic, None) => Course::Hold(self.value),
+            (kind, Goal::History) => Course::History(kind),
+            (StageKind::Static, Goal::Value(factor)) => Course::Ramp { from, to: to(factor) },
+            (StageKind::Dynamic, Goal::Value(_)) if self.has_acted => Course::Hold(from),
+            (StageKind::Dynamic, Goal::Value(factor)) => Course::Hold(to(factor)),
         };
         // A modal stage only looks.
         self.has_acted |= kind != StageKind::Modal;
-        if let Course::Ramp { from } = self.course
-            && from != self.value
+        if let Course::Ramp { from, to } = self.course
+            && from != to
         {
-            self.grown = Some(from);
+            self.grown = Some((from, to));
         }
+        let to = self.start(state.time);
+        if (kind == StageKind::Dynamic && self.is_apart(from, to, length)) || aside > 1e-9 {
+            Err((from, to))
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Where it puts its node at the start of the present stage.
+    pub fn start(&self, time: f64) -> f64 {
+        self.at(time, 0.0)[0]
+    }
+
+    /// Whether two positions are different ones, on the scale of a scene of this `length`.
+    pub fn is_apart(&self, from: f64, to: f64, length: f64) -> bool {
         let scale = if self.kind == MotionKind::Translation { length } else { 1.0 };
-        let to = self.at(state.time, 0.0)[0];
-        let jumps = kind == StageKind::Dynamic && (to - from).abs() > 1e-9 * scale;
-        if jumps || aside > 1e-9 { Err((from, to)) } else { Ok(()) }
+        (to - from).abs() > 1e-9 * scale
     }
 
     /// Whether it would move for the first time in a static stage with this number.
     pub fn is_fresh(&self, stage: usize) -> bool {
-        self.stages.contains(stage) && !self.has_acted && self.history.is_none()
+        let grows = matches!(Goal::of(self.history.as_ref(), stage), Goal::Value(factor) if factor != 0.0);
+        self.stages.contains(stage) && !self.has_acted && grows
+    }
+
+    /// Whether it goes with the load factor in the present stage.
+    pub fn grows(&self) -> bool {
+        matches!(self.course, Course::Ramp { from, to } if from != to)
+    }
+
+    /// Whether it follows a history in the present stage.
+    pub fn follows_history(&self) -> bool {
+        matches!(self.course, Course::History(_))
     }
 
     /// Where the node is along the axis, and how far its rotation is off the axis.
-    fn reached(&self, state: &State) -> (f64, f64) {
+    pub fn reached(&self, state: &State) -> (f64, f64) {
         let slot = self.slot as usize;
         match self.kind {
             MotionKind::Translation => (state.q[slot].dot(self.axis), 0.0),
@@ -172,19 +199,35 @@ impl Motion {
     /// The first time behind `time` at which it takes another course.
     pub fn next_corner(&self, time: f64) -> Option<f64> {
         match self.course {
-            Course::History(kind) => self.history.as_ref()?.next_corner_in_stage(kind, time),
+            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_corner(time),
             _ => None,
         }
     }
 
+    /// The first time behind `time` at which its velocity jumps.
+    pub fn next_kink(&self, time: f64) -> Option<f64> {
+        match self.course {
+            Course::History(StageKind::Dynamic) => self.history.as_ref()?.next_kink(time),
+            _ => None,
+        }
+    }
+
+    /// Its velocity just before `time`.
+    pub fn velocity_before(&self, time: f64) -> f64 {
+        match (self.course, &self.history) {
+            (Course::History(StageKind::Dynamic), Some(history)) => self.value * history.slope_before(time),
+            _ => 0.0,
+        }
+    }
+
     /// Value and two derivatives over time.
-    fn at(&self, time: f64, load: f64) -> [f64; 3] {
+    pub fn at(&self, time: f64, load: f64) -> [f64; 3] {
         match self.course {
             Course::Off => [0.0; 3],
             Course::Hold(value) => [value, 0.0, 0.0],
-            Course::Ramp { from } => [from + (self.value - from) * load, 0.0, 0.0],
+            Course::Ramp { from, to } => [from + (to - from) * load, 0.0, 0.0],
             Course::History(kind) => {
-                let history = self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.in_stage(kind, time, load));
+                let history = self.history.as_ref().map_or([1.0, 0.0, 0.0], |h| h.at(kind, time, load));
                 history.map(|factor| self.value * factor)
             }
         }

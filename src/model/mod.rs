@@ -13,11 +13,12 @@ pub use crate::system::{StageContext, StageKind, StageSet};
 pub use amplitude::Amplitude;
 pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
-pub use history::{History, Table};
+pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
 pub use share::Share;
 
-use crate::effect::{Effect, Energy, Momentum};
+use crate::effect::joint::nearest_angle;
+use crate::effect::{Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{
     Aspect, Category, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, System,
@@ -25,6 +26,7 @@ use crate::system::{
 };
 use crate::tensor::Vec3;
 use crate::threads;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A prescribed rotation may go this far in one step or load increment.
@@ -146,7 +148,31 @@ pub enum StageError {
     Jump(Jump),
     /// A support would hold single components of a rotation that is not zero there.
     TurnedHinge(Slot),
+    /// A motor would have to jump.
+    MotorJump(MotorJump),
+    /// A path or a search for critical loads, and nothing goes with the load factor.
+    NothingGrows(StageKind),
+    /// A search for modes, and nothing that is free to move has mass.
+    NoMass,
 }
+
+/// A motor that would have to jump when a dynamic stage begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotorJump {
+    /// The slot of its multiplier
+    pub slot: Slot,
+    /// The number of its amplitude
+    pub amplitude: usize,
+    /// Whether it turns, or slides
+    pub turns: bool,
+    /// The angle or displacement that it has reached
+    pub from: f64,
+    /// Where it begins
+    pub to: f64,
+}
+
+/// What a motor may jump by when a dynamic stage begins, in radians or relative to the scene's length.
+pub const LARGEST_GAP: f64 = 1e-6;
 
 impl Model {
     /// The number of slots.
@@ -183,19 +209,61 @@ impl Model {
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
     pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<Equations, StageError> {
-        let fresh = self.has_fresh_loads(stage);
-        self.charted = if self.is_linear(kind) { Arc::default() } else { self.rotating.clone() };
-        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind, fresh));
-        for (number, motion) in self.motions.iter_mut().enumerate() {
-            let jump = |(from, to)| StageError::Jump(Jump { motion: number, from, to });
-            motion.begin_stage(stage, kind, state, self.length, fresh).map_err(jump)?;
+        if let Some(jump) = self.settle(stage, kind, state).into_iter().next() {
+            return Err(StageError::Jump(jump));
         }
-        let held = self.held_directions(stage);
         let plane = self
             .plane
             .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
-        self.refuse_turned_hinges(&held, state)?;
+        self.refuse_turned_hinges(stage, state)?;
         self.number(stage, plane)
+    }
+
+    /// Settles the courses of loads and motions; the motions that would have to jump.
+    pub fn settle(&mut self, stage: usize, kind: StageKind, state: &State) -> Vec<Jump> {
+        let fresh = self.has_fresh_loads(stage);
+        self.charted = if self.is_linear(kind) { Arc::default() } else { self.rotating.clone() };
+        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind, state.time, fresh));
+        let mut jumps = Vec::new();
+        for (number, motion) in self.motions.iter_mut().enumerate() {
+            let begun = motion.begin_stage(stage, kind, state, self.length, fresh);
+            jumps.extend(begun.err().map(|(from, to)| Jump { motion: number, from, to }));
+        }
+        jumps
+    }
+
+    /// Whether neither a load nor a motion goes with the load factor in the present stage.
+    pub fn is_idle(&self) -> bool {
+        !self.amplitudes.iter().any(Amplitude::grows) && !self.motions.iter().any(Motion::grows)
+    }
+
+    /// Whether no mass of a stage sits where something is free to move.
+    pub fn lacks_mass(&self, stage: &StageContext, equations: &Equations) -> bool {
+        let is_free = |&slot: &Slot| equations.of(slot).iter().any(|&number| number != Equations::HELD);
+        let effects = self.effects.iter().filter(|effect| effect.category() == Category::Inertia && effect.acts(stage));
+        !effects.into_iter().any(|effect| effect.cliques().iter().flatten().any(is_free))
+    }
+
+    /// The motors of joints that a change of amplitudes moves by more than a joint may be open.
+    pub fn motor_jumps(&self, from: &[f64], state: &State) -> Vec<MotorJump> {
+        let mut jumps = Vec::new();
+        self.each_motor(state, &mut |motor| {
+            let [from, to] = [from, &state.amplitude].map(|amplitudes| motor.value * amplitudes[motor.amplitude]);
+            let (gap, size) = match motor.turns {
+                true => (nearest_angle(to - from), 1.0),
+                false => (to - from, self.length),
+            };
+            if gap.abs() > LARGEST_GAP * size {
+                let MotorState { slot, amplitude, turns, .. } = motor;
+                jumps.push(MotorJump { slot, amplitude, turns, from, to });
+            }
+        });
+        jumps
+    }
+
+    /// Shows the motors of joints.
+    pub fn each_motor(&self, state: &State, show: &mut dyn FnMut(MotorState)) {
+        self.effects.iter().for_each(|effect| effect.motors(state, show));
     }
 
     /// Whether stages of a kind are linear in the displacements.
@@ -275,11 +343,13 @@ impl Model {
     }
 
     /// One or two held components of a rotation vector survive a change of chart only where they are zero.
-    fn refuse_turned_hinges(&self, held: &[Direction], state: &State) -> Result<(), StageError> {
+    pub fn refuse_turned_hinges(&self, stage: usize, state: &State) -> Result<(), StageError> {
+        let mut held: HashMap<Slot, Vec<Vec3>> = HashMap::new();
+        self.held_directions(stage).iter().for_each(|d| held.entry(d.slot).or_default().push(d.axis));
         for &slot in &self.charted.rotations {
-            let here = || held.iter().filter(|d| d.slot == slot);
-            let turned = here().any(|d| state.q[slot as usize].dot(d.axis).abs() > 1e-9);
-            let spans = |axis: &Vec3| here().any(|d| d.axis.dot(*axis).abs() > 1e-9);
+            let Some(axes) = held.get(&slot) else { continue };
+            let turned = axes.iter().any(|axis| state.q[slot as usize].dot(*axis).abs() > 1e-9);
+            let spans = |axis: &Vec3| axes.iter().any(|held| held.dot(*axis).abs() > 1e-9);
             if turned && !Vec3::UNIT.iter().all(spans) {
                 return Err(StageError::TurnedHinge(slot));
             }

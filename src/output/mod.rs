@@ -15,5 +15,5 @@ pub use files::{PartFile, remove_if_there};
 pub use history::{Beside, HistoryReader, HistoryWriter, Row, RowCounter, Rows};
 pub use modes::ModesWriter;
 pub use plot::{LinePlots, NamedLine};
-pub use record::{Outcome, Reached, Record};
+pub use record::{Outcome, Reached, Record, warnings};
 pub use report::{Film, Report};

@@ -1,7 +1,7 @@
 //! modes.csv and buckling.csv: what modal and buckling stages find.
 
 use super::files::{PartFile, remove_if_there};
-use crate::drive::Mode;
+use crate::drive::{CriticalLoad, Mode};
 use std::io;
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use std::path::Path;
 #[derive(Clone, Debug, Default)]
 pub struct ModesWriter {
     modes: Vec<(usize, usize, Mode)>,
-    loads: Vec<(usize, usize, f64)>,
+    loads: Vec<(usize, usize, CriticalLoad)>,
 }
 
 impl ModesWriter {
@@ -19,7 +19,7 @@ impl ModesWriter {
     }
 
     /// The critical loads of a stage (from 1).
-    pub fn push_loads(&mut self, stage: usize, loads: &[f64]) {
+    pub fn push_loads(&mut self, stage: usize, loads: &[CriticalLoad]) {
         self.loads.extend(loads.iter().enumerate().map(|(k, &load)| (stage, k + 1, load)));
     }
 
@@ -27,11 +27,13 @@ impl ModesWriter {
     pub fn finish(&self, folder: &Path) -> io::Result<()> {
         // Debug formatting is the shortest text that reads back to the same float.
         let mode = |(stage, number, m): &(usize, usize, Mode)| format!("{stage},{number},{:?},{:?}", m.omega, m.growth);
-        let load = |(stage, number, load): &(usize, usize, f64)| format!("{stage},{number},{load:?}");
+        let load = |(stage, number, CriticalLoad { load, kind }): &(usize, usize, CriticalLoad)| {
+            format!("{stage},{number},{load:?},{}", kind.name())
+        };
         let modes: Vec<String> = self.modes.iter().map(mode).collect();
         let loads: Vec<String> = self.loads.iter().map(load).collect();
         write(folder, "modes.csv", "stage,mode,omega,growth", &modes)?;
-        write(folder, "buckling.csv", "stage,mode,load", &loads)
+        write(folder, "buckling.csv", "stage,mode,load,kind", &loads)
     }
 }
 

@@ -1,6 +1,6 @@
 //! run.json: what was simulated, what it took, how it ended.
 
-use crate::drive::{Counters, Event, Failure, Moment, Place};
+use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, Warning};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::fmt::{self, Display, Formatter};
@@ -93,6 +93,8 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         "effects": effects,
         "counters": counters(outcome.counters),
         "events": events(outcome.counters),
+        "stability": stability(outcome.counters),
+        "warnings": warnings(scene.warnings.iter().chain(&outcome.counters.findings.warnings)),
         "threads": outcome.threads,
         "seconds": {
             "total": outcome.seconds,
@@ -112,7 +114,7 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         });
     }
     if let Err(failure) = outcome.result {
-        record["failure"] = numbers(failure);
+        record["failure"] = numbers(failure, scene);
     }
     record
 }
@@ -127,7 +129,28 @@ fn events(counters: &Counters) -> Value {
             "negative_pivots": event.negative_pivots,
         })
     };
-    counters.events.iter().map(event).collect()
+    counters.findings.events.iter().map(event).collect()
+}
+
+/// Of each static stage that came to its end.
+fn stability(counters: &Counters) -> Value {
+    let one = |found: &StageStability| json!({ "stage": found.stage, "verdict": found.verdict.name(), "negative": found.negative });
+    counters.findings.stability.iter().map(one).collect()
+}
+
+/// Warnings with their names; those about a deck have no moment.
+pub fn warnings<'a>(given: impl Iterator<Item = &'a Warning>) -> Value {
+    let one = |warning: &Warning| {
+        json!({
+            "name": warning.kind.name(),
+            "about": warning.kind.about().name(),
+            "stage": warning.at.map(|at| at.stage),
+            "time": warning.at.map(|at| at.time),
+            "load": warning.at.map(|at| at.load),
+            "message": warning.message,
+        })
+    };
+    given.map(one).collect()
 }
 
 fn counters(counters: &Counters) -> Value {
@@ -147,9 +170,9 @@ fn counters(counters: &Counters) -> Value {
 }
 
 /// The numbers of a failure.
-fn numbers(failure: &Failure) -> Value {
+fn numbers(failure: &Failure, scene: &Scene) -> Value {
     let mut record = json!({ "name": failure.name(), "message": failure.to_string() });
-    if let Some(hint) = failure.hint() {
+    if let Some(hint) = failure.hint(&scene.plan) {
         record["hint"] = json!(hint);
     }
     let when = |at: &Moment, record: &mut Value| {

@@ -6,6 +6,7 @@ use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, S
 use crate::model::{StageSet, Support};
 use crate::system::Direction;
 use crate::tensor::{Mat3, Vec3};
+use crate::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::HashSet;
 
@@ -55,7 +56,7 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Inertia and gravity need mass.
+/// Inertia and gravity need mass: of beams, or of bodies that massless beams carry.
 fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let inertia =
         |s: &deck::Stage| matches!(s.body, StageBody::Dynamic { .. } | StageBody::Modal { .. }) || s.frame.is_some();
@@ -65,23 +66,43 @@ fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         return;
     }
     let why = if dynamic { "a stage with inertia" } else { "`gravity`" };
-    for section in &deck.sections {
-        let used = deck.beams.iter().find(|b| b.sections.iter().any(|s| s.value == section.name.value));
-        let Some(beam) = used else { continue };
-        let missing = match &section.body {
-            SectionBody::Resultants { mass: None, .. } => Some("`rhoA`"),
-            SectionBody::Full { mass: None, .. } => Some("`mass`"),
-            SectionBody::Shaped { material, .. } => {
-                let found = deck.materials.iter().find(|m| m.name.value == material.value);
-                found.filter(|m| m.density.is_none()).map(|_| "a material with `rho`")
-            }
-            _ => None,
+    let section = |name: &str| deck.sections.iter().find(|section| section.name.value == name);
+    for own in &deck.sections {
+        let used = |beam: &&deck::Beam| beam.sections.iter().any(|name| name.value == own.name.value);
+        let users: Vec<&deck::Beam> = deck.beams.iter().filter(used).collect();
+        let (Some(beam), Some(Missing { key, zero })) = (users.first(), missing_mass(deck, own)) else { continue };
+        // Between a section with mass and one without there is no taper of mass.
+        let has_mass = |name: &Spanned<String>| section(&name.value).is_some_and(|s| missing_mass(deck, s).is_none());
+        let tapers = users.iter().any(|beam| beam.sections.iter().any(has_mass));
+        let name = &own.name;
+        let diagnostic = if deck.bodies.is_empty() || tapers {
+            Diagnostic::error(format!("section `{}` needs {key} for {why}", name.value), name.span.clone())
+        } else {
+            let message = format!("section `{}` has no mass: in {why} only bodies have", name.value);
+            Diagnostic::warning(WarningKind::MasslessSection, message, name.span.clone())
+                .help(format!("where that is meant, {zero} says so"))
         };
-        if let Some(missing) = missing {
-            let message = format!("section `{}` needs {missing} for {why}", section.name.value);
-            let diagnostic = Diagnostic::error(message, section.name.span.clone());
-            diagnostics.push(diagnostic.context(beam.name.span.clone(), "used by this beam"));
+        diagnostics.push(diagnostic.context(beam.name.span.clone(), "used by this beam"));
+    }
+}
+
+/// What a section without mass lacks.
+struct Missing {
+    /// The key
+    key: &'static str,
+    /// How a deck says that there is none
+    zero: &'static str,
+}
+
+fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
+    match &section.body {
+        SectionBody::Resultants { mass: None, .. } => Some(Missing { key: "`rhoA`", zero: "`rhoA = 0`" }),
+        SectionBody::Full { mass: None, .. } => Some(Missing { key: "`mass`", zero: "a `mass` of zeros" }),
+        SectionBody::Shaped { material, .. } => {
+            let material = deck.materials.iter().find(|m| m.name.value == material.value)?;
+            material.density.is_none().then_some(Missing { key: "a material with `rho`", zero: "`rho = 0`" })
         }
+        _ => None,
     }
 }
 
@@ -98,7 +119,7 @@ fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             if place == there && used(&name.value) && used(&other.value) {
                 let message =
                     format!("the points `{}` and `{}` lie at the same place and stay apart", other.value, name.value);
-                let diagnostic = Diagnostic::warning(message, name.span.clone());
+                let diagnostic = Diagnostic::warning(WarningKind::EqualPlaces, message, name.span.clone());
                 diagnostics.push(diagnostic.help("beams are joined where they name the same point"));
             }
         }
@@ -129,14 +150,15 @@ fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// The histories that act in a stage, from 1.
+/// The names of the histories that go on in a stage, from 1.
 pub fn histories_in(deck: &Deck, stage: usize) -> impl Iterator<Item = &Spanned<String>> {
     let acts = move |stages: &Option<Vec<usize>>| stages.as_ref().is_none_or(|stages| stages.contains(&stage));
     let loads = deck.loads.iter().filter(move |l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
     let motions = deck.motions.iter().filter(move |m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
     let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|(_, history)| history.as_ref());
     let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
-    loads.chain(motions).chain(motors).chain(strains)
+    let all = loads.chain(motions).chain(motors).chain(strains);
+    all.filter(move |history| history.goes_on_in(stage)).map(|history| &history.name)
 }
 
 /// The rotation-aware scheme has no total rotation vectors to interpolate, nor to clamp one component of.
@@ -178,7 +200,8 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
             let message = "joints with multipliers need a scheme that dissipates: without, accelerations and forces of joints \
                            oscillate from step to step";
             let help = "take scheme = \"generalized_alpha\"; without dissipation a run may even lose its balance";
-            diagnostics.push(Diagnostic::warning(message, stage.span.clone()).help(help));
+            let diagnostic = Diagnostic::warning(WarningKind::UndampedMultipliers, message, stage.span.clone());
+            diagnostics.push(diagnostic.help(help));
         }
     }
 }

@@ -1,11 +1,12 @@
 //! Supports and motions: from tables to held directions, and the clashes between them.
 
-use super::compose::stage_set;
+use super::compose::{DrivenTable, stage_set};
 use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
-use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, MotionWhat, Span};
-use crate::model::{History, Motion, MotionKind, StageSet, Support, Table};
+use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
+use crate::drive::Driven;
+use crate::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
 use crate::system::{Direction, Node, Slot};
 use crate::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
@@ -65,7 +66,7 @@ pub fn constraints(
     histories: &HashMap<String, Arc<dyn History>>,
     connections: &[FoundJoint],
     diagnostics: &mut Vec<Diagnostic>,
-) -> (Vec<Support>, Vec<Motion>) {
+) -> SceneConstraints {
     let mut held = Vec::new();
     let mut supports = Vec::new();
     for support in &deck.supports {
@@ -80,7 +81,13 @@ pub fn constraints(
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
-    let mut motions = Vec::new();
+    let (mut motions, mut driven) = (Vec::new(), Vec::new());
+    let table = |number: usize, what: &'static str, span: &Span, history: Option<&HistoryUse>| DrivenTable {
+        drives: Driven::Motion(number),
+        what,
+        span: span.clone(),
+        history: history.cloned(),
+    };
     for connection in connections.iter().filter(|connection| connection.is_support()) {
         let Some(node) = connection.nodes[1].map(|node| mesh.nodes[node].node) else { continue };
         let directions = directions(connection.held(), connection.axes, node.u, node.p);
@@ -89,7 +96,9 @@ pub fn constraints(
         match ground_motor(deck, histories, connection, node) {
             Ok(None) => {}
             Ok(Some(motor)) => {
-                note(&mut held, &motor.directions(), &motor.stages, &connection.joint.span, "motion");
+                let (span, history) = (&connection.joint.span, connection.joint.motor.as_ref());
+                note(&mut held, &motor.directions(), &motor.stages, span, "motion");
+                driven.push(table(motions.len(), "motor", span, history.and_then(|(_, history)| history.as_ref())));
                 motions.push(motor);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -98,8 +107,7 @@ pub fn constraints(
     for motion in &deck.motions {
         match read_motion(deck, mesh, histories, motion) {
             Ok(found) => {
-                refuse_early_jump(deck, motion, &found, diagnostics);
-                warn_of_kinks(deck, motion, diagnostics);
+                driven.push(table(motions.len(), "motion", &motion.span, motion.history.as_ref()));
                 note(&mut held, &found.directions(), &found.stages, &motion.span, "motion");
                 motions.push(found);
             }
@@ -107,7 +115,17 @@ pub fn constraints(
         }
     }
     refuse_clashes(deck, mesh, &held, diagnostics);
-    (supports, motions)
+    SceneConstraints { supports, motions, driven }
+}
+
+/// What acts on the state instead of the forces.
+pub struct SceneConstraints {
+    /// Supports
+    pub supports: Vec<Support>,
+    /// Motions, and motors of joints to ground
+    pub motions: Vec<Motion>,
+    /// The tables of the motions
+    pub driven: Vec<DrivenTable>,
 }
 
 /// The motor of a joint to ground is a prescribed motion of its node.
@@ -127,13 +145,17 @@ fn ground_motor(
     Ok(Some(Motion::new(kind, slot, axis, *value, history, StageSet::default())))
 }
 
-fn find_history(
+/// The history that a table names.
+pub fn find_history(
     deck: &Deck,
     histories: &HashMap<String, Arc<dyn History>>,
-    name: Option<&deck::Spanned<String>>,
-) -> Result<Option<Arc<dyn History>>, Diagnostic> {
-    let unknown = |name| names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()));
-    name.map(|name| histories.get(&name.value).cloned().ok_or_else(|| unknown(name))).transpose()
+    named: Option<&HistoryUse>,
+) -> Result<Option<Reading>, Diagnostic> {
+    let Some(HistoryUse { name, stages }) = named else { return Ok(None) };
+    match histories.get(&name.value) {
+        Some(function) => Ok(Some(Reading::new(function.clone(), stage_set(stages.as_ref())))),
+        None => Err(names::unknown("history", name, deck.histories.iter().map(|h| h.name.value.as_str()))),
+    }
 }
 
 fn directions(fix: [bool; 6], axes: Mat3, u: Slot, p: Slot) -> Vec<Direction> {
@@ -168,47 +190,6 @@ fn read_motion(
             Motion::new(MotionKind::Rotation, node.p, axis, angle, history, stages)
         }
     })
-}
-
-/// A motion that acts in a dynamic first stage must start where everything starts: at zero.
-fn refuse_early_jump(deck: &Deck, motion: &deck::Motion, found: &Motion, diagnostics: &mut Vec<Diagnostic>) {
-    let dynamic = matches!(deck.stages.first().map(|s| &s.body), Some(deck::StageBody::Dynamic { .. }));
-    if !dynamic || !found.stages.contains(0) {
-        return;
-    }
-    let course = found.history.as_ref().map_or([1.0, 0.0, 0.0], |history| history.at(0.0));
-    if course.iter().any(|value| !value.is_finite()) {
-        let message = "the history of this motion has no finite value, velocity or acceleration at time 0";
-        diagnostics.push(Diagnostic::error(message, motion.span.clone()));
-        return;
-    }
-    if course[1] != 0.0 {
-        let message = "this motion begins with a velocity, while its node is at rest: velocities jump there";
-        let help = "a history that begins with a slope of zero does not excite vibrations";
-        diagnostics.push(Diagnostic::warning(message, motion.span.clone()).help(help));
-    }
-    let start = found.value * course[0];
-    if start.abs() > 1e-12 * found.value.abs() || start.is_nan() {
-        let message = format!("this motion begins with a jump from 0 to {start}");
-        let help = "a dynamic stage starts where the scene is; give the motion a `history` that begins with 0";
-        diagnostics.push(Diagnostic::error(message, motion.span.clone()).help(help));
-    }
-}
-
-/// A kink of the velocity excites the stiff axial vibrations of a beam.
-fn warn_of_kinks(deck: &Deck, motion: &deck::Motion, diagnostics: &mut Vec<Diagnostic>) {
-    let dynamic = |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Dynamic { .. });
-    let named =
-        |history: &&deck::HistoryTable| motion.history.as_ref().is_some_and(|name| name.value == history.name.value);
-    let Some(history) = deck.histories.iter().find(named) else { return };
-    if let HistoryBody::Table { values, smooth: false, .. } = &history.body
-        && deck.stages.iter().any(dynamic)
-        && values.windows(2).any(|pair| pair[0] != pair[1])
-    {
-        let message = format!("the history `{}` of this motion has kinks: velocities jump there", history.name.value);
-        let diagnostic = Diagnostic::warning(message, motion.span.clone());
-        diagnostics.push(diagnostic.help("`smooth = true` makes velocity and acceleration continuous"));
-    }
 }
 
 /// Whether earlier tables hold all three directions of the slot, whenever this one holds its own.

@@ -11,6 +11,7 @@ mod names;
 mod output;
 mod path;
 mod planar;
+mod rehearsal;
 mod section;
 
 pub use compose::Reason;
@@ -19,17 +20,19 @@ pub use names::Spot;
 pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{
-    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Spanned, StageBody,
+    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
 };
-use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
+use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;
 use crate::effect::rigid_body::Body;
 use crate::integrate::Scheme;
-use crate::model::{Charted, ElementInfo, Model, SlotKind};
+use crate::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
 use crate::probe::{Figure, Probe, Quantity};
 use crate::system::Node;
 use crate::tensor::{Mat3, Vec3};
+use crate::warning::WarningKind;
+use constraints::SceneConstraints;
 use output::Columns;
 use std::sync::Arc;
 
@@ -47,6 +50,8 @@ pub struct Scene {
     pub vtk: bool,
     /// What is expected
     pub expectations: Vec<Expectation>,
+    /// Warnings about the deck itself, where the scene was built by [`from_deck`]
+    pub warnings: Vec<Warning>,
     /// Which effects act, and why
     pub reasons: Vec<Reason>,
     /// Nodes, beams, elements
@@ -71,7 +76,7 @@ impl Scene {
 /// What is expected of a run.
 #[derive(Clone)]
 pub struct Expectation {
-    /// The column or failure as it stands in the deck
+    /// The column, failure or warning as it stands in the deck
     pub name: String,
     /// What is expected
     pub kind: ExpectationKind,
@@ -111,6 +116,10 @@ pub enum ExpectationKind {
     },
     /// That it fails
     Fails,
+    /// A warning of this kind
+    Warns(WarningKind),
+    /// No warning that puts an answer in doubt
+    Quiet,
 }
 
 /// A number of a mode.
@@ -166,9 +175,22 @@ pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene
         }
     }
     match scene {
-        Some(scene) if told.iter().all(Diagnostic::is_warning) => Ok((scene, told)),
+        Some(scene) if told.iter().all(Diagnostic::is_warning) => {
+            let warnings = told.iter().filter_map(before_the_run).collect();
+            Ok((Scene { warnings, ..scene }, told))
+        }
         _ => Err(told),
     }
+}
+
+/// The warning of a diagnostic, with the help that belongs to it.
+fn before_the_run(diagnostic: &Diagnostic) -> Option<Warning> {
+    let Severity::Warning(kind) = diagnostic.severity else { return None };
+    let message = match &diagnostic.help {
+        Some(help) => format!("{}: {help}", diagnostic.message),
+        None => diagnostic.message.clone(),
+    };
+    Some(Warning { kind, at: None, message })
 }
 
 /// Whether a name speaks of a table: `arm`, `arm@end`, `arm:3`.
@@ -192,7 +214,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let mut found = Vec::new();
     let connections = joints::find(deck, &mesh, &mut found);
     let composition = compose::compose(deck, &mesh, &histories, &connections, &mut found);
-    let (supports, motions) = constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
+    let SceneConstraints { supports, motions, driven } =
+        constraints::constraints(deck, &mesh, &histories, &connections, &mut found);
     let columns = Columns { deck, mesh: &mesh, elasticity: &composition.elasticity };
     let probes = columns.written(&mut found);
     let stages = stages(deck, &columns, &mut found);
@@ -236,20 +259,27 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
+    let plan = Plan {
+        energy: expected || watched || probes.iter().any(energy),
+        continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
+        model,
+        initial,
+        places: places(&mesh, &stages),
+        stages,
+        interval: deck.output.interval,
+    };
+    // Of a deck that could be read in part the stages may be others.
+    if plan.stages.len() == deck.stage_count && diagnostics.iter().all(Diagnostic::is_warning) {
+        rehearsal::tell(deck, &plan, &[composition.driven, driven].concat(), diagnostics);
+    }
     Some(Scene {
         title: deck.title.clone(),
-        plan: Plan {
-            energy: expected || watched || probes.iter().any(energy),
-            continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
-            model,
-            initial,
-            stages,
-            interval: deck.output.interval,
-        },
+        plan,
         probes,
         every: deck.output.every,
         vtk: deck.output.vtk,
         expectations,
+        warnings: Vec::new(),
         reasons: [vec![planar], composition.reasons].concat(),
         mesh,
         bodies: composition.bodies,
@@ -262,6 +292,13 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
 /// Where a point is that stands in a deck by its name or its coordinates.
 pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Option<Vec3> {
     names::place(deck, point).ok()
+}
+
+/// The initial places of all nodes, where a modal stage asks for them.
+fn places(mesh: &Mesh, stages: &[Stage]) -> Vec<(Node, Vec3)> {
+    let is_modal = |stage: &Stage| stage.work.kind() == StageKind::Modal;
+    let wanted = stages.iter().any(is_modal);
+    mesh.nodes.iter().filter(|_| wanted).map(|node| (node.node, node.place)).collect()
 }
 
 /// The rotations of all nodes, and the elements beam by beam.
@@ -341,6 +378,12 @@ fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic
         match &expect.body {
             ExpectBody::Fails(name) => {
                 found.push(Expectation { name: name.value.clone(), kind: ExpectationKind::Fails, source });
+            }
+            ExpectBody::Warns(kind) => {
+                found.push(Expectation { name: kind.name().into(), kind: ExpectationKind::Warns(*kind), source });
+            }
+            ExpectBody::Quiet => {
+                found.push(Expectation { name: "no warning".into(), kind: ExpectationKind::Quiet, source });
             }
             ExpectBody::Column { column, reduce, value, below, above } => {
                 let bounds = Bounds { value: *value, below: *below, above: *above };

@@ -159,9 +159,21 @@ pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result
         }
         SectionBody::Full { stiffness, mass } => full(section, stiffness, mass.as_ref(), span),
         SectionBody::Shaped { shape, material, shear_factor } => {
-            Ok(shaped(*shape, find_material(material, materials)?, *shear_factor))
+            within_range(shaped(*shape, find_material(material, materials)?, *shear_factor), section)
         }
     }
+}
+
+/// Refuses resultants of a shape that no floating-point number holds.
+fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<SectionMatrices, Diagnostic> {
+    let stiff = (0..6).all(|k| found.stiffness[k][k].is_finite() && found.stiffness[k][k] > 0.0);
+    let heavy = found.mass.as_ref().is_none_or(|mass| mass.mass.is_finite() && mass.about_line.max_abs().is_finite());
+    if stiff && heavy {
+        return Ok(found);
+    }
+    let name = &section.name;
+    let message = format!("the resultants of section `{}` are beyond the range of floating-point numbers", name.value);
+    Err(Diagnostic::error(message, name.span.clone()).help("look at its dimensions and its material"))
 }
 
 /// The course of a taper between two sections.
@@ -174,6 +186,9 @@ pub fn taper(ends: [&deck::Section; 2], materials: &[deck::Material]) -> Result<
         let alike = std::mem::discriminant(a) == std::mem::discriminant(b) && ma.value == mb.value;
         let material = find_material(ma, materials)?.clone();
         if alike && fa.is_some() == fb.is_some() {
+            // Between the ends nothing is larger, or smaller, than at both.
+            matrices(ends[0], materials)?;
+            matrices(ends[1], materials)?;
             return Ok(SectionCourse::Shaped { shapes: [*a, *b], material, shear_factors: [*fa, *fb] });
         }
     }

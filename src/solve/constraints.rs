@@ -19,7 +19,7 @@ const FACTOR: f64 = 8.0;
 
 /// The multipliers of a pattern, and the values of the last tangent that was made ready.
 pub struct Constraints {
-    rows: Vec<Row>,
+    rows: Vec<Multiplier>,
     additions: Vec<Addition>,
     /// Groups of multipliers
     groups: Vec<u32>,
@@ -29,13 +29,13 @@ pub struct Constraints {
 }
 
 /// The row of a multiplier.
-struct Row {
+struct Multiplier {
     equation: u32,
-    ends: Vec<End>,
+    ties: Vec<Tie>,
 }
 
 /// An equation that a multiplier enters: where the entries of C, of B and of the diagonal stand.
-struct End {
+struct Tie {
     equation: u32,
     of_column: usize,
     of_row: usize,
@@ -69,13 +69,13 @@ impl Constraints {
         for (number, &equation) in equations.iter().enumerate() {
             let met: Vec<u32> = pattern.entries(equation).map(|entry| entry.row).collect();
             let others = met.into_iter().filter(|&other| !is_multiplier[other as usize]);
-            let end = |other: u32| {
+            let tie = |other: u32| {
                 let (of_column, of_row) = (place(other, equation)?, place(equation, other)?);
-                Some(End { equation: other, of_column, of_row, diagonal: place(other, other)? })
+                Some(Tie { equation: other, of_column, of_row, diagonal: place(other, other)? })
             };
-            let ends: Vec<End> = others.filter_map(end).collect();
-            for (k, a) in ends.iter().enumerate() {
-                for b in &ends[k..] {
+            let ties: Vec<Tie> = others.filter_map(tie).collect();
+            for (k, a) in ties.iter().enumerate() {
+                for b in &ties[k..] {
                     let pair = [place(a.equation, b.equation), place(b.equation, a.equation)];
                     let [Some(above), Some(below)] = pair else { continue };
                     let add = |place, of_column, of_row| Addition { place, row: number, of_column, of_row };
@@ -86,7 +86,7 @@ impl Constraints {
                     }
                 }
             }
-            rows.push(Row { equation, ends });
+            rows.push(Multiplier { equation, ties });
         }
         let mut groups: Vec<u32> = multipliers.iter().map(|&slot| pattern.groups.of(slot).0 as u32).collect();
         groups.sort_unstable();
@@ -100,6 +100,11 @@ impl Constraints {
         &self.groups
     }
 
+    /// The equations of multipliers.
+    pub fn equations(&self) -> impl Iterator<Item = usize> {
+        self.rows.iter().map(|row| row.equation as usize)
+    }
+
     /// The number of multipliers.
     pub fn count(&self) -> usize {
         self.rows.len()
@@ -110,7 +115,7 @@ impl Constraints {
         let Self { rows, additions, weights, values, .. } = self;
         values.clear();
         values.extend_from_slice(&system.values);
-        let largest = rows.iter().flat_map(|row| &row.ends).map(|end| values[end.diagonal].abs()).fold(0.0, f64::max);
+        let largest = rows.iter().flat_map(|row| &row.ties).map(|tie| values[tie.diagonal].abs()).fold(0.0, f64::max);
         weights.iter_mut().zip(&*rows).for_each(|(weight, row)| *weight = row.weight(values, largest));
         for addition in additions {
             let product = system.values[addition.of_column] * system.values[addition.of_row];
@@ -128,20 +133,22 @@ impl Constraints {
         for (row, weight) in self.rows.iter().zip(&self.weights) {
             let gap = weight * right_hand_side[row.equation as usize];
             if gap != 0.0 {
-                row.ends.iter().for_each(|end| right_hand_side[end.equation as usize] += self.values[end.of_column] * gap);
+                row.ties
+                    .iter()
+                    .for_each(|tie| right_hand_side[tie.equation as usize] += self.values[tie.of_column] * gap);
             }
         }
     }
 }
 
-impl Row {
+impl Multiplier {
     /// From the stiffness beside a multiplier in its own unit, so that it does not depend on any: FACTOR/w = sum B_k C_k/|K_kk|. Where
     /// nothing has stiffness that of others, `largest`, must do.
     fn weight(&self, values: &[f64], largest: f64) -> f64 {
-        let square = |end: &End| (values[end.of_column] * values[end.of_row]).abs();
-        let stiff = self.ends.iter().filter(|end| values[end.diagonal] != 0.0);
-        let softness: f64 = stiff.map(|end| square(end) / values[end.diagonal].abs()).sum();
-        let squares: f64 = self.ends.iter().map(square).sum();
+        let square = |tie: &Tie| (values[tie.of_column] * values[tie.of_row]).abs();
+        let stiff = self.ties.iter().filter(|tie| values[tie.diagonal] != 0.0);
+        let softness: f64 = stiff.map(|tie| square(tie) / values[tie.diagonal].abs()).sum();
+        let squares: f64 = self.ties.iter().map(square).sum();
         match (softness > 0.0, squares > 0.0) {
             (true, _) => FACTOR / softness,
             (false, true) => largest / squares,

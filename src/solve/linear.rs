@@ -11,7 +11,7 @@ use crate::tensor::Vec3;
 
 /// Solves with tangents of one pattern.
 ///
-/// Blocks serve what is not too much of a net; multipliers of joints are made ready for them ([`Constraints`]). Tangents whose pivots fail
+/// Blocks serve what is not too much of a net; multipliers of joints are made ready for them (`solve/constraints.rs`). Tangents whose pivots fail
 /// across blocks are left to LU with partial pivoting. Factors take the place of a tangent that may go as long
 /// as that is sure to lose no digits; else they stand beside it, and what they solve is looked at.
 pub struct LinearSolver {
@@ -102,6 +102,11 @@ impl LinearSolver {
         })
     }
 
+    /// What its multipliers are, where there are some.
+    pub(super) fn constraints(&self) -> Option<&Constraints> {
+        self.constraints.as_ref()
+    }
+
     /// Its solver in blocks, where it has one, whether it is in use or not.
     pub(super) fn blocks(&self) -> Option<&BlockSolver> {
         self.blocks.as_deref()
@@ -126,8 +131,14 @@ impl LinearSolver {
     pub(super) fn negative_of_own(&mut self, tangent: &mut Tangent) -> Option<usize> {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
         (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
+        if done { self.negative_of_last() } else { None }
+    }
+
+    /// The negative pivots of the last factorisation, where it tells them.
+    pub(super) fn negative_of_last(&self) -> Option<usize> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
-        self.blocks_in_use()?.negative().filter(|_| done)?.checked_sub(of_multipliers)
+        let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
+        blocks.negative()?.checked_sub(of_multipliers)
     }
 
     /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field

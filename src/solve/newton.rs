@@ -108,6 +108,9 @@ pub struct Newton {
     last: Option<f64>,
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
     pub first: Rough<3>,
+    /// The largest ratio of a correction of the last solution to the one before it, of those that are no round-off: an iteration that
+    /// follows the path contracts
+    pub contraction: f64,
     reuse: Reuse,
     foresight: Foresight,
     /// What follows the error of time steps, where something does
@@ -115,6 +118,9 @@ pub struct Newton {
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
     given: Option<u64>,
 }
+
+/// Corrections below this (lengths of the scene, radians) need not become any smaller.
+const NO_CORRECTION: f64 = 1e-6;
 
 /// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
 const RUNAWAY: f64 = 1e6;
@@ -129,6 +135,7 @@ impl Newton {
             dq: zeros(system.force[0].len()),
             last: None,
             first: Rough::default(),
+            contraction: 0.0,
             reuse: Reuse::new(),
             foresight: Foresight::default(),
             time_error: None,
@@ -169,7 +176,7 @@ impl Newton {
         self.foresight.forget(assembly);
         let noise = assembly.noise(state);
         let mut iterations = 0;
-        self.last = None;
+        (self.last, self.contraction) = (None, 0.0);
         self.first.clear();
         self.reuse.begin(self.given.take() == Some(assembly.system.revision));
         let (mut refinement, mut formed_anew) = (Refinement::default(), false);
@@ -242,6 +249,9 @@ impl Newton {
                 self.foresight.forget(assembly);
             } else {
                 self.foresight.remember();
+            }
+            if let Some(last) = self.last.filter(|&last| last > NO_CORRECTION) {
+                self.contraction = self.contraction.max(length / last);
             }
             let changes_charts = method.changes_charts();
             if changes_charts && iterations == 1 {

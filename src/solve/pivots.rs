@@ -24,7 +24,11 @@ impl LinearSolver {
         if self.is_symmetric() {
             return self.negative_of_own(tangent);
         }
-        let system = tangent.look();
+        self.negative_beside(tangent.look())
+    }
+
+    /// The same of a system that this solver need not have factorised; its own last factorisation stays.
+    pub(super) fn negative_beside(&mut self, system: &System) -> Option<usize> {
         if !is_symmetric(&system.pattern, &system.values) {
             return None;
         }

@@ -44,6 +44,9 @@ impl NullVector {
 /// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
 const NO_STIFFNESS: f64 = 8.0;
 
+/// Forces of multipliers that cancel to this part of themselves cancel.
+const SAID_TWICE: f64 = 1e-10;
+
 impl LinearSolver {
     /// A direction in which the tangent has no stiffness.
     pub fn null_vector(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
@@ -82,8 +85,28 @@ impl LinearSolver {
         threads::each_part(&mut motion, |start, part| {
             part.iter_mut().zip(&x[start..]).for_each(|(scale, x)| *scale = x / *scale)
         });
-        let held = stiffness_of(tangent.look(), &motion) > NO_STIFFNESS;
+        let system = tangent.look();
+        let held = stiffness_of(system, &motion) > NO_STIFFNESS && !self.is_said_twice(system, &x, &motion);
         Some(NullVector { entries: x, motion, held, broke_down: false })
+    }
+
+    /// Whether what moves most, by entries that compare, are multipliers whose forces cancel: conditions that hold what is held already. Their
+    /// unknowns are round-off, of which the stiffness tells nothing.
+    fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
+        let Some(constraints) = self.constraints() else { return false };
+        let mut multipliers = vec![0.0; motion.len()];
+        constraints.equations().for_each(|k| multipliers[k] = motion[k]);
+        let largest = |of_multipliers: bool| {
+            let kind = entries.iter().zip(&multipliers).filter(|(_, m)| (**m != 0.0) == of_multipliers);
+            kind.fold(0.0_f64, |largest, (entry, _)| largest.max(entry.abs()))
+        };
+        if largest(true) <= largest(false) {
+            return false;
+        }
+        let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+        let all: Vec<f64> = multipliers.iter().map(|v| v.abs()).collect();
+        let (left, all) = (system.multiply(&system.values, &multipliers), system.multiply(&sizes, &all));
+        left.iter().zip(&all).all(|(left, all)| left.abs() <= SAID_TWICE * all)
     }
 
     /// The same where the factorisation broke down: the diagonal is raised by a little first.
@@ -151,6 +174,11 @@ fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
 /// whose softest motions are nearly free, are not taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
+}
+
+/// The part of x.Jx that round-off in the entries of J may have taken.
+pub(super) fn lost_part(system: &System, x: &[f64]) -> f64 {
+    1.0 / stiffness_of(system, x).max(1.0)
 }
 
 fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {

@@ -19,6 +19,8 @@ pub struct Forecast {
     pub watched: f64,
     /// How it ended within these, if it did
     pub ended: Option<Result<(), Failure>>,
+    /// Whether a state had been computed by then
+    pub computed: bool,
     /// Where it was then
     pub at: Moment,
 }
@@ -33,7 +35,8 @@ pub fn forecast(scene: &Scene, patience: Duration) -> Forecast {
     let watched = watch.begun.elapsed().as_secs_f64();
     let gave_up = matches!(result, Err(Failure::Interrupted { .. }));
     let left = if gave_up { watch.left(watched, &counters) } else { 0.0 };
-    Forecast { seconds: watched + left, watched, ended: (!gave_up).then_some(result), at: watch.at }
+    let computed = counters.work.iterations > 0;
+    Forecast { seconds: watched + left, watched, ended: (!gave_up).then_some(result), computed, at: watch.at }
 }
 
 /// An attempt at a step or level begins.

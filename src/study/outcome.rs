@@ -1,7 +1,7 @@
 //! A run of a scene: all its outputs, and what they took.
 
 use crate::deck::{Diagnostic, Spanned, is_named, nearest};
-use crate::drive::{Counters, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
+use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
 use crate::model::StageKind;
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
@@ -27,8 +27,6 @@ pub struct Outcome {
     pub(in crate::study) expected: Vec<f64>,
     /// Steps and levels tried
     pub(in crate::study) attempts: u64,
-    /// Remarks on the way
-    pub warnings: Vec<String>,
     /// Work done
     pub counters: Counters,
     /// Wall-clock seconds
@@ -51,17 +49,16 @@ impl Outcome {
             found: ModesWriter::default(),
             modes: Vec::new(),
             attempts: 0,
-            warnings: Vec::new(),
             most_attempts,
             interrupted,
         };
         let start = Instant::now();
         let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
         let seconds = start.elapsed().as_secs_f64();
-        let Columns { recorder, moments, rows, found, modes, attempts, warnings, .. } = columns;
+        let Columns { recorder, moments, rows, found, modes, attempts, .. } = columns;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
         let dynamic = are_dynamic(scene);
-        Self { ended, dynamic, moments, rows, found, modes, expected, attempts, warnings, counters, seconds }
+        Self { ended, dynamic, moments, rows, found, modes, expected, attempts, counters, seconds }
     }
 
     /// The rows of the history, with their moments.
@@ -154,7 +151,6 @@ impl Outcome {
             modes: vec![f64::NAN; places.len() - history.len()],
             expected: Vec::new(),
             attempts: 0,
-            warnings: Vec::new(),
             counters: Counters::default(),
             seconds: 0.0,
         }
@@ -208,7 +204,6 @@ struct Columns<'a> {
     found: ModesWriter,
     modes: Vec<f64>,
     attempts: u64,
-    warnings: Vec<String>,
     most_attempts: u64,
     interrupted: &'a dyn Fn() -> Option<i32>,
 }
@@ -239,15 +234,11 @@ impl Observer for Columns<'_> {
         Ok(())
     }
 
-    fn buckling(&mut self, stage: usize, loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
         self.found.push_loads(stage, loads);
-        self.take_modes(stage, loads.to_vec());
+        self.take_modes(stage, loads.iter().map(|critical| critical.load).collect());
         Ok(())
-    }
-
-    fn warn(&mut self, message: &str) {
-        self.warnings.push(message.to_string());
     }
 
     fn progress(&mut self, at: Moment, _done: f64) -> Result<(), Failure> {

@@ -1,7 +1,7 @@
 //! Expectations held against a run.
 
 use crate::deck::{Instant, Reduce};
-use crate::drive::{Counters, Failure, Mode, Snapshot};
+use crate::drive::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
 use crate::probe::Probe;
 use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
 
@@ -17,6 +17,8 @@ pub struct Recorder {
     /// Of the last stages that had some
     modes: Vec<Mode>,
     critical: Vec<f64>,
+    /// About the deck
+    warnings: Vec<Warning>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +32,7 @@ struct Row {
 /// What became of an expectation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// Column, counter or failure, and where it was looked at
+    /// Column, counter, failure or warnings, and where it was looked at
     pub what: String,
     /// What was expected
     pub expected: String,
@@ -51,7 +53,16 @@ impl Recorder {
         let rows = vec![Vec::new(); expectations.len()];
         let mut probes: Vec<Probe> = Vec::new();
         let places = expectations.iter().map(|expectation| place(expectation, &mut probes)).collect();
-        Self { rows, expectations, probes, places, scratch: Vec::new(), modes: Vec::new(), critical: Vec::new() }
+        Self {
+            rows,
+            expectations,
+            probes,
+            places,
+            scratch: Vec::new(),
+            modes: Vec::new(),
+            critical: Vec::new(),
+            warnings: scene.warnings.clone(),
+        }
     }
 
     /// Takes the modes of a stage.
@@ -60,8 +71,8 @@ impl Recorder {
     }
 
     /// Takes the critical loads of a stage.
-    pub fn buckling(&mut self, loads: &[f64]) {
-        self.critical = loads.to_vec();
+    pub fn buckling(&mut self, loads: &[CriticalLoad]) {
+        self.critical = loads.iter().map(|critical| critical.load).collect();
     }
 
     fn mode(&self, quantity: ModeQuantity, number: usize) -> Option<f64> {
@@ -77,7 +88,10 @@ impl Recorder {
         let came = self.expectations.iter().zip(&self.rows).filter_map(|(expectation, rows)| match &expectation.kind {
             ExpectationKind::Column { reduce: how, bounds, .. } => bounds.value.map(|_| reduce(rows, *how)),
             ExpectationKind::Mode { quantity, number, bounds } => bounds.value.map(|_| self.mode(*quantity, *number)),
-            ExpectationKind::Counter { .. } | ExpectationKind::Fails => None,
+            ExpectationKind::Counter { .. }
+            | ExpectationKind::Fails
+            | ExpectationKind::Warns(_)
+            | ExpectationKind::Quiet => None,
         });
         came.map(|value| value.unwrap_or(f64::NAN)).collect()
     }
@@ -116,7 +130,10 @@ pub fn expected_values(expectations: &[Expectation]) -> Vec<(String, f64)> {
             Some((format!("{} {}", expectation.name, describe(how)), bounds.value?.0))
         }
         ExpectationKind::Mode { bounds, .. } => Some((expectation.name.clone(), bounds.value?.0)),
-        ExpectationKind::Counter { .. } | ExpectationKind::Fails => None,
+        ExpectationKind::Counter { .. }
+        | ExpectationKind::Fails
+        | ExpectationKind::Warns(_)
+        | ExpectationKind::Quiet => None,
     });
     expected.collect()
 }
@@ -136,9 +153,16 @@ pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Count
             holds: false,
         });
     }
+    let warnings: Vec<&Warning> = recorder.warnings.iter().chain(&counters.findings.warnings).collect();
     for (expectation, rows) in recorder.expectations.iter().zip(&recorder.rows) {
         judgements.push(match &expectation.kind {
             ExpectationKind::Fails => expected_failure(&expectation.name, came),
+            ExpectationKind::Warns(kind) => {
+                expected_warning(expectation, &warnings, warnings.iter().any(|warning| warning.kind == *kind))
+            }
+            ExpectationKind::Quiet => {
+                expected_warning(expectation, &warnings, !warnings.iter().any(|warning| warning.is_doubt()))
+            }
             ExpectationKind::Counter { name, bounds } => {
                 hold(expectation.name.clone(), bounds, Some(counter(counters, name) as f64))
             }
@@ -162,6 +186,21 @@ pub fn expected_failure(expected: &str, came: &str) -> Judgement {
         error: None,
         ratio: None,
         holds: came == expected,
+    }
+}
+
+/// The judgement of expected warnings, or of none.
+fn expected_warning(expectation: &Expectation, given: &[&Warning], holds: bool) -> Judgement {
+    let mut names: Vec<&str> = given.iter().map(|warning| warning.kind.name()).collect();
+    names.sort_unstable();
+    names.dedup();
+    Judgement {
+        what: "warnings".into(),
+        expected: expectation.name.clone(),
+        came: if names.is_empty() { "none".into() } else { names.join(", ") },
+        error: None,
+        ratio: None,
+        holds,
     }
 }
 

@@ -194,7 +194,15 @@ fn check_tells_what_would_be_simulated() {
     folder.write("loose.toml", &GOOD.replace("fix = \"all\"", "fix = \"pin\""));
     let output = folder.beamsim(&["check", "loose.toml"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(status(&output) == 0 && text.contains("it was run, and ends with `singular`"), "{text}");
+    assert!(status(&output) == 3 && !text.contains("run: about"), "{text}");
+    assert!(last_line(&output).starts_with("error[singular]: nothing holds node"), "{}", last_line(&output));
+    // One that fails later is told of, and can be run.
+    let short = GOOD.replace("steps = ", "adaptive = false\nmax_iterations = 1\nsteps = ");
+    folder.write("short.toml", &short);
+    let output = folder.beamsim(&["check", "short.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(status(&output) == 0 && said.contains("a run ends as `not_converged`: no balance at stage 1"), "{said}");
+    assert!(said.contains("hint: leave `adaptive = false` out"), "{said}");
 }
 
 /// A cantilever whose load comes smoothly, and stays.
@@ -310,8 +318,8 @@ fn what_a_search_has_run_is_written_as_if_it_ran_again() {
         }
         let [found, again] = [&found, &again].map(|name| record(name));
         assert_eq!(
-            [&found["counters"], &found["deck"], &found["text"]],
-            [&again["counters"], &again["deck"], &again["text"]]
+            [&found["counters"], &found["deck"], &found["text"], &found["warnings"], &found["stability"]],
+            [&again["counters"], &again["deck"], &again["text"], &again["warnings"], &again["stability"]]
         );
     }
 }
@@ -679,4 +687,56 @@ fn tables_beside_a_deck_are_read_from_its_folder() {
     let lost = folder.beamsim(&["run", "lost.toml"]);
     let told = String::from_utf8_lossy(&lost.stderr);
     assert!(status(&lost) == 2 && told.contains("lost.toml:3:") && told.contains("spine.csv"), "{told}");
+}
+
+/// Numbers near the limits of floating point, and scenes far from the origin.
+#[test]
+fn check_prints_numbers() {
+    let folder = Folder::new("numbers");
+    let heavy = "[[body]]\nat = \"tip\"\nmass = 1e300\noffset = [1e10, 0, 0]\n";
+    folder.write("heavy.toml", &format!("{GOOD}{heavy}"));
+    let text = String::from_utf8_lossy(&folder.beamsim(&["check", "heavy.toml"]).stdout).into_owned();
+    assert!(!text.contains("NaN") && !text.contains("inf") && text.contains("beyond the range"), "{text}");
+    let far = GOOD
+        .replace("root = [0, 0, 0]", "root = [1e9, 1e9, 0]")
+        .replace("tip = [1, 0, 0]", "tip = [1000000001, 1e9, 0]");
+    folder.write("far.toml", &far);
+    let text = String::from_utf8_lossy(&folder.beamsim(&["check", "far.toml"]).stdout).into_owned();
+    let line = text.lines().find(|line| line.starts_with("inertia")).unwrap_or_else(|| panic!("{text}"));
+    assert!(line.contains("[0.0, 0.083333"), "{line}");
+}
+
+/// Another scheme does not trip over the coefficient of the one before.
+#[test]
+fn a_scheme_is_set_without_its_coefficients() {
+    let folder = Folder::new("scheme");
+    let swings = swinging(0.1).replace("step = 0.01", "step = 0.01\nscheme = \"generalized_alpha\"\nrho_inf = 0.5");
+    folder.write("swings.toml", &swings);
+    for scheme in ["newmark", "hht", "lie_generalized_alpha", "generalized_alpha"] {
+        let output = folder.beamsim(&["run", "swings.toml", "--set", &format!("stage.0.scheme={scheme}")]);
+        assert_eq!(status(&output), 0, "{scheme}: {}", last_line(&output));
+    }
+    let output =
+        folder.beamsim(&["run", "swings.toml", "--set", "stage.0.scheme=newmark", "--set", "stage.0.rho_inf=1"]);
+    assert_eq!(status(&output), 2);
+}
+
+/// What holds of several tables is said once, with the lines of the others.
+#[test]
+fn equal_warnings_are_said_once() {
+    let folder = Folder::new("once");
+    let bodies: String = (0..4).map(|k| format!("[[body]]\nat = \"b{k}\"\nmass = 1\ninertia = [1, 1, 1]\n")).collect();
+    let points: String = (0..4).map(|k| format!("b{k} = [{k}, 0, 0]\n")).collect();
+    let motion = |k: usize| {
+        format!("[[motion]]\nat = \"b{k}\"\nux = 1\nhistory = \"h{k}\"\n[history.h{k}]\nexpr = \"({k} + 1)*t\"\n")
+    };
+    let motions: String = (0..4).map(motion).collect();
+    folder.write(
+        "many.toml",
+        &format!("[point]\n{points}{bodies}{motions}[[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.1\n"),
+    );
+    let output = folder.beamsim(&["run", "many.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(said.matches("warning[velocity_jump]: this motion begins with a velocity").count(), 1, "{said}");
+    assert!(said.contains("the same warning holds of lines "), "{said}");
 }

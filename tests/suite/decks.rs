@@ -1,6 +1,6 @@
 //! Every deck in `decks/` holds its own expectations.
 
-use beamsim::drive::{Failure, Mode, Observer, Run, Snapshot};
+use beamsim::drive::{CriticalLoad, Failure, Mode, Observer, Run, Snapshot};
 use beamsim::scene;
 use beamsim::study::{Recorder, judge};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ impl Observer for Watcher {
         Ok(())
     }
 
-    fn buckling(&mut self, _stage: usize, loads: &[f64]) -> Result<(), Failure> {
+    fn buckling(&mut self, _stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
         self.0.buckling(loads);
         Ok(())
     }
@@ -82,6 +82,11 @@ fn paths_and_critical_loads_hold() {
 #[test]
 fn modes_hold() {
     all_hold("decks/modes", 18);
+}
+
+#[test]
+fn stability_holds() {
+    all_hold("decks/stability", 17);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Effects that are forced off, and the study that takes them out one by one.
 
 use beamsim::deck::{self, EffectWord};
-use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot};
+use beamsim::drive::{Counters, CriticalLoad, Failure, Observer, Run, Snapshot, Warning};
 use beamsim::scene;
 use beamsim::study::ablation::{Ablation, ablate};
 use beamsim::tensor::Vec3;
@@ -368,12 +368,12 @@ impl Observer for Loads {
         Ok(())
     }
 
-    fn buckling(&mut self, _stage: usize, loads: &[f64]) -> Result<(), Failure> {
-        self.loads.extend(loads);
+    fn buckling(&mut self, _stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
+        self.loads.extend(loads.iter().map(|critical| critical.load));
         Ok(())
     }
 
-    fn warn(&mut self, message: &str) {
-        self.warnings.push(message.into());
+    fn warn(&mut self, warning: &Warning) {
+        self.warnings.push(warning.message.clone());
     }
 }

@@ -5,7 +5,7 @@
 use crate::dual::Dual;
 use crate::random::Random;
 use crate::tangents::{agree, symmetric};
-use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot};
+use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot, Warning};
 use beamsim::kernel::beam::StiffnessPoint;
 use beamsim::kernel::elastic::{Stiffness, Strain};
 use beamsim::kernel::inertia::{Inertia, Spin, body};
@@ -199,8 +199,8 @@ impl Observer for Seen {
         Ok(())
     }
 
-    fn warn(&mut self, message: &str) {
-        self.warnings.push(message.into());
+    fn warn(&mut self, warning: &Warning) {
+        self.warnings.push(warning.message.clone());
     }
 }
 

@@ -10,6 +10,8 @@ pub struct Simulation {
     pub rows: Vec<Vec<f64>>,
     pub result: Result<(), Failure>,
     pub counters: Counters,
+    /// What is proposed where it has failed
+    pub hint: Option<String>,
 }
 
 struct Collector {
@@ -33,10 +35,27 @@ pub fn attempt(text: &str) -> Simulation {
         panic!("{}", all.join("\n"))
     });
     let mut collector = Collector { probes: scene.probes.clone(), rows: Vec::new() };
-    let (result, counters) = Run::new(scene.plan, &mut collector).finish();
+    let (result, counters) = Run::new(scene.plan.clone(), &mut collector).finish();
+    let hint = result.as_ref().err().and_then(|failure| failure.hint(&scene.plan));
     let columns = collector.probes.iter().flat_map(|probe| probe.names.clone());
     let names = std::iter::once("load".to_string()).chain(columns).collect();
-    Simulation { names, rows: collector.rows, result, counters }
+    Simulation { names, rows: collector.rows, result, counters, hint }
+}
+
+/// What is said of a deck that is refused.
+pub fn refusal(text: &str) -> String {
+    match scene::from_text(text) {
+        Ok(_) => panic!("the deck is accepted:\n{text}"),
+        Err(found) => found.iter().map(|d| d.render("deck", text, false)).collect::<Vec<_>>().join("\n"),
+    }
+}
+
+/// What a deck that is accepted is warned of.
+pub fn warnings(text: &str) -> Vec<String> {
+    match scene::from_text(text) {
+        Ok((_, found)) => found.into_iter().map(|d| d.message).collect(),
+        Err(_) => panic!("{}", refusal(text)),
+    }
 }
 
 /// Runs a deck that must finish.

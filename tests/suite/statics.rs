@@ -56,6 +56,7 @@ fn a_limit_point_is_gone_around_with_any_number_of_levels() {
         assert!((uy + 92.7277).abs() < 2e-3, "{steps} levels: {uy}");
         let limits: Vec<f64> = simulation
             .counters
+            .findings
             .events
             .iter()
             .filter(|event| event.kind == EventKind::Limit)
@@ -124,7 +125,7 @@ steps = 10
     let failure = simulation.result.expect_err("20 is the most it carries");
     let Failure::LimitPoint { at, goal, increments, .. } = &failure else { panic!("{failure}") };
     assert!((at.load - 2.0 / 3.0).abs() < 1e-3 && *goal == 0.7 && *increments > 100, "{failure}");
-    assert!(failure.hint().is_some_and(|hint| hint.contains("does not come to this load")));
+    assert!(simulation.hint.is_some_and(|hint| hint.contains("does not come to this load")));
     let most = simulation.rows.iter().map(|row| row[0]).fold(0.0, f64::max);
     assert!((most - 2.0 / 3.0).abs() < 1e-4, "the rows go to the limit: {most}");
 }
@@ -154,7 +155,10 @@ fn round_off_is_no_jump() {
     };
     let along = shaft("[10, 0, 0]", "[1, 0, 0]");
     let skew = shaft("[6, 8, 0]", "[0.6, 0.8, 0]");
-    assert_eq!((along.steps, along.cutbacks, along.events.len()), (skew.steps, skew.cutbacks, skew.events.len()));
+    assert_eq!(
+        (along.steps, along.cutbacks, along.findings.events.len()),
+        (skew.steps, skew.cutbacks, skew.findings.events.len())
+    );
 }
 
 /// A pinned column, 10 pi^2 its critical load, pressed in the first stage by `force` and pushed `aside` at its middle; `stage` ends the
@@ -212,7 +216,10 @@ fn an_imperfect_path_has_no_branches() {
              [[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = {steps}\nmax_steps = 1000\n"
         ));
         let aside = strip.end("middle.uz");
-        assert!((aside - 0.389_643_66).abs() < 1e-7 && strip.counters.events.is_empty(), "{steps} steps: {aside}");
+        assert!(
+            (aside - 0.389_643_66).abs() < 1e-7 && strip.counters.findings.events.is_empty(),
+            "{steps} steps: {aside}"
+        );
     }
 }
 

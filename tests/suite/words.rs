@@ -131,7 +131,7 @@ fn the_manner_of_speaking_is_the_users() {
 
     // One element that turns by 2 rad: a warning of the run.
     let warned = folder.beamsim(&["run", "turned.toml"]);
-    assert!(status(&warned) == 0 && String::from_utf8_lossy(&warned.stderr).contains("warning: "));
+    assert!(status(&warned) == 0 && String::from_utf8_lossy(&warned.stderr).contains("warning[coarse_mesh]: "));
     let denied = folder.beamsim(&["run", "turned.toml", "--deny-warnings"]);
     assert_eq!((status(&denied), last_line(&denied).starts_with("error[warnings]: 1 warning")), (1, true));
     assert!(folder.0.join("results/turned/history.csv").exists());

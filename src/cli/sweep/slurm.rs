@@ -153,7 +153,7 @@ impl Array<'_> {
                 Ok(states) => states,
                 Err(refusal) => {
                     // Nothing is known: that is not an end.
-                    progress.note(&format!("warning: {}", refusal.message));
+                    progress.note(&format!("warning[{}]: {}", refusal.name, refusal.message));
                     continue;
                 }
             };

@@ -1,7 +1,8 @@
 //! Springs, cables and joints.
 
-use super::{Composer, stage_set};
+use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{self, Diagnostic, JointKind};
+use crate::drive::Driven;
 use crate::effect::joint::{self, Joints};
 use crate::effect::link::{self, Links};
 use crate::effect::spring::{self, Spring};
@@ -113,8 +114,8 @@ impl Composer<'_> {
         let motor = match &joint.motor {
             None => None,
             Some((value, history)) => {
-                self.refuse_jump(joint, history.is_none());
-                Some(joint::Motor { value: *value, amplitude: self.amplitude(history.as_ref(), None)? })
+                let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
+                Some(joint::Motor { value: *value, amplitude })
             }
         };
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
@@ -148,6 +149,16 @@ impl Composer<'_> {
         if !kind.normal.is_empty() || (motor.is_some() && joint.kind == JointKind::Revolute) {
             instance.between = Some(self.multiplier(SlotKind::Moment, connection));
         }
+        if let Some((_, history)) = &joint.motor {
+            let slot = if joint.kind == JointKind::Prismatic { instance.along } else { instance.between };
+            let table = |slot| DrivenTable {
+                drives: Driven::Motor(slot),
+                what: "motor",
+                span: joint.span.clone(),
+                history: history.clone(),
+            };
+            self.out.driven.extend(slot.map(table));
+        }
         for slot in [instance.along, instance.between].into_iter().flatten() {
             let used = instance.used(slot);
             let directions = (0..3).filter(|&k| !used[k]).map(|k| Direction { slot, axis: Vec3::UNIT[k] }).collect();
@@ -161,15 +172,5 @@ impl Composer<'_> {
         let node = format!("joint of {}", names.collect::<Vec<_>>().join(" and "));
         self.out.multipliers.push((kind, node));
         (self.mesh.slots() + self.out.multipliers.len() - 1) as u32
-    }
-
-    /// A motor that acts in full from the start would jump.
-    fn refuse_jump(&mut self, joint: &deck::Joint, without_history: bool) {
-        let dynamic = matches!(self.deck.stages.first().map(|s| &s.body), Some(deck::StageBody::Dynamic { .. }));
-        if dynamic && without_history {
-            let message = "the motor of this joint would jump: it has no history, and the first stage is dynamic";
-            let diagnostic = Diagnostic::error(message, joint.span.clone());
-            self.diagnostics.push(diagnostic.help("give it a `history` that begins with 0"));
-        }
     }
 }

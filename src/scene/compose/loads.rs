@@ -18,7 +18,7 @@ impl Composer<'_> {
         for load in &self.deck.loads {
             let LoadTarget::At(at) = &load.target else { continue };
             let Some((node, on)) = self.node(at) else { continue };
-            let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
+            let Some(amplitude) = self.amplitude_of_load(load) else { continue };
             let Some(frame) = self.load_axes(load, at, node, on) else { continue };
             let node = self.mesh.nodes[node].node;
             for (vector, kind) in [(load.force, force_kind(load)), (load.moment, force_kind(load) + 1)] {
@@ -37,6 +37,10 @@ impl Composer<'_> {
                 self.push(effect, reason);
             }
         }
+    }
+
+    fn amplitude_of_load(&mut self, load: &deck::Load) -> Option<usize> {
+        self.amplitude_of("load", &load.span, load.history.as_ref(), load.stages.as_ref())
     }
 
     /// From the components of a load at a node to global ones at the start.
@@ -82,7 +86,7 @@ impl Composer<'_> {
                 }
                 continue;
             };
-            let Some(amplitude) = self.amplitude(load.history.as_ref(), load.stages.as_ref()) else { continue };
+            let Some(amplitude) = self.amplitude_of_load(load) else { continue };
             let out = if load.frame == Frame::Space { &mut spatial } else { &mut material };
             let turning = load.frame != Frame::Space || load.moment.is_some();
             for element in self.mesh.elements_of(beam) {

@@ -6,10 +6,11 @@ mod inertia;
 mod loads;
 mod spins;
 
+use super::constraints::find_history;
 use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh, Rule, Station};
-use super::names;
-use crate::deck::{self, Deck, Diagnostic, EffectWord, InterpolationWord};
+use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
+use crate::drive::Driven;
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElements, StressField};
 use crate::effect::elastic_element::ElasticElement;
 use crate::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
@@ -37,6 +38,19 @@ pub struct Reason {
     pub reason: String,
 }
 
+/// A table that a history drives, for messages.
+#[derive(Clone)]
+pub struct DrivenTable {
+    /// What it drives
+    pub drives: Driven,
+    /// What it is called
+    pub what: &'static str,
+    /// Where it stands
+    pub span: Span,
+    /// Its history, if it has one
+    pub history: Option<HistoryUse>,
+}
+
 /// The effects of a scene with what they need.
 pub struct Composition {
     /// The effects
@@ -59,11 +73,16 @@ pub struct Composition {
     pub idle_multipliers: Vec<Support>,
     /// Nodes whose rotation a joint takes hold of
     pub jointed: Vec<usize>,
+    /// What histories drive, but for motions
+    pub driven: Vec<DrivenTable>,
     /// How many joints remember their angle
     pub angles: usize,
     /// The slots of the rotations on both sides of each of them
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
+
+/// What makes amplitudes one: the name of the history with its stages, and the stages of what it drives.
+type AmplitudeKey = (Option<(String, Option<Vec<usize>>)>, Option<Vec<usize>>);
 
 /// Collects effects while the tables of the deck are walked through.
 struct Composer<'a> {
@@ -72,7 +91,7 @@ struct Composer<'a> {
     histories: &'a HashMap<String, Arc<dyn History>>,
     diagnostics: &'a mut Vec<Diagnostic>,
     out: Composition,
-    known_amplitudes: HashMap<(Option<String>, Option<Vec<usize>>), usize>,
+    known_amplitudes: HashMap<AmplitudeKey, usize>,
     dynamic: bool,
 }
 
@@ -102,6 +121,7 @@ pub fn compose(
         multipliers: Vec::new(),
         idle_multipliers: Vec::new(),
         jointed: Vec::new(),
+        driven: Vec::new(),
         angles: 0,
         sprung_joints: Vec::new(),
     };
@@ -137,25 +157,32 @@ impl Composer<'_> {
     }
 
     /// The number of the amplitude with this history and these stages.
-    fn amplitude(&mut self, history: Option<&deck::Spanned<String>>, stages: Option<&Vec<usize>>) -> Option<usize> {
-        let key = (history.map(|h| h.value.clone()), stages.cloned());
+    fn amplitude(&mut self, history: Option<&HistoryUse>, stages: Option<&Vec<usize>>) -> Option<usize> {
+        let key = (history.map(|h| (h.name.value.clone(), h.stages.clone())), stages.cloned());
         if let Some(&number) = self.known_amplitudes.get(&key) {
             return Some(number);
         }
-        let function = match history {
-            None => None,
-            Some(name) => match self.histories.get(&name.value) {
-                Some(function) => Some(function.clone()),
-                None => {
-                    let known = self.deck.histories.iter().map(|h| h.name.value.as_str());
-                    self.diagnostics.push(names::unknown("history", name, known));
-                    return None;
-                }
-            },
-        };
+        let found = find_history(self.deck, self.histories, history);
+        let function = found.map_err(|diagnostic| self.diagnostics.push(diagnostic)).ok()?;
         self.out.amplitudes.push(Amplitude::of_load(function, stage_set(stages)));
         self.known_amplitudes.insert(key, self.out.amplitudes.len() - 1);
         Some(self.out.amplitudes.len() - 1)
+    }
+
+    /// The number of the amplitude of a table of the deck.
+    fn amplitude_of(
+        &mut self,
+        what: &'static str,
+        span: &Span,
+        history: Option<&HistoryUse>,
+        stages: Option<&Vec<usize>>,
+    ) -> Option<usize> {
+        let number = self.amplitude(history, stages)?;
+        if let Some(history) = history.cloned() {
+            let drives = Driven::Amplitude(number);
+            self.out.driven.push(DrivenTable { drives, what, span: span.clone(), history: Some(history) });
+        }
+        Some(number)
     }
 
     fn node(&mut self, name: &deck::Spanned<String>) -> Option<(usize, Option<(usize, f64)>)> {
@@ -230,11 +257,15 @@ impl Composer<'_> {
 
     /// The amplitudes of free strains, by beam.
     fn free_strains(&mut self) -> HashMap<String, usize> {
-        let beams: Vec<(String, deck::FreeStrain)> =
-            self.mesh.beams.iter().filter_map(|b| Some((b.name.clone(), b.free_strain.clone()?))).collect();
-        let numbered =
-            |(name, free): (String, deck::FreeStrain)| Some((name, self.amplitude(free.history.as_ref(), None)?));
-        beams.into_iter().filter_map(numbered).collect()
+        let deck = self.deck;
+        let of_beam = |name: &str| deck.beams.iter().find(|beam| beam.name.value == name);
+        let mut numbered = HashMap::new();
+        for beam in self.mesh.beams.iter().filter_map(|beam| of_beam(&beam.name)) {
+            let Some(free) = &beam.free_strain else { continue };
+            let number = self.amplitude_of("free strain", &beam.span, free.history.as_ref(), None);
+            numbered.extend(number.map(|number| (beam.name.value.clone(), number)));
+        }
+        numbered
     }
 
     fn each_element(&self, mut visit: impl FnMut(&BeamElement)) {
@@ -284,7 +315,7 @@ fn needs_mass(deck: &Deck) -> bool {
     let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
     let expected = deck.expects.iter().any(|expect| match &expect.body {
         deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
-        deck::ExpectBody::Fails(_) => false,
+        deck::ExpectBody::Fails(_) | deck::ExpectBody::Warns(_) | deck::ExpectBody::Quiet => false,
     });
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
     dynamic || written || expected || watched

@@ -1,6 +1,6 @@
 //! One point of a sweep.
 
-use crate::drive::Failure;
+use crate::drive::{Failure, Warning};
 use crate::study::error_bars::of_expected;
 use crate::study::outcome::Outcome as Run;
 use crate::study::variant::Variant;
@@ -74,8 +74,7 @@ fn simulate(variant: Variant, error_bars: bool, interrupted: &dyn Fn() -> Option
             let expected = expected_values(&scene.expectations);
             let missed = expected.iter().zip(&run.expected).find(|(_, value)| value.is_nan());
             let missed = missed.map(|((name, _), _)| format!("`{name}` was not reached"));
-            let message =
-                missed.or(run.warnings.first().map(|warning| format!("warning: {warning}"))).unwrap_or_default();
+            let message = missed.unwrap_or_else(|| told(&run.counters.findings.warnings));
             Outcome { status: "finished".into(), message, values: run.expected, errors, ..outcome }
         }
         // What was run is worth having without.
@@ -87,4 +86,17 @@ fn simulate(variant: Variant, error_bars: bool, interrupted: &dyn Fn() -> Option
             ..outcome
         },
     }
+}
+
+/// The first warning of a run, and the names of others; nothing where there are none.
+fn told(warnings: &[Warning]) -> String {
+    let Some(first) = warnings.first() else { return String::new() };
+    let mut names = vec![first.kind.name()];
+    for warning in warnings {
+        if !names.contains(&warning.kind.name()) {
+            names.push(warning.kind.name());
+        }
+    }
+    let others = &names[1..];
+    if others.is_empty() { first.to_string() } else { format!("{first}; also {}", others.join(", ")) }
 }

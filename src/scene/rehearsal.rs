@@ -1,0 +1,162 @@
+//! What can be told of a deck's stages before anything is computed, with the places in its text.
+
+use super::compose::DrivenTable;
+use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
+use crate::drive::{Driven, HistoryJump, JumpKind, Plan, refusal, refusal_help, rehearse};
+use crate::model::{StageError, StageKind};
+use crate::warning::WarningKind;
+
+/// Refuses stages that cannot begin, and warns where histories jump.
+pub fn tell(deck: &Deck, plan: &Plan, tables: &[DrivenTable], diagnostics: &mut Vec<Diagnostic>) {
+    let rehearsal = rehearse(plan);
+    for (number, error) in &rehearsal.refusals {
+        let stage = &deck.stages[*number].span;
+        let span = place(error, tables).unwrap_or(stage);
+        let message = format!("stage {}: {}", number + 1, refusal(error, &plan.model));
+        let mut diagnostic = Diagnostic::error(message, span.clone());
+        diagnostic.help = refusal_help(error, &plan.model, *number);
+        diagnostics.push(if span == stage { diagnostic } else { diagnostic.context(stage.clone(), "this stage") });
+    }
+    let teller = Teller { deck, plan, tables };
+    // Whose place is wrong has no velocity to speak of.
+    let refused: Vec<&Span> = rehearsal.refusals.iter().filter_map(|(_, error)| place(error, tables)).collect();
+    let mut told: Vec<Warned> = Vec::new();
+    for jump in &rehearsal.jumps {
+        let own = tables.iter().filter(|table| table.drives == jump.what && teller.concerns(jump, table));
+        for table in own.filter(|table| !refused.contains(&&table.span)) {
+            let history = table.history.as_ref().map(|history| history.name.value.as_str());
+            let same = |told: &&mut Warned| {
+                let kinds = std::mem::discriminant(&told.jump.how) == std::mem::discriminant(&jump.how);
+                kinds && told.history == history && told.table.what == table.what
+            };
+            match told.iter_mut().find(same) {
+                Some(told) if told.table.span != table.span => told.others += 1,
+                Some(_) => {}
+                None => told.push(Warned { jump, table, history, others: 0 }),
+            }
+        }
+    }
+    diagnostics.extend(told.iter().map(|told| teller.diagnostic(told)));
+}
+
+/// The table that cannot begin a stage.
+fn place<'t>(error: &StageError, tables: &'t [DrivenTable]) -> Option<&'t Span> {
+    let driven = match error {
+        StageError::Jump(jump) => Driven::Motion(jump.motion),
+        StageError::MotorJump(jump) => Driven::Motor(jump.slot),
+        _ => return None,
+    };
+    tables.iter().find(|table| table.drives == driven).map(|table| &table.span)
+}
+
+/// One warning for all tables that it holds of.
+struct Warned<'a> {
+    jump: &'a HistoryJump,
+    table: &'a DrivenTable,
+    history: Option<&'a str>,
+    others: usize,
+}
+
+const SMOOTH: &str = "`smooth = true` makes velocity and acceleration continuous";
+/// A smooth table stands still at each of its times.
+const SAMPLED: &str = "an `expr`, or a table of more points, has none (`smooth = true` has none either, but stands still at each of its times)";
+
+struct Teller<'a> {
+    deck: &'a Deck,
+    plan: &'a Plan,
+    tables: &'a [DrivenTable],
+}
+
+impl Teller<'_> {
+    fn kind(&self, stage: usize) -> StageKind {
+        self.plan.stages[stage].work.kind()
+    }
+
+    /// Motors that jump into a dynamic stage are refused, not warned of.
+    fn concerns(&self, jump: &HistoryJump, table: &DrivenTable) -> bool {
+        let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage) == StageKind::Dynamic;
+        !(jumps && self.is_motor(table))
+    }
+
+    fn is_motor(&self, table: &DrivenTable) -> bool {
+        let twin = |other: &DrivenTable| matches!(other.drives, Driven::Motor(_)) && other.span == table.span;
+        self.tables.iter().any(twin)
+    }
+
+    fn diagnostic(&self, told: &Warned) -> Diagnostic {
+        let Warned { jump: HistoryJump { stage, how, .. }, table, history, others } = told;
+        let (number, what) = (stage + 1, table.what);
+        let name = history.map_or(String::new(), |name| format!(" `{name}`"));
+        let more = match others {
+            0 => String::new(),
+            1 => format!(" (and so does another {what})"),
+            _ => format!(" (and so do {others} other {what}s)"),
+        };
+        let begins_there = self.deck.stages[*stage].span.clone();
+        match how {
+            JumpKind::NotFinite => {
+                let message = format!(
+                    "the history{name} of this {what} has no finite value, velocity or acceleration where stage {number} begins{more}"
+                );
+                Diagnostic::error(message, table.span.clone())
+            }
+            JumpKind::Value { from, to } => {
+                let message = format!(
+                    "the history{name} of this {what} jumps from {from} to {to} where stage {number} begins{more}"
+                );
+                let diagnostic = Diagnostic::warning(WarningKind::HistoryJump, message, table.span.clone())
+                    .context(begins_there, "this stage");
+                diagnostic.help(self.help(told))
+            }
+            JumpKind::Velocity { from, to } => {
+                let has = if *from == 0.0 { "is at rest".into() } else { format!("has {from}") };
+                let whose = if what == "motion" { "node" } else { "joint" };
+                let message = format!(
+                    "this {what} begins with a velocity of {to} in stage {number}, while its {whose} {has}: velocities jump there{more}"
+                );
+                let help = "a history that begins with a slope of zero does not excite vibrations; in the first dynamic stage `[[initial]]` can \
+                            give the velocity";
+                Diagnostic::warning(WarningKind::VelocityJump, message, table.span.clone()).help(help)
+            }
+            JumpKind::Kink { time } => {
+                let message = format!(
+                    "the history{name} of this {what} has kinks: velocities jump there, first at time {time}{more}"
+                );
+                let diagnostic = Diagnostic::warning(WarningKind::HistoryKinks, message, table.span.clone());
+                diagnostic.help(self.help_of_kinks(*history))
+            }
+        }
+    }
+
+    /// What takes the kinks out of a history.
+    fn help_of_kinks(&self, history: Option<&str>) -> &'static str {
+        let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
+        let Some(HistoryBody::Table { values, .. }) = self.deck.histories.iter().find(named).map(|table| &table.body)
+        else {
+            return SMOOTH;
+        };
+        let goes_on = |w: &[f64]| (w[1] - w[0]) * (w[2] - w[1]) > 0.0;
+        if values.windows(3).any(goes_on) { SAMPLED } else { SMOOTH }
+    }
+
+    /// What makes a history go on where the stage before has left it.
+    fn help(&self, told: &Warned) -> String {
+        let Warned { jump: HistoryJump { stage, .. }, table, history, .. } = told;
+        let own_stages = table.history.as_ref().is_some_and(|history| history.stages.is_some());
+        let before = (0..*stage).rev().find(|&k| matches!(self.kind(k), StageKind::Static | StageKind::Dynamic));
+        let before = before.unwrap_or_default();
+        match (own_stages, self.kind(*stage) == self.kind(before)) {
+            (true, _) => "a static stage reads it over the load factor from 0 to 1: let it begin where the stage before has left it".into(),
+            (false, true) => "each static stage reads it over the load factor from 0 to 1: let it end where it begins, or give the stages \
+                              histories of their own"
+                .into(),
+            (false, false) => format!(
+                "static stages read it over the load factor, dynamic ones over the clock: `history = {{ name = \"{}\", stages = [{own}] }}` holds \
+                 its first value before stage {own}, `stages = [{last}]` its last behind stage {last}",
+                history.unwrap_or_default(),
+                own = stage + 1,
+                last = before + 1
+            ),
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! What decks and runs can be warned of: names that are part of the contract with users, each said once.
+
+/// What a warning puts in doubt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum About {
+    /// Which equilibrium was reached, and whether it is stable
+    Path,
+    /// Time steps: whether they resolve the motion
+    Time,
+    /// Elements: whether they resolve the shape
+    Mesh,
+    /// Digits lost in floating-point arithmetic
+    RoundOff,
+    /// How the deck is written, or what acts in it; no answer is in doubt.
+    Deck,
+}
+
+impl About {
+    /// Its name in run.json.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Time => "time",
+            Self::Mesh => "mesh",
+            Self::RoundOff => "round_off",
+            Self::Deck => "deck",
+        }
+    }
+}
+
+/// The enum of kinds from a table: what each means, its variant, its name, what it is about.
+macro_rules! warning_kinds {
+    ($($(#[doc = $meaning:literal])+ $kind:ident: $name:literal, $about:ident;)+) => {
+        /// Kinds of warnings.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum WarningKind {
+            $($(#[doc = $meaning])+ $kind,)+
+        }
+
+        impl WarningKind {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$kind),+];
+
+            /// Its name in run.json, in decks and on the terminal.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kind => $name,)+
+                }
+            }
+
+            /// What it puts in doubt.
+            pub fn about(self) -> About {
+                match self {
+                    $(Self::$kind => About::$about,)+
+                }
+            }
+        }
+    };
+}
+
+warning_kinds! {
+    /// The path of equilibrium passed a point where the load factor is stationary.
+    LimitPoint: "limit_point", Path;
+    /// The path passed a point where the displacement that the loads do work on is stationary.
+    TurningPoint: "turning_point", Path;
+    /// The number of negative pivots changed: a bifurcation, or a limit point under load control.
+    BranchPoint: "branch_point", Path;
+    /// More of these points follow, which are listed as events only.
+    MorePoints: "more_points", Path;
+    /// A static stage ended in an unstable equilibrium.
+    Unstable: "unstable", Path;
+    /// A planar scene is unstable out of its plane.
+    UnstableOutOfPlane: "unstable_out_of_plane", Path;
+    /// Load control failed, and the path is followed by arc length.
+    ArcLengthDetour: "arc_length_detour", Path;
+    /// Load control goes on after a detour by arc length.
+    LoadControlResumed: "load_control_resumed", Path;
+    /// A path ended after `max_steps` increments.
+    PathEnds: "path_ends", Path;
+    /// A buckling load is an estimate: no critical point was found.
+    BucklingEstimate: "buckling_estimate", Path;
+    /// Unstable modes exist that a modal stage has not found.
+    MissingModes: "missing_modes", Path;
+    /// The state of a modal or buckling stage is no equilibrium.
+    OutOfBalance: "out_of_balance", Path;
+    /// A node left its axis near a whole turn, so that the columns `rc` depend on the steps.
+    LostAxis: "lost_axis", Deck;
+    /// The scheme dissipated a notable part of the energy.
+    EnergyLoss: "energy_loss", Time;
+    /// The total energy rose from nothing.
+    EnergyGain: "energy_gain", Time;
+    /// The energy account is off by what static stages leave out of it.
+    EnergyBalance: "energy_balance", Time;
+    /// The estimated error of fixed time steps is large.
+    LongSteps: "long_steps", Time;
+    /// A fixed step failed and was taken in smaller ones.
+    StepSubdivided: "step_subdivided", Deck;
+    /// Mass does not determine the accelerations at the start.
+    NoStartAccelerations: "no_start_accelerations", Time;
+    /// A motion begins with a velocity.
+    VelocityJump: "velocity_jump", Time;
+    /// A history jumps from one stage to the next.
+    HistoryJump: "history_jump", Time;
+    /// The history of a motion has kinks, at which velocities jump.
+    HistoryKinks: "history_kinks", Time;
+    /// An element turns far from node to node.
+    CoarseMesh: "coarse_mesh", Mesh;
+    /// Curvatures depend on the orientation of the scene.
+    FrameDependence: "frame_dependence", Mesh;
+    /// Round-off takes most digits of the displacements.
+    LostDigits: "lost_digits", RoundOff;
+    /// Round-off takes the stiffness of the softest motion.
+    LostStiffness: "lost_stiffness", RoundOff;
+    /// Only stress holds a motion at the start of a stage.
+    HeldByStress: "held_by_stress", Deck;
+    /// A stage of a planar scene is simulated in space.
+    SimulatedInSpace: "simulated_in_space", Deck;
+    /// Joints with multipliers are simulated by a scheme without dissipation.
+    UndampedMultipliers: "undamped_multipliers", Deck;
+    /// Two points at one place are not joined.
+    EqualPlaces: "equal_places", Deck;
+    /// Beams of a section have no mass where only bodies have.
+    MasslessSection: "massless_section", Deck;
+    /// `step_tolerance` stands in a stage of fixed steps.
+    IdleStepTolerance: "idle_step_tolerance", Deck;
+    /// A key of `[cost]` varies what the deck has nothing of.
+    IdleCostKey: "idle_cost_key", Deck;
+}
+
+impl WarningKind {
+    /// The kind of this name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|kind| kind.name() == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_words() {
+        for (k, kind) in WarningKind::ALL.iter().enumerate() {
+            let name = kind.name();
+            assert!(name.chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{name}");
+            assert_eq!(WarningKind::ALL.iter().position(|other| other.name() == name), Some(k), "{name}");
+            assert_eq!(WarningKind::of(name), Some(*kind));
+        }
+        assert_eq!(WarningKind::of("nothing"), None);
+    }
+}

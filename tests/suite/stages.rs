@@ -1,0 +1,276 @@
+//! What goes through several stages: histories that belong to some of them, what jumps between them, and what cannot begin.
+
+use crate::failures::frequencies;
+use crate::scenes::{attempt, refusal, simulate, warnings};
+
+/// A clamped beam.
+const ARM: &str = r#"
+[point]
+root = [0, 0, 0]
+tip = [1, 0, 0]
+[section.s]
+EA = 1e5
+GA = 1e5
+GJ = 10
+EI = 10
+rhoA = 1
+rhoJ = [1e-3, 1e-3, 1e-3]
+[[beam]]
+name = "arm"
+section = "s"
+through = ["root", "tip"]
+elements = 2
+"#;
+
+const CLAMP: &str = "[[support]]\nat = \"root\"\nfix = \"all\"\n";
+const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 2\n";
+
+fn dynamic(end: f64) -> String {
+    format!("[[stage]]\nkind = \"dynamic\"\nend = {end:?}\nstep = 0.01\nscheme = \"generalized_alpha\"\n")
+}
+
+/// A body on a spring to ground, loaded along y.
+fn sprung(history: &str, stages: &str) -> String {
+    format!(
+        "[point]\no = [0, 0, 0]\n[[body]]\nat = \"o\"\nmass = 1\n[[spring]]\nat = \"o\"\nstiffness = [10, 10, 10, 1, 1, 1]\n\
+         damping = [40, 40, 40, 1, 1, 1]\n[[load]]\nat = \"o\"\nforce = [0, 1, 0]\nhistory = {history}\n\
+         [history.h]\ntimes = [0, 1, 2]\nvalues = [0, 1, 1]\n{stages}[output]\ncolumns = [\"u\"]\n"
+    )
+}
+
+#[test]
+fn a_history_belongs_to_its_stages() {
+    let stages = format!("{STATIC}{}{}{STATIC}", dynamic(0.5), dynamic(1.0));
+    // Each stage at its end: nothing before the second dynamic stage, half of the history in it, and held behind.
+    let own = simulate(&sprung("{ name = \"h\", stages = [3] }", &stages));
+    let uy = own.column("o.uy");
+    assert_eq!(uy[..53], [0.0; 53]);
+    assert!((own.end("o.uy") - 0.05).abs() < 1e-9, "{}", own.end("o.uy"));
+    // The load factor of the first stage, and its last value in all others.
+    let first = simulate(&sprung("{ name = \"h\", stages = [1] }", &stages));
+    assert!(first.column("o.uy")[2..].iter().all(|u| (u - 0.1).abs() < 1e-9));
+    // Both dynamic stages: the time goes on.
+    let both = simulate(&sprung("{ name = \"h\", stages = [2, 3] }", &stages));
+    assert!((both.end("o.uy") - 0.1).abs() < 1e-9, "{}", both.end("o.uy"));
+}
+
+#[test]
+fn what_a_history_begins_with_is_brought_in_by_the_load_factor() {
+    let text = sprung("{ name = \"h\", stages = [2] }", &format!("{STATIC}{}", dynamic(0.1)))
+        .replace("values = [0, 1, 1]", "values = [2, 2, 2]");
+    let run = simulate(&text);
+    for (came, value) in run.column("o.uy").iter().zip([0.0, 0.1, 0.2, 0.2, 0.2]) {
+        assert!((came - value).abs() < 1e-9, "{came} {value}");
+    }
+}
+
+#[test]
+fn histories_that_jump_between_stages_are_told() {
+    let jumps = |history: &str, stages: &str| {
+        let told = warnings(&sprung(history, stages));
+        told.into_iter().filter(|message| message.contains("jumps from")).collect::<Vec<_>>()
+    };
+    let stages = format!("{STATIC}{}", dynamic(0.5));
+    let told = jumps("\"h\"", &stages);
+    assert!(told.len() == 1 && told[0].contains("of this load jumps from 1 to 0 where stage 2 begins"), "{told:?}");
+    for own in ["{ name = \"h\", stages = [1] }", "{ name = \"h\", stages = [2] }"] {
+        assert!(jumps(own, &stages).is_empty(), "{own}");
+    }
+    assert!(jumps("\"h\"", &format!("{}{}", dynamic(0.5), dynamic(1.0))).is_empty());
+    assert_eq!(jumps("\"h\"", &format!("{STATIC}{STATIC}")).len(), 1);
+    // A sudden load, and one that comes to its stage, jump nowhere.
+    assert!(jumps("\"h\"", &dynamic(0.5)).is_empty());
+    // What ends at an `until` ends nobody knows where.
+    let until = STATIC.replace("steps = 2", "steps = 2\nuntil = { column = \"o.uy\", above = 1 }");
+    assert!(jumps("\"h\"", &format!("{until}{}", dynamic(0.5))).is_empty());
+}
+
+#[test]
+fn motions_that_jump_between_static_stages_are_told() {
+    let motion = "[[motion]]\nat = \"tip\"\nuy = 0.1\nhistory = \"h\"\n[history.h]\ntimes = [0, 1]\nvalues = [0, 1]\n";
+    let told = warnings(&format!("{ARM}{CLAMP}{motion}{STATIC}{STATIC}"));
+    assert!(told.len() == 1 && told[0].contains("of this motion jumps from 0.1 to 0 where stage 2 begins"), "{told:?}");
+    assert!(warnings(&format!("{ARM}{CLAMP}{motion}{STATIC}")).is_empty());
+}
+
+/// An arm that is turned, or pushed, at a constant speed.
+fn moved(motion: &str, history: &str, initial: &str) -> Vec<String> {
+    warnings(&format!("{ARM}{motion}history = \"h\"\n[history.h]\n{history}\n{initial}{}", dynamic(2.0)))
+}
+
+#[test]
+fn a_motion_that_begins_with_the_velocity_of_its_node_is_no_jump() {
+    let push = "[[support]]\nat = \"root\"\nfix = [\"uy\", \"uz\", \"rx\", \"ry\", \"rz\"]\n[[motion]]\nat = \"root\"\nux = 1\n";
+    let turn = "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[motion]]\nat = \"root\"\nrotate = [0, 0, 1]\nangle = 1\n";
+    let velocity = "[[initial]]\nvelocity = [5, 0, 0]\n";
+    let spin = "[[initial]]\nspin = [0, 0, 5]\n";
+    let (formula, table) = ("expr = \"5*t\"", "times = [0, 2]\nvalues = [0, 10]");
+    for (motion, initial) in [(push, velocity), (turn, spin)] {
+        for history in [formula, table] {
+            assert!(moved(motion, history, initial).is_empty(), "{:?}", moved(motion, history, initial));
+            let told = moved(motion, history, "");
+            assert!(told.len() == 1 && told[0].contains("begins with a velocity of 5"), "{told:?}");
+            assert_eq!(moved(motion, history, &initial.replace('5', "4")).len(), 1);
+        }
+        // About, or along, another axis.
+        assert_eq!(
+            moved(motion, formula, &initial.replace("5, 0, 0", "0, 5, 0").replace("0, 0, 5", "5, 0, 0")).len(),
+            1
+        );
+        // Kinks within the stage.
+        let told = moved(motion, "times = [0, 1, 2]\nvalues = [0, 5, 6]", initial);
+        assert!(told.len() == 1 && told[0].contains("has kinks: velocities jump there, first at time 1"), "{told:?}");
+        assert!(moved(motion, "times = [0, 1, 2]\nvalues = [0, 5, 6]\nsmooth = true", "").is_empty());
+    }
+}
+
+/// Two arms with a motor between them, or one with a motor to ground.
+fn driven(ground: bool, history: &str, initial: &str, stages: &str) -> String {
+    let joint = |rest: &str| {
+        format!(
+            "[[joint]]\nkind = \"revolute\"\n{rest}\naxis = [0, 0, 1]\nangle = 1\nhistory = \"h\"\n[history.h]\n{history}\n"
+        )
+    };
+    let scene = match ground {
+        true => format!("{ARM}{}", joint("at = \"root\"\nbeams = [\"arm\"]")),
+        false => {
+            let second = "[[beam]]\nname = \"fore\"\nsection = \"s\"\nthrough = [\"tip\", \"end\"]\nelements = 2\n";
+            let arm = ARM.replace("tip = [1, 0, 0]", "tip = [1, 0, 0]\nend = [2, 0, 0]");
+            format!("{arm}{second}{CLAMP}{}", joint("at = \"tip\"\nbeams = [\"arm\", \"fore\"]"))
+        }
+    };
+    format!("{scene}{initial}{stages}")
+}
+
+#[test]
+fn motors_with_kinks_are_told_as_motions_are() {
+    for ground in [true, false] {
+        let told = |history: &str, initial: &str| warnings(&driven(ground, history, initial, &dynamic(1.0)));
+        let kinked = told("times = [0, 0.25, 0.5, 1]\nvalues = [0, 0, 0.5, 0.6]", "");
+        assert!(kinked.len() == 1 && kinked[0].contains("of this motor has kinks"), "{kinked:?}");
+        assert!(kinked[0].contains("first at time 0.25"), "{kinked:?}");
+        assert!(told("times = [0, 1]\nvalues = [0, 0.5]\nsmooth = true", "").is_empty());
+        let speed = told("expr = \"2*t\"", "");
+        assert!(speed.len() == 1 && speed[0].contains("this motor begins with a velocity of 2"), "{speed:?}");
+        let beam = if ground { "arm" } else { "fore" };
+        let spin = format!("[[initial]]\nbeam = \"{beam}\"\nspin = [0, 0, 2]\n");
+        assert!(told("expr = \"2*t\"", &spin).is_empty(), "{:?}", told("expr = \"2*t\"", &spin));
+    }
+}
+
+#[test]
+fn a_profile_after_preload_runs_where_its_history_belongs_to_its_stage() {
+    let stages = format!("{STATIC}{}", dynamic(0.2));
+    let profile = "times = [0, 0.1]\nvalues = [0.3, 0.5]\nsmooth = true";
+    for ground in [true, false] {
+        // Read over the load factor it would end where the motor does not begin.
+        let text = driven(ground, profile, "", &stages);
+        let why = refusal(&text);
+        assert!(
+            why.contains("stage 2: the mot") && why.contains("would have to jump from 0.5 rad (28.6°) to 0.3"),
+            "{why}"
+        );
+        assert!(why.contains("stages = [2]"), "{why}");
+        let own = text.replace("history = \"h\"", "history = { name = \"h\", stages = [2] }");
+        assert!(warnings(&own).is_empty());
+        let run = simulate(&(own + "[output]\ncolumns = [\"r\"]\n"));
+        let turned = if ground { run.column("root.rz") } else { Vec::new() };
+        for (came, value) in turned.iter().zip([0.0, 0.15, 0.3]) {
+            assert!((came - value).abs() < 1e-12, "{came} {value}");
+        }
+        assert!(!ground || (run.end("root.rz") - 0.5).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn what_cannot_begin_is_refused_before_anything_is_computed() {
+    let path = "[[stage]]\nkind = \"static\"\ncontrol = \"arc_length\"\nsteps = 4\n";
+    let buckling = "[[stage]]\nkind = \"buckling\"\nmodes = 1\n";
+    let modal = "[[stage]]\nkind = \"modal\"\nmodes = 1\n";
+    let load = "[[load]]\nat = \"tip\"\nforce = [0, 1, 0]\nstages = [1]\n";
+    let held = "[[support]]\nat = \"tip\"\nfix = \"all\"\nstages = [2]\n";
+    let motion = "[[motion]]\nat = \"tip\"\nrotate = [0, 0, 1]\nangle = 1\nstages = [1]\n";
+    let hinge = "[[support]]\nat = \"tip\"\nfix = [\"rz\"]\nstages = [2]\n";
+    let massless = ARM.replace("rhoA = 1", "rhoA = 0").replace("rhoJ = [1e-3, 1e-3, 1e-3]", "");
+    let moved = "[[motion]]\nat = \"tip\"\nuy = 0.1\nhistory = \"h\"\n[history.h]\nexpr = \"t\"\n";
+    let cases = [
+        (format!("{ARM}{CLAMP}{path}"), "stage 1: control = \"arc_length\" needs a load"),
+        (format!("{ARM}{CLAMP}{STATIC}{path}"), "stage 2: control = \"arc_length\" needs a load"),
+        (format!("{ARM}{CLAMP}{STATIC}{buckling}"), "stage 2: no load and no motion grows"),
+        (format!("{massless}{CLAMP}{load}{STATIC}{modal}"), "stage 2: a modal stage needs mass"),
+        (
+            format!("{}{CLAMP}{held}{STATIC}{modal}", ARM.replace("elements = 2", "elements = 1")),
+            "stage 2: a modal stage",
+        ),
+        (format!("{ARM}{CLAMP}{motion}{hinge}{STATIC}{STATIC}"), "stage 2: a support takes hold of single rotation"),
+        (
+            format!("{ARM}{CLAMP}{moved}{STATIC}{}", dynamic(0.5)),
+            "stage 2: the motion of node \"tip\" would have to jump",
+        ),
+    ];
+    for (text, words) in cases {
+        let why = refusal(&text);
+        assert!(why.contains(words), "{words}\n{why}");
+    }
+    // The load is still there, and grows on; a motion that ended where the node is now free begins nobody knows where.
+    let grows = "[[load]]\nat = \"tip\"\nforce = [0, -0.1, 0]\n";
+    assert!(attempt(&format!("{ARM}{CLAMP}{grows}{STATIC}{buckling}")).result.is_ok());
+    let free = "[[load]]\nat = \"tip\"\nforce = [0, 1, 0]\n[[motion]]\nat = \"tip\"\nuy = 0.1\nstages = [2]\n";
+    assert!(attempt(&format!("{ARM}{CLAMP}{free}{STATIC}{}", dynamic(0.5))).result.is_err());
+}
+
+/// A portal whose mass sits at its corners: the girder is rigid and the columns are clamped at both ends.
+#[test]
+fn massless_frames_carry_bodies() {
+    let text = |mass: &str, rest: &str| {
+        format!(
+            "[point]\na = [0, 0, 0]\nb = [0, 0, 3]\nc = [4, 0, 3]\nd = [4, 0, 0]\n\
+             [section.column]\nEA = 1e9\nGA = 1e9\nGJ = 1e4\nEI = 1e4\n{mass}\n[section.girder]\nEA = 1e9\nGA = 1e9\nGJ = 1e9\nEI = 1e9\n{mass}\n\
+             [[beam]]\nname = \"l\"\nsection = \"column\"\nthrough = [\"a\", \"b\"]\nelements = 2\norder = 3\n\
+             [[beam]]\nname = \"g\"\nsection = \"girder\"\nthrough = [\"b\", \"c\"]\nelements = 1\norder = 3\n\
+             [[beam]]\nname = \"r\"\nsection = \"column\"\nthrough = [\"d\", \"c\"]\nelements = 2\norder = 3\n\
+             [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"d\"\nfix = \"all\"\n{rest}\n[[stage]]\nkind = \"modal\"\nmodes = 3\n"
+        )
+    };
+    let bodies = "[[body]]\nat = \"b\"\nmass = 50\n[[body]]\nat = \"c\"\nmass = 50\n";
+    for mass in ["rhoA = 0", ""] {
+        let found = frequencies(&text(mass, bodies));
+        let sway = (2.0_f64 * 12.0 * 1e4 / 27.0 / 100.0).sqrt();
+        assert!(found.iter().any(|mode| (mode / sway - 1.0).abs() < 1e-3), "{found:?}");
+    }
+    assert!(warnings(&text("rhoA = 0", bodies)).is_empty());
+    let told = warnings(&text("", bodies));
+    assert!(told.len() == 2 && told[0].contains("section `column` has no mass"), "{told:?}");
+    assert!(refusal(&text("", "")).contains("section `column` needs `rhoA` for a stage with inertia"));
+}
+
+/// Hints name what helps and never what the deck has.
+#[test]
+fn hints_know_the_deck() {
+    let load = |force: f64| format!("{ARM}{CLAMP}[[load]]\nat = \"tip\"\nforce = [0, 0, {force:?}]\n");
+    let hint = |stage: &str| {
+        let run = attempt(&format!("{}{stage}max_iterations = 1\n", load(1e8)));
+        run.hint.unwrap_or_else(|| panic!("{stage}: {:?}", run.result))
+    };
+    let few = hint("[[stage]]\nkind = \"static\"\nsteps = 2\n");
+    assert!(few.contains("more `steps` than 2") && few.contains("`[damping]`"), "{few}");
+    let many = hint("[[stage]]\nkind = \"static\"\nsteps = 2000\n");
+    assert!(!many.contains("`steps`"), "{many}");
+    let straight = hint("[[stage]]\nkind = \"static\"\nsteps = 2\nadaptive = false\n");
+    assert!(straight.contains("leave `adaptive = false` out"), "{straight}");
+    let with = |scheme: &str| hint(&format!("[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.1\n{scheme}\n"));
+    assert!(with("").contains("scheme = \"generalized_alpha\""), "{}", with(""));
+    assert!(with("scheme = \"hht\"").contains("with a small `rho_inf`"));
+    let damped = with("scheme = \"generalized_alpha\"");
+    assert!(damped.contains("a smaller `rho_inf`") && !damped.contains("scheme ="), "{damped}");
+    let most = with("scheme = \"generalized_alpha\"\nrho_inf = 0");
+    assert!(!most.contains("rho_inf") && most.contains("a smaller `step`"), "{most}");
+    // A hinged arm falls to where its loads hold it; a rod that spins about its own axis comes to rest nowhere.
+    let hinge = "[[support]]\nat = \"root\"\nfix = [\"ux\", \"uy\", \"uz\", \"rx\", \"ry\"]\n[damping]\nmass = 1\n";
+    let loose = |stages: &str| attempt(&format!("{ARM}{hinge}{stages}{STATIC}")).hint.unwrap_or_default();
+    assert!(loose("").contains("comes to rest in a dynamic stage with `[damping]`"), "{}", loose(""));
+    assert!(!loose(&dynamic(0.1)).contains("comes to rest"), "{}", loose(&dynamic(0.1)));
+    let spins = "[[support]]\nat = \"root\"\nfix = \"pin\"\n[[support]]\nat = \"tip\"\nfix = [\"uy\", \"uz\"]\n";
+    let spun = attempt(&format!("{ARM}{spins}{STATIC}")).hint.unwrap_or_default();
+    assert_eq!(spun, "add a support, a spring or a joint that holds this direction");
+}

@@ -1,0 +1,195 @@
+//! Warnings and the stability of static stages as data: their names, run.json, and what decks expect of them.
+
+use super::folder::{Folder, last_line, status};
+use crate::scenes::simulate;
+use beamsim::drive::{StabilityVerdict, StageStability};
+use beamsim::warning::WarningKind;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn file(name: &str) -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap()
+}
+
+/// A cantilever column under `load` in its axis, in space, with other tables.
+fn column(load: f64, more: &str) -> String {
+    column_with("planar = false", load, more)
+}
+
+/// The same with other words under `[effects]`. Its soft axis is x.
+fn column_with(effects: &str, load: f64, more: &str) -> String {
+    format!(
+        "[effects]\n{effects}\n[point]\nfoot = [0, 0, 0]\ntop = [0, 0, 1]\n[section.s]\nEA = 1e6\nGA = 1e6\nGJ = 10\nEI = [10, 20]\nrhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n\
+         [[beam]]\nname = \"column\"\nsection = \"s\"\nthrough = [\"foot\", \"top\"]\nelements = 8\n\
+         [[support]]\nat = \"foot\"\nfix = \"all\"\n[[load]]\nat = \"top\"\nforce = [0, 0, -{load}]\n{more}"
+    )
+}
+
+const STATIC: &str = "[[stage]]\nkind = \"static\"\nsteps = 3\n";
+
+/// pi^2 EI/(4 L^2) about the soft axis
+const CRITICAL: f64 = 24.674;
+
+fn verdicts(deck: &str) -> Vec<StageStability> {
+    simulate(deck).counters.findings.stability
+}
+
+#[test]
+fn the_reference_lists_each_warning_with_what_it_is_about() {
+    let page = file("docs/deck.md");
+    let (_, section) = page.split_once("\n## Warnings\n").unwrap();
+    let (section, _) = section.split_once("\n## ").unwrap();
+    let listed: Vec<Vec<&str>> = section
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .map(|line| line.split('|').map(|cell| cell.trim().trim_matches('`')).collect())
+        .collect();
+    let found: Vec<[&str; 2]> = listed.iter().map(|cells| [cells[1], cells[2]]).collect();
+    let expected: Vec<[&str; 2]> = WarningKind::ALL.iter().map(|kind| [kind.name(), kind.about().name()]).collect();
+    assert_eq!(found, expected);
+    assert!(listed.iter().all(|cells| cells[3].len() > 20));
+}
+
+#[test]
+fn the_schema_allows_the_names_of_warnings_and_false() {
+    let schema: Value = serde_json::from_str(&file("src/deck/schema.json")).unwrap();
+    let names = WarningKind::ALL.iter().map(|kind| Value::from(kind.name()));
+    let expected: Vec<Value> = names.chain([Value::from(false)]).collect();
+    assert_eq!(schema["properties"]["expect"]["items"]["properties"]["warns"]["enum"], Value::from(expected));
+}
+
+/// Lee's frame, which snaps through on the way, from the binary.
+#[test]
+fn a_record_lists_the_warnings_of_a_snap_through_and_the_stability_of_its_end() {
+    let folder = Folder::new("warnings");
+    folder.write("lee.toml", &file("decks/hard/s01_lee_plain_static.toml"));
+    let ran = folder.beamsim(&["run", "lee.toml"]);
+    assert_eq!(status(&ran), 0);
+    let record: Value = serde_json::from_slice(&fs::read(folder.0.join("results/lee/run.json")).unwrap()).unwrap();
+    let warnings = record["warnings"].as_array().unwrap();
+    let names: Vec<&str> = warnings.iter().map(|warning| warning["name"].as_str().unwrap()).collect();
+    let expected = ["arc_length_detour", "limit_point", "turning_point", "turning_point", "limit_point"];
+    assert_eq!(names[..5], expected);
+    assert_eq!(names[5..], ["load_control_resumed"]);
+    assert!(
+        warnings.iter().all(|warning| warning["about"] == "path" && warning["stage"] == 1 && warning["time"] == 0.0)
+    );
+    let limit = &record["events"][0];
+    assert_eq!((&limit["kind"], &limit["load"]), (&Value::from("limit point"), &warnings[1]["load"]));
+    assert!((limit["load"].as_f64().unwrap() - 0.9278).abs() < 1e-3);
+    assert_eq!(record["stability"], serde_json::json!([{ "stage": 1, "verdict": "stable", "negative": 0 }]));
+    // On the terminal the same, in the same order.
+    let told = String::from_utf8_lossy(&ran.stderr).into_owned();
+    let told: Vec<&str> = told.lines().filter(|line| line.starts_with("warning")).collect();
+    let lines =
+        warnings.iter().zip(&names).map(|(w, name)| format!("warning[{name}]: {}", w["message"].as_str().unwrap()));
+    assert_eq!(told, lines.collect::<Vec<_>>());
+}
+
+#[test]
+fn static_stages_end_stable_or_unstable_or_unknown() {
+    let end = |verdict, negative| vec![StageStability { stage: 1, verdict, negative }];
+    let [stable, unstable] = [end(StabilityVerdict::Stable, Some(0)), end(StabilityVerdict::Unstable, Some(1))];
+    let along = "[[stage]]\nkind = \"static\"\nsteps = 4\ncontrol = \"arc_length\"\n";
+    // About the soft axis alone it buckles below 98.7.
+    for stage in [STATIC, along] {
+        assert_eq!(verdicts(&column(0.9 * CRITICAL, stage)), stable);
+        assert_eq!(verdicts(&column(1.1 * CRITICAL, stage)), unstable);
+    }
+    let linear = column_with("large_rotations = false", 1.1 * CRITICAL, STATIC);
+    assert_eq!(verdicts(&linear), stable, "linear theory knows no buckling");
+    // A moment fixed in space: the tangent is not symmetric, and pivots say nothing.
+    let twisted = format!("[[load]]\nat = \"top\"\nmoment = [1, 1, 1]\n{STATIC}");
+    assert_eq!(verdicts(&column(1.0, &twisted)), end(StabilityVerdict::Unknown, None));
+}
+
+/// About its soft axis a strip buckles first, out of the plane that it is loaded in.
+#[test]
+fn a_planar_stage_that_is_unstable_aside_ends_unstable() {
+    let bent = format!("[[load]]\nat = \"top\"\nforce = [0.01, 0, 0]\n{STATIC}");
+    for planar in [true, false] {
+        let found = verdicts(&column_with(&format!("planar = {planar}"), 1.1 * CRITICAL, &bent));
+        let expected = StageStability { stage: 1, verdict: StabilityVerdict::Unstable, negative: Some(1) };
+        assert_eq!(found, [expected], "planar = {planar}");
+    }
+}
+
+#[test]
+fn only_static_stages_have_a_verdict() {
+    let dynamic = "[[stage]]\nkind = \"dynamic\"\nend = 0.01\nstep = 0.005\n";
+    let modal = "[[stage]]\nkind = \"modal\"\nmodes = 1\n";
+    let found = verdicts(&column(1.0, &format!("{STATIC}{modal}{STATIC}{dynamic}")));
+    assert_eq!(found.iter().map(|found| found.stage).collect::<Vec<_>>(), [1, 3]);
+}
+
+/// On the falling branch of Lee's frame, reached by a detour of load control that ends there.
+#[test]
+fn a_detour_that_ends_by_until_tells_the_stability_of_its_end() {
+    let deck = file("decks/hard/s01_lee_plain_static.toml");
+    let (scene, _) = deck.split_once("[[stage]]").unwrap();
+    let stage = "[[stage]]\nkind = \"static\"\nsteps = 4\nuntil = { column = \"loaded.uy\", below = -60 }\n";
+    let simulation = simulate(&format!("{scene}{stage}"));
+    let findings = &simulation.counters.findings;
+    assert_eq!(
+        findings.stability,
+        [StageStability { stage: 1, verdict: StabilityVerdict::Unstable, negative: Some(1) }]
+    );
+    assert_eq!(findings.warnings.last().map(|warning| warning.kind), Some(WarningKind::Unstable));
+}
+
+/// A point on another one: a warning about the deck, which puts no answer in doubt.
+#[test]
+fn warnings_about_a_deck_stand_in_its_record_without_a_moment() {
+    let folder = Folder::new("deck_warnings");
+    let twins = "[point]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [1, 0, 0]\nd = [2, 0, 0]\n[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 10\nEI = 10\n\
+         [[beam]]\nname = \"left\"\nsection = \"s\"\nthrough = [\"a\", \"b\"]\nelements = 1\n\
+         [[beam]]\nname = \"right\"\nsection = \"s\"\nthrough = [\"c\", \"d\"]\nelements = 1\n\
+         [[support]]\nat = \"a\"\nfix = \"all\"\n[[support]]\nat = \"d\"\nfix = \"all\"\n\
+         [[load]]\nat = \"b\"\nforce = [0, 0, 0.1]\n[[stage]]\nkind = \"static\"\nsteps = 1\n\
+         [[expect]]\nwarns = \"equal_places\"\n[[expect]]\nwarns = false\n";
+    folder.write("twins.toml", twins);
+    let ran = folder.beamsim(&["run", "twins.toml"]);
+    assert!(String::from_utf8_lossy(&ran.stderr).starts_with("warning[equal_places]: "));
+    let record: Value = serde_json::from_slice(&fs::read(folder.0.join("results/twins/run.json")).unwrap()).unwrap();
+    let [warning] = &record["warnings"].as_array().unwrap()[..] else { panic!("{record}") };
+    assert_eq!((&warning["name"], &warning["about"]), (&Value::from("equal_places"), &Value::from("deck")));
+    assert!(["stage", "time", "load"].iter().all(|key| warning[key].is_null()));
+    assert_eq!(status(&folder.beamsim(&["verify", "twins.toml"])), 0);
+    let checked = folder.beamsim(&["check", "twins.toml", "--json"]);
+    let told: Value = serde_json::from_slice(&checked.stdout).unwrap();
+    assert_eq!(told["warnings"], record["warnings"]);
+}
+
+#[test]
+fn expected_warnings_are_judged() {
+    let folder = Folder::new("expected_warnings");
+    for (load, wanted, holds) in [
+        (0.9 * CRITICAL, "\"unstable\"", false),
+        (0.9 * CRITICAL, "false", true),
+        (1.1 * CRITICAL, "\"unstable\"", true),
+        (1.1 * CRITICAL, "\"limit_point\"", false),
+        (1.1 * CRITICAL, "false", false),
+    ] {
+        folder.write("deck.toml", &column(load, &format!("{STATIC}[[expect]]\nwarns = {wanted}\n")));
+        let verified = folder.beamsim(&["verify", "deck.toml"]);
+        assert_eq!(status(&verified), i32::from(!holds), "{wanted} under {load}: {}", last_line(&verified));
+    }
+    // What came is told by name.
+    let verified = folder.beamsim(&["verify", "deck.toml"]);
+    assert!(String::from_utf8_lossy(&verified.stdout).contains("branch_point, unstable"));
+}
+
+#[test]
+fn a_sweep_tells_the_warnings_of_its_points() {
+    let folder = Folder::new("sweep_warnings");
+    folder.write(
+        "deck.toml",
+        &format!("[param]\nx = 0\n{}[[expect]]\ncolumn = \"top.uz\"\nbelow = 1\n", column(1.1 * CRITICAL, STATIC)),
+    );
+    let swept = folder.beamsim(&["sweep", "deck.toml", "--vary", "section.s.GJ=10,11", "--output", "top.uz"]);
+    assert_eq!(status(&swept), 0, "{}", last_line(&swept));
+    let table = fs::read_to_string(folder.0.join("results/deck/sweep.csv")).unwrap();
+    assert_eq!(table.matches("warning[branch_point]: ").count(), 2, "{table}");
+    assert_eq!(table.matches("; also unstable").count(), 2, "{table}");
+}
