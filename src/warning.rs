@@ -98,11 +98,11 @@ warning_kinds! {
     /// Mass does not determine the accelerations at the start.
     NoStartAccelerations: "no_start_accelerations", Time;
     /// A motion begins with a velocity.
-    VelocityJump: "velocity_jump", Time;
+    VelocityJump: "velocity_jump", Deck;
     /// A history jumps from one stage to the next.
-    HistoryJump: "history_jump", Time;
+    HistoryJump: "history_jump", Deck;
     /// The history of a motion has kinks, at which velocities jump.
-    HistoryKinks: "history_kinks", Time;
+    HistoryKinks: "history_kinks", Deck;
     /// An element turns far from node to node.
     CoarseMesh: "coarse_mesh", Mesh;
     /// Curvatures depend on the orientation of the scene.

@@ -34,9 +34,11 @@ impl Run<'_> {
         let mut before = step;
         match adaptive {
             None => {
-                let (system, first) = (&workshop.assembly.system, Step { scheme, length: step });
-                let error = TimeError::new(&self.model, system, &self.state, &workshop.massive, first);
-                workshop.newton.time_error = error.map(Box::new);
+                let first = Step { scheme, length: step };
+                let Workshop { assembly, newton, massive, increments, .. } = &mut *workshop;
+                let start = (&self.state, increments.as_ref());
+                let duration = end - self.state.time;
+                newton.time_error = Some(TimeError::new(&self.model, assembly, start, massive, (first, duration)));
                 self.run_fixed(workshop, end, step, scheme, &mut before)
             }
             Some(tolerance) => {
@@ -229,8 +231,7 @@ impl Run<'_> {
         let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
         self.refuse_leaps()?;
-        let equations = &assembly.system.pattern.equations;
-        newton.end_step(equations, (&self.good, &self.state), (&step, increments.as_ref()));
+        newton.end_step(&assembly.system, (&self.good, &self.state), &step, increments.as_ref());
         Ok(())
     }
 

@@ -26,8 +26,6 @@ struct Balance {
     start: f64,
     /// What the total was where it was farthest from that of the run's start, and from that of the stage's
     farthest: [f64; 2],
-    /// The largest kinetic + strain energy, or work from outside
-    scale: f64,
 }
 
 /// What an account is off by that should be closed, over the largest kinetic + strain energy or work from outside.
@@ -69,19 +67,14 @@ impl EnergyGuard {
         self.floor += round_off;
         let total = ledger.total();
         self.start = Some(total);
-        self.balance = Balance { first, start: total, farthest: [total; 2], scale: 0.0 };
+        self.balance = Balance { first, start: total, farthest: [total; 2] };
         self.balance.look(ledger);
         self.largest = size(ledger);
     }
 
-    /// The largest kinetic + strain energy, or work from outside; zero where that is round-off.
-    pub fn scale(&self) -> f64 {
-        if self.largest > self.floor { self.balance.scale } else { 0.0 }
-    }
-
-    /// What the account of the run is off by.
-    pub fn imbalance(&self) -> Option<Imbalance> {
-        if self.largest > self.floor { self.balance.imbalance() } else { None }
+    /// What the account of the run is off by, if that is worth a warning; `scale` is the largest energy of the run so far.
+    pub fn imbalance(&self, scale: f64) -> Option<Imbalance> {
+        if self.largest > self.floor { self.balance.imbalance(scale) } else { None }
     }
 
     /// Looks at the account of a step over which nodes have moved by `moved` at most; tells a growth that lasts.
@@ -98,7 +91,6 @@ impl EnergyGuard {
 
 impl Balance {
     fn look(&mut self, ledger: Ledger) {
-        self.scale = self.scale.max(ledger.kinetic + ledger.strain).max(ledger.external.abs());
         let total = ledger.total();
         for (farthest, from) in self.farthest.iter_mut().zip([self.first, self.start]) {
             if (total - from).abs() > (*farthest - from).abs() {
@@ -107,11 +99,11 @@ impl Balance {
         }
     }
 
-    fn imbalance(&self) -> Option<Imbalance> {
+    fn imbalance(&self, scale: f64) -> Option<Imbalance> {
         let [of_run, of_stage] = self.farthest;
         let off = of_run - self.first;
         let is_own = (of_stage - self.start).abs() > TO_BLAME * off.abs();
-        let share = off / self.scale;
+        let share = off / scale;
         is_unbalanced(share).then_some(Imbalance { share, is_own })
     }
 }
@@ -164,13 +156,13 @@ mod tests {
             let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
             guard.open(ledger(1.0), 1.0, 0.0);
             totals.iter().for_each(|&total| assert!(guard.judge(ledger(total), 0.0).is_none()));
-            guard.imbalance()
+            guard.imbalance(1.0)
         };
         let own = |share: f64| Some(Imbalance { share, is_own: true });
         assert_eq!(told(&[0.96, 1.04]), None);
         assert_eq!(told(&[0.75, 0.9]), own(-0.25));
         // From step to step to and fro, and never three steps running.
-        assert_eq!(told(&[1.5, 0.8, 2.0, 0.5]), own(0.5));
+        assert_eq!(told(&[1.5, 0.8, 2.0, 0.5]), own(1.0));
     }
 
     #[test]
@@ -178,6 +170,6 @@ mod tests {
         let mut guard = EnergyGuard::new(0.2, 0.0, 0.0);
         guard.open(ledger(1.0), 0.8, 0.0);
         assert!(guard.judge(ledger(1.01), 0.0).is_none());
-        assert!(guard.imbalance().is_some_and(|imbalance| !imbalance.is_own && imbalance.share > 0.2));
+        assert!(guard.imbalance(1.0).is_some_and(|imbalance| !imbalance.is_own && imbalance.share > 0.2));
     }
 }

@@ -319,8 +319,6 @@ pub struct Run<'o> {
     pub(super) observer: &'o mut dyn Observer,
     pub(super) plan: Plan,
     pub(super) bookkeeper: Bookkeeper,
-    /// The total of the account where it was opened first
-    pub(super) first_total: Option<f64>,
     pub(super) stage: usize,
     /// Whether loads act for the first time in this stage
     pub(super) fresh: bool,
@@ -334,7 +332,8 @@ pub struct Run<'o> {
     origin: Option<State>,
     /// Of earlier stages
     cutbacks_before: u64,
-    moving: bool,
+    /// Whether a dynamic stage has begun
+    pub(super) moving: bool,
 }
 
 /// What one stage works with.
@@ -366,7 +365,6 @@ impl<'o> Run<'o> {
             good: state.clone(),
             state,
             bookkeeper: Bookkeeper::default(),
-            first_total: None,
             model,
             plan,
             counters: Counters::default(),
@@ -410,7 +408,7 @@ impl<'o> Run<'o> {
             self.warn_of_round_off();
             self.warn_of_frame();
             self.warn_of_imbalance(&workshop);
-            self.warn_of_steps(&workshop);
+            self.judge_steps(&workshop);
             result?;
             self.hand_over(&mut workshop);
             self.model.end_stage(&self.state);
@@ -494,12 +492,12 @@ impl<'o> Run<'o> {
     }
 
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
-    pub(super) fn open_account(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
-        let mut first = 0.0;
+    /// `begins` tells that initial motions set the scene in motion here.
+    pub(super) fn open_account(&mut self, workshop: &mut Workshop, begins: bool) -> Result<(), Failure> {
         if self.keeps_account(workshop) {
-            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
-            first = *self.first_total.get_or_insert(self.bookkeeper.ledger().total());
+            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system, begins);
         }
+        let first = self.bookkeeper.first().unwrap_or_default();
         if let Some(guard) = &mut workshop.guard {
             let force = self.model.largest_force(&workshop.assembly.system);
             guard.open(self.bookkeeper.ledger(), first, f64::EPSILON * force * self.model.length);

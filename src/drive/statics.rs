@@ -106,7 +106,7 @@ impl Run<'_> {
             }
         }
         self.refuse_loose_in_space(workshop, Weights::STIFFNESS)?;
-        self.open_account(workshop)
+        self.open_account(workshop, false)
     }
 
     /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or along the path.

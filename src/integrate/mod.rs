@@ -2,6 +2,7 @@
 //! which weights stiffness, damping and mass enter the tangent.
 
 mod alpha;
+mod carried_error;
 mod increments;
 mod time_error;
 mod trend;

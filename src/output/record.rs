@@ -1,6 +1,7 @@
 //! run.json: what was simulated, what it took, how it ended.
 
-use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, Warning};
+use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
+use crate::integrate::Largest;
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::fmt::{self, Display, Formatter};
@@ -94,6 +95,7 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         "counters": counters(outcome.counters),
         "events": events(outcome.counters),
         "stability": stability(outcome.counters),
+        "time_errors": time_errors(outcome.counters),
         "warnings": warnings(scene.warnings.iter().chain(&outcome.counters.findings.warnings)),
         "threads": outcome.threads,
         "seconds": {
@@ -136,6 +138,12 @@ fn events(counters: &Counters) -> Value {
 fn stability(counters: &Counters) -> Value {
     let one = |found: &StageStability| json!({ "stage": found.stage, "verdict": found.verdict.name(), "negative": found.negative });
     counters.findings.stability.iter().map(one).collect()
+}
+
+/// Of each dynamic stage of fixed steps, as far as it came.
+fn time_errors(counters: &Counters) -> Value {
+    let one = |&StageTimeError { stage, largest: Largest { displacement, rotation, moved } }: &StageTimeError| json!({ "stage": stage, "displacement": displacement, "rotation": rotation, "moved": moved });
+    counters.findings.time_errors.iter().map(one).collect()
 }
 
 /// Warnings with their names; those about a deck have no moment.

@@ -8,11 +8,11 @@ use super::refinement::Refinement;
 use super::reuse::Reuse;
 use super::softest::NullVector;
 use super::tangent::Tangent;
-use crate::integrate::{Increments, Method, TimeError};
+use crate::integrate::{Increments, Method, Step, TimeError};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
 use crate::real::Rough;
-use crate::system::{Equations, State, System};
+use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
 use std::time::Instant;
 
@@ -114,7 +114,7 @@ pub struct Newton {
     reuse: Reuse,
     foresight: Foresight,
     /// What follows the error of time steps, where something does
-    pub time_error: Option<Box<TimeError>>,
+    pub time_error: Option<TimeError>,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
     given: Option<u64>,
 }
@@ -285,12 +285,13 @@ impl Newton {
     /// The step that was solved last is taken from one state to another.
     pub fn end_step(
         &mut self,
-        equations: &Equations,
+        system: &System,
         states: (&State, &State),
-        (method, increments): (&dyn Method, Option<&Increments>),
+        step: &Step,
+        increments: Option<&Increments>,
     ) {
         if let Some(time_error) = &mut self.time_error {
-            time_error.end(equations, &self.dq, states, (method.weights(), increments));
+            time_error.end(system, &self.dq, states, step, increments);
         }
     }
 

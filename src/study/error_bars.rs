@@ -62,9 +62,11 @@ pub fn error_bars(
     refuse_paths(deck).map_err(Refusal::Deck)?;
     let sampler = Sampler::of_rows(deck, scene, Vec::new(), Pace::Timeless);
     let sources = companions(text, deck, &sampler);
-    let run = |source: Vec<Beneath>| first_that_ends(source, &|point| {
-        trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted)
-    });
+    let run = |source: Vec<Beneath>| {
+        first_that_ends(source, &|point| {
+            trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted)
+        })
+    };
     let outcomes: Vec<Result<(Outcome, Vec<f64>), Failure>> = thread::scope(|scope| {
         let started: Vec<_> = sources.into_iter().map(|source| threads::beside(scope, || run(source))).collect();
         let broken = |why: String| Err(Failure::Limit(format!("no error bars: {why}")));
@@ -113,9 +115,8 @@ pub fn of_expected(
     let (sampler, _) = Sampler::of_expectations(deck, scene);
     let mut errors: Vec<f64> = came.iter().map(|value| left_by_newton(deck) * value.abs()).collect();
     for source in companions(text, deck, &sampler) {
-        let run = |point: &Point| {
-            trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted)
-        };
+        let run =
+            |point: &Point| trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted);
         let (outcome, divisors) = first_that_ends(source, &run)?;
         for (((error, a), b), divisor) in errors.iter_mut().zip(came).zip(&outcome.expected).zip(&divisors) {
             *error += (a - b).abs() / divisor;
@@ -138,7 +139,8 @@ fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<Vec<Beneath>> {
             (Point::new(Family::default(), other, Pace::Timeless), divisors)
         };
         let first = mesher.companion(None, &own);
-        let finer = (first.1 > 1.0).then(|| (own.iter().map(|beam| beam.iter().map(|n| 2 * n).collect()).collect(), 0.5));
+        let finer =
+            (first.1 > 1.0).then(|| (own.iter().map(|beam| beam.iter().map(|n| 2 * n).collect()).collect(), 0.5));
         found.push(std::iter::once(first).chain(finer).map(with).collect());
     }
     let all = |divisor| vec![divisor; sampler.columns.len()];
