@@ -24,9 +24,9 @@ const FEW_SLOTS: usize = 100;
 const MOST_SLOTS: usize = 200_000;
 
 /// The sum of local errors, over the largest motion, for which errors are carried along where a stage would come to it at its present rate.
-const WORTH_CARRYING: f64 = 0.01;
+const WORTH_CARRYING: f64 = 0.02;
 /// The same for rotations, in radians
-const WORTH_CARRYING_TURNS: f64 = 0.05;
+const WORTH_CARRYING_TURNS: f64 = 0.1;
 
 /// Steps, and the part of a stage, after which that rate is believed: at first little has moved yet.
 const FIRST_STEPS: usize = 4 * WIDTH;

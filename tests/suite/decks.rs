@@ -90,6 +90,11 @@ fn stability_holds() {
 }
 
 #[test]
+fn what_motions_are_told_of_their_steps_holds() {
+    all_hold("decks/dynamics", 6);
+}
+
+#[test]
 fn joints_hold() {
     all_hold("decks/joints", 25);
 }

@@ -34,6 +34,7 @@ mod statics;
 mod sweep;
 mod tangents;
 mod threads;
+mod time_error;
 mod turned;
 mod warnings;
 mod words;
