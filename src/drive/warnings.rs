@@ -113,10 +113,11 @@ impl Run<'_> {
         let Some(guard) = &workshop.guard else { return self.warn_of_standstill() };
         let Some(Imbalance { share, is_own }) = guard.imbalance(self.bookkeeper.scale()) else { return };
         let is_told = std::mem::replace(&mut self.told.unbalanced, true);
-        let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
         if !is_own && is_told {
             return;
         }
+        let stage = self.stage + 1;
+        let percent = 100.0 * share.abs();
         if !is_own {
             let message = format!(
                 "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, most of it from the stages before: their work is \
@@ -143,7 +144,8 @@ impl Run<'_> {
         let (Some(first), true) = (self.bookkeeper.first(), self.plan.energy && self.moving) else { return };
         let share = (self.bookkeeper.ledger().total() - first) / self.bookkeeper.scale();
         if is_unbalanced(share) && !std::mem::replace(&mut self.told.unbalanced, true) {
-            let (stage, percent) = (self.stage + 1, 100.0 * share.abs());
+            let stage = self.stage + 1;
+            let percent = 100.0 * share.abs();
             let message = format!(
                 "stage {stage}: energy.total is off by {percent:.0} % of the largest energy: what moved stands still since the stage began, and \
                  works are summed by the trapezoidal rule from load level to load level"
@@ -162,23 +164,22 @@ impl Run<'_> {
         // What is left of a motion that has died away may err by its own size.
         self.told.moved = self.told.moved.max(moved);
         let moved = self.told.moved;
-        // NaN, too, is more.
-        let is_large = |share: f64| !(share <= 1.0);
         let of_displacements = if moved > 0.0 { displacement / moved } else { 0.0 };
-        let allowed = if moved > STILL * self.model.length { MOST_BESIDE } else { MOST_ALONE };
-        let (shares, what) = match () {
-            () if is_large(of_displacements / MOST) => (
-                of_displacements / MOST,
-                format!("displacements is {} of the largest motion", percent(of_displacements)),
-            ),
-            () if is_large(rotation / allowed) => (rotation / allowed, format!("rotations is {}", radians(rotation))),
-            () => return,
+        let is_moving = moved > STILL * self.model.length;
+        let allowed = if is_moving { MOST_BESIDE } else { MOST_ALONE };
+        let (over, what) = if of_displacements > MOST {
+            let size = percent(of_displacements);
+            (of_displacements / MOST, format!("displacements is {size} of the largest motion"))
+        } else if rotation > allowed {
+            (rotation / allowed, format!("rotations is {}", radians(rotation)))
+        } else {
+            return;
         };
         // Beyond its own size an error that grows linearly tells no more.
-        let shares = if shares < 1.0 / MOST { shares } else { 1.0 / MOST };
-        let shorter = round_down(step * (AIM / shares).sqrt());
-        let turns = !is_large(of_displacements / MOST) && scheme.rotations == Rotations::Totals;
-        let other = if turns { ", or `scheme = \"lie_generalized_alpha\"`" } else { "" };
+        let over = over.min(1.0 / MOST);
+        let shorter = round_down(step * (AIM / over).sqrt());
+        let is_of_rotations = of_displacements <= MOST && scheme.rotations == Rotations::Totals;
+        let other = if is_of_rotations { ", or `scheme = \"lie_generalized_alpha\"`" } else { "" };
         let message = format!(
             "stage {}: the time steps are too long: the estimated error of {what} (try `step = {shorter}`{other})",
             self.stage + 1

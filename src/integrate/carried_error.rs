@@ -20,13 +20,12 @@
 //! The derivatives are slopes of accelerations over several steps. A motion that steps do not resolve errs by its own size and no
 //! more, which a linear equation does not know; over several steps nothing is seen of it.
 
-use super::time_error::{Largest, Scene, is_to_switch};
+use super::time_error::{Correct, Largest, Scene, is_to_switch};
 use super::{Increments, Method, Scheme, Step};
 use crate::kernel::Weights;
 use crate::kernel::turn::Turn;
 use crate::model::{Assembly, SlotKind};
 use crate::rotation::{Complement, Rotation, log};
-use crate::solve::LinearSolver;
 use crate::system::{Category, Equations, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
@@ -209,8 +208,8 @@ impl CarriedError {
     }
 
     /// The step is in balance: its tangent tells the error at its end, unless it has been given up.
-    pub fn solve(&mut self, solver: &mut LinearSolver, system: &mut System, state: &State, error: &mut [Vec3]) {
-        if self.known != Known::Forces || !solver.has_factorised(system) {
+    pub fn solve(&mut self, correct: &mut Correct, system: &mut System, state: &State, error: &mut [Vec3]) {
+        if self.known != Known::Forces {
             return;
         }
         // The solver takes the sum of all forces: what the others have of it is taken away from what it shall see.
@@ -222,7 +221,7 @@ impl CarriedError {
             }
         });
         std::mem::swap(&mut system.force[INERTIA], &mut self.force[INERTIA]);
-        let solved = solver.correct(system, false, None, error);
+        let solved = correct(system, error);
         std::mem::swap(&mut system.force[INERTIA], &mut self.force[INERTIA]);
         if solved {
             self.known = Known::Error;

@@ -1,16 +1,15 @@
 //! The estimated error of the fixed steps of a stage.
 //!
 //! A step leaves tau = (1/6 - beta - d/2) h^3 q''' out of a motion, d = alpha_m - alpha_f. In all steps the sizes of these sum up to
-//! |1/6 - beta - d/2| h^2 times the way that accelerations take, which is the error of an oscillation times pi/2: errors of its phase add up,
+//! |1/6 - beta - d/2| h^2 times the way that accelerations take, which is 2/pi of the error of an oscillation: errors of its phase add up,
 //! one quarter period like the other. Where that sum stays far below what is worth a warning nothing else is done; where it will not, and
-//! in small scenes, where errors may grow by themselves, the error is [carried along](super::carried_error) with the motion.
+//! in small scenes, where errors may grow by themselves, the error is carried along with the motion (`carried_error`).
 
 use super::carried_error::{CarriedError, FREE_SPIN, WIDTH};
 use super::{Increments, Scheme, Step};
 use crate::kernel::Weights;
 use crate::model::charts::DYNAMIC_BAND;
 use crate::model::{Assembly, Model, SlotKind};
-use crate::solve::LinearSolver;
 use crate::system::{Equations, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
@@ -65,6 +64,9 @@ impl Largest {
         }
     }
 }
+
+/// Finds the correction that the forces of a system ask for with the factors of its tangent; `false` where there are none.
+pub type Correct<'a> = dyn FnMut(&System, &mut [Vec3]) -> bool + 'a;
 
 /// What is needed to know of a scene.
 pub(super) struct Scene {
@@ -149,9 +151,9 @@ impl TimeError {
     }
 
     /// The step is in balance: its tangent tells the error at its end, unless it has been given up.
-    pub fn solve(&mut self, solver: &mut LinearSolver, system: &mut System, state: &State, error: &mut [Vec3]) {
+    pub fn solve(&mut self, correct: &mut Correct, system: &mut System, state: &State, error: &mut [Vec3]) {
         if let Some(carried) = &mut self.carried {
-            carried.solve(solver, system, state, error);
+            carried.solve(correct, system, state, error);
         }
     }
 

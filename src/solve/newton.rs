@@ -268,7 +268,10 @@ impl Newton {
     fn end(&mut self, assembly: &mut Assembly, state: &State) {
         let Self { time_error, solver, dq, .. } = self;
         if let Some(time_error) = time_error {
-            time_error.solve(solver, &mut assembly.system, state, dq);
+            let mut correct = |system: &System, dq: &mut [Vec3]| {
+                solver.has_factorised(system) && solver.correct(system, false, None, dq)
+            };
+            time_error.solve(&mut correct, &mut assembly.system, state, dq);
         }
         self.reuse.end();
         self.solver.succeeded();

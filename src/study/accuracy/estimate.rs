@@ -34,9 +34,6 @@ impl Falls {
     }
 }
 
-/// A difference to a run in whose mesh a place may be a node, over the error of what is interpolated there.
-const BETWEEN: f64 = 1.0;
-
 /// The lowest order that is believed.
 const LEAST_ORDER: f64 = 0.5;
 
@@ -55,9 +52,8 @@ pub fn largest_tolerance(deck: &Deck) -> f64 {
 /// By what differences of columns to a run with other elements are divided to be errors: `ratio` is that of the widths of the other
 /// elements and the own; columns that lie `between` nodes may be nodes there, or nearer to one.
 pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String], between: &[bool]) -> Vec<f64> {
-    let divisor = |(column, &between): (&String, &bool)| match between {
-        true => BETWEEN.min(ratio),
-        false => (ratio.powf(Falls::of(column).in_space(order).0) - 1.0).abs(),
+    let divisor = |(column, &between): (&String, &bool)| {
+        if between { ratio.min(1.0) } else { (ratio.powf(Falls::of(column).in_space(order).0) - 1.0).abs() }
     };
     columns.iter().zip(between).map(divisor).collect()
 }
@@ -180,10 +176,9 @@ impl Fall {
         let mut largest = [f64::NAN; 2];
         let mut coarser = f64::NAN;
         // What is interpolated may differ by its error from a node of the other mesh.
-        let interpolated = largest_of(sampler, wanted, &differences, |k| between[k]) / BETWEEN;
+        let interpolated = largest_of(sampler, wanted, &differences, |k| between[k]);
         for k in (0..falls.len()).filter(|&k| between[k]) {
-            differences[k] /= BETWEEN;
-            of_coarser[k] = differences[k] * (1.0 + BETWEEN);
+            of_coarser[k] = 2.0 * differences[k];
         }
         for (number, one) in Falls::ALL.into_iter().enumerate() {
             let is_of = |k: usize| falls[k] == one && !between[k];
@@ -205,7 +200,7 @@ impl Fall {
         Share {
             largest: known(largest[0].max(largest[1]).max(interpolated)),
             columns: differences,
-            coarser: (known(coarser.max(interpolated * (1.0 + BETWEEN))), of_coarser),
+            coarser: (known(coarser.max(2.0 * interpolated)), of_coarser),
         }
     }
 }

@@ -189,10 +189,7 @@ impl Mesher<'_> {
         let orders = self.orders(order);
         let of_piece = |beam: usize, piece: usize, count: usize| {
             let Sampler { places, outputs, .. } = self.sampler;
-            let unit = match self.keeps_places {
-                true => places.unit((beam, piece), orders[beam], outputs, 2 * count),
-                false => 1,
-            };
+            let unit = if self.keeps_places { places.unit((beam, piece), orders[beam], outputs, 2 * count) } else { 1 };
             change(count, unit)
         };
         let of_beam = |(beam, counts): (usize, &Vec<usize>)| {
