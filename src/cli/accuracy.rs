@@ -131,7 +131,7 @@ impl Target {
     }
 }
 
-/// What an accuracy is missed by.
+/// Says by how much an accuracy is missed.
 fn missed(found: &Found, wanted: &Accuracy) -> String {
     let (column, estimate) = found.worst(wanted);
     format!(
@@ -141,7 +141,7 @@ fn missed(found: &Found, wanted: &Accuracy) -> String {
     )
 }
 
-/// What no estimate contains.
+/// Notes beams whose straight pieces may stand for curves, which no estimate contains.
 fn tell_polylines(deck: &Deck) {
     polylines(deck).iter().for_each(|line| say::note(line));
 }
