@@ -89,16 +89,22 @@ warning_kinds! {
     LostAxis: "lost_axis", Deck;
     /// The scheme dissipated a notable part of the energy.
     EnergyLoss: "energy_loss", Time;
+    /// The total energy rose from nothing.
+    EnergyGain: "energy_gain", Time;
+    /// The energy account is off by what static stages leave out of it.
+    EnergyBalance: "energy_balance", Time;
+    /// The estimated error of fixed time steps is large.
+    LongSteps: "long_steps", Time;
     /// A fixed step failed and was taken in smaller ones.
-    StepSubdivided: "step_subdivided", Time;
+    StepSubdivided: "step_subdivided", Deck;
     /// Mass does not determine the accelerations at the start.
     NoStartAccelerations: "no_start_accelerations", Time;
     /// A motion begins with a velocity.
-    VelocityJump: "velocity_jump", Time;
+    VelocityJump: "velocity_jump", Deck;
     /// A history jumps from one stage to the next.
-    HistoryJump: "history_jump", Time;
+    HistoryJump: "history_jump", Deck;
     /// The history of a motion has kinks, at which velocities jump.
-    HistoryKinks: "history_kinks", Time;
+    HistoryKinks: "history_kinks", Deck;
     /// An element turns far from node to node.
     CoarseMesh: "coarse_mesh", Mesh;
     /// Curvatures depend on the orientation of the scene.

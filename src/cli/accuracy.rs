@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::study::Outcome;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Journal, Options, Pace, Point};
-use crate::study::error_bars::{ErrorBars, error_bars, refuse_paths};
+use crate::study::error_bars::{ErrorBars, error_bars, polylines, refuse_paths};
 use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -40,8 +40,10 @@ pub struct Aimed {
     pub text: String,
     /// The scene
     pub scene: Scene,
-    /// The accuracy that was wanted and reached
+    /// The accuracy that was wanted, and what was reached
     pub reached: Option<Reached>,
+    /// By what it was missed, if it was
+    pub missed: Option<String>,
     /// Its outputs, where the search for that accuracy has run it
     pub outcome: Option<Outcome>,
     /// Error bars, where they are wanted
@@ -63,6 +65,7 @@ impl Target {
             }
             return self.with_bars(path, loaded, None, None);
         };
+        tell_polylines(&loaded.deck);
         if self.error_bars {
             refuse_paths(&loaded.deck).map_err(|why| refused(cost::Refusal::Deck(why), path, &loaded))?;
         }
@@ -73,13 +76,16 @@ impl Target {
         let columns = columns.map(|(column, &estimate)| (column.clone(), wanted.of(column), estimate));
         let reached = Reached {
             columns: columns.filter(|(_, wanted, _)| wanted.is_finite()).collect(),
+            is_reached: found.reached,
             settings: found.settings.clone(),
             runs: found.runs,
             seconds: start.elapsed().as_secs_f64(),
         };
         // The file may have changed since it was read.
         let loaded = load::again(path, &loaded.text, &found.settings)?;
-        self.with_bars(path, loaded, Some(reached), found.outcome.take())
+        let missed = (!found.reached).then(|| missed(&found, &wanted));
+        let aimed = self.with_bars(path, loaded, Some(reached), found.outcome.take())?;
+        Ok(Aimed { missed, ..aimed })
     }
 
     fn with_bars(
@@ -91,8 +97,11 @@ impl Target {
     ) -> Result<Aimed, Refusal> {
         let made = || error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
         let bars = self.error_bars.then(made).transpose().map_err(|refusal| refused(refusal, path, &loaded))?;
+        if self.error_bars && reached.is_none() {
+            tell_polylines(&loaded.deck);
+        }
         let film = self.report.then(|| Film::of(&loaded.scene));
-        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, outcome, bars, film })
+        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, missed: None, outcome, bars, film })
     }
 
     fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {
@@ -111,23 +120,30 @@ impl Target {
         let found = reach(&loaded.text, &loaded.deck, &loaded.scene, wanted, options);
         progress.done();
         let found = found.map_err(|refusal| refused(refusal, path, loaded))?;
-        if found.reached {
-            return Ok(found);
-        }
-        let (column, estimate) = found.worst(wanted);
-        let message = format!(
-            "an error of {:e} of `{column}` is not reached, the best estimate is {estimate:.1e}, with {}",
-            wanted.of(column),
-            describe(&found.point)
-        );
-        lines(&loaded.deck, &found.settings).iter().for_each(|line| say::note(line));
-        match found.stopped {
+        match &found.stopped {
+            None => Ok(found),
             Some(stopped) => {
-                Err(Refusal::of(run::status_of(&stopped), stopped.name(), format!("the search was stopped: {message}")))
+                lines(&loaded.deck, &found.settings).iter().for_each(|line| say::note(line));
+                let message = format!("the search was stopped: {}", missed(&found, wanted));
+                Err(Refusal::of(run::status_of(stopped), stopped.name(), message))
             }
-            None => Err(Refusal::of(Status::Wrong, "limit", message)),
         }
     }
+}
+
+/// Says by how much an accuracy is missed.
+fn missed(found: &Found, wanted: &Accuracy) -> String {
+    let (column, estimate) = found.worst(wanted);
+    format!(
+        "an error of {:e} of `{column}` is not reached, the best estimate is {estimate:.1e}, with {}",
+        wanted.of(column),
+        describe(&found.point)
+    )
+}
+
+/// Notes beams whose straight pieces may stand for curves, which no estimate contains.
+fn tell_polylines(deck: &Deck) {
+    polylines(deck).iter().for_each(|line| say::note(line));
 }
 
 /// A study that could not be made, as it is told for a deck.

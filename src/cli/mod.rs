@@ -24,7 +24,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 const AFTER_HELP: &str = "Exit status: 0 fine; 1 an expectation or comparison failed; 2 the deck or the command line is \
-                          wrong; 3 the numerics gave up; 4 a file could not be read or written; 130 or 143 interrupted.";
+                          wrong; 3 the numerics gave up; 4 a file could not be read or written; 5 an accuracy was not reached; 130 or \
+                          143 interrupted.";
 
 /// Simulates slender parts that bend, twist and spin far.
 #[derive(Parser)]
@@ -191,6 +192,8 @@ pub enum Status {
     GaveUp = 3,
     /// A file could not be read or written
     Io = 4,
+    /// An accuracy was not reached; the results are the best that were found
+    Missed = 5,
     /// SIGINT
     Interrupted = 130,
     /// SIGTERM

@@ -24,7 +24,7 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
     for (number, path) in decks.iter().enumerate() {
         let name = load::name(path);
         match target.aim(&name, path, settings) {
-            Ok(Aimed { text, scene, reached, outcome, bars, film }) => {
+            Ok(Aimed { text, scene, reached, missed, outcome, bars, film }) => {
                 let folder = folder(out, &name, decks.len() > 1);
                 let beyond = Beyond { reached, outcome, bars, text, film };
                 let threads = threads_of(&scene, target.threads);
@@ -36,8 +36,10 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
                     let written = report::write(&scene, &name, &record, film, &folder, &page);
                     written.unwrap_or_else(|refusal| verdict.refuse(refusal));
                 }
-                if let Err(failure) = &finished.result {
-                    verdict.fail(finished.status(), failure.name(), failure.to_string());
+                match (&finished.result, missed) {
+                    (Err(failure), _) => verdict.fail(finished.status(), failure.name(), failure.to_string()),
+                    (Ok(()), Some(missed)) => verdict.fail(Status::Missed, "accuracy", missed),
+                    (Ok(()), None) => {}
                 }
             }
             Err(refusal) => verdict.refuse(refusal),

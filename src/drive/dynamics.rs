@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::grid::Grid;
 use super::guard::Growth;
 use super::run::{Run, Workshop};
-use crate::integrate::{Increments, Rotations, Scheme, Step, Trend};
+use crate::integrate::{Increments, Rotations, Scheme, Step, TimeError, Trend};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::NewtonFailure;
@@ -33,7 +33,14 @@ impl Run<'_> {
         self.find_rates(workshop);
         let mut before = step;
         match adaptive {
-            None => self.run_fixed(workshop, end, step, scheme, &mut before),
+            None => {
+                let first = Step { scheme, length: step };
+                let Workshop { assembly, newton, massive, increments, .. } = &mut *workshop;
+                let start = (&self.state, increments.as_ref());
+                let duration = end - self.state.time;
+                newton.time_error = Some(TimeError::new(&self.model, assembly, start, massive, (first, duration)));
+                self.run_fixed(workshop, end, step, scheme, &mut before)
+            }
             Some(tolerance) => {
                 let judged = workshop.massive.clone();
                 let control = Control::new(tolerance, end - self.state.time, step, scheme, judged);
@@ -111,6 +118,9 @@ impl Run<'_> {
 
     fn settle_charts(&mut self, workshop: &mut Workshop, step: &Step) {
         let totals = workshop.increments.is_none();
+        if let Some(error) = workshop.newton.time_error.as_mut().filter(|_| totals) {
+            error.change_charts(&self.state, &self.model.charted.rotations);
+        }
         let switched = self.change_charts(totals.then_some(step.scheme.lag() * step.length));
         if totals && switched > 0 {
             workshop.trend.forget();
@@ -191,6 +201,9 @@ impl Run<'_> {
         if !rateless.is_empty() {
             self.model.steady(&mut self.state);
         }
+        if let Some(error) = &mut newton.time_error {
+            error.begin(&step, before);
+        }
         if let Some(increments) = increments {
             increments.begin(&mut self.state, &step, before);
         }
@@ -217,7 +230,9 @@ impl Run<'_> {
         }
         let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
-        self.refuse_leaps()
+        self.refuse_leaps()?;
+        newton.end_step(&assembly.system, (&self.good, &self.state), &step, increments.as_ref());
+        Ok(())
     }
 
     /// Rotations without inertia have no spin to speak of: they go where balance is. While a step is iterated the unknown is the

@@ -2,6 +2,7 @@
 
 use super::failure::Moment;
 use super::run::Event;
+use crate::integrate::Largest;
 use crate::warning::{About, WarningKind};
 use std::fmt;
 
@@ -75,6 +76,15 @@ impl StageStability {
     }
 }
 
+/// The estimated errors of the fixed time steps of a dynamic stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageTimeError {
+    /// Stage, from 1
+    pub stage: usize,
+    /// The largest errors, and the largest motion since the stage began
+    pub largest: Largest,
+}
+
 /// What was found out on the way.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
@@ -82,6 +92,8 @@ pub struct Findings {
     pub events: Vec<Event>,
     /// Of each static stage that came to its end
     pub stability: Vec<StageStability>,
+    /// Of each dynamic stage of fixed steps, as far as it came
+    pub time_errors: Vec<StageTimeError>,
     /// In the order in which they were given
     pub warnings: Vec<Warning>,
 }

@@ -31,6 +31,10 @@ impl Ledger {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bookkeeper {
     ledger: Ledger,
+    /// The total that an exact solution keeps; known once the account is opened
+    first: Option<f64>,
+    /// The largest kinetic + strain energy, or work from outside, of the run so far
+    scale: f64,
     q: Vec<Vec3>,
     wound: Vec<Vec3>,
     force: Vec<Vec3>,
@@ -39,8 +43,10 @@ pub(super) struct Bookkeeper {
 }
 
 impl Bookkeeper {
-    /// Opens a stage: energies are taken, no work is added.
-    pub fn open(&mut self, model: &Model, state: &State, system: &System) {
+    /// Opens a stage: energies are taken, no work is added. `begins` tells that initial motions bring in the kinetic energy that is
+    /// new.
+    pub fn open(&mut self, model: &Model, state: &State, system: &System, begins: bool) {
+        let kinetic = self.ledger.kinetic;
         self.drives = model.drives(state);
         self.force = zeros(state.q.len());
         threads::each_part(&mut self.force, |start, part| {
@@ -51,6 +57,11 @@ impl Bookkeeper {
         // Where nothing damps it is empty.
         threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
         self.take(model, state);
+        match &mut self.first {
+            None => self.first = Some(self.ledger.total()),
+            Some(first) if begins => *first += self.ledger.kinetic - kinetic,
+            Some(_) => {}
+        }
     }
 
     /// Adds the work of the step that ends here.
@@ -76,12 +87,23 @@ impl Bookkeeper {
         self.ledger
     }
 
+    /// The total that an exact solution keeps; `None` where no account was opened.
+    pub fn first(&self) -> Option<f64> {
+        self.first
+    }
+
+    /// The largest kinetic + strain energy, or work from outside, of the run so far.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
     /// Takes the energies of a state, and where it is.
     fn take(&mut self, model: &Model, state: &State) {
         threads::copy(&mut self.q, &state.q);
         threads::copy(&mut self.wound, &state.wound);
         let energy = model.energy(state);
         (self.ledger.kinetic, self.ledger.strain) = (energy.kinetic, energy.strain);
+        self.scale = self.scale.max(energy.kinetic + energy.strain).max(self.ledger.external.abs());
     }
 }
 

@@ -24,7 +24,7 @@ mod statics;
 mod warnings;
 
 pub use failure::{Failure, Moment, Place, refusal, refusal_help};
-pub use findings::{Findings, StabilityVerdict, StageStability, Warning};
+pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
 pub use ledger::Ledger;
 pub use levels::Approach;
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};

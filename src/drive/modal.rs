@@ -63,7 +63,7 @@ impl Run<'_> {
         let (time, load) = (self.state.time, self.state.load);
         self.model.set_clock(&mut self.state, time, load);
         self.change_charts(None);
-        self.open_account(workshop)?;
+        self.open_account(workshop, false)?;
         self.warn_out_of_balance(workshop);
         let matrices = self.matrices(workshop);
         let rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);

@@ -332,7 +332,8 @@ pub struct Run<'o> {
     origin: Option<State>,
     /// Of earlier stages
     cutbacks_before: u64,
-    moving: bool,
+    /// Whether a dynamic stage has begun
+    pub(super) moving: bool,
 }
 
 /// What one stage works with.
@@ -406,7 +407,8 @@ impl<'o> Run<'o> {
             self.note_solver(workshop.newton.solver.name());
             self.warn_of_round_off();
             self.warn_of_frame();
-            self.warn_of_loss(&workshop);
+            self.warn_of_imbalance(&workshop);
+            self.judge_steps(&workshop);
             result?;
             self.hand_over(&mut workshop);
             self.model.end_stage(&self.state);
@@ -490,13 +492,15 @@ impl<'o> Run<'o> {
     }
 
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
-    pub(super) fn open_account(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    /// `begins` tells that initial motions set the scene in motion here.
+    pub(super) fn open_account(&mut self, workshop: &mut Workshop, begins: bool) -> Result<(), Failure> {
         if self.keeps_account(workshop) {
-            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
+            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system, begins);
         }
+        let first = self.bookkeeper.first().unwrap_or_default();
         if let Some(guard) = &mut workshop.guard {
             let force = self.model.largest_force(&workshop.assembly.system);
-            guard.open(self.bookkeeper.ledger(), f64::EPSILON * force * self.model.length);
+            guard.open(self.bookkeeper.ledger(), first, f64::EPSILON * force * self.model.length);
         }
         if std::mem::replace(&mut self.started, true) {
             return Ok(());

@@ -16,7 +16,8 @@ use nalgebra::{Matrix3, SymmetricEigen};
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
     pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, step: &Step) -> Result<(), Failure> {
-        if self.takes_initial_motion() {
+        let begins = self.takes_initial_motion();
+        if begins {
             let initial = std::mem::take(&mut self.plan.initial);
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
         }
@@ -42,7 +43,7 @@ impl Run<'_> {
         if let Some(increments) = &workshop.increments {
             increments.start(&mut self.state);
         }
-        self.open_account(workshop)
+        self.open_account(workshop, begins)
     }
 
     /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing the joints takes,

@@ -20,6 +20,9 @@ use std::f64::consts::PI;
 /// a momentum.
 const LARGEST_RATIO: f64 = 10.0;
 
+/// What h^4 w^2 times a change of phi is divided by to be the error of a rotation.
+const FREE: f64 = 240.0;
+
 /// Part of the largest principal value below which there is no inertia.
 const MASSLESS: f64 = 1e-12;
 
@@ -105,20 +108,34 @@ impl Increments {
         factor: f64,
     ) -> impl Iterator<Item = (f64, usize)> + 'a {
         let h2 = length * length;
-        self.carriers.iter().map(move |&(slot, carrier)| {
-            let [(mu0, phi0, _), (mu1, phi1, w2)] = [start, end].map(|state| accelerations(state, slot, &carrier));
-            let size = (mu1 - mu0).norm() * (factor * h2) + (phi1 - phi0).norm() * (h2 * h2 * w2 / 240.0);
-            (size, slot as usize)
+        self.accelerations(start).zip(self.accelerations(end)).map(move |(before, after)| {
+            let driven = (after.driven - before.driven).norm() * (factor * h2);
+            let free = (after.free - before.free).norm() * (h2 * h2 * after.spin.squared() / FREE);
+            (driven + free, after.slot as usize)
+        })
+    }
+
+    /// The accelerations of all rotations in a state with total vectors.
+    pub fn accelerations<'a>(&'a self, state: &'a State) -> impl Iterator<Item = Accelerations> + 'a {
+        self.carriers.iter().map(|&(slot, carrier)| {
+            let spin = state.spin(slot);
+            let driven = carrier.inverse * carrier.rate(spin.omega, spin.acceleration);
+            let r = spin.rotation.r;
+            Accelerations { slot, driven: r * driven, free: r * (spin.acceleration - driven), spin: spin.omega }
         })
     }
 }
 
-/// mu and phi, spatial, and the square of the spin.
-fn accelerations(state: &State, slot: Slot, carrier: &Carrier) -> (Vec3, Vec3, f64) {
-    let spin = state.spin(slot);
-    let driven = carrier.inverse * carrier.rate(spin.omega, spin.acceleration);
-    let r = spin.rotation.r;
-    (r * driven, r * (spin.acceleration - driven), spin.omega.squared())
+/// What the acceleration of a rotation comes from, spatial.
+pub struct Accelerations {
+    /// The rotation
+    pub slot: Slot,
+    /// mu: moments
+    pub driven: Vec3,
+    /// phi: its own spin
+    pub free: Vec3,
+    /// Its spin, material
+    pub spin: Vec3,
 }
 
 /// What sits at each rotation, taken together, with the slot of its displacement.

@@ -2,11 +2,14 @@
 //! which weights stiffness, damping and mass enter the tangent.
 
 mod alpha;
+mod carried_error;
 mod increments;
+mod time_error;
 mod trend;
 
 pub use alpha::{Rotations, Scheme, Step};
 pub use increments::Increments;
+pub use time_error::{Largest, TimeError};
 pub use trend::Trend;
 
 use crate::kernel::Weights;

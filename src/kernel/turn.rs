@@ -110,6 +110,21 @@ impl Turn {
         }
     }
 
+    /// The same from another start: turned by a material vector, with other rates (Omega0 and Acc0 material, B0 spatial). `stretch` is that
+    /// of the [start](Start).
+    pub fn changed(&self, turned: Vec3, [omega, acceleration, algorithmic]: [Vec3; 3], stretch: f64) -> Self {
+        let Self { base, carrier, step, .. } = *self;
+        let own = carrier.inverse * (self.rate - self.omega.cross(self.momentum));
+        let start = Start {
+            rotation: base * Rotation::new(turned).r,
+            omega: self.omega + omega,
+            acceleration: own + acceleration,
+            algorithmic: base * (self.rate + (self.algorithmic - self.rate) * (1.0 / stretch)) + algorithmic,
+            stretch,
+        };
+        Self::new(step, carrier, &start)
+    }
+
     /// R0
     pub fn base(&self) -> Mat3 {
         self.base

@@ -75,6 +75,19 @@ fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part
     }
 }
 
+/// The same of those that inertia or damping come from, without a tangent.
+fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
+    for (number, acting) in effects.iter().enumerate() {
+        if !acting.categories().any(|category| matches!(category, Category::Inertia | Category::Damping)) {
+            continue;
+        }
+        for instances in part.instances(number) {
+            let category = acting.effect.category();
+            acting.add(state, Weights::NONE, &mut part.sink(number, category, false, instances.clone()));
+        }
+    }
+}
+
 impl Assembly {
     /// The system of what acts in a stage on these equations.
     pub fn new(stage: &StageContext, equations: Equations, model: &Model) -> Self {
@@ -163,6 +176,25 @@ impl Assembly {
             add_part(effects, state, weights, &mut system.whole());
         }
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
+    }
+
+    /// Inertia and damping of a state alone, into other forces than those of the system, which stay; what else stands there is nobody's.
+    /// In linear stages those of its rates.
+    pub fn evaluate_rates(&mut self, state: &State, force: &mut [Vec<Vec3>; 4]) {
+        if let Some(linear) = &self.linear {
+            force.iter_mut().for_each(|force| force.fill(Vec3::ZERO));
+            return linear.add_rates(state, force);
+        }
+        std::mem::swap(&mut self.system.force, force);
+        let Self { effects, system, .. } = self;
+        system.each_part(|part| {
+            part.clear(false);
+            add_rates(effects, state, part);
+        });
+        if system.is_cut() {
+            add_rates(effects, state, &mut system.whole());
+        }
+        std::mem::swap(&mut self.system.force, force);
     }
 
     /// Whether any effect forms tangents with something that it foresees.

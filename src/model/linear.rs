@@ -66,23 +66,31 @@ impl Linear {
     /// Adds what displacements, velocities and accelerations bring to the forces.
     pub fn add_forces(&self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         let displaced: Vec<Vec3> = state.q.iter().zip(&self.about.q).map(|(q, q0)| *q - *q0).collect();
-        let parts = [
-            (&self.stiffness, &displaced[..], Category::Internal),
-            (&self.damping, &state.v[..], Category::Damping),
-            (&self.mass, &state.a[..], Category::Inertia),
-        ];
-        for (values, field, category) in parts {
-            // Without held directions the equations are the components of the slots, one after the other.
-            let mut x: Vec<f64> = field.iter().flat_map(|v| v.0).collect();
-            let of_multipliers = || self.multipliers.iter().flat_map(|&slot| 3 * slot as usize..3 * slot as usize + 3);
-            let rates = category != Category::Internal;
+        self.add_part(&self.stiffness, &displaced, &mut force[Category::Internal as usize]);
+        self.add_rates(state, force);
+    }
+
+    /// The same of velocities and accelerations alone.
+    pub fn add_rates(&self, state: &State, force: &mut [Vec<Vec3>; 4]) {
+        for (values, field, category) in
+            [(&self.damping, &state.v[..], Category::Damping), (&self.mass, &state.a[..], Category::Inertia)]
+        {
+            let mut rates = field.to_vec();
             // Joints show the mass matrix their conditions for accelerations, which are no forces.
-            of_multipliers().filter(|_| rates).for_each(|k| x[k] = 0.0);
-            let mut product = self.whole.multiply(values, &x);
-            of_multipliers().filter(|_| rates).for_each(|k| product[k] = 0.0);
-            for (force, part) in force[category as usize].iter_mut().zip(product.as_chunks::<3>().0) {
-                *force += Vec3(*part);
-            }
+            self.multipliers.iter().for_each(|&slot| rates[slot as usize] = Vec3::ZERO);
+            let force = &mut force[category as usize];
+            let kept: Vec<Vec3> = self.multipliers.iter().map(|&slot| force[slot as usize]).collect();
+            self.add_part(values, &rates, force);
+            self.multipliers.iter().zip(kept).for_each(|(&slot, kept)| force[slot as usize] = kept);
+        }
+    }
+
+    fn add_part(&self, values: &[f64], field: &[Vec3], force: &mut [Vec3]) {
+        // Without held directions the equations are the components of the slots, one after the other.
+        let x: Vec<f64> = field.iter().flat_map(|v| v.0).collect();
+        let product = self.whole.multiply(values, &x);
+        for (force, part) in force.iter_mut().zip(product.as_chunks::<3>().0) {
+            *force += Vec3(*part);
         }
     }
 }

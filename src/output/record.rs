@@ -1,6 +1,7 @@
 //! run.json: what was simulated, what it took, how it ended.
 
-use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, Warning};
+use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
+use crate::integrate::Largest;
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::fmt::{self, Display, Formatter};
@@ -23,10 +24,12 @@ pub struct Outcome<'a> {
     pub text: &'a str,
 }
 
-/// An accuracy that was wanted and reached.
+/// An accuracy that was wanted, and what was reached.
 pub struct Reached {
     /// Columns with what was wanted of each and the estimated error, over the largest value of its kind
     pub columns: Vec<(String, f64, f64)>,
+    /// Whether all estimates are what was wanted
+    pub is_reached: bool,
     /// What was set in the deck for it
     pub settings: Vec<String>,
     /// Runs that it took to find
@@ -92,6 +95,7 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
         "counters": counters(outcome.counters),
         "events": events(outcome.counters),
         "stability": stability(outcome.counters),
+        "time_errors": time_errors(outcome.counters),
         "warnings": warnings(scene.warnings.iter().chain(&outcome.counters.findings.warnings)),
         "threads": outcome.threads,
         "seconds": {
@@ -100,10 +104,16 @@ fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
             "solve": outcome.counters.work.solve_seconds,
         },
     });
-    if let Some(Reached { columns, settings, runs, seconds }) = outcome.reached {
+    if let Some(Reached { columns, is_reached, settings, runs, seconds }) = outcome.reached {
         let column = |(name, wanted, estimate): &(String, f64, f64)| (name.clone(), json!([wanted, estimate]));
         let columns: Map<String, Value> = columns.iter().map(column).collect();
-        record["accuracy"] = json!({ "columns": columns, "settings": settings, "runs": runs, "seconds": seconds });
+        record["accuracy"] = json!({
+            "reached": is_reached,
+            "columns": columns,
+            "settings": settings,
+            "runs": runs,
+            "seconds": seconds,
+        });
     }
     if let Err(failure) = outcome.result {
         record["failure"] = numbers(failure, scene);
@@ -128,6 +138,12 @@ fn events(counters: &Counters) -> Value {
 fn stability(counters: &Counters) -> Value {
     let one = |found: &StageStability| json!({ "stage": found.stage, "verdict": found.verdict.name(), "negative": found.negative });
     counters.findings.stability.iter().map(one).collect()
+}
+
+/// Of each dynamic stage of fixed steps, as far as it came.
+fn time_errors(counters: &Counters) -> Value {
+    let one = |&StageTimeError { stage, largest: Largest { displacement, rotation, moved } }: &StageTimeError| json!({ "stage": stage, "displacement": displacement, "rotation": rotation, "moved": moved });
+    counters.findings.time_errors.iter().map(one).collect()
 }
 
 /// Warnings with their names; those about a deck have no moment.

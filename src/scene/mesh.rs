@@ -158,6 +158,13 @@ impl MeshBeam {
         &self.nodes[first..=first + self.order]
     }
 
+    /// The piece of the centre line at a fraction of the length, and the part of its elements before that.
+    pub fn along(&self, fraction: f64) -> (usize, f64) {
+        let (element, xi) = self.element_at(fraction);
+        let Part { piece, number, count } = self.part_of_line(element);
+        (piece, (number as f64 + 0.5 * (xi + 1.0)) / count as f64)
+    }
+
     /// Where on the centre line an element lies.
     fn part_of_line(&self, element: usize) -> Part {
         let number = element - self.elements.start;

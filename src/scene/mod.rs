@@ -16,9 +16,12 @@ mod section;
 
 pub use compose::Reason;
 pub use mesh::{Mesh, MeshBeam, Rule};
+pub use names::Spot;
 pub use section::{MassPerLength, SectionMatrices};
 
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Instant, Reduce, SchemeWord, Severity, Spanned, StageBody};
+use crate::deck::{
+    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
+};
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use crate::effect::beam_elasticity::StressField;
 use crate::effect::link;
@@ -284,6 +287,11 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         resolved: deck.resolved.clone(),
         elasticity: composition.elasticity,
     })
+}
+
+/// Where a point is that stands in a deck by its name or its coordinates.
+pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Option<Vec3> {
+    names::place(deck, point).ok()
 }
 
 /// The initial places of all nodes, where a modal stage asks for them.

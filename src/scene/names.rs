@@ -48,7 +48,31 @@ pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item
     }
 }
 
+/// Where a name lies on a beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// The number of the beam
+    pub beam: usize,
+    /// The piece of its centre line
+    pub piece: usize,
+    /// The part of the nodes of that piece that lie before it, from 0 to 1
+    pub along: f64,
+    /// Whether it is a node
+    pub is_node: bool,
+}
+
 impl Mesh {
+    /// Where the name of a place on a beam lies; `None` for other names.
+    pub fn spot(&self, deck: &Deck, name: &str) -> Option<Spot> {
+        let name = Spanned { value: name.to_string(), span: 0..0 };
+        let (beam, fraction, is_node) = match self.find(deck, &name).ok()? {
+            Found::Node(_, on) => on.map(|(beam, fraction)| (beam, fraction, true))?,
+            Found::Between(beam, fraction) => (beam, fraction, false),
+        };
+        let (piece, along) = self.beams[beam].along(fraction);
+        Some(Spot { beam, piece, along, is_node })
+    }
+
     /// Looks a name up: a point, `beam@start`, `beam@end`, `beam@0.25`, `beam:3`.
     pub fn find(&self, deck: &Deck, name: &Spanned<String>) -> Result<Found, Diagnostic> {
         if let Some((beam, rest)) = name.value.split_once('@') {

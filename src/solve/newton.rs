@@ -8,7 +8,7 @@ use super::refinement::Refinement;
 use super::reuse::Reuse;
 use super::softest::NullVector;
 use super::tangent::Tangent;
-use crate::integrate::Method;
+use crate::integrate::{Increments, Method, Step, TimeError};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
 use crate::real::Rough;
@@ -113,6 +113,8 @@ pub struct Newton {
     pub contraction: f64,
     reuse: Reuse,
     foresight: Foresight,
+    /// What follows the error of time steps, where something does
+    pub time_error: Option<TimeError>,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
     given: Option<u64>,
 }
@@ -136,6 +138,7 @@ impl Newton {
             contraction: 0.0,
             reuse: Reuse::new(),
             foresight: Foresight::default(),
+            time_error: None,
             given: None,
         }
     }
@@ -192,7 +195,7 @@ impl Newton {
                     if residual.ratio > 0.0 {
                         self.polish(model, assembly, state, method, forms, work);
                     }
-                    self.end();
+                    self.end(assembly, state);
                     return Ok(());
                 }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
@@ -205,7 +208,7 @@ impl Newton {
                         self.reuse.forget();
                     } else if refined.is_done() || iterations >= self.max_iterations {
                         work.uncertainty = work.uncertainty.max(refined.uncertainty());
-                        self.end();
+                        self.end(assembly, state);
                         return Ok(());
                     }
                 }
@@ -227,6 +230,7 @@ impl Newton {
             } else {
                 self.reuse.keep();
             }
+            self.show_rates(assembly, state, method, work);
             let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
             if !self.find_correction(&mut tangent, lift.take(), work) {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, &mut tangent, model)));
@@ -261,9 +265,37 @@ impl Newton {
     }
 
     /// A solution is found.
-    fn end(&mut self) {
+    fn end(&mut self, assembly: &mut Assembly, state: &State) {
+        let Self { time_error, solver, dq, .. } = self;
+        if let Some(time_error) = time_error {
+            let mut correct = |system: &System, dq: &mut [Vec3]| {
+                solver.has_factorised(system) && solver.correct(system, false, None, dq)
+            };
+            time_error.solve(&mut correct, &mut assembly.system, state, dq);
+        }
         self.reuse.end();
         self.solver.succeeded();
+    }
+
+    /// What follows the error of a time step sees the state that a new tangent is that of.
+    fn show_rates(&mut self, assembly: &mut Assembly, state: &mut State, method: &dyn Method, work: &mut Work) {
+        let Self { time_error, solver, .. } = self;
+        if let Some(time_error) = time_error.as_mut().filter(|_| !solver.has_factorised(&assembly.system)) {
+            timed(&mut work.evaluation_seconds, || time_error.look(assembly, state, method.weights()));
+        }
+    }
+
+    /// The step that was solved last is taken from one state to another.
+    pub fn end_step(
+        &mut self,
+        system: &System,
+        states: (&State, &State),
+        step: &Step,
+        increments: Option<&Increments>,
+    ) {
+        if let Some(time_error) = &mut self.time_error {
+            time_error.end(system, &self.dq, states, step, increments);
+        }
     }
 
     /// Forces and the tangent.
@@ -292,6 +324,7 @@ impl Newton {
         if !formed && !self.reuse.has_tangent() {
             self.form(assembly, state, method, work);
         }
+        self.show_rates(assembly, state, method, work);
         let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
         if self.substitute(&mut tangent, None, formed, work) && size(model, &self.dq) <= most {
             Self::add(model, state, method, &self.dq);

@@ -91,7 +91,12 @@ fn stability_holds() {
 
 #[test]
 fn states_of_rest_hold() {
-    all_hold("decks/rest", 6);
+    all_hold("decks/rest", 7);
+}
+
+#[test]
+fn what_motions_are_told_of_their_steps_holds() {
+    all_hold("decks/dynamics", 6);
 }
 
 #[test]

@@ -35,6 +35,7 @@ mod statics;
 mod sweep;
 mod tangents;
 mod threads;
+mod time_error;
 mod turned;
 mod warnings;
 mod words;

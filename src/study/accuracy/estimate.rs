@@ -50,10 +50,12 @@ pub fn largest_tolerance(deck: &Deck) -> f64 {
 }
 
 /// By what differences of columns to a run with other elements are divided to be errors: `ratio` is that of the widths of the other
-/// elements and the own.
-pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String]) -> Vec<f64> {
-    let divisor = |column: &String| (ratio.powf(Falls::of(column).in_space(order).0) - 1.0).abs();
-    columns.iter().map(divisor).collect()
+/// elements and the own; columns that lie `between` nodes may be nodes there, or nearer to one.
+pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String], between: &[bool]) -> Vec<f64> {
+    let divisor = |(column, &between): (&String, &bool)| {
+        if between { ratio.min(1.0) } else { (ratio.powf(Falls::of(column).in_space(order).0) - 1.0).abs() }
+    };
+    columns.iter().zip(between).map(divisor).collect()
 }
 
 /// And to a run with other steps.
@@ -166,20 +168,26 @@ impl Fall {
         source: Source,
         (width, ratio): (f64, f64),
         (own, coarser): (&Samples, &Samples),
-        (sampler, wanted): (&Sampler, &Accuracy),
+        (sampler, wanted, between): (&Sampler, &Accuracy, &[bool]),
     ) -> Share {
         let mut differences = sampler.differences(coarser, own, &sampler.scales(own));
         let mut of_coarser = differences.clone();
         let falls: Vec<Falls> = sampler.columns.iter().map(|column| Falls::of(column)).collect();
         let mut largest = [f64::NAN; 2];
         let mut coarser = f64::NAN;
+        // What is interpolated may differ by its error from a node of the other mesh.
+        let interpolated = largest_of(sampler, wanted, &differences, |k| between[k]);
+        for k in (0..falls.len()).filter(|&k| between[k]) {
+            of_coarser[k] = 2.0 * differences[k];
+        }
         for (number, one) in Falls::ALL.into_iter().enumerate() {
-            let size = largest_of(sampler, wanted, &differences, |k| falls[k] == one);
+            let is_of = |k: usize| falls[k] == one && !between[k];
+            let size = largest_of(sampler, wanted, &differences, is_of);
             if size.is_nan() {
                 continue;
             }
             let growth = ratio.powf(self.traces[number].order(source.orders(one), Difference { width, ratio, size }));
-            for k in (0..falls.len()).filter(|&k| falls[k] == one) {
+            for k in (0..falls.len()).filter(|&k| is_of(k)) {
                 differences[k] /= growth - 1.0;
                 of_coarser[k] = differences[k] * growth;
             }
@@ -190,9 +198,9 @@ impl Fall {
         self.leading = usize::from(rank(largest[1]) > rank(largest[0]));
         let known = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
         Share {
-            largest: known(largest[0].max(largest[1])),
+            largest: known(largest[0].max(largest[1]).max(interpolated)),
             columns: differences,
-            coarser: (known(coarser), of_coarser),
+            coarser: (known(coarser.max(2.0 * interpolated)), of_coarser),
         }
     }
 }

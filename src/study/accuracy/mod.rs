@@ -74,7 +74,8 @@ pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options:
     let pace = first_pace(deck);
     let sampler = Sampler::of_histories(deck, scene, outputs(wanted, scene)?, coarser(pace));
     let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
-    let mut mesher = Mesher { text, deck, sampler: &sampler, interpolation: Some(InterpolationWord::Relative) };
+    let mut mesher =
+        Mesher { text, deck, sampler: &sampler, interpolation: Some(InterpolationWord::Relative), keeps_places: true };
     if !mesher.makes_sense(None, &own) {
         // Some supports take hold of rotation vectors.
         mesher.interpolation = None;

@@ -254,7 +254,9 @@ impl<'a> Search<'a> {
             (Some((_, ratio)), longer) => {
                 let pair = longer.as_ref().map(|longer| (own, longer));
                 self.in_time.beside = round.own.width();
-                share(&mut self.in_time.fall, Source::Steps, (width, *ratio), pair, (self.mesher.sampler, self.wanted))
+                let none = vec![false; self.mesher.sampler.columns.len()];
+                let told = (self.mesher.sampler, self.wanted, &none[..]);
+                share(&mut self.in_time.fall, Source::Steps, (width, *ratio), pair, told)
             }
             (None, _) => self.in_time.known(&self.pace, round.own.width()).unwrap_or_else(|| self.none()),
         };
@@ -276,7 +278,8 @@ impl<'a> Search<'a> {
         let is_finer = *ratio < 1.0;
         let (finer, ratio) = if is_finer { (other, 1.0 / ratio) } else { (&round.own, *ratio) };
         let pair = if is_finer { pair.map(|(own, other)| (other, own)) } else { pair };
-        let told = (self.mesher.sampler, self.wanted);
+        let between = self.mesher.between(self.family.order, &finer.elements);
+        let told = (self.mesher.sampler, self.wanted, &between[..]);
         let of_finer = share(&mut self.in_space.fall, source, (finer.width(), ratio), pair, told);
         let of_wider = of_finer.of_coarser();
         let (of_own, of_other) = if is_finer { (of_wider, of_finer) } else { (of_finer, of_wider) };
@@ -377,11 +380,11 @@ fn share(
     source: Source,
     (width, ratio): (f64, f64),
     pair: Option<(&Trial, &Trial)>,
-    (sampler, wanted): (&Sampler, &Accuracy),
+    (sampler, wanted, between): (&Sampler, &Accuracy, &[bool]),
 ) -> Share {
     match pair {
         Some((own, coarser)) if own.finished() && coarser.finished() && ratio > 1.0 => {
-            fall.share(source, (width, ratio), (&own.samples, &coarser.samples), (sampler, wanted))
+            fall.share(source, (width, ratio), (&own.samples, &coarser.samples), (sampler, wanted, between))
         }
         _ => Share::unknown(sampler.columns.len()),
     }

@@ -134,6 +134,8 @@ pub struct Mesher<'a> {
     pub sampler: &'a Sampler,
     /// The interpolation of all beams; `None` for those of the deck
     pub interpolation: Option<InterpolationWord>,
+    /// Whether outputs that are nodes of the deck's mesh shall be nodes of other meshes, too
+    pub keeps_places: bool,
 }
 
 impl Mesher<'_> {
@@ -146,6 +148,7 @@ impl Mesher<'_> {
             self.deck.beams.iter().map(of_beam).collect()
         };
         let rounded = each(&|beam, n| (n as f64 * ratio(beam)).round().max(1.0) as usize);
+        let rounded = self.by_units(order, &rounded, |count, unit| ((count + unit / 2) / unit).max(1) * unit);
         if self.makes_sense(order, &rounded) {
             return rounded;
         }
@@ -164,13 +167,45 @@ impl Mesher<'_> {
         let each = |change: &dyn Fn(usize) -> usize| -> Vec<Vec<usize>> {
             elements.iter().map(|beam| beam.iter().map(|&count| change(count)).collect()).collect()
         };
-        let coarse = each(&|count| count.div_ceil(2));
+        let coarse = self.by_units(order, elements, |count, unit| match count % unit {
+            0 => (count / unit).div_ceil(2) * unit,
+            _ => count.div_ceil(2),
+        });
         let pairs = elements.iter().flatten().zip(coarse.iter().flatten());
         let ratio = pairs.map(|(&fine, &coarse)| fine as f64 / coarse as f64).fold(2.0, f64::min);
         if ratio > 1.0 && self.makes_sense(order, &coarse) {
             return (coarse, ratio);
         }
         (each(&|count| count.saturating_mul(2)), 0.5)
+    }
+
+    /// Changes the numbers of elements, with those that they are to be multiples of.
+    fn by_units(
+        &self,
+        order: Option<usize>,
+        elements: &[Vec<usize>],
+        change: impl Fn(usize, usize) -> usize,
+    ) -> Vec<Vec<usize>> {
+        let orders = self.orders(order);
+        let of_piece = |beam: usize, piece: usize, count: usize| {
+            let Sampler { places, outputs, .. } = self.sampler;
+            let unit = if self.keeps_places { places.unit((beam, piece), orders[beam], outputs, 2 * count) } else { 1 };
+            change(count, unit)
+        };
+        let of_beam = |(beam, counts): (usize, &Vec<usize>)| {
+            counts.iter().enumerate().map(|(piece, &count)| of_piece(beam, piece, count)).collect()
+        };
+        elements.iter().enumerate().map(of_beam).collect()
+    }
+
+    /// The orders of all beams.
+    fn orders(&self, order: Option<usize>) -> Vec<usize> {
+        self.deck.beams.iter().map(|beam| order.unwrap_or(beam.order)).collect()
+    }
+
+    /// For each column whether it lies between nodes of a mesh.
+    pub fn between(&self, order: Option<usize>, elements: &[Vec<usize>]) -> Vec<bool> {
+        self.sampler.places.between(elements, &self.orders(order))
     }
 
     /// Whether the deck makes sense with these elements of an order.

@@ -6,6 +6,7 @@ mod frontier;
 mod grid;
 mod journal;
 mod order;
+mod places;
 mod reference;
 mod sample;
 mod table;
@@ -130,7 +131,7 @@ pub fn study(text: &str, deck: &Deck, scene: &Scene, against: &Against, options:
     let (sampler, given) = sampler(deck, scene, &grid, against).map_err(Refusal::Deck)?;
     let mut crew = Crew::new(text, deck, &sampler, options);
 
-    let mesher = Mesher { text, deck, sampler: &sampler, interpolation: None };
+    let mesher = Mesher { text, deck, sampler: &sampler, interpolation: None, keeps_places: false };
     let points = grid.points(&mesher);
     crew.expect(points.len());
     let reference = match given {

@@ -2,6 +2,7 @@
 
 use super::grid::{Pace, dynamic_stages};
 use super::order::Expected;
+use super::places::Places;
 use crate::deck::{Deck, Diagnostic, NormWord, Path, StageBody};
 use crate::probe::Quantity;
 use crate::scene::Scene;
@@ -37,6 +38,8 @@ pub struct Sampler {
     curved: bool,
     /// Whether something is lumped to nodes where rotations are relative
     lumped: bool,
+    /// Where its columns lie on beams
+    pub places: Places,
     /// What is looked at
     looks: Look,
 }
@@ -87,6 +90,7 @@ impl Sampler {
 
     fn new(deck: &Deck, scene: &Scene, columns: Vec<String>, of_history: usize) -> Self {
         Self {
+            places: Places::of(deck, scene, &columns),
             outputs: (0..columns.len()).collect(),
             columns,
             norm: deck.cost.norm.unwrap_or_default(),

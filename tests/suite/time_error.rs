@@ -1,0 +1,207 @@
+//! What dynamic stages of fixed steps know of their error, and what they tell of it.
+
+use super::folder::{Folder, last_line, status};
+use crate::scenes::{Simulation, simulate};
+use beamsim::integrate::Largest;
+use beamsim::output::HistoryReader;
+use beamsim::warning::{About, WarningKind};
+use serde_json::Value;
+use std::f64::consts::PI;
+use std::fs;
+
+/// A point mass of 1 on a spring of stiffness pi^2 along x, let go with the velocity pi: x = sin(pi t), y = z = 0.
+fn oscillator(scheme: &str, step: f64) -> String {
+    format!(
+        "[point]\na = [0, 0, 0]\n[[body]]\nat = \"a\"\nmass = 1\n[[spring]]\nat = \"a\"\nstiffness = [{k}, {k}, {k}, 0, 0, 0]\n\
+         [[initial]]\nat = \"a\"\nvelocity = [{PI}, 0, 0]\n[output]\nnodes = [\"a\"]\ncolumns = [\"u\", \"energy\"]\n\
+         [[stage]]\nkind = \"dynamic\"\nend = 10\nstep = {step}\nscheme = \"{scheme}\"\n",
+        k = PI * PI
+    )
+}
+
+/// A chain of 60 elements that swings in its second shape of a pendulum, in a plane or in space.
+fn chain(planar: bool, step: f64) -> String {
+    format!(
+        "gravity = [0, 0, -9.81]\n[effects]\nplanar = {planar}\n[point]\ntop = [0, 0, 0]\nend = [1, 0, -1]\n\
+         [section.s]\nEA = 1e4\nGA = 1e4\nGJ = 0.1\nEI = 0.1\nrhoA = 1\n\
+         [[beam]]\nname = \"b\"\nsection = \"s\"\nthrough = [\"top\", \"end\"]\nelements = 60\n\
+         [[support]]\nat = \"top\"\nfix = \"all\"\n[output]\nnodes = [\"end\"]\n\
+         [[stage]]\nkind = \"dynamic\"\nend = 2\nstep = {step}\nscheme = \"generalized_alpha\"\n"
+    )
+}
+
+/// A free body of inertia 3, 5, 7 about its middle axis.
+fn tumbling(scheme: &str, step: f64) -> String {
+    format!(
+        "[point]\nc = [0, 0, 0]\n[[body]]\nat = \"c\"\nmass = 1\ninertia = [3, 5, 7]\n[[initial]]\nat = \"c\"\nspin = [0.1, 10, 0]\n\
+         [output]\nnodes = [\"c\"]\ncolumns = [\"d\"]\n[[stage]]\nkind = \"dynamic\"\nend = 6\nstep = {step}\nscheme = \"{scheme}\"\n"
+    )
+}
+
+/// The estimated errors of the only dynamic stage.
+fn estimated(simulation: &Simulation) -> Largest {
+    let [found] = simulation.counters.findings.time_errors[..] else { panic!("one stage") };
+    found.largest
+}
+
+/// The names of the warnings that put an answer in doubt.
+fn doubts(simulation: &Simulation) -> Vec<WarningKind> {
+    let given = simulation.counters.findings.warnings.iter();
+    given.map(|warning| warning.kind).filter(|kind| kind.about() != About::Deck).collect()
+}
+
+fn largest_difference(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
+    a.iter().enumerate().map(|(k, a)| (a - b(k)).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_estimate_is_the_error_of_an_oscillation_and_falls_with_the_order_of_the_scheme() {
+    for scheme in ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"] {
+        let of = |step: f64| {
+            let simulation = simulate(&oscillator(scheme, step));
+            let error = largest_difference(&simulation.column("a.ux"), |k| (PI * step * k as f64).sin());
+            let estimate = estimated(&simulation);
+            assert!((estimate.moved - 1.0).abs() < 0.01, "{scheme}: {estimate:?}");
+            (error, estimate.displacement)
+        };
+        let [whole, half] = [of(0.02), of(0.01)];
+        for (error, estimate) in [whole, half] {
+            assert!((0.75..1.25).contains(&(estimate / error)), "{scheme}: {estimate:e} for {error:e}");
+        }
+        let ratio = whole.1 / half.1;
+        assert!((3.6..4.6).contains(&ratio), "{scheme}: halved steps leave 1/{ratio}");
+    }
+}
+
+#[test]
+fn errors_of_free_rotations_are_known_and_the_other_scheme_is_named() {
+    // Exact to 1e-4: d2 lies across the momentum at 1.352 and 4.056.
+    let exact = simulate(&tumbling("lie_generalized_alpha", 1e-3));
+    let [newmark, lie] = ["newmark", "lie_generalized_alpha"].map(|scheme| simulate(&tumbling(scheme, 0.01)));
+    let off = |simulation: &Simulation| {
+        let exact = exact.column("c.d2y");
+        largest_difference(&simulation.column("c.d2y"), |k| exact[10 * k])
+    };
+    assert!(off(&newmark) > 0.5 && off(&lie) < 0.02);
+    assert!(estimated(&newmark).rotation > 0.5);
+    assert!((off(&lie)..0.1).contains(&estimated(&lie).rotation), "{:?}", estimated(&lie));
+    assert_eq!((doubts(&newmark), doubts(&lie)), (vec![WarningKind::LongSteps], vec![]));
+    let message = &newmark.counters.findings.warnings[0].message;
+    assert!(message.contains("scheme = \"lie_generalized_alpha\""), "{message}");
+}
+
+/// Scenes of more than a hundred slots carry their errors only where the sum of local ones comes to something.
+#[test]
+fn large_scenes_know_their_errors_too_and_the_proposed_step_will_do() {
+    for planar in [true, false] {
+        let long = simulate(&chain(planar, 0.1));
+        let end = |simulation: &Simulation| simulation.vector("end.u");
+        let exact = end(&simulate(&chain(planar, 0.002)));
+        let off = |simulation: &Simulation| largest_difference(&end(simulation), |k| exact[k]);
+        assert!(doubts(&long).contains(&WarningKind::LongSteps), "planar: {planar}");
+        assert!(estimated(&long).displacement > 0.3 * off(&long), "{:?} for {}", estimated(&long), off(&long));
+        let message =
+            &long.counters.findings.warnings.iter().find(|w| w.kind == WarningKind::LongSteps).unwrap().message;
+        let (_, proposed) = message.split_once("`step = ").unwrap();
+        let proposed: f64 = proposed.split_once('`').unwrap().0.parse().unwrap();
+        let shorter = simulate(&chain(planar, proposed));
+        assert_eq!(doubts(&shorter), [], "step {proposed}");
+        assert!(off(&shorter) < 0.05 * estimated(&shorter).moved, "step {proposed}: {}", off(&shorter));
+    }
+}
+
+/// A scene is let go from a preload with initial motions: they bring energy in that no step is to blame for.
+#[test]
+fn what_initial_motions_bring_in_after_a_preload_is_no_imbalance() {
+    let preload = "[[load]]\nat = \"a\"\nforce = [0, 0.1, 0]\n[[stage]]\nkind = \"static\"\nsteps = 4\n[[stage]]";
+    let deck = oscillator("newmark", 0.01).replace("[[stage]]", preload);
+    assert_eq!(doubts(&simulate(&deck)), []);
+}
+
+/// Errors are compared with the largest motion and energy of the run: a stage that is almost at rest may err by its own.
+#[test]
+fn a_stage_nearly_at_rest_is_judged_by_the_motion_of_the_run() {
+    // A damper takes nearly all of the energy; then steps are far too long for what is left of the motion.
+    let deck = oscillator("generalized_alpha", 0.005)
+        .replace("stiffness = ", "damping = [4, 4, 4, 0, 0, 0]\nstiffness = ")
+        + "[[stage]]\nkind = \"dynamic\"\nend = 14\nstep = 0.4\nscheme = \"generalized_alpha\"\nrho_inf = 0\n";
+    let simulation = simulate(&deck);
+    let [_, last] = simulation.counters.findings.time_errors[..] else { panic!("two stages") };
+    assert!(last.largest.displacement > 0.1 * last.largest.moved, "{last:?}");
+    assert_eq!(doubts(&simulation), []);
+}
+
+#[test]
+fn an_accuracy_that_is_missed_has_a_status_of_its_own_and_the_best_is_written() {
+    let folder = Folder::new("missed");
+    folder.write("deck.toml", &oscillator("newmark", 0.01));
+    // A few rounds fit into a second, and none comes near.
+    let output = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-12", "--budget", "1s"]);
+    assert_eq!(status(&output), 5, "{}", last_line(&output));
+    assert!(last_line(&output).starts_with("error[accuracy]: an error of 1e-12 of `a.ux` is not reached"));
+    let read = |name: &str| fs::read(folder.0.join("results/deck").join(name)).unwrap();
+    let record: Value = serde_json::from_slice(&read("run.json")).unwrap();
+    assert_eq!((&record["accuracy"]["reached"], &record["status"]), (&false.into(), &"finished".into()));
+    let [wanted, estimate] = [0, 1].map(|k| record["accuracy"]["columns"]["a.ux"][k].as_f64().unwrap());
+    assert!(wanted == 1e-12 && estimate > 1e-12 && estimate < 1e-2);
+    assert!(!read("history.csv").is_empty());
+}
+
+/// The middle of an arc is a node of the deck's mesh, and of those that are chosen.
+#[test]
+fn an_accuracy_is_kept_at_nodes_that_other_meshes_do_not_have() {
+    let folder = Folder::new("between_nodes");
+    let deck = format!("{}/decks/dynamics/accuracy_between_nodes.toml", env!("CARGO_MANIFEST_DIR"));
+    for wanted in [1e-3, 3e-4] {
+        let output = folder.beamsim(&["run", &deck, "--accuracy", &wanted.to_string(), "--out", "out"]);
+        assert_eq!(status(&output), 0, "{}", last_line(&output));
+        let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
+        let column = history.names.iter().position(|name| name == "b1@0.5.uy").unwrap();
+        let came = history.rows.last().unwrap()[column];
+        // 36 cubic elements an arc; the largest displacement is 0.02618.
+        assert!((came - 0.0012150).abs() <= wanted * 0.02618, "{came} for 0.0012150, wanted {wanted:e}");
+    }
+}
+
+#[test]
+fn bars_of_long_steps_hold_the_error() {
+    let folder = Folder::new("bars_of_long_steps");
+    folder.write("deck.toml", &oscillator("newmark", 0.1));
+    let output = folder.beamsim(&["run", "deck.toml", "--error-bars", "--out", "out"]);
+    assert_eq!(status(&output), 0, "{}", last_line(&output));
+    let history = HistoryReader::read(&folder.0.join("out/history.csv")).unwrap();
+    let column = |name: &str| history.names.iter().position(|known| known == name).unwrap();
+    let (time, own, bar) = (column("time"), column("a.ux"), column("a.ux.err"));
+    let mut largest: f64 = 0.0;
+    for row in &history.rows {
+        let error = (row[own] - (PI * row[time]).sin()).abs();
+        assert!(error <= row[bar] + 1e-15, "at {}: {error:e} in {:e}", row[time], row[bar]);
+        largest = largest.max(error);
+    }
+    let last = history.rows.last().unwrap()[bar];
+    assert!(last <= 3.0 * largest, "{largest:e} in {last:e}");
+}
+
+#[test]
+fn error_bars_say_where_a_polyline_may_stand_for_a_curve() {
+    let folder = Folder::new("polyline");
+    let deck = |path: &str| {
+        format!(
+            "[section.s]\nEA = 1e3\nGA = 1e3\nGJ = 10\nEI = 10\n[[beam]]\nname = \"b\"\nsection = \"s\"\n{path}\n\
+             [[support]]\nat = \"b@start\"\nfix = \"all\"\n[[load]]\nat = \"b@end\"\nforce = [0, 0, 1]\n\
+             [output]\nnodes = [\"b@end\"]\n[[stage]]\nkind = \"static\"\nsteps = 1\n"
+        )
+    };
+    let told = |path: &str, words: &[&str]| {
+        folder.write("deck.toml", &deck(path));
+        let output = folder.beamsim(&[&["run", "deck.toml", "--out", "out"][..], words].concat());
+        assert_eq!(status(&output), 0, "{}", last_line(&output));
+        let said = [output.stdout, output.stderr].concat();
+        String::from_utf8_lossy(&said).contains("straight pieces turn by up to")
+    };
+    let pieces = "through = [[0, 0, 0], [1, 0, 0], [1.98, 0.2, 0], [2.9, 0.6, 0]]\nelements = 2";
+    let corner = "through = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]\nelements = 2";
+    let arc = "arc = [[0, 0, 0], [1, 0.3, 0], [2, 1, 0]]\nelements = 4";
+    assert!(told(pieces, &["--error-bars"]) && !told(pieces, &[]));
+    assert!(!told(corner, &["--error-bars"]) && !told(arc, &["--error-bars"]));
+}
