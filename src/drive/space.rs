@@ -5,7 +5,7 @@ use super::findings::StageStability;
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Assembly;
-use crate::solve::{LinearSolver, Tangent, mechanism};
+use crate::solve::{LinearSolver, Signature, Tangent, mechanism};
 
 /// A stage that is treated in a plane, as it is in space.
 pub(super) struct Space {
@@ -60,14 +60,15 @@ impl Run<'_> {
         Ok(in_space.and_then(|in_space| in_space.checked_sub(in_plane)))
     }
 
-    /// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is not. `negative`: the number of negative
-    /// pivots, as the stage is treated, where it is known; `on_limit`: whether the state is a limit point, with the pivots behind it.
+    /// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is not. `signature`: of its tangent, as the
+    /// stage is treated, where it is known; `on_limit`: whether the state is a limit point, with the pivots behind it.
     pub(super) fn conclude_static(
         &mut self,
         workshop: &mut Workshop,
-        negative: Option<usize>,
+        signature: Option<Signature>,
         on_limit: bool,
     ) -> Result<(), Failure> {
+        let negative = signature.and_then(Signature::negative);
         self.warn_of_instability(negative);
         let aside = match negative {
             None => None,
