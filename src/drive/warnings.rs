@@ -3,7 +3,8 @@
 use super::failure::Moment;
 use super::findings::Warning;
 use super::guard::EnergyGuard;
-use super::run::{Run, Workshop};
+use super::run::{Mode, Run, Workshop};
+use super::vibrations::Vibrations;
 use crate::model::{StageKind, charts};
 use crate::system::Slot;
 use crate::warning::WarningKind;
@@ -159,6 +160,24 @@ impl Run<'_> {
             let message = format!("a step fails at {at} and is taken in smaller ones, as are others that fail");
             self.warn(WarningKind::StepSubdivided, message);
         }
+    }
+
+    /// The same where pivots do not tell.
+    pub(super) fn warn_of_vibrations(&mut self, vibrations: Vibrations) {
+        let how = match vibrations {
+            Vibrations::Bounded | Vibrations::Unknown => return,
+            Vibrations::Counted(negative) => return self.warn_of_instability(Some(negative)),
+            Vibrations::Diverging => "its tangent has a negative real eigenvalue: divergence".into(),
+            Vibrations::Growing(Mode { omega: 0.0, growth }) => {
+                format!("a small motion grows with exp({growth:.4} t): divergence")
+            }
+            Vibrations::Growing(Mode { omega, growth }) => {
+                format!("a small vibration of angular frequency {omega:.4} grows with exp({growth:.4} t): flutter")
+            }
+        };
+        let stage = self.stage + 1;
+        let message = format!("stage {stage} ends in an unstable equilibrium ({how}): a real structure would leave it");
+        self.warn(WarningKind::Unstable, message);
     }
 
     /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.
