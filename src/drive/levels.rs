@@ -154,7 +154,8 @@ impl Levels {
     /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points
     /// at once, of which each may have a branch that the path turns into.
     pub fn may_have_strayed(&self, contraction: f64, signature: Option<Signature>) -> bool {
-        let is_counted = [self.stability.signature, signature].iter().all(|s| s.and_then(Signature::negative).is_some());
+        let is_counted =
+            [self.stability.signature, signature].iter().all(|s| s.and_then(Signature::negative).is_some());
         let largest = if is_counted { LARGEST_CONTRACTION } else { LARGEST_UNCOUNTED };
         contraction > largest || self.stability.changes_to(signature) > 1
     }

@@ -5,7 +5,9 @@ use super::rigid::rigid_motions;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, StageError};
-use crate::solve::{Convergence, LinearSolver, Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, Verdict, mechanism, timed};
+use crate::solve::{
+    Convergence, LinearSolver, Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, Verdict, mechanism, timed,
+};
 use crate::system::System;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
@@ -73,8 +75,8 @@ impl Run<'_> {
         self.refuse_massless_mechanisms(workshop, &matrices)?;
         let Workshop { assembly, newton, .. } = &mut *workshop;
         let found = self.find_modes(assembly, &mut newton.solver, &matrices, rigid, modes, 0.0)?;
-        let found =
-            found.ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))?;
+        let found = found
+            .ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))?;
         let mut listed = listed(&found, modes);
         listed.iter_mut().for_each(|motion| self.refine(workshop, motion));
         self.warn_of_modes(&found, &listed);
@@ -146,11 +148,7 @@ impl Run<'_> {
     }
 
     /// What neither stiffness nor mass holds.
-    fn refuse_massless_mechanisms(
-        &mut self,
-        workshop: &mut Workshop,
-        matrices: &Matrices,
-    ) -> Result<(), Failure> {
+    fn refuse_massless_mechanisms(&mut self, workshop: &mut Workshop, matrices: &Matrices) -> Result<(), Failure> {
         let Workshop { assembly, newton, .. } = workshop;
         let shift = first_shift(matrices, &assembly.system);
         matrices.combine(shift, &mut assembly.system.values);

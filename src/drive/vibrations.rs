@@ -2,7 +2,8 @@
 //!
 //! Under an unsymmetric tangent K the motions x exp(s t) with (s^2 M + s C + K) x = 0 tell (Bolotin 1963, Nonconservative Problems of the Theory of
 //! Elastic Stability). A real s > 0 is divergence, a complex one with a positive real part is flutter. Where det K < 0 there is a real s > 0,
-//! whatever M and C: det(s^2 M + s C + K) is negative at s = 0 and positive for large s.
+//! whatever masses M and dampers C there are: det(s^2 M + s C + K) is negative at s = 0 and positive for large s. Without masses no more is
+//! known: for each K that is not symmetric there are masses with which something grows.
 
 use super::failure::Failure;
 use super::modal::grows;
@@ -58,6 +59,10 @@ impl Run<'_> {
         };
         let matrices = self.matrices(&mut assembly);
         self.counters.work.factorisations += 1;
+        // Without digits signs tell nothing.
+        if !solver.factorise_surely(&assembly.system) {
+            return Ok(Vibrations::Unknown);
+        }
         match solver.signature(&mut Tangent::that_stays(&mut assembly, &self.state)) {
             Some(Signature::Negative(count)) => return Ok(Vibrations::Counted(count)),
             Some(Signature::Parity { is_odd: true }) => return Ok(Vibrations::Diverging),

@@ -167,17 +167,20 @@ impl Run<'_> {
         let how = match vibrations {
             Vibrations::Bounded | Vibrations::Unknown => return,
             Vibrations::Counted(negative) => return self.warn_of_instability(Some(negative)),
-            Vibrations::Diverging => "its tangent has a negative real eigenvalue: divergence".into(),
+            Vibrations::Diverging => {
+                "its tangent has a negative real eigenvalue: divergence): a real structure would leave it".into()
+            }
             Vibrations::Growing(Mode { omega: 0.0, growth }) => {
-                format!("a small motion grows with exp({growth:.4} t): divergence")
+                format!("a small motion grows with exp({growth:.4} t): divergence): a real structure would leave it")
             }
-            Vibrations::Growing(Mode { omega, growth }) => {
-                format!("a small vibration of angular frequency {omega:.4} grows with exp({growth:.4} t): flutter")
-            }
+            Vibrations::Growing(Mode { omega, growth }) => format!(
+                "a small vibration of angular frequency {omega:.4} grows with exp({growth:.4} t): flutter): a real structure would \
+                 leave it, unless it has more damping than the scene (about {:.2} % of critical)",
+                100.0 * growth / omega.hypot(growth)
+            ),
         };
         let stage = self.stage + 1;
-        let message = format!("stage {stage} ends in an unstable equilibrium ({how}): a real structure would leave it");
-        self.warn(WarningKind::Unstable, message);
+        self.warn(WarningKind::Unstable, format!("stage {stage} ends in an unstable equilibrium ({how}"));
     }
 
     /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.

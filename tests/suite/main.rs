@@ -35,5 +35,6 @@ mod sweep;
 mod tangents;
 mod threads;
 mod turned;
+mod verdicts;
 mod warnings;
 mod words;
