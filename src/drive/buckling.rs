@@ -30,6 +30,8 @@ const SEEN: f64 = 1e-3;
 const LEAP: f64 = 8.0;
 /// Just before a limit point a unit of load moves the scene so many times further than at the start: by the root of one over [`CLOSED`].
 const RUNS_AWAY: f64 = 50.0;
+/// A path that goes on so far behind a load, relative to it, has no limit point there.
+const BEHIND: f64 = 1e-4;
 /// States on both sides of a critical load that are further apart than this do not lie on one path.
 const APART: f64 = 1e-3;
 /// States of one load that lie nearer together than this are one.
@@ -121,6 +123,12 @@ impl Run<'_> {
         };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
+                if search.ended.is_some() && self.goes_on(workshop, &search, found, none.map(|none| none + before))? {
+                    // A step from further away came down elsewhere, or nowhere.
+                    let ahead = self.next_critical(workshop, way, before)?;
+                    search.go_on_from(&self.state, ahead);
+                    continue;
+                }
                 let is_apart = |behind: &State| distance(&self.model, &search.here, behind) > APART;
                 if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.state.copy_from(&search.here);
@@ -153,15 +161,35 @@ impl Run<'_> {
                 search.ended = None;
                 search.stretch = 1.0;
             } else {
-                let ahead = self.critical_loads(workshop, before + 4)?;
-                search.advance(
-                    &self.state,
-                    ahead.into_iter().filter(|load| (load - target) * way > 0.0).nth(before - passed),
-                );
+                let ahead = self.next_critical(workshop, way, before - passed)?;
+                search.advance(&self.state, ahead);
             }
         }
         self.warn_of_estimate(search.here.load, search.ended);
         Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+    }
+
+    /// Whether load control follows the path past a load from next to it, with so many negative pivots. The state is then that point.
+    fn goes_on(
+        &mut self,
+        workshop: &mut Workshop,
+        search: &Search,
+        load: f64,
+        negative: Option<usize>,
+    ) -> Result<bool, Failure> {
+        self.state.copy_from(&search.here);
+        self.good.copy_from(&search.here);
+        let walked = self.continue_path(workshop, load + search.way * BEHIND * load.abs());
+        Ok(walked == Walked::There
+            && !self.has_leapt(workshop, &search.here)?
+            && negative.is_some_and(|most| self.negative_pivots(workshop).is_some_and(|count| count <= most)))
+    }
+
+    /// The critical load with `before` others between it and the present one, as it looks from here.
+    fn next_critical(&mut self, workshop: &mut Workshop, way: f64, before: usize) -> Result<Option<f64>, Failure> {
+        let load = self.state.load;
+        let ahead = self.critical_loads(workshop, before + 4)?;
+        Ok(ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before))
     }
 
     /// What lies just ahead of the present state: towards a limit point the path moves without bounds.
@@ -186,10 +214,7 @@ impl Run<'_> {
         let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
         for _ in 0..MOST_EXTRAPOLATIONS {
             let load = self.state.load;
-            let ahead = self.critical_loads(workshop, before + 4)?;
-            let Some(critical) = ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before) else {
-                break;
-            };
+            let Some(critical) = self.next_critical(workshop, way, before)? else { break };
             let now = Sight { from: load, critical };
             let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
             if drift < least_drift {
@@ -461,6 +486,13 @@ impl Search {
             }
             _ => target,
         }
+    }
+
+    /// The path goes on past what was taken for its end, to this point, with what a critical load looks like from there.
+    fn go_on_from(&mut self, state: &State, next: Option<f64>) {
+        (self.beyond, self.behind, self.ended) = (None, None, None);
+        self.stretch = 1.0;
+        self.advance(state, next);
     }
 
     /// A point that lies before the critical load, with what that looks like from there.

@@ -2,6 +2,7 @@
 
 use super::failure::Moment;
 use super::run::Event;
+use super::vibrations::Vibrations;
 use crate::integrate::Largest;
 use crate::warning::{About, WarningKind};
 use std::fmt;
@@ -73,6 +74,17 @@ impl StageStability {
             Some(_) => StabilityVerdict::Unstable,
         };
         Self { stage, verdict, negative }
+    }
+
+    /// As small vibrations tell.
+    pub(super) fn of_vibrations(stage: usize, vibrations: Vibrations) -> Self {
+        let verdict = match vibrations {
+            Vibrations::Counted(negative) => return Self::of_pivots(stage, Some(negative), Some(0)),
+            Vibrations::Bounded => StabilityVerdict::Stable,
+            Vibrations::Growing(_) | Vibrations::Diverging => StabilityVerdict::Unstable,
+            Vibrations::Unknown => StabilityVerdict::Unknown,
+        };
+        Self { stage, verdict, negative: None }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::real::Rough;
 use crate::rotation::{Rotation, relative_angle};
-use crate::solve::Tangent;
+use crate::solve::{Signature, Tangent};
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads;
@@ -20,7 +20,7 @@ const SMALLEST_OF_STAGE: f64 = 1.0 / 65536.0;
 /// Where round-off takes the stiffness smaller parts hardly help.
 const SMALLEST_SOFT_PART: f64 = 1.0 / 16.0;
 
-/// A step over which the number of negative pivots changes is cut back to this part of a level: it may have jumped.
+/// A step over which the signs of pivots change is cut back to this part of a level: it may have jumped.
 const CLOSE: f64 = 1.0 / 256.0;
 
 /// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
@@ -30,7 +30,7 @@ const JUMP: f64 = 8.0;
 /// Methods for Nonlinear Problems, 5.1).
 pub(super) const LARGEST_CONTRACTION: f64 = 1.0;
 
-/// The same where no pivots tell whether it ended on another branch.
+/// The same where pivots do not count whether it ended on another branch.
 pub(super) const LARGEST_UNCOUNTED: f64 = 0.5;
 
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.
@@ -62,11 +62,11 @@ pub(super) enum Way {
     Rest,
 }
 
-/// Follows the number of negative pivots from step to step.
+/// Follows the signs of pivots from step to step.
 pub(super) struct Stability {
     /// Whether there is something to follow
     counts: bool,
-    pub negative: Option<usize>,
+    pub signature: Option<Signature>,
 }
 
 impl Stability {
@@ -75,14 +75,14 @@ impl Stability {
         // The start was assembled with its stiffness.
         let Workshop { assembly, newton, .. } = workshop;
         let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
-        let negative = newton.count_pivots(&mut tangent, &mut run.counters.work);
+        let signature = newton.signature(&mut tangent, &mut run.counters.work);
         newton.begin_with(&assembly.system);
         // What is linear keeps its tangent.
-        Self { counts: !run.is_linear(), negative }
+        Self { counts: !run.is_linear(), signature }
     }
 
-    /// The number at the run's state; `None` where it is not known.
-    pub fn count(&mut self, run: &mut Run, workshop: &mut Workshop) -> Option<usize> {
+    /// At the run's state; `None` where it is not known.
+    pub fn look(&mut self, run: &mut Run, workshop: &mut Workshop) -> Option<Signature> {
         if !self.counts {
             return None;
         }
@@ -90,20 +90,26 @@ impl Stability {
         workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = workshop;
         let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
-        let negative = newton.count_pivots(&mut tangent, &mut run.counters.work);
-        // What is not symmetric will not be so next.
-        self.counts = negative.is_some();
-        negative
+        let signature = newton.signature(&mut tangent, &mut run.counters.work);
+        // Where nothing tells, nothing will next.
+        self.counts = signature.is_some();
+        signature
     }
 
-    fn changes_to(&self, negative: Option<usize>) -> bool {
-        matches!((self.negative, negative), (Some(before), Some(after)) if before != after)
+    /// Of how many eigenvalues the sign changes at least.
+    fn changes_to(&self, signature: Option<Signature>) -> usize {
+        self.signature.zip(signature).map_or(0, |(before, after)| before.changes_to(after))
     }
 
     /// Says where a limit or branch point lies behind.
-    pub fn pass(&mut self, run: &mut Run, workshop: &mut Workshop, negative: Option<usize>) -> Result<(), Failure> {
-        let before = std::mem::replace(&mut self.negative, negative);
-        run.tell_stability(workshop, None, before, negative)
+    pub fn pass(
+        &mut self,
+        run: &mut Run,
+        workshop: &mut Workshop,
+        signature: Option<Signature>,
+    ) -> Result<(), Failure> {
+        let before = std::mem::replace(&mut self.signature, signature);
+        run.tell_stability(workshop, None, before, signature)
     }
 }
 
@@ -176,28 +182,28 @@ impl Levels {
 
     /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points
     /// at once, of which each may have a branch that the path turns into.
-    pub fn may_have_strayed(&self, contraction: f64, negative: Option<usize>) -> bool {
-        match self.stability.negative.zip(negative) {
-            Some((before, after)) => contraction > LARGEST_CONTRACTION || before.abs_diff(after) > 1,
-            None => contraction > LARGEST_UNCOUNTED,
-        }
+    pub fn may_have_strayed(&self, contraction: f64, signature: Option<Signature>) -> bool {
+        let is_counted =
+            [self.stability.signature, signature].iter().all(|s| s.and_then(Signature::negative).is_some());
+        let largest = if is_counted { LARGEST_CONTRACTION } else { LARGEST_UNCOUNTED };
+        contraction > largest || self.stability.changes_to(signature) > 1
     }
 
-    /// Whether a step may have gone to another branch: it went back against the `first` correction, or it changed the number of
-    /// negative pivots and is not small, or the state has moved further than on a path that goes on.
+    /// Whether a step may have gone to another branch: it went back against the `first` correction, or it changed the signs of pivots and is
+    /// not small, or the state has moved further than on a path that goes on.
     pub fn may_have_jumped(
         &self,
         model: &Model,
         states: [&State; 2],
         first: &Rough<3>,
-        negative: Option<usize>,
+        signature: Option<Signature>,
     ) -> bool {
         let [from, to] = states;
         if self.approach == Approach::Straight {
             return false;
         }
         let (step, risen) = (to.load - from.load, from.load - self.start.load);
-        if !self.stability.changes_to(negative) {
+        if self.stability.changes_to(signature) == 0 {
             // A stage may begin out of balance: its first step need not go along a path.
             return risen > 0.0 && has_turned_back(model, from, to, first);
         }

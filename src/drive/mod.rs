@@ -21,6 +21,7 @@ mod run;
 mod space;
 mod start;
 mod statics;
+mod vibrations;
 mod warnings;
 
 pub use failure::{Failure, Moment, Place, refusal, refusal_help};

@@ -4,8 +4,10 @@ use super::failure::Failure;
 use super::rigid::rigid_motions;
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
-use crate::model::{Model, StageError};
-use crate::solve::{Convergence, Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, Verdict, mechanism, timed};
+use crate::model::{Assembly, Model, StageError};
+use crate::solve::{
+    Convergence, LinearSolver, Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, Verdict, mechanism, timed,
+};
 use crate::system::System;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
@@ -40,8 +42,8 @@ const TOLD: f64 = 1e-3;
 
 /// The modes of a stage, and what is known about them.
 #[derive(Default)]
-struct Found {
-    motions: Vec<SmallMotion>,
+pub(super) struct Found {
+    pub motions: Vec<SmallMotion>,
     /// Rigid motions of free parts
     rigid: usize,
     /// Unstable modes that are known to be there and were not found
@@ -65,9 +67,16 @@ impl Run<'_> {
         self.change_charts(None);
         self.open_account(workshop, false)?;
         self.warn_out_of_balance(workshop);
-        let matrices = self.matrices(workshop);
+        let matrices = self.matrices(&mut workshop.assembly);
+        if matrices.is_massless() {
+            return Err(self.describe(StageError::NoMass));
+        }
         let rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);
-        let found = self.find_modes(workshop, &matrices, rigid, modes)?;
+        self.refuse_massless_mechanisms(workshop, &matrices)?;
+        let Workshop { assembly, newton, .. } = &mut *workshop;
+        let found = self.find_modes(assembly, &mut newton.solver, &matrices, rigid, modes, 0.0)?;
+        let found = found
+            .ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))?;
         let mut listed = listed(&found, modes);
         listed.iter_mut().for_each(|motion| self.refine(workshop, motion));
         self.warn_of_modes(&found, &listed);
@@ -96,8 +105,7 @@ impl Run<'_> {
     }
 
     /// K, C and M; the system is left with K and the forces.
-    fn matrices(&mut self, workshop: &mut Workshop) -> Matrices {
-        let assembly = &mut workshop.assembly;
+    pub(super) fn matrices(&mut self, assembly: &mut Assembly) -> Matrices {
         let mut part = |weights: Weights| {
             assembly.evaluate(&self.state, weights, None);
             assembly.system.values.clone()
@@ -107,50 +115,42 @@ impl Run<'_> {
         Matrices { stiffness, damping, mass }
     }
 
-    /// A few looks place the shift below the lowest frequency; then all modes are searched from there.
-    fn find_modes(
+    /// A few looks place the shift below the lowest frequency; then all modes are searched from there. `begun`: the part of the stage that
+    /// lies behind. `None` where a solve with the tangent fails.
+    pub(super) fn find_modes(
         &mut self,
-        workshop: &mut Workshop,
+        assembly: &mut Assembly,
+        solver: &mut LinearSolver,
         matrices: &Matrices,
         rigid: Vec<Vec<f64>>,
         modes: usize,
-    ) -> Result<Found, Failure> {
-        if matrices.mass.iter().all(|&m| m == 0.0) {
-            return Err(self.describe(StageError::NoMass));
-        }
-        let mut shift = FIRST_SHIFT * matrices.softest_frequency(&workshop.assembly.system);
-        if shift == 0.0 || !shift.is_finite() {
-            // Nothing holds anything: every mode is a free motion.
-            shift = 1.0;
-        }
-        self.refuse_massless_mechanisms(workshop, matrices, shift)?;
-        let failed = || Failure::Limit("the modes could not be found: a solve with the tangent failed".into());
-        let Workshop { assembly, newton, .. } = workshop;
-        let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid);
+        begun: f64,
+    ) -> Result<Option<Found>, Failure> {
+        let mut shift = first_shift(matrices, &assembly.system);
+        let done = |part: f64| begun + (1.0 - begun) * part;
+        let mut search = ModeSearch::new(&mut assembly.system, solver, matrices, rigid);
         for look in 0..MOST_LOOKS {
-            let done = 0.5 * look as f64 / MOST_LOOKS as f64;
-            self.observer.progress(self.moment(), self.static_progress(done))?;
-            let sizes = search.factorise(shift).then(|| search.roughly_nearest()).flatten().ok_or_else(failed)?;
+            let looked = 0.5 * look as f64 / MOST_LOOKS as f64;
+            self.observer.progress(self.moment(), self.static_progress(done(looked)))?;
+            let Some(sizes) = search.factorise(shift).then(|| search.roughly_nearest()).flatten() else {
+                return Ok(None);
+            };
             let Some(lowest) = lowest(&sizes) else { break };
             if look > 0 && shift <= NEAR_SHIFT * lowest {
                 break;
             }
             shift = SHIFT * lowest;
         }
-        self.observer.progress(self.moment(), self.static_progress(0.5))?;
+        self.observer.progress(self.moment(), self.static_progress(done(0.5)))?;
         let found = timed(&mut self.counters.work.solve_seconds, || find_all(&mut search, shift, modes));
         self.counters.work.factorisations += search.factorisations;
-        found.ok_or_else(failed)
+        Ok(found)
     }
 
     /// What neither stiffness nor mass holds.
-    fn refuse_massless_mechanisms(
-        &mut self,
-        workshop: &mut Workshop,
-        matrices: &Matrices,
-        shift: f64,
-    ) -> Result<(), Failure> {
+    fn refuse_massless_mechanisms(&mut self, workshop: &mut Workshop, matrices: &Matrices) -> Result<(), Failure> {
         let Workshop { assembly, newton, .. } = workshop;
+        let shift = first_shift(matrices, &assembly.system);
         matrices.combine(shift, &mut assembly.system.values);
         self.counters.work.factorisations += 1;
         let done = newton.solver.factorise_surely(&assembly.system);
@@ -194,6 +194,13 @@ impl Run<'_> {
     }
 }
 
+/// Where the first look is taken.
+fn first_shift(matrices: &Matrices, system: &System) -> f64 {
+    let shift = FIRST_SHIFT * matrices.softest_frequency(system);
+    // Else nothing holds anything: every mode is a free motion.
+    if shift > 0.0 && shift.is_finite() { shift } else { 1.0 }
+}
+
 /// All modes that are asked for, and all unstable ones: where pivots count them, until they are complete; else among more than are asked
 /// for, and from shifts further out. `None` where a solution fails.
 fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
@@ -204,8 +211,10 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
     let Some(unstable) = search.growing() else {
         let is_held = search.is_held();
         found.motions = search.nearest(modes + SPARE)?;
-        for times in FURTHER.into_iter().filter(|_| !is_held) {
-            add_new(&mut found.motions, growing_from(search, times * shift, SPARE));
+        let further = FURTHER.map(|times| times * shift);
+        let unseen = further.into_iter().filter(|&further| !is_held && !search.reaches(&found.motions, further));
+        for further in unseen.collect::<Vec<f64>>() {
+            add_new(&mut found.motions, growing_from(search, further, SPARE));
         }
         return Some(found);
     };
@@ -272,7 +281,7 @@ fn lowest(sizes: &[f64]) -> Option<f64> {
     sizes.iter().copied().filter(|&size| size > FREE * highest).reduce(f64::min)
 }
 
-fn grows(motion: &SmallMotion) -> bool {
+pub(super) fn grows(motion: &SmallMotion) -> bool {
     motion.exponent.re > GROWS * motion.exponent.norm()
 }
 

@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::run::{Event, EventKind, Run, StageWork, Workshop};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, StageError, StageKind, charts};
-use crate::solve::{self, NewtonFailure, Tangent, Verdict, mechanism, timed};
+use crate::solve::{self, NewtonFailure, Signature, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
@@ -59,7 +59,7 @@ struct Point {
     load_rate: f64,
     /// The rate of the displacement that the loads do work on
     work_rate: f64,
-    negative: Option<usize>,
+    signature: Option<Signature>,
     /// Whether it is a limit point: one pivot is next to zero, with the sign of round-off
     on_limit: bool,
 }
@@ -117,7 +117,7 @@ impl Run<'_> {
             let message = format!("the path ends after `max_steps` = {max_steps} increments at {at}");
             self.warn(WarningKind::PathEnds, message);
         }
-        self.conclude_static(workshop, path.here.negative, path.here.on_limit)
+        self.conclude_static(workshop, path.here.signature, path.here.on_limit)
     }
 
     /// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
@@ -167,16 +167,16 @@ impl Run<'_> {
             if goal.value(&path.here) < 0.0 && goal.value(&next) >= 0.0 {
                 targets.push(goal);
             }
-            let behind = next.negative;
+            let behind = next.signature;
             let beyond = (self.plane.is_some() && targets.contains(&Target::Limit)).then(|| next.state.clone());
             let (mut arrived, mut target) = path.nearest(self, workshop, next, length, &targets);
             if target == Some(Target::Limit) {
                 // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
-                arrived.negative = behind;
+                arrived.signature = behind;
                 arrived.on_limit = true;
                 if let Some(beyond) = &beyond {
                     self.state.copy_from(beyond);
-                    self.look_out_of_plane(workshop, behind)?;
+                    self.look_out_of_plane(workshop, behind.and_then(Signature::negative))?;
                 }
             }
             if targets.contains(&goal) && (target.is_none() || target == Some(goal)) {
@@ -237,20 +237,21 @@ impl Run<'_> {
             Some(Target::Turning) => Some(EventKind::Turning),
             _ => None,
         };
-        self.tell_stability(workshop, kind, path.here.negative, point.negative)?;
+        self.tell_stability(workshop, kind, path.here.signature, point.signature)?;
         path.here = Point { state: self.state.clone(), ..point };
         self.show(workshop)
     }
 
-    /// Names limit and turning points, and branches that were passed: where the number of negative pivots changed.
+    /// Names limit and turning points, and branches that were passed: where the signs of pivots changed.
     pub(super) fn tell_stability(
         &mut self,
         workshop: &mut Workshop,
         kind: Option<EventKind>,
-        before: Option<usize>,
-        after: Option<usize>,
+        before: Option<Signature>,
+        after: Option<Signature>,
     ) -> Result<(), Failure> {
-        let changed = matches!((before, after), (Some(before), Some(after)) if before != after);
+        let changed = before.zip(after).is_some_and(|(before, after)| before.changes_to(after) > 0);
+        let after = after.and_then(Signature::negative);
         let kind = kind.or_else(|| changed.then_some(EventKind::Branch));
         let Some(kind) = kind else { return Ok(()) };
         let event = Event { at: self.moment(), kind, negative_pivots: after };
@@ -331,7 +332,7 @@ impl Path {
             tangent: rate,
             load_rate: 1.0,
             work_rate: 1.0,
-            negative: None,
+            signature: None,
             on_limit: false,
         };
         Self {
@@ -358,7 +359,7 @@ impl Path {
         // The tangent of the last evaluation tells the pivots.
         let Workshop { assembly, newton, .. } = workshop;
         let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
-        let negative = newton.solver.negative_pivots(&mut tangent);
+        let signature = newton.solver.signature(&mut tangent);
         let along = dot(run, &rate, &before.tangent) * self.scale + before.load_rate;
         let size = (squared(run, &rate) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
@@ -370,7 +371,7 @@ impl Path {
             tangent,
             load_rate,
             work_rate: work * load_rate,
-            negative,
+            signature,
             on_limit: false,
         })
     }
@@ -428,10 +429,10 @@ impl Path {
     /// Whether a step of this length may have gone to another branch: along a path one pivot changes its sign where the load turns,
     /// and else only where another branch begins, which a short step passes by.
     fn may_have_jumped(&self, next: &Point, length: f64) -> bool {
-        let (Some(before), Some(after)) = (self.here.negative, next.negative) else { return false };
+        let (Some(before), Some(after)) = (self.here.signature, next.signature) else { return false };
         // On a limit point the load has turned already.
         let turned = !self.here.on_limit && (next.load_rate > 0.0) != (self.here.load_rate > 0.0);
-        before.abs_diff(after) != usize::from(turned) && length > BELIEVED * self.first
+        before.changes_to(after) != usize::from(turned) && length > BELIEVED * self.first
     }
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and returns the iterations.

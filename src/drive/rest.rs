@@ -12,7 +12,7 @@ use crate::effect::resistance::Resistance;
 use crate::integrate::{Equilibrium, Method};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, SlotKind, charts};
-use crate::solve::{Convergence, Limp, LinearSolver, Newton, Tangent, Work, size};
+use crate::solve::{Convergence, Limp, LinearSolver, Newton, Signature, Tangent, Work, size};
 use crate::system::{Anchor, Slot, State};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -75,12 +75,12 @@ struct Resisted {
 }
 
 impl Resisted {
-    /// The negative pivots of a state under resistance, where they tell.
-    fn count_pivots(&mut self, state: &State, work: &mut Work) -> Option<usize> {
+    /// Whether a state is unstable under resistance, as far as pivots tell.
+    fn is_unstable(&mut self, state: &State, work: &mut Work) -> bool {
         self.assembly.forget();
         self.assembly.evaluate(state, Weights::STIFFNESS, None);
         let mut tangent = Tangent::that_may_go(&mut self.assembly, state, Weights::STIFFNESS);
-        self.newton.count_pivots(&mut tangent, work)
+        self.newton.signature(&mut tangent, work).is_some_and(Signature::tells_unstable)
     }
 }
 
@@ -164,7 +164,7 @@ impl Run<'_> {
             let work = &mut self.counters.work;
             let solved = newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, lift, work);
             let solved = solved.and_then(|()| self.refuse_leaps()).and_then(|()| self.refuse_windings());
-            if solved.is_err() || resisted.count_pivots(&self.state, &mut self.counters.work) > Some(0) {
+            if solved.is_err() || resisted.is_unstable(&self.state, &mut self.counters.work) {
                 // With less resistance than some motion gains by the forces there is no way along them.
                 self.counters.cutbacks += 1;
                 resistance *= HARDER;
@@ -191,7 +191,7 @@ impl Run<'_> {
                 }
                 continue;
             }
-            if self.count_unresisted(workshop) > Some(0) {
+            if self.is_unstable(workshop) {
                 // Balance, but not at rest: what is unstable is pushed on its way.
                 self.push(resisted);
                 waiting = STEPS_OF_PUSH;
@@ -214,13 +214,13 @@ impl Run<'_> {
         found
     }
 
-    /// The negative pivots of the state without resistance, where they tell.
-    fn count_unresisted(&mut self, workshop: &mut Workshop) -> Option<usize> {
+    /// Whether the state is unstable without resistance, as far as pivots tell.
+    fn is_unstable(&mut self, workshop: &mut Workshop) -> bool {
         let Workshop { assembly, newton, .. } = workshop;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
-        newton.count_pivots(&mut tangent, &mut self.counters.work)
+        newton.signature(&mut tangent, &mut self.counters.work).is_some_and(Signature::tells_unstable)
     }
 
     /// From the last good state a little along its softest motion.

@@ -1,11 +1,11 @@
 //! What a stage in a plane cannot see: whether the plane is left.
 
 use super::failure::Failure;
-use super::findings::StageStability;
+use super::findings::{StabilityVerdict, StageStability};
 use super::run::{Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::Assembly;
-use crate::solve::{LinearSolver, Tangent, mechanism};
+use crate::solve::{LinearSolver, Signature, Tangent, mechanism};
 
 /// A stage that is treated in a plane, as it is in space.
 pub(super) struct Space {
@@ -60,22 +60,30 @@ impl Run<'_> {
         Ok(in_space.and_then(|in_space| in_space.checked_sub(in_plane)))
     }
 
-    /// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is not. `negative`: the number of negative
-    /// pivots, as the stage is treated, where it is known; `on_limit`: whether the state is a limit point, with the pivots behind it.
+    /// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is not. `signature`: of its tangent, as the
+    /// stage is treated, where it is known; `on_limit`: whether the state is a limit point, with the pivots behind it.
     pub(super) fn conclude_static(
         &mut self,
         workshop: &mut Workshop,
-        negative: Option<usize>,
+        signature: Option<Signature>,
         on_limit: bool,
     ) -> Result<(), Failure> {
+        let negative = signature.and_then(Signature::negative);
         self.warn_of_instability(negative);
+        let stage = self.stage + 1;
         let aside = match negative {
             None => None,
             // There the look in space was taken behind it.
             Some(_) if on_limit => (self.told.unstable != Some(self.stage)).then_some(0),
             Some(in_plane) => self.count_out_of_plane(workshop, in_plane)?,
         };
-        self.counters.findings.stability.push(StageStability::of_pivots(self.stage + 1, negative, aside));
+        let mut found = StageStability::of_pivots(stage, negative, aside);
+        if found.verdict == StabilityVerdict::Unknown && !on_limit {
+            let vibrations = self.vibrations(signature)?;
+            self.warn_of_vibrations(vibrations);
+            found = StageStability::of_vibrations(stage, vibrations);
+        }
+        self.counters.findings.stability.push(found);
         match aside {
             Some(more @ 1..) if self.told.unstable != Some(self.stage) => self.warn_out_of_plane(more),
             _ => {}

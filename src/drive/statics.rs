@@ -7,7 +7,7 @@ use super::run::{Run, Workshop};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Limp, NewtonFailure, Tangent};
+use crate::solve::{Limp, NewtonFailure, Signature, Tangent};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
@@ -17,12 +17,12 @@ const DETOUR: (f64, f64) = (0.01, 0.05);
 
 /// What came of a step.
 enum Tried {
-    /// Balance, with so many negative pivots
-    Good(Option<usize>),
+    /// Balance, with these signs of pivots
+    Good(Option<Signature>),
     /// Balance, perhaps on another branch
-    Jumped(Option<usize>),
+    Jumped(Option<Signature>),
     /// Balance, by an iteration that has not gone straight to it
-    Strayed(Option<usize>),
+    Strayed(Option<Signature>),
     /// None
     Failed(NewtonFailure),
 }
@@ -52,7 +52,7 @@ impl Run<'_> {
     ) -> Result<(), Failure> {
         let loose = self.begin_static(workshop)?;
         let mut levels = Levels::new(self, workshop, steps, approach, loose);
-        let at_start = levels.stability.negative;
+        let at_start = levels.stability.signature;
         self.good.copy_from(&self.state);
         for number in 1..=steps {
             let reached = self.reach(workshop, number as f64 / steps as f64, &mut levels)?;
@@ -65,8 +65,8 @@ impl Run<'_> {
             }
         }
         // What is linear keeps the tangent of its start.
-        let negative = if self.is_linear() { at_start } else { levels.stability.negative };
-        self.conclude_static(workshop, negative, false)
+        let signature = if self.is_linear() { at_start } else { levels.stability.signature };
+        self.conclude_static(workshop, signature, false)
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
@@ -134,15 +134,15 @@ impl Run<'_> {
             let next = levels.next(self.good.load, target);
             self.observer.progress(self.moment(), self.static_progress(next))?;
             match self.try_step(workshop, next, levels) {
-                Tried::Good(negative) => self.take_step(workshop, negative, levels)?,
+                Tried::Good(signature) => self.take_step(workshop, signature, levels)?,
                 _ if levels.halve(self.soft) => {
                     self.counters.cutbacks += 1;
                     self.state.copy_all_but_rates(&self.good);
                 }
                 // Nothing tells better.
-                Tried::Strayed(negative) => self.take_step(workshop, negative, levels)?,
-                Tried::Jumped(negative) if levels.approach != Approach::Path => {
-                    self.take_step(workshop, negative, levels)?;
+                Tried::Strayed(signature) => self.take_step(workshop, signature, levels)?,
+                Tried::Jumped(signature) if levels.approach != Approach::Path => {
+                    self.take_step(workshop, signature, levels)?;
                 }
                 Tried::Jumped(_) => return self.go_around(workshop, target, None, levels),
                 Tried::Failed(failure) => return self.go_around(workshop, target, Some(failure), levels),
@@ -174,9 +174,9 @@ impl Run<'_> {
              balance without that"
         );
         self.warn(WarningKind::CameToRest, message);
-        levels.stability.negative = levels.stability.count(self, workshop);
+        levels.stability.signature = levels.stability.look(self, workshop);
         levels.way = Way::Rest;
-        self.take_step(workshop, levels.stability.negative, levels)?;
+        self.take_step(workshop, levels.stability.signature, levels)?;
         self.bookkeeper.damp_to(total);
         Ok(Reached::Level)
     }
@@ -185,29 +185,29 @@ impl Run<'_> {
         if let Err(failure) = self.attempt(workshop, next) {
             return Tried::Failed(failure);
         }
-        let negative = levels.stability.count(self, workshop);
+        let signature = levels.stability.look(self, workshop);
         let states = [&self.good, &self.state];
         let newton = &workshop.newton;
-        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, negative);
+        let jumped = !self.soft && levels.may_have_jumped(&self.model, states, &newton.first, signature);
         match jumped {
-            true => Tried::Jumped(negative),
-            false if !self.soft && levels.may_have_strayed(newton.contraction, negative) => Tried::Strayed(negative),
-            false => Tried::Good(negative),
+            true => Tried::Jumped(signature),
+            false if !self.soft && levels.may_have_strayed(newton.contraction, signature) => Tried::Strayed(signature),
+            false => Tried::Good(signature),
         }
     }
 
     fn take_step(
         &mut self,
         workshop: &mut Workshop,
-        negative: Option<usize>,
+        signature: Option<Signature>,
         levels: &mut Levels,
     ) -> Result<(), Failure> {
         self.accept(workshop)?;
-        levels.stability.pass(self, workshop, negative)?;
+        levels.stability.pass(self, workshop, signature)?;
         self.good.copy_all_but_rates(&self.state);
         levels.way = levels.way.max(Way::Levels);
-        // Where pivots were counted the stiffness is that of this state.
-        if negative.is_some() {
+        // Where pivots were looked at the stiffness is that of this state.
+        if signature.is_some() {
             workshop.newton.begin_with(&workshop.assembly.system);
         }
         levels.double();
@@ -244,7 +244,7 @@ impl Run<'_> {
         let limit = Failure::LimitPoint { at, goal: target, increments, end };
         match arrival {
             Ok(Arrival::Until) => {
-                levels.stability.negative = levels.stability.count(self, workshop);
+                levels.stability.signature = levels.stability.look(self, workshop);
                 Ok(Reached::Over)
             }
             Ok(Arrival::Goal) => {
@@ -262,7 +262,7 @@ impl Run<'_> {
     /// Load control goes on where a detour has come to its level.
     fn resume(&mut self, workshop: &mut Workshop, target: f64, increments: u64, levels: &mut Levels) {
         self.good.copy_from(&self.state);
-        levels.stability.negative = levels.stability.count(self, workshop);
+        levels.stability.signature = levels.stability.look(self, workshop);
         levels.restart();
         self.warn(
             WarningKind::LoadControlResumed,

@@ -3,7 +3,8 @@
 use super::failure::Moment;
 use super::findings::{StageTimeError, Warning};
 use super::guard::{Imbalance, is_unbalanced};
-use super::run::{Run, StageWork, Workshop};
+use super::run::{Mode, Run, StageWork, Workshop};
+use super::vibrations::Vibrations;
 use crate::integrate::{Largest, Rotations};
 use crate::model::{StageKind, charts};
 use crate::system::Slot;
@@ -249,6 +250,27 @@ impl Run<'_> {
             let message = format!("a step fails at {at} and is taken in smaller ones, as are others that fail");
             self.warn(WarningKind::StepSubdivided, message);
         }
+    }
+
+    /// The same where pivots do not tell.
+    pub(super) fn warn_of_vibrations(&mut self, vibrations: Vibrations) {
+        let how = match vibrations {
+            Vibrations::Bounded | Vibrations::Unknown => return,
+            Vibrations::Counted(negative) => return self.warn_of_instability(Some(negative)),
+            Vibrations::Diverging => {
+                "its tangent has a negative real eigenvalue: divergence): a real structure would leave it".into()
+            }
+            Vibrations::Growing(Mode { omega: 0.0, growth }) => {
+                format!("a small motion grows with exp({growth:.4} t): divergence): a real structure would leave it")
+            }
+            Vibrations::Growing(Mode { omega, growth }) => format!(
+                "a small vibration of angular frequency {omega:.4} grows with exp({growth:.4} t): flutter): a real structure would \
+                 leave it, unless it has more damping than the scene (about {:.2} % of critical)",
+                100.0 * growth / omega.hypot(growth)
+            ),
+        };
+        let stage = self.stage + 1;
+        self.warn(WarningKind::Unstable, format!("stage {stage} ends in an unstable equilibrium ({how}"));
     }
 
     /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.

@@ -129,9 +129,14 @@ impl LinearSolver {
 
     /// Factorises, as far as it can by blocks, and counts negative pivots.
     pub(super) fn negative_of_own(&mut self, tangent: &mut Tangent) -> Option<usize> {
+        if self.factorise_by_own(tangent) { self.negative_of_last() } else { None }
+    }
+
+    /// Factorises by blocks what they have not factorised last; whether they could.
+    pub(super) fn factorise_by_own(&mut self, tangent: &mut Tangent) -> bool {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
         (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
-        if done { self.negative_of_last() } else { None }
+        done
     }
 
     /// The negative pivots of the last factorisation, where it tells them.
@@ -139,6 +144,14 @@ impl LinearSolver {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
         let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
         blocks.negative()?.checked_sub(of_multipliers)
+    }
+
+    /// Whether the determinant of the last factorisation is negative on the space that constraints leave, where blocks tell: each multiplier
+    /// turns the sign of that of the whole.
+    pub(super) fn has_negative_determinant(&self) -> Option<bool> {
+        let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
+        let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
+        Some(blocks.has_negative_determinant()? != (of_multipliers % 2 == 1))
     }
 
     /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field

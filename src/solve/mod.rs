@@ -25,6 +25,6 @@ pub use linear::LinearSolver;
 pub use mechanism::{Limp, mechanism};
 pub use modes::{Matrices, ModeSearch, ModeShape, SmallMotion};
 pub use newton::{Newton, NewtonFailure, Work, timed};
-pub use pivots::is_symmetric;
+pub use pivots::{Signature, is_symmetric};
 pub use softest::NullVector;
 pub use tangent::Tangent;

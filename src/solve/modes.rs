@@ -108,6 +108,11 @@ impl Matrices {
         }
     }
 
+    /// Whether nothing has any mass.
+    pub fn is_massless(&self) -> bool {
+        self.mass.iter().all(|&m| m == 0.0)
+    }
+
     /// The root of the smallest K_ii / M_ii, or of the stiffest over the heaviest: no lowest frequency lies above it.
     pub fn softest_frequency(&self, system: &System) -> f64 {
         let Self { stiffness, mass, .. } = self;
@@ -226,6 +231,17 @@ impl<'a> ModeSearch<'a> {
     /// Whether stiffness holds everything, so that nothing can grow but by dampers that drive.
     pub fn is_held(&self) -> bool {
         self.negative == Some(0)
+    }
+
+    /// Whether `motions`, nearest to the shift that was factorised last, reach around another shift: those near to it are among them.
+    pub fn reaches(&self, motions: &[SmallMotion], other: f64) -> bool {
+        let shift = Complex::from(self.shift);
+        let distance = |exponent: Complex<f64>| match self.form {
+            Form::Symmetric | Form::Undamped => (exponent * exponent - shift * shift).norm(),
+            Form::Gyroscopic | Form::General => (exponent - shift).norm(),
+        };
+        let reach = motions.iter().map(|motion| distance(motion.exponent)).fold(0.0, f64::max);
+        reach >= 2.0 * distance(other.into())
     }
 
     /// How many motions swing slower than `omega` or grow, rigid ones among them, where pivots tell. Another shift has to be factorised

@@ -4,6 +4,7 @@ use super::convergence::{Convergence, Residual, Verdict, size};
 use super::foresight::Foresight;
 use super::linear::LinearSolver;
 use super::mechanism::mechanism;
+use super::pivots::Signature;
 use super::refinement::Refinement;
 use super::reuse::Reuse;
 use super::softest::NullVector;
@@ -143,12 +144,12 @@ impl Newton {
         }
     }
 
-    /// Counts the negative pivots of a tangent, see [`LinearSolver::negative_pivots`].
-    pub fn count_pivots(&mut self, tangent: &mut Tangent, work: &mut Work) -> Option<usize> {
+    /// What the pivots of a tangent tell, see [`LinearSolver::signature`].
+    pub fn signature(&mut self, tangent: &mut Tangent, work: &mut Work) -> Option<Signature> {
         let known = self.solver.has_factorised(tangent.system());
-        let negative = self.solver.negative_pivots(tangent);
+        let signature = self.solver.signature(tangent);
         work.factorisations += u64::from(!known && self.solver.has_factorised(tangent.system()));
-        negative
+        signature
     }
 
     /// Memory for a field of slots that nobody needs between solutions.

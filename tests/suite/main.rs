@@ -37,5 +37,6 @@ mod tangents;
 mod threads;
 mod time_error;
 mod turned;
+mod verdicts;
 mod warnings;
 mod words;

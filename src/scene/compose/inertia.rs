@@ -47,13 +47,13 @@ impl Composer<'_> {
         if mass.is_empty() {
             self.reason(names[0], false, "no section has mass on its centre line");
         } else {
-            self.push(mass, "a dynamic stage, and sections with `rhoA`".into());
+            self.push(mass, "sections have `rhoA`, and something moves or may vibrate".into());
         }
         match (rotary.elements.is_empty(), wanted) {
             (_, false) => self.reason(names[1], false, SWITCHED_OFF),
             (true, _) if !bodies.is_empty() => self.reason(names[1], false, "what sections have is at the nodes"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
-            _ => self.push(rotary, "a dynamic stage, and sections with rotary inertia".into()),
+            _ => self.push(rotary, "sections have rotary inertia, and something moves or may vibrate".into()),
         }
         if bodies.is_empty() {
             self.reason(
@@ -106,7 +106,7 @@ impl Composer<'_> {
             (true, _) => self.reason("rigid body inertia", false, "no [[body]]"),
             (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
             _ => {
-                let reason = format!("{} [[body]] table(s) and a dynamic stage", bodies.len());
+                let reason = format!("{} [[body]] table(s), and something moves or may vibrate", bodies.len());
                 let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
                 self.push(RigidBody { name: "rigid body inertia", bodies, gyroscopic }, reason);
             }

@@ -307,7 +307,7 @@ impl Composer<'_> {
     }
 }
 
-/// Inertia is there for dynamic stages, and where momenta are looked at.
+/// Inertia is there for dynamic stages, where momenta are looked at, and where only small vibrations tell whether a static stage ends stable.
 fn needs_mass(deck: &Deck) -> bool {
     let inertia =
         |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
@@ -318,7 +318,20 @@ fn needs_mass(deck: &Deck) -> bool {
         deck::ExpectBody::Fails(_) | deck::ExpectBody::Warns(_) | deck::ExpectBody::Quiet => false,
     });
     let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
-    dynamic || written || expected || watched
+    dynamic || written || expected || watched || may_flutter(deck)
+}
+
+/// Whether a static stage may end under loads that turn, whose tangents are not symmetric.
+fn may_flutter(deck: &Deck) -> bool {
+    let turns = |load: &deck::Load| match load.frame {
+        deck::Frame::Space => load.moment.is_some(),
+        deck::Frame::Body | deck::Frame::Section => true,
+    };
+    let settles = |body: &deck::StageBody| match body {
+        deck::StageBody::Static { .. } | deck::StageBody::Path { .. } => true,
+        deck::StageBody::Modal { .. } | deck::StageBody::Buckling { .. } | deck::StageBody::Dynamic { .. } => false,
+    };
+    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| settles(&stage.body))
 }
 
 /// The stages of the deck count from 1, those of a run from 0.

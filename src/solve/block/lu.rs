@@ -108,11 +108,12 @@ where
         let end = self.rows().end;
         let Self { orders, above, below, row: before } = self;
         let (mut factor, mut y, mut w) = (tile::zero(), tile::zero(), tile::zero());
-        let mut doubtful = 0;
+        let (mut negative, mut doubtful) = (0, 0);
         for row in rows {
             tile::copy(&mut factor, &diagonal[row]);
             let (order, mut is_sure) = tile::factorise(&mut factor)?;
             orders[row] = order;
+            negative += usize::from(tile::has_negative_determinant(&factor, &order));
             let (neighbours, mut target) = (elimination.neighbours(row), elimination.first_target(row));
             before.clear();
             for k in neighbours.clone() {
@@ -149,8 +150,7 @@ where
             tile::invert(&factor, &mut diagonal[row]);
             doubtful += usize::from(!is_sure);
         }
-        // Signs of pivots are not those of eigenvalues.
-        Some(Signs { negative: 0, doubtful })
+        Some(Signs { negative, doubtful })
     }
 
     #[inline(always)]

@@ -49,6 +49,9 @@ trait Factor: Send {
     /// See [`BlockSolver::negative`].
     fn negative(&self) -> Option<usize>;
 
+    /// See [`BlockSolver::has_negative_determinant`].
+    fn has_negative_determinant(&self) -> Option<bool>;
+
     /// See [`BlockSolver::is_sure`].
     fn is_sure(&self) -> bool;
 
@@ -135,6 +138,12 @@ impl BlockSolver {
     /// `None` where it is not symmetric, or did not come to its end.
     pub fn negative(&self) -> Option<usize> {
         self.factor.negative()
+    }
+
+    /// Whether the determinant of what was factorised last is negative: an odd number of its real eigenvalues is. `None` where the
+    /// factorisation did not come to its end.
+    pub fn has_negative_determinant(&self) -> Option<bool> {
+        self.factor.has_negative_determinant()
     }
 
     /// Whether the last factorisation shows no sign of lost digits. Where the tangent is symmetric, all pivots are positive: it is that of a

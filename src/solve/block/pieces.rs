@@ -25,7 +25,7 @@ macro_rules! run {
 /// What the pivots of rows were.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Signs {
-    /// How many are negative, where that can be counted
+    /// How many are negative; of unsymmetric tangents, how many tiles on the diagonal have a negative determinant
     pub negative: usize,
     /// How many rows may have lost digits, or cost later ones some
     pub doubtful: usize,
@@ -43,7 +43,7 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// What it does, in a word
     const NAME: &'static str;
 
-    /// Whether it is one of symmetric tangents, whose pivots have signs that count
+    /// Whether it is one of symmetric tangents, whose pivots have the signs of eigenvalues
     const SYMMETRIC: bool;
 
     /// A tile on the diagonal as it is factorised
@@ -261,6 +261,10 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
 
     fn negative(&self) -> Option<usize> {
         self.signs.filter(|_| P::SYMMETRIC).map(|signs| signs.negative)
+    }
+
+    fn has_negative_determinant(&self) -> Option<bool> {
+        self.signs.map(|signs| signs.negative % 2 == 1)
     }
 
     fn is_sure(&self) -> bool {

@@ -543,6 +543,20 @@ fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b
     })
 }
 
+/// Whether the determinant of a tile that was factorised with its rows in this order is negative: negative pivots and exchanges of rows
+/// are odd in sum.
+#[inline(always)]
+pub fn has_negative_determinant<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>) -> bool {
+    let mut is_negative = false;
+    for r in 0..W {
+        is_negative ^= factor[r][r] < 0.0;
+        for k in 0..r {
+            is_negative ^= order[k] > order[r];
+        }
+    }
+    is_negative
+}
+
 /// Takes row r, whose pivot has this inverse, from those below.
 #[inline(always)]
 fn take_pivot<const W: usize>(tile: &mut Tile<W>, r: usize, inverse: f64)
