@@ -165,8 +165,8 @@ impl Run<'_> {
         // What is left of a motion that has died away may err by its own size.
         self.told.moved = self.told.moved.max(moved);
         let moved = self.told.moved;
-        let of_displacements = if moved > 0.0 { displacement / moved } else { 0.0 };
         let is_moving = moved > STILL * self.model.length;
+        let of_displacements = if is_moving { displacement / moved } else { 0.0 };
         let allowed = if is_moving { MOST_BESIDE } else { MOST_ALONE };
         let (over, what) = if of_displacements > MOST {
             let size = percent(of_displacements);
