@@ -128,7 +128,10 @@ impl<'a> Has<'a> {
         let hold = "add a support, a spring or a joint that holds this direction";
         match self.stage.work {
             StageWork::Dynamic { .. } | StageWork::Modal { .. } => format!("{hold}, or give it mass"),
-            StageWork::Static { .. } => format!("{hold}: its loads do not, either"),
+            StageWork::Static { approach, .. } => {
+                let looked = approach != Approach::Straight && !self.plan.model.linear;
+                if looked { format!("{hold}: its loads do not, either") } else { hold.into() }
+            }
             StageWork::Path { .. } | StageWork::Buckling { .. } => {
                 format!("{hold}; what its loads hold comes to rest in a static stage with load levels, before this one")
             }

@@ -86,11 +86,8 @@ impl Stability {
         if !self.counts {
             return None;
         }
-        workshop.assembly.forget();
-        workshop.assembly.evaluate(&run.state, Weights::STIFFNESS, None);
         let Workshop { assembly, newton, .. } = workshop;
-        let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
-        let signature = newton.signature(&mut tangent, &mut run.counters.work);
+        let signature = newton.signature_at(assembly, &run.state, &mut run.counters.work);
         // Where nothing tells, nothing will next.
         self.counts = signature.is_some();
         signature

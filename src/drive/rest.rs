@@ -4,7 +4,7 @@
 //! The structure moves along the forces on it, against an artificial resistance that fades (see [`crate::effect::resistance`]), until it
 //! comes to rest. Balance is then found without any resistance, from that state.
 
-use super::failure::Failure;
+use super::failure::{Failure, Moment};
 use super::levels::{LARGEST_UNCOUNTED, distance};
 use super::run::{Run, Workshop};
 use super::space::Space;
@@ -12,8 +12,8 @@ use crate::effect::resistance::Resistance;
 use crate::integrate::{Equilibrium, Method};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, SlotKind, charts};
-use crate::solve::{Convergence, Limp, LinearSolver, Newton, Signature, Tangent, Work, size};
-use crate::system::{Anchor, Slot, State};
+use crate::solve::{Convergence, Limp, LinearSolver, Newton, NullVector, Signature, Tangent, size};
+use crate::system::{Anchor, Slot, State, System};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -31,13 +31,13 @@ const HARDEST: f64 = 1e8;
 const ARM: f64 = 0.05;
 
 /// After a step that moves less (lengths of the scene, radians) balance is tried without resistance.
-const NEAR: f64 = 1e-2;
+const SLOW: f64 = 1e-2;
 
 /// Where steps move less, and there is no balance without resistance, there will be none.
-const STILL: f64 = 1e-10;
+const STANDING: f64 = 1e-10;
 
 /// Balance is not further away than that.
-const AROUND: f64 = 0.1;
+const NEIGHBOURHOOD: f64 = 0.1;
 
 /// What is unstable is pushed by this (lengths of the scene, radians).
 const PUSH: f64 = 1e-3;
@@ -48,13 +48,16 @@ const STEPS_OF_PUSH: usize = 8;
 /// What has less stiffness than this part of the largest force over the length of the scene is held by nothing.
 const LOOSE: f64 = 1e-7;
 
+/// The same of turns without any displacement, relative to the largest force times the length: thin cables have next to no torsional stiffness.
+const LOOSE_TURN: f64 = 1e-12;
+
 /// What moves further than so many lengths of the scene, nothing holds.
-const AWAY: f64 = 100.0;
+const FARTHEST: f64 = 100.0;
 
 /// Steps in all, those that fail among them.
 const MOST_STEPS: usize = 2000;
 
-/// And at one load factor.
+/// Steps at one load factor, those that fail among them.
 const MOST_AT_ONCE: usize = 200;
 
 /// Prescribed motions begin with increments of this size (lengths of the scene, radians).
@@ -74,37 +77,30 @@ struct Resisted {
     steps: usize,
 }
 
-impl Resisted {
-    /// Whether a state is unstable under resistance, as far as pivots tell.
-    fn is_unstable(&mut self, state: &State, work: &mut Work) -> bool {
-        self.assembly.forget();
-        self.assembly.evaluate(state, Weights::STIFFNESS, None);
-        let mut tangent = Tangent::that_may_go(&mut self.assembly, state, Weights::STIFFNESS);
-        self.newton.signature(&mut tangent, work).is_some_and(Signature::tells_unstable)
-    }
-}
-
 impl Run<'_> {
     /// From the last good state to one at rest at the load factor `target`; `false`, with the last good state, where none is found.
     pub(super) fn come_to_rest(&mut self, workshop: &mut Workshop, target: f64) -> Result<bool, Failure> {
         let start = self.good.kept();
+        let account = self.bookkeeper.clone();
         let mut resisted = self.resist()?;
         let mut part = (target - start.load) * self.first_part(target);
         let mut arrived = true;
         while arrived && self.good.load < target {
             let rest = target - self.good.load;
             let next = if part >= rest * (1.0 - 1e-9) { target } else { self.good.load + part };
-            let before = self.good.kept();
+            let (before, account) = (self.good.kept(), self.bookkeeper.clone());
             if self.fall(workshop, &mut resisted, next)? {
                 part *= 2.0;
             } else {
                 self.good.copy_all_but_rates(&before);
+                self.bookkeeper = account;
                 part = (part / DIVISOR).min(rest / DIVISOR);
                 arrived = part >= SMALLEST && resisted.steps > 0;
             }
         }
         self.count_evaluations(&resisted.assembly);
         if !arrived {
+            self.bookkeeper = account;
             self.good.copy_all_but_rates(&start);
             self.state.copy_all_but_rates(&start);
         }
@@ -141,86 +137,92 @@ impl Run<'_> {
     /// the good one.
     fn fall(&mut self, workshop: &mut Workshop, resisted: &mut Resisted, load: f64) -> Result<bool, Failure> {
         let start = self.good.kept();
-        let mut lift = Vec::new();
+        let gentle = self.gentle_resistance(resisted, load);
+        let (mut resistance, mut lifts, mut growing) = (gentle, true, 0_usize);
         self.state.copy_all_but_rates(&self.good);
-        // With prescribed motions in the state: what they strain at once is to be resisted, too.
-        let time = self.state.time;
-        self.model.set_clock(&mut self.state, time, load);
-        resisted.assembly.evaluate(&self.state, Weights::NONE, None);
-        let gentle = self.model.largest_force(&resisted.assembly.system) / (GENTLE * self.model.length);
-        self.state.copy_all_but_rates(&self.good);
-        if self.set_load(&mut lift, load).is_err() {
-            return Ok(false);
-        }
-        let mut resistance = gentle;
-        let (mut lifts, mut waiting) = (true, 0_usize);
         let enough = resisted.steps.saturating_sub(MOST_AT_ONCE);
         while gentle > 0.0 && resistance <= HARDEST * gentle && resisted.steps > enough {
             self.observer.progress(self.moment(), self.static_progress(start.load))?;
             resisted.steps -= 1;
-            self.state.anchor = Some(Arc::new(Anchor { resistance, q: self.state.q.clone() }));
-            let lift = (lifts && !lift.is_empty()).then_some(&lift[..]);
-            let Resisted { assembly, newton, .. } = resisted;
-            let work = &mut self.counters.work;
-            let solved = newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, lift, work);
-            let solved = solved.and_then(|()| self.refuse_leaps()).and_then(|()| self.refuse_windings());
-            if solved.is_err() || resisted.is_unstable(&self.state, &mut self.counters.work) {
-                // With less resistance than some motion gains by the forces there is no way along them.
+            let lift = lifts.then_some(load);
+            if !self.step_against(resisted, resistance, lift) {
                 self.counters.cutbacks += 1;
                 resistance *= HARDER;
                 self.state.copy_all_but_rates(&self.good);
-                if lifts && self.set_load(&mut Vec::new(), load).is_err() {
-                    return Ok(false);
-                }
                 continue;
             }
             lifts = false;
             resistance *= EASIER;
             let moved = distance(&self.model, &self.good, &self.state);
             self.pass_through(&resisted.assembly.system)?;
-            if distance(&self.model, &start, &self.good) > AWAY {
+            if distance(&self.model, &start, &self.good) > FARTHEST {
                 return Ok(false);
             }
-            waiting = waiting.saturating_sub(1);
-            if moved >= NEAR || waiting > 0 {
+            growing = growing.saturating_sub(1);
+            if moved >= SLOW || growing > 0 {
                 continue;
             }
             if !self.balances(workshop, load) {
-                if moved < STILL {
+                if moved < STANDING {
                     return Ok(false);
                 }
                 continue;
             }
-            if self.is_unstable(workshop) {
-                // Balance, but not at rest: what is unstable is pushed on its way.
-                self.push(resisted);
-                waiting = STEPS_OF_PUSH;
-                continue;
+            let Workshop { assembly, newton, .. } = &mut *workshop;
+            let signature = newton.signature_at(assembly, &self.state, &mut self.counters.work);
+            if signature.is_none_or(|signature| !signature.tells_unstable()) {
+                self.good.copy_all_but_rates(&self.state);
+                return Ok(true);
             }
-            self.good.copy_all_but_rates(&self.state);
-            return Ok(true);
+            // In balance, but not at rest.
+            self.push(resisted);
+            growing = STEPS_OF_PUSH;
         }
         Ok(false)
     }
 
+    /// The resistance that lets the largest force at a load factor move its node by little. Motions that are prescribed are in the state at
+    /// once: what they strain is to be resisted, too.
+    fn gentle_resistance(&mut self, resisted: &mut Resisted, load: f64) -> f64 {
+        self.state.copy_all_but_rates(&self.good);
+        let time = self.state.time;
+        self.model.set_clock(&mut self.state, time, load);
+        resisted.assembly.evaluate(&self.state, Weights::NONE, None);
+        self.model.largest_force(&resisted.assembly.system) / (GENTLE * self.model.length)
+    }
+
+    /// One step from the run's state; in the first, whose load factor is given, prescribed motions come in. `false` where it finds no balance,
+    /// or none that is a minimum: with less resistance than some motion gains by the forces there is no way along them.
+    fn step_against(&mut self, resisted: &mut Resisted, resistance: f64, first: Option<f64>) -> bool {
+        let mut lift = Vec::new();
+        let moves = match first.map(|load| self.set_load(&mut lift, load)) {
+            Some(Err(_)) => return false,
+            Some(Ok(moves)) => moves,
+            None => false,
+        };
+        self.state.anchor = Some(Arc::new(Anchor { resistance, q: self.state.q.clone() }));
+        let Resisted { assembly, newton, .. } = resisted;
+        let work = &mut self.counters.work;
+        let lift = moves.then_some(&lift[..]);
+        let solved = newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, lift, work);
+        let solved = solved.and_then(|()| self.refuse_leaps()).and_then(|()| self.refuse_windings());
+        if solved.is_err() {
+            return false;
+        }
+        let signature = newton.signature_at(assembly, &self.state, &mut self.counters.work);
+        !signature.is_some_and(Signature::tells_unstable)
+    }
+
     /// Whether there is balance without resistance at the last good state; then it is the state of the run.
     fn balances(&mut self, workshop: &mut Workshop, load: f64) -> bool {
+        workshop.newton.begin_anew();
         let found = self.attempt(workshop, load).is_ok()
             && workshop.newton.contraction <= LARGEST_UNCOUNTED
-            && distance(&self.model, &self.good, &self.state) < AROUND;
+            && distance(&self.model, &self.good, &self.state) < NEIGHBOURHOOD;
         if !found {
             self.state.copy_all_but_rates(&self.good);
         }
         found
-    }
-
-    /// Whether the state is unstable without resistance, as far as pivots tell.
-    fn is_unstable(&mut self, workshop: &mut Workshop) -> bool {
-        let Workshop { assembly, newton, .. } = workshop;
-        assembly.forget();
-        assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
-        newton.signature(&mut tangent, &mut self.counters.work).is_some_and(Signature::tells_unstable)
     }
 
     /// From the last good state a little along its softest motion.
@@ -232,44 +234,60 @@ impl Run<'_> {
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
         let Some(softest) = newton.solver.softest(&mut tangent) else { return };
         let (_, mut motion) = softest.by_slot(&assembly.system.pattern.equations, self.state.q.len());
-        let size = size(&self.model, &motion);
-        let scale = if size > 0.0 { PUSH / size } else { 0.0 };
-        let moves = self.model.kinds.iter().map(|kind| if kind.is_multiplier() { 0.0 } else { scale });
-        motion.iter_mut().zip(moves).for_each(|(motion, scale)| *motion = *motion * scale);
+        let extent = size(&self.model, &motion);
+        let scale = if extent > 0.0 { PUSH / extent } else { 0.0 };
+        let scales = self.model.kinds.iter().map(|kind| if kind.is_multiplier() { 0.0 } else { scale });
+        motion.iter_mut().zip(scales).for_each(|(motion, scale)| *motion = *motion * scale);
         charts::carry(&mut self.state, &motion, &self.model.charted.rotations);
         Equilibrium.correct(&mut self.state, &motion);
     }
 
-    /// Refuses, with `failure`, a state of rest that leaves a motion which neither loads nor stiffness hold, in the plane of the stage or out
-    /// of it.
-    pub(super) fn refuse_loose_at_rest(&mut self, workshop: &mut Workshop, failure: Failure) -> Result<(), Failure> {
+    /// Refuses a state of rest that leaves a motion which neither loads nor stiffness hold, in the plane of the stage or out of it.
+    pub(super) fn refuse_loose_at_rest(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
         let Workshop { assembly, newton, .. } = &mut *workshop;
         self.counters.work.factorisations += 1;
-        if is_loose_at_rest(assembly, &mut newton.solver, &self.model, &self.state) {
-            return Err(failure);
+        if let Some(vector) = loose_at_rest(assembly, &mut newton.solver, &self.model, &self.state) {
+            return Err(self.name_unheld(vector, &workshop.assembly.system));
         }
         let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
         self.counters.work.factorisations += 1;
-        match is_loose_at_rest(assembly, solver, &self.model, &self.state) {
-            true => Err(failure),
-            false => Ok(()),
+        match loose_at_rest(assembly, solver, &self.model, &self.state) {
+            Some(vector) => Err(self.name_unheld(vector, &assembly.system)),
+            None => Ok(()),
+        }
+    }
+
+    /// It is a mechanism from the start of the stage on.
+    fn name_unheld(&self, vector: NullVector, system: &System) -> Failure {
+        match self.name_mechanism(Some(vector), system) {
+            Failure::Singular { at, place } => Failure::Singular { at: Moment { load: 0.0, ..at }, place },
+            failure => failure,
         }
     }
 }
 
-/// Whether the softest motion has no stiffness, but for what the tolerance of balance leaves: that of a motion that loads hold is a force
-/// over a length.
-fn is_loose_at_rest(assembly: &mut Assembly, solver: &mut LinearSolver, model: &Model, state: &State) -> bool {
+/// The softest motion, where it has no stiffness but for what the tolerance of balance leaves: that of a motion that loads hold is a force over
+/// a length.
+fn loose_at_rest(
+    assembly: &mut Assembly,
+    solver: &mut LinearSolver,
+    model: &Model,
+    state: &State,
+) -> Option<NullVector> {
     assembly.forget();
     assembly.evaluate(state, Weights::STIFFNESS, None);
     let force = model.largest_force(&assembly.system);
     let mut tangent = Tangent::that_may_go(assembly, state, Weights::STIFFNESS);
-    let Some(limp) = Limp::find(solver, &mut tangent, model, false) else { return false };
+    let limp = Limp::find(solver, &mut tangent, model, false)?;
     let system = tangent.look();
     let motion = &limp.vector.motion;
     let stiffness: f64 = system.multiply(&system.values, motion).iter().zip(motion).map(|(f, x)| f * x).sum();
     let (_, by_slot) = limp.vector.by_slot(&system.pattern.equations, state.q.len());
-    let moves = by_slot.iter().zip(model.kinds.iter()).filter(|(_, kind)| **kind == SlotKind::Displacement);
-    let displaced = moves.map(|(u, _)| u.squared()).fold(0.0, f64::max);
-    limp.is_loose() || stiffness.abs() < LOOSE * force / model.length * displaced
+    let largest = |wanted: SlotKind| {
+        let slots = by_slot.iter().zip(model.kinds.iter()).filter(|(_, kind)| **kind == wanted);
+        slots.map(|(motion, _)| motion.squared()).fold(0.0, f64::max)
+    };
+    let moves = LOOSE * force / model.length * largest(SlotKind::Displacement);
+    let turns = LOOSE_TURN * force * model.length * largest(SlotKind::Rotation);
+    (limp.is_loose() || stiffness.abs() < moves.max(turns)).then_some(limp.vector)
 }

@@ -160,14 +160,16 @@ impl Run<'_> {
         levels: &mut Levels,
     ) -> Result<Reached, Failure> {
         let total = self.bookkeeper.ledger().total();
-        if self.is_linear() || levels.way == Way::Levels || !self.come_to_rest(workshop, target)? {
+        let may_rest = !self.is_linear() && levels.approach != Approach::Straight && levels.way != Way::Levels;
+        if !may_rest || !self.come_to_rest(workshop, target)? {
             return Err(failure);
         }
-        self.refuse_loose_at_rest(workshop, failure.clone())?;
+        self.refuse_loose_at_rest(workshop)?;
         let at = self.moment();
-        let why = match &failure {
-            Failure::Singular { place: Some(place), .. } => format!("nothing but its loads holds {place}"),
-            _ => "load levels lead to no balance".into(),
+        let why = if let Failure::Singular { place: Some(place), .. } = &failure {
+            format!("nothing but its loads holds {place}")
+        } else {
+            "load levels lead to no balance".into()
         };
         let message = format!(
             "{why}: the state at {at} is where the structure came to rest, moved by all forces against an artificial resistance; it is in \

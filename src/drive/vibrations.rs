@@ -38,10 +38,6 @@ pub(super) enum Vibrations {
 impl Run<'_> {
     /// About the run's state, in space and with the masses and dampers of the scene. `signature`: of the tangent as the stage is treated.
     pub(super) fn vibrations(&mut self, signature: Option<Signature>) -> Result<Vibrations, Failure> {
-        // In a plane no direction out of it takes part.
-        if let Some(Signature::Parity { is_odd: true }) = signature {
-            return Ok(Vibrations::Diverging);
-        }
         if self.is_linear() {
             return Ok(Vibrations::Unknown);
         }
@@ -49,8 +45,8 @@ impl Run<'_> {
         let context = StageContext { kind: StageKind::Modal, ..stage };
         let equations = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
         let is_massless = self.model.lacks_mass(&context, &equations);
-        let is_known_in_space = self.plane.is_none() && signature.is_some();
-        if equations.count() > MOST_UNKNOWNS || (is_massless && is_known_in_space) {
+        let is_even_in_space = self.plane.is_none() && signature.is_some_and(|signature| !signature.tells_unstable());
+        if equations.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {
             return Ok(Vibrations::Unknown);
         }
         let mut assembly = Assembly::new(&context, equations, &self.model);
@@ -59,9 +55,14 @@ impl Run<'_> {
         };
         let matrices = self.matrices(&mut assembly);
         self.counters.work.factorisations += 1;
-        // Without digits signs tell nothing.
-        if !solver.factorise_surely(&assembly.system) {
+        // Without digits signs tell nothing, nor where a motion has no stiffness, such as a spin that statics holds.
+        let is_sure = solver.factorise_surely(&assembly.system);
+        if !is_sure || solver.null_vector(&mut Tangent::that_stays(&mut assembly, &self.state)).is_some() {
             return Ok(Vibrations::Unknown);
+        }
+        // In a plane no direction out of it takes part.
+        if let Some(Signature::Parity { is_odd: true }) = signature {
+            return Ok(Vibrations::Diverging);
         }
         match solver.signature(&mut Tangent::that_stays(&mut assembly, &self.state)) {
             Some(Signature::Negative(count)) => return Ok(Vibrations::Counted(count)),

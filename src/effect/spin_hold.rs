@@ -81,7 +81,9 @@ impl Effect for SpinHold {
     }
 
     fn steady(&self, at: &mut State) {
-        for part in &self.parts {
+        // What is held in statics may spin by its inertia.
+        let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
+        for part in parts {
             for node in &part.nodes {
                 let (rotation, p) = (at.rotation(node.p), node.p as usize);
                 let about = rotation.t_inverse() * part.axis;

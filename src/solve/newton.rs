@@ -152,6 +152,18 @@ impl Newton {
         signature
     }
 
+    /// Forms the stiffness of a state, and tells what its pivots do.
+    pub fn signature_at(&mut self, assembly: &mut Assembly, state: &State, work: &mut Work) -> Option<Signature> {
+        assembly.forget();
+        assembly.evaluate(state, Weights::STIFFNESS, None);
+        self.signature(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS), work)
+    }
+
+    /// The tangent that is there is that of another state than the one the next solution begins with.
+    pub fn begin_anew(&mut self) {
+        self.given = None;
+    }
+
     /// Memory for a field of slots that nobody needs between solutions.
     pub fn scratch(&mut self) -> &mut [Vec3] {
         &mut self.dq

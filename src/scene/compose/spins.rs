@@ -1,7 +1,7 @@
 //! Straight parts whose spin about their own axis nothing resists.
 
 use super::Composer;
-use crate::deck::{EffectWord, JointKind, LoadTarget, MotionWhat, Spanned, StageBody};
+use crate::deck::{EffectWord, Frame, JointKind, Load, LoadTarget, MotionWhat, Spanned, StageBody};
 use crate::effect::Effect;
 use crate::effect::spin_hold::{HeldIn, Instance, SpinHold};
 use crate::scene::joints::FoundJoint;
@@ -13,22 +13,44 @@ use std::collections::{BTreeMap, HashSet};
 /// What is nearer to a straight line is one, relative to its length.
 const STRAIGHT: f64 = 1e-9;
 
+/// Stiffnesses that differ by less are the same, relative to themselves.
+const ALIKE: f64 = 1e-9;
+
 /// No beam, in lists by slot.
 const NONE: usize = usize::MAX;
 
 /// Beams that are joined rigidly along one line.
 struct StraightPart<'m> {
     beams: Vec<&'m MeshBeam>,
+    /// The rotations at its two ends
+    ends: [Slot; 2],
     hold: Instance,
+}
+
+impl StraightPart<'_> {
+    /// Whether it is straight without load, and bends about all axes alike: a spin in a bend strains nothing.
+    fn is_round(&self) -> bool {
+        let at = |beam: &MeshBeam, fraction: f64| {
+            let k = beam.section.at(fraction).stiffness;
+            let size = |i: usize| k[i][i].abs();
+            let alike = |i: usize, j: usize| (k[i][i] - k[j][j]).abs() <= ALIKE * size(i).max(size(j));
+            let apart = |i: usize, j: usize| i == j || k[i][j].abs() <= ALIKE * (size(i) * size(j)).sqrt();
+            alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
+        };
+        self.beams
+            .iter()
+            .all(|beam| beam.free_strain.is_none() && beam.fractions.iter().all(|&fraction| at(beam, fraction)))
+    }
 }
 
 impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
         let parts = self.straight_parts(&self.resisted_rotations(connections));
-        let rests = |body: &StageBody| {
-            matches!(body, StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Buckling { .. })
+        let is_static = |body: &StageBody| match body {
+            StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Buckling { .. } => true,
+            StageBody::Modal { .. } | StageBody::Dynamic { .. } => false,
         };
-        let rests = self.deck.stages.iter().any(|stage| rests(&stage.body));
+        let rests = self.deck.stages.iter().any(|stage| is_static(&stage.body));
         let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<Instance> {
             parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect()
         };
@@ -84,12 +106,12 @@ impl Composer<'_> {
         let nodes: Vec<_> =
             beams.iter().flat_map(|beam| beam.nodes.iter().map(|&node| &self.mesh.nodes[node])).collect();
         let first = nodes.first()?.place;
-        let farthest = |from: Vec3| {
-            let far = |a: &Vec3, b: &Vec3| (*a - from).squared().total_cmp(&(*b - from).squared());
-            nodes.iter().map(|node| node.place).max_by(far)
-        };
-        let start = farthest(first)?;
-        let end = farthest(start)?;
+        let farthest =
+            |from: Vec3| nodes.iter().max_by(|a, b| (a.place - from).squared().total_cmp(&(b.place - from).squared()));
+        let first_end = farthest(first)?;
+        let start = first_end.place;
+        let second_end = farthest(start)?;
+        let end = second_end.place;
         let (axis, length) = ((end - start).normalized()?, (end - start).norm());
         let aside = |place: Vec3| (place - start - axis * axis.dot(place - start)).norm();
         if nodes.iter().any(|node| aside(node.place) > STRAIGHT * length) {
@@ -103,7 +125,7 @@ impl Composer<'_> {
             axis,
             stiffness: torsion / length,
         };
-        Some(StraightPart { beams, hold })
+        Some(StraightPart { beams, ends: [first_end.node.p, second_end.node.p], hold })
     }
 
     /// Whether something of it is turned by gravity, or resists a spin by its inertia.
@@ -118,19 +140,31 @@ impl Composer<'_> {
         part.beams.iter().any(of_beam) || of_body
     }
 
-    /// Whether loads may turn it about its axis: moments, weight beside the axis, and in rotating frames all inertia.
+    /// Whether loads may turn it about its axis: moments, loads that turn with it, weight beside its axis, in rotating frames all inertia; and
+    /// where it bends about one axis more easily than about another, or is curved by itself, whatever bends it.
     fn feels_loads(&self, part: &StraightPart) -> bool {
-        let is_along = |name: &str| part.beams.iter().any(|beam| beam.name == name);
-        let turns = self.deck.loads.iter().filter(|load| load.moment.is_some()).any(|load| match &load.target {
+        let acts_on = |load: &Load| match &load.target {
             LoadTarget::At(at) => self.is_on(part, at),
-            LoadTarget::Along(along) => is_along(&along.value),
-        });
+            LoadTarget::Along(along) => part.beams.iter().any(|beam| beam.name == along.value),
+        };
+        let turns =
+            self.deck.loads.iter().any(|load| (load.moment.is_some() || load.frame != Frame::Space) && acts_on(load));
+        let along = self.deck.loads.iter().any(|load| matches!(load.target, LoadTarget::Along(_)) && acts_on(load));
+        let inside = |load: &Load| matches!(&load.target, LoadTarget::At(at) if self.is_on(part, at) && !self.is_at_end(part, at));
+        let bends = along || self.deck.gravity.is_some() || self.deck.loads.iter().any(inside);
         let is_eccentric = |beam: &&MeshBeam| {
             let mass = beam.section.at(beam.fractions[beam.nodes.len() / 2]).mass;
             mass.is_some_and(|mass| mass.offset != Vec3::ZERO)
         };
         let rotates = self.deck.stages.iter().any(|stage| stage.frame.is_some());
-        turns || part.beams.iter().any(is_eccentric) || (rotates && self.has_spin_inertia(part))
+        let inert = rotates && (self.has_spin_inertia(part) || !part.is_round());
+        turns || (bends && !part.is_round()) || part.beams.iter().any(is_eccentric) || inert
+    }
+
+    /// Whether a node of a part is one of its ends.
+    fn is_at_end(&self, part: &StraightPart, name: &Spanned<String>) -> bool {
+        let found = self.mesh.find_node(self.deck, name).ok();
+        found.is_some_and(|(number, _)| part.ends.contains(&self.mesh.nodes[number].node.p))
     }
 
     /// Whether a node of a part has this name.
