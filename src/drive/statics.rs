@@ -235,14 +235,12 @@ impl Run<'_> {
         }
         let (at, steps) = (self.moment(), self.counters.steps);
         let motion = if self.state.fading.is_empty() { "" } else { IN_MOTION };
+        let message =
+            format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
+        self.warn(WarningKind::ArcLengthDetour, message);
         let increment = levels.level.clamp(DETOUR.0, DETOUR.1);
         let arrival = self.detour(workshop, &levels.start, target, increment, levels.level);
         let (end, increments) = (self.moment(), self.counters.steps - steps);
-        if increments > 0 {
-            let message =
-                format!("load control stood still at {at}: the path was followed by arc length from there{motion}");
-            self.warn_at(WarningKind::ArcLengthDetour, at, message);
-        }
         let limit = Failure::LimitPoint { at, goal: target, increments, end };
         match arrival {
             Ok(Arrival::Until) => {
