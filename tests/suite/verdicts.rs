@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::scenes::simulate;
 use beamsim::drive::{StabilityVerdict, StageStability};
-use nalgebra::{DMatrix, SMatrix};
+use nalgebra::DMatrix;
 use std::path::Path;
 
 /// A column of length, stiffness and mass one along x; `rest`: supports, loads, other tables.
@@ -117,10 +117,13 @@ fn grows(loads: &Loads, pinned: bool) -> bool {
     let size = 2 * ELEMENTS + 2;
     let l = 1.0 / ELEMENTS as f64;
     let (mut stiffness, mut mass) = (DMatrix::<f64>::zeros(size, size), DMatrix::<f64>::zeros(size, size));
-    let bent = SMatrix::<f64, 4, 4>::from_row_slice(&[
-        12.0, 6.0 * l, -12.0, 6.0 * l, 6.0 * l, 4.0 * l * l, -6.0 * l, 2.0 * l * l, -12.0, -6.0 * l, 12.0, -6.0 * l, 6.0 * l,
-        2.0 * l * l, -6.0 * l, 4.0 * l * l,
-    ]) / (l * l * l);
+    let bent = [
+        [12.0, 6.0 * l, -12.0, 6.0 * l],
+        [6.0 * l, 4.0 * l * l, -6.0 * l, 2.0 * l * l],
+        [-12.0, -6.0 * l, 12.0, -6.0 * l],
+        [6.0 * l, 2.0 * l * l, -6.0 * l, 4.0 * l * l],
+    ]
+    .map(|row| row.map(|entry| entry / (l * l * l)));
     // Gauss's rule of four points on [0, 1].
     let gauss = [
         (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
@@ -155,7 +158,7 @@ fn grows(loads: &Loads, pinned: bool) -> bool {
         }
         for i in 0..4 {
             for j in 0..4 {
-                stiffness[(first + i, first + j)] += bent[(i, j)];
+                stiffness[(first + i, first + j)] += bent[i][j];
             }
         }
     }

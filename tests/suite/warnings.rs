@@ -99,9 +99,11 @@ fn static_stages_end_stable_or_unstable_or_unknown() {
     }
     let linear = column_with("large_rotations = false", 1.1 * CRITICAL, STATIC);
     assert_eq!(verdicts(&linear), stable, "linear theory knows no buckling");
-    // A moment fixed in space: the tangent is not symmetric, and pivots say nothing.
-    let twisted = format!("[[load]]\nat = \"top\"\nmoment = [1, 1, 1]\n{STATIC}");
-    assert_eq!(verdicts(&column(1.0, &twisted)), end(StabilityVerdict::Unknown, None));
+    // A moment fixed in space: the tangent is not symmetric, pivots say nothing, and vibrations tell where there are masses.
+    let twisted = column(1.0, &format!("[[load]]\nat = \"top\"\nmoment = [1, 1, 1]\n{STATIC}"));
+    assert_eq!(verdicts(&twisted), end(StabilityVerdict::Stable, None));
+    let massless = twisted.replace("rhoA = 1\nrhoJ = [2e-3, 1e-3, 1e-3]\n", "rhoA = 0\n");
+    assert_eq!(verdicts(&massless), end(StabilityVerdict::Unknown, None));
 }
 
 /// About its soft axis a strip buckles first, out of the plane that it is loaded in.
