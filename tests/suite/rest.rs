@@ -158,7 +158,12 @@ fn a_hinged_bar_turns_into_its_load() {
         // What the load did beyond stretching the bar, the artificial resistance has taken.
         let [work, damped, total] =
             ["external", "damped", "total"].map(|part| simulation.end(&format!("energy.{part}")));
-        assert!((9.0..10.1).contains(&work) && damped > 0.9 * work && total.abs() < 1e-9, "{work} {damped} {total}");
+        // It turns at the first level; the load grows on the way.
+        let fall = 5.0 * 2.0 / f64::from(levels);
+        assert!(
+            (0.9..1.01).contains(&(work / fall)) && damped > 0.9 * work && total.abs() < 1e-9,
+            "{work} {damped} {total}"
+        );
     }
 }
 
@@ -223,7 +228,7 @@ fn a_spin_that_statics_holds_goes_on_in_time() {
     let still = "[[stage]]\nkind = \"static\"\nsteps = 1\n";
     let turns = "[[stage]]\nkind = \"dynamic\"\nend = 1\nstep = 0.05\n";
     for stages in [format!("{turns}{still}"), format!("{still}{turns}")] {
-        let turned = simulate(&format!("{rod}{stages}")).end("b.rcx");
+        let turned = simulate(&format!("{rod}{stages}")).end("b.rx");
         assert!((turned - 1.0).abs() < 1e-6, "{stages}: {turned}");
     }
 }
