@@ -142,6 +142,11 @@ impl TimeError {
         }
     }
 
+    /// Whether an error is carried along that has not seen yet what it meets in the present step.
+    pub fn knows_no_forces(&self) -> bool {
+        self.carried.as_ref().is_some_and(|carried| carried.knows_no_forces())
+    }
+
     /// Looks at what the error meets of inertia and damping in the state that the tangent of the step belongs to. The forces of the system
     /// are those of that state, and stay.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {

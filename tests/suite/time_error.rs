@@ -19,6 +19,11 @@ fn oscillator(scheme: &str, step: f64) -> String {
     )
 }
 
+/// The same in a linear stage, whose energy is that of another theory.
+fn linear_oscillator(scheme: &str, step: f64) -> String {
+    format!("[effects]\nlarge_rotations = false\n{}", oscillator(scheme, step)).replace(", \"energy\"", "")
+}
+
 /// A chain of 60 elements that swings in its second shape of a pendulum, in a plane or in space.
 fn chain(planar: bool, step: f64) -> String {
     format!(
@@ -56,9 +61,13 @@ fn largest_difference(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
 
 #[test]
 fn the_estimate_is_the_error_of_an_oscillation_and_falls_with_the_order_of_the_scheme() {
-    for scheme in ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"] {
+    type Deck = fn(&str, f64) -> String;
+    let large =
+        ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"].map(|scheme| (scheme, oscillator as Deck));
+    let linear = ["newmark", "hht", "generalized_alpha"].map(|scheme| (scheme, linear_oscillator as Deck));
+    for (scheme, deck) in large.into_iter().chain(linear) {
         let of = |step: f64| {
-            let simulation = simulate(&oscillator(scheme, step));
+            let simulation = simulate(&deck(scheme, step));
             let error = largest_difference(&simulation.column("a.ux"), |k| (PI * step * k as f64).sin());
             let estimate = estimated(&simulation);
             assert!((estimate.moved - 1.0).abs() < 0.01, "{scheme}: {estimate:?}");
@@ -71,6 +80,15 @@ fn the_estimate_is_the_error_of_an_oscillation_and_falls_with_the_order_of_the_s
         let ratio = whole.1 / half.1;
         assert!((3.6..4.6).contains(&ratio), "{scheme}: halved steps leave 1/{ratio}");
     }
+}
+
+/// The tangent of a linear stage is factorised once, before there is any error.
+#[test]
+fn linear_stages_carry_their_errors_like_others() {
+    let [large, linear] = [oscillator("newmark", 0.1), linear_oscillator("newmark", 0.1)].map(|deck| simulate(&deck));
+    let [expected, found] = [&large, &linear].map(|simulation| estimated(simulation).displacement);
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found} for {expected}");
+    assert!(doubts(&large).contains(&WarningKind::LongSteps) && doubts(&linear) == [WarningKind::LongSteps]);
 }
 
 #[test]
