@@ -128,6 +128,29 @@ fn large_scenes_know_their_errors_too_and_the_proposed_step_will_do() {
     }
 }
 
+/// A static stage whose work nobody asks for is not booked.
+#[test]
+fn a_static_stage_between_is_no_imbalance_where_nobody_asks_for_energies() {
+    let deck = oscillator("newmark", 0.01)
+        .replace(", \"energy\"", "")
+        .replace("end = 10", "end = 0.5")
+        .replace("[[stage]]", "[[load]]\nat = \"a\"\nforce = [0, 0.1, 0]\n[[stage]]");
+    let dynamic = "[[stage]]\nkind = \"dynamic\"\nend = 1.5\nstep = 0.01\n";
+    let simulation = simulate(&format!("{deck}[[stage]]\nkind = \"static\"\nsteps = 4\n{dynamic}"));
+    assert_eq!(doubts(&simulation), []);
+}
+
+/// What moved goes on behind a modal stage; behind a static one it does not.
+#[test]
+fn only_stages_that_end_at_rest_take_kinetic_energy() {
+    let deck = oscillator("newmark", 0.01).replace("end = 10", "end = 1");
+    let after = |stages: &str| doubts(&simulate(&format!("{deck}{stages}"))).contains(&WarningKind::EnergyBalance);
+    let modal = "[[stage]]\nkind = \"modal\"\nmodes = 1\n";
+    assert!(!after(modal));
+    assert!(!after(&format!("{modal}[[stage]]\nkind = \"dynamic\"\nend = 2\nstep = 0.01\n")));
+    assert!(after("[[stage]]\nkind = \"static\"\nsteps = 1\n"));
+}
+
 /// A scene is let go from a preload with initial motions: they bring energy in that no step is to blame for.
 #[test]
 fn what_initial_motions_bring_in_after_a_preload_is_no_imbalance() {
