@@ -166,9 +166,11 @@ impl Run<'_> {
     }
 
     /// Notes the estimated errors of fixed steps, and warns of steps that are too long.
-    pub(super) fn judge_steps(&mut self, workshop: &Workshop) {
+    pub(super) fn judge_steps(&mut self, workshop: &mut Workshop) {
         let StageWork::Dynamic { step, scheme, .. } = self.plan.stages[self.stage].work else { return };
-        let Some(error) = &workshop.newton.time_error else { return };
+        let Workshop { assembly, newton, increments, .. } = workshop;
+        let Some(error) = &mut newton.time_error else { return };
+        error.sum_up(&assembly.system.pattern.equations, &self.state, increments.as_ref());
         let largest = error.largest();
         self.counters.findings.time_errors.push(StageTimeError { stage: self.stage + 1, largest });
         let Largest { displacement, rotation, moved } = largest;

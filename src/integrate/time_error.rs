@@ -95,6 +95,8 @@ pub struct TimeError {
     /// How many steps there were, of how many
     steps: usize,
     of_steps: f64,
+    /// The longest step since the sum was taken last, once there is one
+    longest: Option<Step>,
     /// The sizes of local errors, summed over the steps before the error was carried along
     sum: Largest,
     carried: Option<Box<CarriedError>>,
@@ -122,6 +124,7 @@ impl TimeError {
                 .collect(),
             steps: 0,
             of_steps: duration / first.length,
+            longest: None,
             sum: Largest::default(),
             carried: None,
         };
@@ -175,16 +178,18 @@ impl TimeError {
             return carried.end(&system.pattern.equations, error, states, increments);
         }
         self.steps += 1;
+        self.longest = self.longest.filter(|longest| longest.length >= step.length).or(Some(*step));
         if self.steps.is_multiple_of(WIDTH) {
-            self.add(&system.pattern.equations, states.1, step, increments);
+            self.sum_up(&system.pattern.equations, states.1, increments);
             if self.is_worth_carrying() {
                 self.carry(system, states.1, *step);
             }
         }
     }
 
-    /// Adds the local errors since the sum was taken last.
-    fn add(&mut self, equations: &Equations, state: &State, step: &Step, increments: Option<&Increments>) {
+    /// Adds the local errors of the steps since the sum was taken last, up to this state: after some steps, and where the stage is over.
+    pub fn sum_up(&mut self, equations: &Equations, state: &State, increments: Option<&Increments>) {
+        let Some(step) = self.longest.take() else { return };
         let (Scheme { beta, .. }, h2) = (step.scheme, step.length * step.length);
         let factor = (1.0 / 6.0 - beta - 0.5 * step.scheme.lag()).abs() * h2;
         let Self { scene, start, past, .. } = self;

@@ -128,6 +128,26 @@ fn large_scenes_know_their_errors_too_and_the_proposed_step_will_do() {
     }
 }
 
+/// Sums of local errors are taken every fourth step: what is left over at the end counts, too.
+#[test]
+fn short_stages_of_large_scenes_know_their_errors() {
+    for steps in [1, 2, 3, 4, 6] {
+        let of = |step: f64| {
+            let deck = chain(true, step).replace("end = 2\n", &format!("end = {}\n", 0.05 * f64::from(steps)));
+            simulate(&deck.replace("[\"end\"]", "[\"b@0.05\", \"b@0.1\", \"b@0.25\", \"end\"]"))
+        };
+        let (long, exact) = (of(0.05), of(0.001));
+        let places = exact.names.iter().filter(|name| name.ends_with(".ux") || name.ends_with(".uz"));
+        let off = places.map(|name| {
+            let exact = exact.column(name);
+            largest_difference(&long.column(name), |k| exact[50 * k])
+        });
+        let (off, estimate) = (off.fold(0.0, f64::max), estimated(&long));
+        let ratio = estimate.displacement / off;
+        assert!((0.5..5.0).contains(&ratio), "{steps} steps: {estimate:?} for {off}");
+    }
+}
+
 /// A static stage whose work nobody asks for is not booked.
 #[test]
 fn a_static_stage_between_is_no_imbalance_where_nobody_asks_for_energies() {
