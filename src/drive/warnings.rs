@@ -264,7 +264,7 @@ impl Run<'_> {
         }
     }
 
-    /// The same where pivots do not tell.
+    /// An equilibrium that a stage ends in, judged by the small vibrations about it: pivots do not tell.
     pub(super) fn warn_of_vibrations(&mut self, vibrations: Vibrations) {
         let how = match vibrations {
             Vibrations::Bounded | Vibrations::Unknown => return,

@@ -24,7 +24,7 @@ const MOST_SLOTS: usize = 200_000;
 
 /// The sum of local errors, over the largest motion, for which errors are carried along where a stage would come to it at its present rate.
 const WORTH_CARRYING: f64 = 0.02;
-/// The same for rotations, in radians
+/// The sum of local errors of rotations, in radians, for which errors are carried along, likewise.
 const WORTH_CARRYING_TURNS: f64 = 0.1;
 
 /// Steps, and the part of a stage, after which that rate is believed: at first little has moved yet.
