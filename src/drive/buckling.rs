@@ -62,7 +62,7 @@ impl Run<'_> {
         self.model.set_clock(&mut self.state, time, load);
         self.state.q = held;
         self.change_charts(None);
-        self.open_account(workshop, false)?;
+        self.open_account(workshop)?;
         self.warn_out_of_balance(workshop);
         let loads = self.critical_loads(workshop, modes)?;
         if loads.is_empty() {

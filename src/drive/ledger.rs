@@ -31,7 +31,7 @@ impl Ledger {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bookkeeper {
     ledger: Ledger,
-    /// The total that an exact solution keeps; known once the account is opened
+    /// The total that an exact solution keeps; known while the account is open
     first: Option<f64>,
     /// The largest kinetic + strain energy, or work from outside, of the run so far
     scale: f64,
@@ -43,10 +43,20 @@ pub(super) struct Bookkeeper {
 }
 
 impl Bookkeeper {
-    /// Opens a stage: energies are taken, no work is added. `begins` tells that initial motions bring in the kinetic energy that is
-    /// new.
-    pub fn open(&mut self, model: &Model, state: &State, system: &System, begins: bool) {
-        let kinetic = self.ledger.kinetic;
+    /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic energy that is new belongs to the account.
+    pub fn bring_in(&mut self, model: &Model, state: &State) {
+        if let Some(first) = &mut self.first {
+            *first += model.energy(state).kinetic - self.ledger.kinetic;
+        }
+    }
+
+    /// A stage begins whose work is not booked: the account begins anew behind it.
+    pub fn close(&mut self) {
+        self.first = None;
+    }
+
+    /// Opens a stage: energies are taken, no work is added.
+    pub fn open(&mut self, model: &Model, state: &State, system: &System) {
         self.drives = model.drives(state);
         self.force = zeros(state.q.len());
         threads::each_part(&mut self.force, |start, part| {
@@ -57,11 +67,7 @@ impl Bookkeeper {
         // Where nothing damps it is empty.
         threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
         self.take(model, state);
-        match &mut self.first {
-            None => self.first = Some(self.ledger.total()),
-            Some(first) if begins => *first += self.ledger.kinetic - kinetic,
-            Some(_) => {}
-        }
+        self.first.get_or_insert(self.ledger.total());
     }
 
     /// Adds the work of the step that ends here.
@@ -87,7 +93,7 @@ impl Bookkeeper {
         self.ledger
     }
 
-    /// The total that an exact solution keeps; `None` where no account was opened.
+    /// The total that an exact solution keeps; `None` where no account is open.
     pub fn first(&self) -> Option<f64> {
         self.first
     }

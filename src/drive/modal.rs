@@ -65,7 +65,7 @@ impl Run<'_> {
         let (time, load) = (self.state.time, self.state.load);
         self.model.set_clock(&mut self.state, time, load);
         self.change_charts(None);
-        self.open_account(workshop, false)?;
+        self.open_account(workshop)?;
         self.warn_out_of_balance(workshop);
         let matrices = self.matrices(&mut workshop.assembly);
         if matrices.is_massless() {

@@ -408,7 +408,7 @@ impl<'o> Run<'o> {
             self.warn_of_round_off();
             self.warn_of_frame();
             self.warn_of_imbalance(&workshop);
-            self.judge_steps(&workshop);
+            self.judge_steps(&mut workshop);
             result?;
             self.hand_over(&mut workshop);
             self.model.end_stage(&self.state);
@@ -492,10 +492,11 @@ impl<'o> Run<'o> {
     }
 
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
-    /// `begins` tells that initial motions set the scene in motion here.
-    pub(super) fn open_account(&mut self, workshop: &mut Workshop, begins: bool) -> Result<(), Failure> {
+    pub(super) fn open_account(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
         if self.keeps_account(workshop) {
-            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system, begins);
+            self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
+        } else {
+            self.bookkeeper.close();
         }
         let first = self.bookkeeper.first().unwrap_or_default();
         if let Some(guard) = &mut workshop.guard {

@@ -43,7 +43,10 @@ impl Run<'_> {
         if let Some(increments) = &workshop.increments {
             increments.start(&mut self.state);
         }
-        self.open_account(workshop, begins)
+        if begins {
+            self.bookkeeper.bring_in(&self.model, &self.state);
+        }
+        self.open_account(workshop)
     }
 
     /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing the joints takes,

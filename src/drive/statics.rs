@@ -103,7 +103,7 @@ impl Run<'_> {
                 if matches!(&named, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
                     return Err(named);
                 }
-                self.open_account(workshop, false)?;
+                self.open_account(workshop)?;
                 return Ok(Some(named));
             }
             if limp.is_soft() {
@@ -117,7 +117,7 @@ impl Run<'_> {
             }
         }
         let loose = self.refuse_loose_in_space(workshop, Weights::STIFFNESS).err();
-        self.open_account(workshop, false)?;
+        self.open_account(workshop)?;
         Ok(loose)
     }
 

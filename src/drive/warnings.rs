@@ -105,13 +105,23 @@ impl Run<'_> {
         }
     }
 
-    /// An account of the energy that does not close: steps do not resolve part of the motion.
+    /// An account of the energy that does not close.
     pub(super) fn warn_of_imbalance(&mut self, workshop: &Workshop) {
         // The energy of the full theory is not that of the linear one.
         if self.is_linear() {
             return;
         }
-        let Some(guard) = &workshop.guard else { return self.warn_of_standstill() };
+        match self.plan.stages[self.stage].work {
+            StageWork::Dynamic { .. } => self.warn_of_scheme(workshop),
+            StageWork::Static { .. } | StageWork::Path { .. } | StageWork::Buckling { .. } => self.warn_of_standstill(),
+            // What moved goes on behind it.
+            StageWork::Modal { .. } => {}
+        }
+    }
+
+    /// An account that time steps do not close, or found open.
+    fn warn_of_scheme(&mut self, workshop: &Workshop) {
+        let Some(guard) = &workshop.guard else { return };
         let Some(Imbalance { share, is_own }) = guard.imbalance(self.bookkeeper.scale()) else { return };
         let is_told = std::mem::replace(&mut self.told.unbalanced, true);
         if !is_own && is_told {
@@ -140,7 +150,7 @@ impl Run<'_> {
         }
     }
 
-    /// A static stage takes kinetic energy away from what moved before.
+    /// A stage that ends at rest takes kinetic energy away from what moved before.
     fn warn_of_standstill(&mut self) {
         let (Some(first), true) = (self.bookkeeper.first(), self.plan.energy && self.moving) else { return };
         let share = (self.bookkeeper.ledger().total() - first) / self.bookkeeper.scale();
@@ -156,9 +166,11 @@ impl Run<'_> {
     }
 
     /// Notes the estimated errors of fixed steps, and warns of steps that are too long.
-    pub(super) fn judge_steps(&mut self, workshop: &Workshop) {
+    pub(super) fn judge_steps(&mut self, workshop: &mut Workshop) {
         let StageWork::Dynamic { step, scheme, .. } = self.plan.stages[self.stage].work else { return };
-        let Some(error) = &workshop.newton.time_error else { return };
+        let Workshop { assembly, newton, increments, .. } = workshop;
+        let Some(error) = &mut newton.time_error else { return };
+        error.sum_up(&assembly.system.pattern.equations, &self.state, increments.as_ref());
         let largest = error.largest();
         self.counters.findings.time_errors.push(StageTimeError { stage: self.stage + 1, largest });
         let Largest { displacement, rotation, moved } = largest;
@@ -252,7 +264,7 @@ impl Run<'_> {
         }
     }
 
-    /// The same where pivots do not tell.
+    /// An equilibrium that a stage ends in, judged by the small vibrations about it: pivots do not tell.
     pub(super) fn warn_of_vibrations(&mut self, vibrations: Vibrations) {
         let how = match vibrations {
             Vibrations::Bounded | Vibrations::Unknown => return,

@@ -152,6 +152,11 @@ impl CarriedError {
         (self.step, self.stretch, self.known) = (*step, step.length / before, Known::Nothing);
     }
 
+    /// Whether what the error meets in the present step is not known yet.
+    pub fn knows_no_forces(&self) -> bool {
+        self.known == Known::Nothing
+    }
+
     /// Looks at what the error meets of inertia and damping in the state that the tangent of the step belongs to. The forces of the system
     /// are those of that state, and stay.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {

@@ -24,7 +24,7 @@ const MOST_SLOTS: usize = 200_000;
 
 /// The sum of local errors, over the largest motion, for which errors are carried along where a stage would come to it at its present rate.
 const WORTH_CARRYING: f64 = 0.02;
-/// The same for rotations, in radians
+/// The sum of local errors of rotations, in radians, for which errors are carried along, likewise.
 const WORTH_CARRYING_TURNS: f64 = 0.1;
 
 /// Steps, and the part of a stage, after which that rate is believed: at first little has moved yet.
@@ -95,6 +95,8 @@ pub struct TimeError {
     /// How many steps there were, of how many
     steps: usize,
     of_steps: f64,
+    /// The longest step since the sum was taken last, once there is one
+    longest: Option<Step>,
     /// The sizes of local errors, summed over the steps before the error was carried along
     sum: Largest,
     carried: Option<Box<CarriedError>>,
@@ -122,6 +124,7 @@ impl TimeError {
                 .collect(),
             steps: 0,
             of_steps: duration / first.length,
+            longest: None,
             sum: Largest::default(),
             carried: None,
         };
@@ -140,6 +143,11 @@ impl TimeError {
         if let Some(carried) = &mut self.carried {
             carried.begin(step, before);
         }
+    }
+
+    /// Whether an error is carried along that has not seen yet what it meets in the present step.
+    pub fn knows_no_forces(&self) -> bool {
+        self.carried.as_ref().is_some_and(|carried| carried.knows_no_forces())
     }
 
     /// Looks at what the error meets of inertia and damping in the state that the tangent of the step belongs to. The forces of the system
@@ -170,16 +178,18 @@ impl TimeError {
             return carried.end(&system.pattern.equations, error, states, increments);
         }
         self.steps += 1;
+        self.longest = self.longest.filter(|longest| longest.length >= step.length).or(Some(*step));
         if self.steps.is_multiple_of(WIDTH) {
-            self.add(&system.pattern.equations, states.1, step, increments);
+            self.sum_up(&system.pattern.equations, states.1, increments);
             if self.is_worth_carrying() {
                 self.carry(system, states.1, *step);
             }
         }
     }
 
-    /// Adds the local errors since the sum was taken last.
-    fn add(&mut self, equations: &Equations, state: &State, step: &Step, increments: Option<&Increments>) {
+    /// Adds the local errors of the steps since the sum was taken last, up to this state: after some steps, and where the stage is over.
+    pub fn sum_up(&mut self, equations: &Equations, state: &State, increments: Option<&Increments>) {
+        let Some(step) = self.longest.take() else { return };
         let (Scheme { beta, .. }, h2) = (step.scheme, step.length * step.length);
         let factor = (1.0 / 6.0 - beta - 0.5 * step.scheme.lag()).abs() * h2;
         let Self { scene, start, past, .. } = self;

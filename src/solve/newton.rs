@@ -290,10 +290,12 @@ impl Newton {
         self.solver.succeeded();
     }
 
-    /// What follows the error of a time step sees the state that a new tangent is that of.
+    /// What follows the error of a time step sees the state that a new tangent is that of. That of a linear stage, which is formed once, fits
+    /// the states of all steps.
     fn show_rates(&mut self, assembly: &mut Assembly, state: &mut State, method: &dyn Method, work: &mut Work) {
         let Self { time_error, solver, .. } = self;
-        if let Some(time_error) = time_error.as_mut().filter(|_| !solver.has_factorised(&assembly.system)) {
+        let is_new = !solver.has_factorised(&assembly.system);
+        if let Some(time_error) = time_error.as_mut().filter(|error| is_new || error.knows_no_forces()) {
             timed(&mut work.evaluation_seconds, || time_error.look(assembly, state, method.weights()));
         }
     }

@@ -58,7 +58,8 @@ impl Signature {
     pub fn changes_to(self, other: Self) -> usize {
         match (self, other) {
             (Self::Negative(before), Self::Negative(after)) => before.abs_diff(after),
-            (_, _) => usize::from(self.is_odd() != other.is_odd()),
+            (Self::Negative(_) | Self::Parity { .. }, Self::Parity { .. })
+            | (Self::Parity { .. }, Self::Negative(_)) => usize::from(self.is_odd() != other.is_odd()),
         }
     }
 }

@@ -19,6 +19,11 @@ fn oscillator(scheme: &str, step: f64) -> String {
     )
 }
 
+/// The same in a linear stage, whose energy is that of another theory.
+fn linear_oscillator(scheme: &str, step: f64) -> String {
+    format!("[effects]\nlarge_rotations = false\n{}", oscillator(scheme, step)).replace(", \"energy\"", "")
+}
+
 /// A chain of 60 elements that swings in its second shape of a pendulum, in a plane or in space.
 fn chain(planar: bool, step: f64) -> String {
     format!(
@@ -56,9 +61,13 @@ fn largest_difference(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
 
 #[test]
 fn the_estimate_is_the_error_of_an_oscillation_and_falls_with_the_order_of_the_scheme() {
-    for scheme in ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"] {
+    type Deck = fn(&str, f64) -> String;
+    let large =
+        ["newmark", "hht", "generalized_alpha", "lie_generalized_alpha"].map(|scheme| (scheme, oscillator as Deck));
+    let linear = ["newmark", "hht", "generalized_alpha"].map(|scheme| (scheme, linear_oscillator as Deck));
+    for (scheme, deck) in large.into_iter().chain(linear) {
         let of = |step: f64| {
-            let simulation = simulate(&oscillator(scheme, step));
+            let simulation = simulate(&deck(scheme, step));
             let error = largest_difference(&simulation.column("a.ux"), |k| (PI * step * k as f64).sin());
             let estimate = estimated(&simulation);
             assert!((estimate.moved - 1.0).abs() < 0.01, "{scheme}: {estimate:?}");
@@ -71,6 +80,15 @@ fn the_estimate_is_the_error_of_an_oscillation_and_falls_with_the_order_of_the_s
         let ratio = whole.1 / half.1;
         assert!((3.6..4.6).contains(&ratio), "{scheme}: halved steps leave 1/{ratio}");
     }
+}
+
+/// The tangent of a linear stage is factorised once, before there is any error.
+#[test]
+fn linear_stages_carry_their_errors_like_others() {
+    let [large, linear] = [oscillator("newmark", 0.1), linear_oscillator("newmark", 0.1)].map(|deck| simulate(&deck));
+    let [expected, found] = [&large, &linear].map(|simulation| estimated(simulation).displacement);
+    assert!((found / expected - 1.0).abs() < 1e-6, "{found} for {expected}");
+    assert!(doubts(&large).contains(&WarningKind::LongSteps) && doubts(&linear) == [WarningKind::LongSteps]);
 }
 
 #[test]
@@ -108,6 +126,49 @@ fn large_scenes_know_their_errors_too_and_the_proposed_step_will_do() {
         assert_eq!(doubts(&shorter), [], "step {proposed}");
         assert!(off(&shorter) < 0.05 * estimated(&shorter).moved, "step {proposed}: {}", off(&shorter));
     }
+}
+
+/// Sums of local errors are taken every fourth step: what is left over at the end counts, too.
+#[test]
+fn short_stages_of_large_scenes_know_their_errors() {
+    for steps in [1, 2, 3, 4, 6] {
+        let of = |step: f64| {
+            let deck = chain(true, step).replace("end = 2\n", &format!("end = {}\n", 0.05 * f64::from(steps)));
+            simulate(&deck.replace("[\"end\"]", "[\"b@0.05\", \"b@0.1\", \"b@0.25\", \"end\"]"))
+        };
+        let (long, exact) = (of(0.05), of(0.001));
+        let places = exact.names.iter().filter(|name| name.ends_with(".ux") || name.ends_with(".uz"));
+        let off = places.map(|name| {
+            let exact = exact.column(name);
+            largest_difference(&long.column(name), |k| exact[50 * k])
+        });
+        let (off, estimate) = (off.fold(0.0, f64::max), estimated(&long));
+        let ratio = estimate.displacement / off;
+        assert!((0.5..5.0).contains(&ratio), "{steps} steps: {estimate:?} for {off}");
+    }
+}
+
+/// A static stage whose work nobody asks for is not booked.
+#[test]
+fn a_static_stage_between_is_no_imbalance_where_nobody_asks_for_energies() {
+    let deck = oscillator("newmark", 0.01)
+        .replace(", \"energy\"", "")
+        .replace("end = 10", "end = 0.5")
+        .replace("[[stage]]", "[[load]]\nat = \"a\"\nforce = [0, 0.1, 0]\n[[stage]]");
+    let dynamic = "[[stage]]\nkind = \"dynamic\"\nend = 1.5\nstep = 0.01\n";
+    let simulation = simulate(&format!("{deck}[[stage]]\nkind = \"static\"\nsteps = 4\n{dynamic}"));
+    assert_eq!(doubts(&simulation), []);
+}
+
+/// What moved goes on behind a modal stage; behind a static one it does not.
+#[test]
+fn only_stages_that_end_at_rest_take_kinetic_energy() {
+    let deck = oscillator("newmark", 0.01).replace("end = 10", "end = 1");
+    let after = |stages: &str| doubts(&simulate(&format!("{deck}{stages}"))).contains(&WarningKind::EnergyBalance);
+    let modal = "[[stage]]\nkind = \"modal\"\nmodes = 1\n";
+    assert!(!after(modal));
+    assert!(!after(&format!("{modal}[[stage]]\nkind = \"dynamic\"\nend = 2\nstep = 0.01\n")));
+    assert!(after("[[stage]]\nkind = \"static\"\nsteps = 1\n"));
 }
 
 /// A scene is let go from a preload with initial motions: they bring energy in that no step is to blame for.
