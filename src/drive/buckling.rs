@@ -32,6 +32,8 @@ const LEAP: f64 = 8.0;
 const RUNS_AWAY: f64 = 50.0;
 /// A path that goes on so far behind a load, relative to it, has no limit point there.
 const BEHIND: f64 = 1e-4;
+/// A critical load that the tangent next to it foresees is within this part of it.
+const FORESEEN: f64 = 1e-2;
 /// States on both sides of a critical load that are further apart than this do not lie on one path.
 const APART: f64 = 1e-3;
 /// States of one load that lie nearer together than this are one.
@@ -123,7 +125,8 @@ impl Run<'_> {
         };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
-                if search.ended.is_some() && self.goes_on(workshop, &search, found, none.map(|none| none + before))? {
+                let is_doubtful = search.ended.is_some() && !self.foresees(workshop, &search, found, before)?;
+                if is_doubtful && self.goes_on(workshop, &search, found, none.map(|none| none + before))? {
                     // A step from further away came down elsewhere, or nowhere.
                     let ahead = self.next_critical(workshop, way, before)?;
                     search.go_on_from(&self.state, ahead);
@@ -167,6 +170,20 @@ impl Run<'_> {
         }
         self.warn_of_estimate(search.here.load, search.ended);
         Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+    }
+
+    /// Whether the tangent of the last point before a load looks singular next to that load. A structure with a tiny imperfection has no critical
+    /// point there, but its path runs aside as if it had.
+    fn foresees(
+        &mut self,
+        workshop: &mut Workshop,
+        search: &Search,
+        load: f64,
+        before: usize,
+    ) -> Result<bool, Failure> {
+        self.state.copy_from(&search.here);
+        let seen = self.critical_loads(workshop, before + 4)?;
+        Ok(seen.into_iter().any(|seen| (seen - load).abs() <= FORESEEN * load.abs()))
     }
 
     /// Whether load control follows the path past a load from next to it, with so many negative pivots. The state is then that point.
