@@ -32,8 +32,10 @@ const LEAP: f64 = 8.0;
 const RUNS_AWAY: f64 = 50.0;
 /// A path that goes on so far behind a load, relative to it, has no limit point there.
 const BEHIND: f64 = 1e-4;
-/// A critical load that the tangent next to it foresees is within this part of it.
-const FORESEEN: f64 = 1e-2;
+/// A load that the tangent next to it foresees, to this part of it, is critical for all that can be told.
+const FORESEEN: f64 = 1e-4;
+/// Where it foresees the load to this part of it only, an imperfection turns the path aside.
+const ASIDE: f64 = 1e-2;
 /// States on both sides of a critical load that are further apart than this do not lie on one path.
 const APART: f64 = 1e-3;
 /// States of one load that lie nearer together than this are one.
@@ -125,8 +127,11 @@ impl Run<'_> {
         };
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
-                let is_doubtful = search.ended.is_some() && !self.foresees(workshop, &search, found, before)?;
-                if is_doubtful && self.goes_on(workshop, &search, found, none.map(|none| none + before))? {
+                let off = if search.ended.is_some() { self.foreseen(workshop, &search, found, before)? } else { 0.0 };
+                if off > FORESEEN && self.goes_on(workshop, &search, found, none.map(|none| none + before))? {
+                    if off < ASIDE {
+                        self.warn_of_turn_aside(found);
+                    }
                     // A step from further away came down elsewhere, or nowhere.
                     let ahead = self.next_critical(workshop, way, before)?;
                     search.go_on_from(&self.state, ahead);
@@ -172,18 +177,12 @@ impl Run<'_> {
         Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
     }
 
-    /// Whether the tangent of the last point before a load looks singular next to that load. A structure with a tiny imperfection has no critical
-    /// point there, but its path runs aside as if it had.
-    fn foresees(
-        &mut self,
-        workshop: &mut Workshop,
-        search: &Search,
-        load: f64,
-        before: usize,
-    ) -> Result<bool, Failure> {
+    /// How far from a load, relative to it, the tangent of the last point before it looks singular. A structure with a small imperfection has no
+    /// critical point there, but its path runs aside as if it had, the more sharply the smaller the imperfection.
+    fn foreseen(&mut self, workshop: &mut Workshop, search: &Search, load: f64, before: usize) -> Result<f64, Failure> {
         self.state.copy_from(&search.here);
         let seen = self.critical_loads(workshop, before + 4)?;
-        Ok(seen.into_iter().any(|seen| (seen - load).abs() <= FORESEEN * load.abs()))
+        Ok(seen.into_iter().map(|seen| (seen - load).abs() / load.abs()).fold(f64::INFINITY, f64::min))
     }
 
     /// Whether load control follows the path past a load from next to it, with so many negative pivots. The state is then that point.
@@ -302,6 +301,14 @@ impl Run<'_> {
         }
         self.warn_of_estimate(self.state.load, Some(walked));
         Ok(CriticalLoad { load: critical, kind: CriticalKind::Estimate })
+    }
+
+    fn warn_of_turn_aside(&mut self, load: f64) {
+        let message = format!(
+            "next to load factor {load} the path turns aside, as where a structure with a smaller imperfection buckles; the buckling load \
+             that is listed lies further on"
+        );
+        self.warn(WarningKind::BucklingEstimate, message);
     }
 
     fn warn_of_estimate(&mut self, from: f64, ended: Option<Walked>) {
