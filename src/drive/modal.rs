@@ -1,7 +1,7 @@
 //! Small motions about the state that was reached: (s^2 M + s C + K) x = 0.
 
 use super::failure::Failure;
-use super::rigid::rigid_motions;
+use super::rigid::{free_spins, rigid_motions};
 use super::run::{Mode, Run, Workshop};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, StageError};
@@ -71,7 +71,8 @@ impl Run<'_> {
         if matrices.is_massless() {
             return Err(self.describe(StageError::NoMass));
         }
-        let rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);
+        let mut rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);
+        rigid.extend(free_spins(&workshop.assembly.system, &self.model, &self.state));
         self.refuse_massless_mechanisms(workshop, &matrices)?;
         let Workshop { assembly, newton, .. } = &mut *workshop;
         let found = self.find_modes(assembly, &mut newton.solver, &matrices, rigid, modes, 0.0)?;

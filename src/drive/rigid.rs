@@ -11,7 +11,7 @@
 
 use crate::model::Model;
 use crate::rotation::Rotation;
-use crate::system::{Node, State, System};
+use crate::system::{Node, Slot, State, System};
 use crate::tensor::Vec3;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -27,6 +27,31 @@ const MOST_PARTS: usize = 64;
 
 /// Directions of motion of one free part.
 const MOTIONS: usize = 6;
+
+/// Forces against a spin that are smaller than this part of their terms are what the tolerance of balance leaves.
+const NO_FORCE_OF_SPIN: f64 = 1e-8;
+
+/// The spins of straight parts about their own axes against which nothing acts, one number an equation each. The system holds the stiffness of
+/// the state.
+pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
+    let equations = &system.pattern.equations;
+    let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+    let mut found = Vec::new();
+    let mut field = vec![Vec3::ZERO; state.q.len()];
+    let mut look = |increments: &[(Slot, Vec3)]| {
+        increments.iter().for_each(|&(slot, increment)| field[slot as usize] = increment);
+        let mut motion = vec![0.0; equations.count()];
+        equations.gather(|slot| field[slot], &mut motion);
+        increments.iter().for_each(|&(slot, _)| field[slot as usize] = Vec3::ZERO);
+        let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
+        let (force, terms) = (system.multiply(&system.values, &motion), system.multiply(&sizes, &absolute));
+        if force.iter().zip(&terms).all(|(force, terms)| force.abs() <= NO_FORCE_OF_SPIN * terms) {
+            found.push(motion);
+        }
+    };
+    model.effects.iter().for_each(|effect| effect.free_motions(state, &mut look));
+    found
+}
 
 /// The rigid motions of all free parts, one number an equation each. The system holds forces and stiffness of the state.
 pub(super) fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {

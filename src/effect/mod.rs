@@ -189,6 +189,9 @@ pub trait Effect: Send + Sync {
         (Vec3::ZERO, Vec3::ZERO)
     }
 
+    /// Shows motions against which nothing acts, each by the increments of some unknowns.
+    fn free_motions(&self, _at: &State, _show: &mut dyn FnMut(&[(Slot, Vec3)])) {}
+
     /// Before a step is predicted from the velocities: takes out of them what nothing but round-off has put there.
     fn steady(&self, _at: &mut State) {}
 

@@ -3,7 +3,7 @@
 
 use super::Effect;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, Slot, StageContext, StageKind, State};
 use crate::tensor::Vec3;
 
 /// One straight part: beams that are joined rigidly along a line.
@@ -78,6 +78,15 @@ impl Effect for SpinHold {
 
     fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
         self.parts.iter().for_each(|part| show(Aspect::Line(part.axis)));
+    }
+
+    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&[(Slot, Vec3)])) {
+        // A material spin about the axis of each node of a part: what has no inertia is no mode.
+        let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
+        for part in parts {
+            let spin = |node: &Node| (node.p, at.rotation(node.p).t_inverse() * part.axis);
+            show(&part.nodes.iter().map(spin).collect::<Vec<_>>());
+        }
     }
 
     fn steady(&self, at: &mut State) {

@@ -7,6 +7,9 @@ use super::softest::lost_part;
 use crate::system::{Symmetry, System};
 use nalgebra::Complex;
 
+/// What is left of a rigid motion beside the others, as part of itself, that is none of its own.
+const MADE_OF_OTHERS: f64 = 1e-6;
+
 /// An eigenvector leaves no more than this of itself.
 const RESIDUAL: f64 = 1e-5;
 
@@ -175,14 +178,15 @@ impl<'a> ModeSearch<'a> {
         self.rigid.len()
     }
 
-    /// Orthonormal to the others.
+    /// Orthonormal to the others; none that is made of these.
     fn take_out(&mut self, mut motion: Vec<f64>) {
+        let before = dot(&motion, &self.system.multiply(&self.matrices.mass, &motion)).max(0.0).sqrt();
         for _ in 0..2 {
             self.project(&mut motion);
         }
         let mut weighed = self.system.multiply(&self.matrices.mass, &motion);
         let size = dot(&motion, &weighed).max(0.0).sqrt();
-        if size > 0.0 {
+        if size > MADE_OF_OTHERS * before {
             motion.iter_mut().chain(&mut weighed).for_each(|v| *v /= size);
             self.rigid.push([motion, weighed]);
         }
