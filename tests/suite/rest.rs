@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 use crate::scenes::{attempt, simulate};
-use beamsim::drive::StabilityVerdict;
+use beamsim::drive::{Failure, Mode, Observer, Run, Snapshot, StabilityVerdict};
 use beamsim::rotation::Rotation;
 use beamsim::tensor::{Mat3, Vec3};
 use beamsim::warning::WarningKind;
@@ -230,5 +230,44 @@ fn a_spin_that_statics_holds_goes_on_in_time() {
     for stages in [format!("{turns}{still}"), format!("{still}{turns}")] {
         let turned = simulate(&format!("{rod}{stages}")).end("b.rx");
         assert!((turned - 1.0).abs() < 1e-6, "{stages}: {turned}");
+    }
+}
+
+/// Modes of a chain at rest: its links spin about their own axes without any force, and swing.
+#[test]
+fn a_chain_at_rest_swings_and_its_spins_are_exact_zeros() {
+    let mut random = Random::new(5);
+    let chain = Chain { links: 6, length: 1.0, weight: 10.0, stiffness: 1e6, span: 3.5, rise: 0.6 };
+    let frame = Rotation::new(random.vector(1.0)).r;
+    let modes = |inertia: &str| {
+        let deck = chain
+            .deck(frame, 0.3, false, 1)
+            .replace("[[beam]]\nname = \"l0\"", &format!("{inertia}[[beam]]\nname = \"l0\""));
+        let deck = deck.replace("[output]", "[[stage]]\nkind = \"modal\"\nmodes = 10\n[output]");
+        let mut recorder = Modes::default();
+        let (scene, _) = beamsim::scene::from_text(&deck).unwrap_or_else(|_| panic!("{deck}"));
+        let (result, _) = Run::new(scene.plan, &mut recorder).finish();
+        assert!(result.is_ok(), "{result:?}\n{deck}");
+        recorder.0
+    };
+    let (spinning, plain) = (modes("rhoJ = [2e-3, 1e-3, 1e-3]\n"), modes(""));
+    assert!(spinning[..6].iter().all(|mode| mode.size() == 0.0), "{spinning:?}");
+    for (with, without) in spinning[6..10].iter().zip(&plain) {
+        assert!(with.growth == 0.0 && (with.omega / without.omega - 1.0).abs() < 0.02, "{spinning:?} {plain:?}");
+    }
+}
+
+/// The modes of the last modal stage.
+#[derive(Default)]
+struct Modes(Vec<Mode>);
+
+impl Observer for Modes {
+    fn row(&mut self, _snapshot: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
+        self.0 = modes.to_vec();
+        Ok(())
     }
 }
