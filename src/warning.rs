@@ -81,7 +81,7 @@ warning_kinds! {
     PathEnds: "path_ends", Path;
     /// A buckling load is an estimate: no critical point was found.
     BucklingEstimate: "buckling_estimate", Path;
-    /// Unstable modes exist that a modal stage has not found.
+    /// Modes exist that a modal stage has not found: unstable ones, or some among those that were asked for.
     MissingModes: "missing_modes", Path;
     /// The state of a modal or buckling stage is no equilibrium.
     OutOfBalance: "out_of_balance", Path;

@@ -48,6 +48,8 @@ pub(super) struct Found {
     rigid: usize,
     /// Unstable modes that are known to be there and were not found
     missing: usize,
+    /// Whether pivots count more among those that are asked for than were found
+    is_short: bool,
 }
 
 impl Found {
@@ -182,6 +184,13 @@ impl Run<'_> {
             let message = format!("stage {stage}: {missing} more unstable mode(s) exist and were not found");
             self.warn(WarningKind::MissingModes, message);
         }
+        if found.is_short {
+            let message = format!(
+                "stage {stage}: a mode among those that are asked for was not found: pivots count more of them (very slender beams on \
+                 very fine meshes lose digits: use fewer elements of a higher order)"
+            );
+            self.warn(WarningKind::MissingModes, message);
+        }
         let worst = listed.iter().enumerate().max_by(|a, b| a.1.uncertainty.total_cmp(&b.1.uncertainty));
         if let Some((number, motion)) = worst.filter(|(_, motion)| motion.uncertainty > TOLD) {
             let message = format!(
@@ -226,7 +235,8 @@ fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> 
             find_growing(search, shift, &mut found, unstable);
         }
         found.missing = unstable.saturating_sub(found.growing());
-        if found.missing == 0 && is_complete(search, &found, modes) {
+        found.is_short = found.missing == 0 && !is_complete(search, &found, modes);
+        if found.missing == 0 && !found.is_short {
             break;
         }
         wanted *= 2;
