@@ -6,6 +6,7 @@ use crate::effect::Effect;
 use crate::effect::spin_hold::{HeldIn, Instance, SpinHold};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
+use crate::scene::section::SectionMatrices;
 use crate::system::Slot;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
@@ -28,14 +29,17 @@ struct StraightPart<'m> {
 }
 
 impl StraightPart<'_> {
-    /// Whether it is straight without load, and bends about all axes alike: a spin in a bend strains nothing.
+    /// Whether it is straight without load, and bends and turns about all axes alike: a spin in a bend strains nothing, nor does it move mass.
     fn is_round(&self) -> bool {
         let at = |beam: &MeshBeam, fraction: f64| {
-            let k = beam.section.at(fraction).stiffness;
+            let SectionMatrices { stiffness: k, mass } = beam.section.at(fraction);
+            let j = mass.map_or(Mat3::ZERO, |mass| mass.about_line).0;
+            let turns_alike =
+                (j[1][1] - j[2][2]).abs() <= ALIKE * j[1][1].abs() && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
             let size = |i: usize| k[i][i].abs();
             let alike = |i: usize, j: usize| (k[i][i] - k[j][j]).abs() <= ALIKE * size(i).max(size(j));
             let apart = |i: usize, j: usize| i == j || k[i][j].abs() <= ALIKE * (size(i) * size(j)).sqrt();
-            alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
+            turns_alike && alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
         };
         self.beams
             .iter()
@@ -157,7 +161,8 @@ impl Composer<'_> {
             mass.is_some_and(|mass| mass.offset != Vec3::ZERO)
         };
         let rotates = self.deck.stages.iter().any(|stage| stage.frame.is_some());
-        let inert = rotates && (self.has_spin_inertia(part) || !part.is_round());
+        let mut heavy = self.deck.bodies.iter().filter(|body| body.inertia.is_some());
+        let inert = rotates && (!part.is_round() || heavy.any(|body| self.is_on(part, &body.at)));
         turns || (bends && !part.is_round()) || part.beams.iter().any(is_eccentric) || inert
     }
 
