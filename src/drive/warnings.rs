@@ -26,6 +26,8 @@ const MOST_ALONE: f64 = 0.3;
 const STILL: f64 = 1e-6;
 /// The error that a step is proposed for, over the one that is told.
 const AIM: f64 = 0.4;
+/// The least part of a step that is proposed where another scheme does with the step as it is.
+const LEAST_PART: f64 = 0.1;
 
 /// What has been told already.
 #[derive(Clone, Debug)]
@@ -189,12 +191,17 @@ impl Run<'_> {
             return;
         };
         // Beyond its own size an error that grows linearly tells no more.
-        let over = over.min(1.0 / MOST);
-        let shorter = round_down(step * (AIM / over).sqrt());
+        let shorter = round_down(step * (AIM / over.min(1.0 / MOST)).sqrt());
         let is_of_rotations = of_displacements <= MOST && scheme.rotations == Rotations::Totals;
-        let other = if is_of_rotations { ", or `scheme = \"lie_generalized_alpha\"`" } else { "" };
+        let advice = if !is_of_rotations {
+            format!("`step = {shorter}`")
+        } else if (AIM / over).sqrt() < LEAST_PART {
+            "`scheme = \"lie_generalized_alpha\"`".into()
+        } else {
+            format!("`step = {shorter}`, or `scheme = \"lie_generalized_alpha\"`")
+        };
         let message = format!(
-            "stage {}: the time steps are too long: the estimated error of {what} (try `step = {shorter}`{other})",
+            "stage {}: the time steps are too long: the estimated error of {what} (try {advice})",
             self.stage + 1
         );
         self.warn(WarningKind::LongSteps, message);

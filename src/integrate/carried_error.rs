@@ -41,6 +41,15 @@ pub(super) const FREE_SPIN: f64 = 1.0 / 8.0;
 /// The change of rates that shows how forces follow them: that of an error of this size, in radians or over the length of the scene.
 const NUDGE: f64 = 1e-6;
 
+/// The most that an error is taken to grow to, over the sum of the sizes of local errors. What is carried along beyond that has grown from
+/// roundoff or second-order terms in an unstable motion (a body about its middle axis), which the motion itself has not.
+const MOST_GROWTH: f64 = 800.0;
+/// The same where accelerations ring from step to step: frequencies far above those that steps resolve let the carried error grow by itself in
+/// a frame that turns.
+const MOST_GROWTH_RINGING: f64 = 8.0;
+/// The part of the local errors from which on that is so.
+const RUNG: f64 = 0.05;
+
 /// The error of the steps of a stage, since it is carried along.
 pub(super) struct CarriedError {
     kinds: Arc<Vec<SlotKind>>,
@@ -62,6 +71,8 @@ pub(super) struct CarriedError {
     steps: usize,
     lengths: [f64; WIDTH],
     largest: Largest,
+    /// The sizes of local errors, summed over the steps, and of those among them that come from ringing
+    sums: [Largest; 2],
 }
 
 /// What is known of the error at the end of the present step.
@@ -143,6 +154,7 @@ impl CarriedError {
             steps: 0,
             lengths: [step.length; WIDTH],
             largest: Largest::default(),
+            sums: [Largest::default(); 2],
             step,
         }
     }
@@ -271,7 +283,7 @@ impl CarriedError {
         let found = self.known == Known::Error;
         let Self { kinds, slots, step, .. } = self;
         let work = |(number, part): (usize, &mut [OfSlot])| {
-            let mut largest = Largest::default();
+            let (mut largest, mut sizes) = (Largest::default(), [Largest::default(); 2]);
             for (k, slot) in (PART * number..).zip(part) {
                 let kind = kinds[k];
                 if kind.is_multiplier() || (kind == SlotKind::Rotation && increments.is_some()) {
@@ -289,6 +301,7 @@ impl CarriedError {
                 }
                 let mut now = slot.error;
                 if slot.moves {
+                    let rings = local.rings(slot, from.a[k], to.a[k]);
                     let [mut of_place, mut of_rate] = local.of(slot, from.a[k], to.a[k]);
                     if !equations.is_plain(k as Slot) {
                         of_place -= equations.held_part(k as Slot, of_place);
@@ -296,20 +309,30 @@ impl CarriedError {
                     }
                     // The error of a rate is not felt before the next step has ended.
                     now += of_place;
+                    take_size(&mut sizes, kind, of_place, rings);
                     slot.error += of_place - of_rate * h;
                     slot.rate += of_rate;
                 }
                 let moved = if kind == SlotKind::Displacement { to.q[k] - slot.start } else { Vec3::ZERO };
                 largest.take(kind, now, moved);
             }
-            largest
+            (largest, sizes)
         };
-        let mut now = Largest::default();
-        threads::in_order(slots.chunks_mut(PART).enumerate(), work, |of_part: Largest| now = now.or(of_part));
+        let (mut now, mut sizes) = (Largest::default(), [Largest::default(); 2]);
+        let gather = |(largest, [all, rung]): (Largest, [Largest; 2])| {
+            now = now.or(largest);
+            sizes = [sizes[0].or(all), sizes[1].or(rung)];
+        };
+        threads::in_order(slots.chunks_mut(PART).enumerate(), work, gather);
         if let Some(increments) = increments {
-            self.end_turns(increments, (from, to), &local, &mut now);
+            self.end_turns(increments, (from, to), &local, (&mut now, &mut sizes));
         }
         let now = now.root();
+        for (sum, size) in self.sums.iter_mut().zip(sizes) {
+            let size = size.root();
+            sum.displacement += size.displacement;
+            sum.rotation += size.rotation;
+        }
         self.largest = self.largest.or(now);
         let size = (now.displacement / self.length).max(now.rotation);
         self.nudge = if size > 0.0 { NUDGE / size } else { 0.0 };
@@ -321,7 +344,7 @@ impl CarriedError {
         increments: &Increments,
         (from, to): (&State, &State),
         local: &Local,
-        largest: &mut Largest,
+        (largest, sizes): (&mut Largest, &mut [Largest; 2]),
     ) {
         let (found, h) = (self.known == Known::Error, self.step.length);
         for (slot, turned) in self.turned.drain(..).filter(|_| found) {
@@ -331,9 +354,11 @@ impl CarriedError {
         for (before, after) in increments.accelerations(from).zip(increments.accelerations(to)) {
             let slot = &mut self.slots[after.slot as usize];
             if slot.moves {
+                let rings = local.rings(slot, before.driven, after.driven);
                 let [of_place, of_rate] = local.of(slot, before.driven, after.driven);
                 let of_spin = (after.free - before.free) * (h.powi(4) * after.spin.squared() * FREE_SPIN);
                 let back = Rotation::new(to.q[after.slot as usize]).r.transpose();
+                take_size(sizes, SlotKind::Rotation, of_place + of_spin, rings);
                 slot.error += back * (of_place + of_spin);
                 slot.rate += back * of_rate;
             }
@@ -361,7 +386,35 @@ impl CarriedError {
 
     /// The largest errors so far.
     pub fn largest(&self) -> Largest {
-        self.largest
+        let [all, rung] = self.sums;
+        let rings = rung.displacement > RUNG * all.displacement || rung.rotation > RUNG * all.rotation;
+        let most = match self.step.scheme {
+            scheme if !is_told_by_places(&scheme) => f64::INFINITY,
+            _ if rings => MOST_GROWTH_RINGING,
+            _ => MOST_GROWTH,
+        };
+        // What has no mass has no local errors of its own.
+        let bounded = |error: f64, sum: f64| if sum > 0.0 { error.min(most * sum) } else { error };
+        Largest {
+            displacement: bounded(self.largest.displacement, all.displacement),
+            rotation: bounded(self.largest.rotation, all.rotation),
+            moved: self.largest.moved,
+        }
+    }
+}
+
+/// Whether local errors of places tell how large those of rates are: those of a scheme of first order, or with a beta near 1/6, do not.
+fn is_told_by_places(scheme: &Scheme) -> bool {
+    let lag = scheme.lag();
+    (0.5 - scheme.gamma - lag).abs() < 1e-9 && (1.0 / 6.0 - scheme.beta - 0.5 * lag).abs() > 0.04
+}
+
+/// Takes the size of a local error into those of a step.
+#[inline(always)]
+fn take_size([all, rung]: &mut [Largest; 2], kind: SlotKind, size: Vec3, rings: bool) {
+    all.take(kind, size, Vec3::ZERO);
+    if rings {
+        rung.take(kind, size, Vec3::ZERO);
     }
 }
 
@@ -385,6 +438,13 @@ impl Local {
         let of_change = 1.0 / 6.0 - lag * (alpha_m - 0.5) - gamma * (0.5 + lag);
         let of_slope = [1.0 / 6.0 - beta - 0.5 * lag, 0.5 - gamma - lag];
         Self { factors: [of_slope[0] * h * h * h, of_slope[1] * h * h, of_change * h * h], place, per_span: 1.0 / span }
+    }
+
+    /// Whether an acceleration goes up and down from step to step.
+    #[inline(always)]
+    fn rings(&self, slot: &OfSlot, before: Vec3, after: Vec3) -> bool {
+        let earlier = slot.past[(self.place + WIDTH - 2) % WIDTH];
+        slot.age > 1 && (after - before).dot(before - earlier) < 0.0
     }
 
     /// tau and tau', from the accelerations at both ends.
