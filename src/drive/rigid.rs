@@ -9,9 +9,10 @@
 //!
 //! It holds in balance and out of it, under pretension and under following loads, but for dead loads that turning changes.
 
+use crate::effect::SomeIncrements;
 use crate::model::Model;
 use crate::rotation::Rotation;
-use crate::system::{Node, Slot, State, System};
+use crate::system::{Node, State, System};
 use crate::tensor::Vec3;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -38,7 +39,7 @@ pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<V
     let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
     let mut found = Vec::new();
     let mut field = vec![Vec3::ZERO; state.q.len()];
-    let mut look = |increments: &[(Slot, Vec3)]| {
+    let mut look = |increments: &SomeIncrements| {
         increments.iter().for_each(|&(slot, increment)| field[slot as usize] = increment);
         let mut motion = vec![0.0; equations.count()];
         equations.gather(|slot| field[slot], &mut motion);

@@ -84,6 +84,9 @@ impl Noise {
     }
 }
 
+/// Increments of some unknowns, each with its slot.
+pub type SomeIncrements = [(Slot, Vec3)];
+
 /// A motor of a joint in some state.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorState {
@@ -190,7 +193,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Shows motions against which nothing acts, each by the increments of some unknowns.
-    fn free_motions(&self, _at: &State, _show: &mut dyn FnMut(&[(Slot, Vec3)])) {}
+    fn free_motions(&self, _at: &State, _show: &mut dyn FnMut(&SomeIncrements)) {}
 
     /// Before a step is predicted from the velocities: takes out of them what nothing but round-off has put there.
     fn steady(&self, _at: &mut State) {}

@@ -1,9 +1,9 @@
 //! Holds spins that nothing resists: a straight part between ball joints may spin about its own axis without any force, in statics
 //! always and in a dynamic stage without rotary inertia; then round-off alone would tell by how much.
 
-use super::Effect;
+use super::{Effect, SomeIncrements};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, Slot, StageContext, StageKind, State};
+use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
 use crate::tensor::Vec3;
 
 /// One straight part: beams that are joined rigidly along a line.
@@ -80,7 +80,7 @@ impl Effect for SpinHold {
         self.parts.iter().for_each(|part| show(Aspect::Line(part.axis)));
     }
 
-    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&[(Slot, Vec3)])) {
+    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
         // A material spin about the axis of each node of a part: what has no inertia is no mode.
         let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
         for part in parts {

@@ -140,7 +140,7 @@ fn chains_come_to_rest_in_any_units_orientation_and_order() {
 }
 
 fn random_angle(number: usize) -> f64 {
-    if number % 4 == 0 { 0.0 } else { 0.7 * number as f64 }
+    if number.is_multiple_of(4) { 0.0 } else { 0.7 * number as f64 }
 }
 
 /// A bar on a hinge that its load turns by a quarter turn: it then lies along the load.
