@@ -30,7 +30,7 @@ const JUMP: f64 = 8.0;
 /// Methods for Nonlinear Problems, 5.1).
 pub(super) const LARGEST_CONTRACTION: f64 = 1.0;
 
-/// The same where pivots do not count whether it ended on another branch.
+/// Where pivots do not count whether a step ended on another branch, no correction may be larger than this part of the one before it.
 pub(super) const LARGEST_UNCOUNTED: f64 = 0.5;
 
 /// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.

@@ -48,7 +48,8 @@ const STEPS_OF_PUSH: usize = 8;
 /// What has less stiffness than this part of the largest force over the length of the scene is held by nothing.
 const LOOSE: f64 = 1e-7;
 
-/// The same of turns without any displacement, relative to the largest force times the length: thin cables have next to no torsional stiffness.
+/// A turn without any displacement that has less stiffness than this part of the largest force times the length is held by nothing: thin
+/// cables have next to no torsional stiffness.
 const LOOSE_TURN: f64 = 1e-12;
 
 /// What moves further than so many lengths of the scene, nothing holds.
@@ -259,10 +260,7 @@ impl Run<'_> {
 
     /// It is a mechanism from the start of the stage on.
     fn name_unheld(&self, vector: NullVector, system: &System) -> Failure {
-        match self.name_mechanism(Some(vector), system) {
-            Failure::Singular { at, place } => Failure::Singular { at: Moment { load: 0.0, ..at }, place },
-            failure => failure,
-        }
+        Failure::Singular { at: Moment { load: 0.0, ..self.moment() }, place: Some(self.place_of(&vector, system)) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
-use super::failure::{Failure, Moment, Tried, place, refusal, refusal_help};
+use super::failure::{Failure, Moment, Place, Tried, place, refusal, refusal_help};
 use super::findings::{Findings, Warning};
 use super::guard::EnergyGuard;
 use super::ledger::{Bookkeeper, Ledger};
@@ -689,9 +689,13 @@ impl<'o> Run<'o> {
     /// Names the node and the direction that move most in a motion without stiffness.
     pub(super) fn name_mechanism(&self, vector: Option<NullVector>, system: &System) -> Failure {
         let at = self.moment();
-        let Some(vector) = vector else { return Failure::Singular { at, place: None } };
+        Failure::Singular { at, place: vector.map(|vector| self.place_of(&vector, system)) }
+    }
+
+    /// Where a motion moves most.
+    pub(super) fn place_of(&self, vector: &NullVector, system: &System) -> Place {
         let (largest, motion) = vector.by_slot(&system.pattern.equations, self.model.slots());
-        Failure::Singular { at, place: Some(place(&self.model, largest, motion[largest])) }
+        place(&self.model, largest, motion[largest])
     }
 
     pub(super) fn describe(&self, error: StageError) -> Failure {

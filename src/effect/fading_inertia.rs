@@ -5,7 +5,7 @@
 //! away from load factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that this had: they have a
 //! potential, and their tangent is zero until the chart changes.
 
-use super::{Effect, own_part};
+use super::{Effect, one_by_one, own_part};
 use crate::kernel::load::force_on_complement;
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::complement;
@@ -31,9 +31,7 @@ impl Effect for FadingInertia {
     }
 
     fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
-        self.slots.iter().for_each(|&(slot, _)| cliques.push([slot]));
-        cliques
+        one_by_one(&self.slots)
     }
 
     fn is_symmetric(&self) -> bool {

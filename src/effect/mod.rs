@@ -433,6 +433,13 @@ fn own_part(before: usize, length: usize, instances: &Range<usize>) -> Range<usi
     place(instances.start)..place(instances.end)
 }
 
+/// Instances at one slot each.
+fn one_by_one(slots: &[(Slot, bool)]) -> Cliques {
+    let mut cliques = Cliques::divisible();
+    slots.iter().for_each(|&(slot, _)| cliques.push([slot]));
+    cliques
+}
+
 /// What of mass properties decides whether they lie in a plane.
 fn inertia_aspects(inertia: &Inertia, show: &mut dyn FnMut(Aspect)) {
     show(Aspect::Vector(inertia.offset));

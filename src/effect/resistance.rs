@@ -10,7 +10,7 @@
 //! along the forces, c dq/dt = -g (proximal point method: Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it
 //! stands beside the effects of a stage only while that looks for rest, and nothing is left of it in the balance that is found.
 
-use super::{Effect, own_part};
+use super::{Effect, one_by_one, own_part};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::{Rotation, log};
 use crate::system::{Aspect, Category, Cliques, Memory, Sink, Slot, StageContext, State};
@@ -36,9 +36,7 @@ impl Effect for Resistance {
     }
 
     fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
-        self.slots.iter().for_each(|&(slot, _)| cliques.push([slot]));
-        cliques
+        one_by_one(&self.slots)
     }
 
     fn is_symmetric(&self) -> bool {
