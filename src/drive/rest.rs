@@ -12,7 +12,7 @@ use crate::effect::resistance::Resistance;
 use crate::integrate::{Equilibrium, Method};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, SlotKind, charts};
-use crate::solve::{Convergence, Limp, LinearSolver, Newton, NullVector, Signature, Tangent, size};
+use crate::solve::{Limp, LinearSolver, Newton, NullVector, Signature, Tangent, size};
 use crate::system::{Anchor, Slot, State, System};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -126,11 +126,7 @@ impl Run<'_> {
         let mut model = self.model.clone();
         model.effects.push(Arc::new(Resistance { slots, arm: ARM * model.length }));
         let assembly = Assembly::new(&stage.context(self.stage), equations, &model);
-        let Some(solver) = LinearSolver::new(&assembly.system, &model.multipliers) else {
-            return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
-        };
-        let convergence = Convergence { tolerance: stage.tolerance };
-        let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
+        let newton = self.newton_for(stage, &assembly)?;
         Ok(Resisted { assembly, newton, steps: MOST_STEPS })
     }
 

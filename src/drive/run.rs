@@ -443,11 +443,7 @@ impl<'o> Run<'o> {
         self.plane = equations.plane().copied();
         self.warn_of_space(kind);
         let assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
-        let Some(solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
-            return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
-        };
-        let convergence = Convergence { tolerance: stage.tolerance };
-        let newton = Newton::new(convergence, stage.max_iterations, solver, &assembly.system);
+        let newton = self.newton_for(stage, &assembly)?;
         Ok(Workshop {
             assembly,
             newton,
@@ -460,6 +456,15 @@ impl<'o> Run<'o> {
             rateless: Vec::new(),
             guard: None,
         })
+    }
+
+    /// Newton's iteration on the system of a stage.
+    pub(super) fn newton_for(&self, stage: &Stage, assembly: &Assembly) -> Result<Newton, Failure> {
+        let Some(solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
+            return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
+        };
+        let convergence = Convergence { tolerance: stage.tolerance };
+        Ok(Newton::new(convergence, stage.max_iterations, solver, &assembly.system))
     }
 
     /// Where the stage is linear, it is so about the state in which the first such stage began, and the springs and loads that act when it
