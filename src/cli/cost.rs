@@ -6,7 +6,7 @@ use super::progress::Progress;
 use super::run::{folder, refuse_twins};
 use super::{Status, Verdict, cores, json, load, say, signals};
 use crate::deck::Accuracy;
-use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
+use crate::output::{Axis, HistoryReader, Level, Line, LinePlot, LineStyle, PartFile, Scale};
 use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -237,44 +237,56 @@ fn tell_lines(loaded: &Loaded, found: &Study, accuracy: f64) {
     lines(&loaded.deck, &run.settings).iter().for_each(|line| say::line(&format!("    {line}")));
 }
 
-/// Error over time: a line for each family through its own best runs, all others beside it, and the frontier of all behind.
+/// Error over CPU time: a line for each family through its own best runs, its other runs beside it, and the best of all families behind.
 fn plot(title: &str, found: &Study) -> String {
-    let place = |run: &&Run| (run.timing.seconds.cpu, run.error);
-    let all = NamedLine {
-        name: "cheapest of all".into(),
-        points: frontier(found).iter().map(place).collect(),
-        beside: Vec::new(),
-        background: true,
-    };
     let mut families: Vec<&Family> = Vec::new();
     for run in &found.runs {
         if !families.contains(&&run.point.family) {
             families.push(&run.point.family);
         }
     }
-    let line = |family: &&Family| {
-        let mut runs: Vec<&Run> =
-            found.runs.iter().filter(|run| run.point.family == **family && run.error > 0.0).collect();
-        runs.sort_by(|a, b| a.timing.seconds.cpu.total_cmp(&b.timing.seconds.cpu));
-        let mut best = f64::INFINITY;
-        let (points, beside): (Vec<&Run>, Vec<&Run>) = runs.into_iter().partition(|run| {
-            let better = run.error < best;
-            best = best.min(run.error);
-            better
-        });
-        let [points, beside] = [points, beside].map(|runs| runs.iter().map(place).collect());
-        NamedLine { name: family.name(), points, beside, background: false }
+    let best = Line {
+        name: "best of all".into(),
+        points: frontier(found).into_iter().map(cost_and_error).collect(),
+        bars: None,
+        beside: Vec::new(),
+        style: LineStyle::Background,
     };
+    let of_families = families.iter().enumerate().map(|(number, family)| family_line(found, family, number));
     let outputs = match &found.outputs[..] {
         [one] => found.columns[*one].clone(),
         several => format!("{} outputs", several.len()),
     };
-    LinePlots {
+    let axis = |title: String| Axis { title, scale: Scale::Logarithmic };
+    LinePlot {
         title: title.into(),
-        x: "CPU time / s".into(),
-        y: format!("error of {outputs}, relative"),
-        lines: std::iter::once(all).chain(families.iter().map(line)).collect(),
-        level: Some((found.reference.least_told(), "the reference tells no less".into())),
+        x: axis("CPU time [s]".into()),
+        y: axis(format!("relative error of {outputs}")),
+        lines: std::iter::once(best).chain(of_families).collect(),
+        level: Some(Level { value: found.reference.least_told(), name: "reference uncertainty".into() }),
+        boundaries: Vec::new(),
     }
-    .to_log_log_svg()
+    .to_svg()
+}
+
+fn cost_and_error(run: &Run) -> (f64, f64) {
+    (run.timing.seconds.cpu, run.error)
+}
+
+fn family_line(found: &Study, family: &Family, number: usize) -> Line {
+    let mut runs: Vec<&Run> = found.runs.iter().filter(|run| run.point.family == *family && run.error > 0.0).collect();
+    runs.sort_by(|a, b| a.timing.seconds.cpu.total_cmp(&b.timing.seconds.cpu));
+    let mut least_error = f64::INFINITY;
+    let (best, others): (Vec<&Run>, Vec<&Run>) = runs.into_iter().partition(|run| {
+        let is_better = run.error < least_error;
+        least_error = least_error.min(run.error);
+        is_better
+    });
+    Line {
+        name: family.name(),
+        points: best.into_iter().map(cost_and_error).collect(),
+        bars: None,
+        beside: others.into_iter().map(cost_and_error).collect(),
+        style: LineStyle::Marked(number),
+    }
 }

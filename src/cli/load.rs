@@ -164,9 +164,44 @@ fn bare(message: &str) -> String {
     words.chars().filter(|c| !c.is_ascii_digit() && !['.', '-'].contains(c)).collect()
 }
 
-/// The name of a deck: its file without the extension.
+/// The name of a deck: that of its file without `.toml`. A dot within the name belongs to it: `arm_0.004.toml` is `arm_0.004`.
 pub fn name(path: &Path) -> String {
-    let stem = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    without_extension(path, ".toml")
+}
+
+/// The name of a folder, with all its dots.
+pub fn folder_name(folder: &Path) -> String {
+    without_extension(folder, "")
+}
+
+/// The last part of a path, without an extension in ASCII letters that it may have.
+pub fn without_extension(path: &Path, extension: &str) -> String {
+    let file = path.file_name().map_or(String::new(), |file| file.to_string_lossy().into_owned());
+    let end = file.len().saturating_sub(extension.len());
+    let has_extension = file.get(end..).is_some_and(|found| found.eq_ignore_ascii_case(extension));
+    let name = if has_extension { &file[..end] } else { &file[..] };
     // Names become folders, never paths that lead elsewhere.
-    if stem.chars().all(|c| c == '.') { "deck".into() } else { stem }
+    if name.chars().all(|c| c == '.') { "deck".into() } else { name.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dots_belong_to_names() {
+        for (path, expected) in [
+            ("decks/arm.toml", "arm"),
+            ("ARM.TOML", "ARM"),
+            ("arm2_0.004.toml", "arm2_0.004"),
+            ("arm2_0.001", "arm2_0.001"),
+            (".toml", "deck"),
+            ("..", "deck"),
+            ("", "deck"),
+        ] {
+            assert_eq!(name(Path::new(path)), expected, "{path}");
+        }
+        assert_eq!(folder_name(Path::new("results/arm2_0.004/")), "arm2_0.004");
+        assert_eq!(without_extension(Path::new("a.b/stored.2.csv"), ".csv"), "stored.2");
+    }
 }

@@ -36,7 +36,7 @@ fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
         let message = format!("{}: this version of beamsim does not read the deck: run it again", folder.display());
         Refusal::of(Status::Wrong, "deck", message)
     })?;
-    let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::name(&path));
+    let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::folder_name(&path));
     // A history holds the nodes that were asked for; the shape is that of the same run once more.
     let film = filmed(&scene, &name)?;
     let path = out.map_or_else(|| folder.join("report.html"), Path::to_path_buf);

@@ -4,7 +4,7 @@ use super::{Status, say};
 use crate::deck::{Entry, SCHEMA, explain as explained};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Columns of a terminal that text is broken at.
 const WIDTH: usize = 96;
@@ -101,7 +101,7 @@ impl Template {
 pub fn new(template: Template, out: Option<&Path>) -> Status {
     use clap::ValueEnum;
     let name = template.to_possible_value().map_or(String::new(), |value| value.get_name().to_string());
-    let path = out.map_or_else(|| Path::new(&name).with_extension("toml"), Path::to_path_buf);
+    let path = out.map_or_else(|| PathBuf::from(format!("{name}.toml")), Path::to_path_buf);
     let file = OpenOptions::new().write(true).create_new(true).open(&path);
     match file.and_then(|mut file| file.write_all(template.text().as_bytes())).and_then(|()| schema_beside(&path)) {
         Ok(()) => {

@@ -1,5 +1,6 @@
 //! run.json: what was simulated, what it took, how it ended.
 
+use super::Units;
 use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
 use crate::integrate::Largest;
 use crate::scene::Scene;
@@ -59,6 +60,11 @@ impl Record {
     /// The deck as it was read.
     pub fn text(&self) -> Option<&str> {
         self.0["text"].as_str()
+    }
+
+    /// Labels of the units of the deck.
+    pub fn units(&self) -> Units {
+        Units::of_deck(&self.0["deck"])
     }
 
     /// Whether a signal ended the run.

@@ -247,7 +247,7 @@ fn cost_writes_its_table_and_plot_and_prints_lines_for_an_accuracy() {
     let table = fs::read_to_string(folder.0.join("results/deck/cost.csv")).unwrap();
     assert_eq!(table.lines().count(), 1 + 2 * 2 * 3);
     let plot = fs::read_to_string(folder.0.join("results/deck/cost.svg")).unwrap();
-    assert!(plot.contains("CPU time / s") && plot.contains("order 2, relative") && !plot.contains("NaN"));
+    assert!(plot.contains("CPU time [s]") && plot.contains("order 2, relative") && !plot.contains("NaN"));
 }
 
 /// The first step on offer fails in two steps of five, and takes three times the iterations of half of it.

@@ -11,7 +11,7 @@ const ORDER: [&str; 18] = [
 ];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 15] = [
     ("rayon", &["src/threads.rs"]),
     ("faer", &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/krylov.rs", "src/solve/block/order.rs"]),
     ("toml", &["src/deck/"]),
@@ -19,7 +19,8 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("annotate_snippets", &["src/deck/"]),
     ("strsim", &["src/deck/"]),
     ("csv", &["src/output/", "src/study/", "src/deck/import.rs"]),
-    ("kuva", &["src/output/plot.rs", "src/output/curves.rs"]),
+    ("resvg", &["src/output/plot/png.rs"]),
+    ("notosans", &["src/output/plot/png.rs"]),
     ("cpu_time", &["src/study/cost/trial.rs"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),
