@@ -6,7 +6,7 @@ use super::{Status, Verdict, json, load, on_threads, report, say, signals, threa
 use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Row, RowCounter, Rows,
-    remove_fields, remove_if_there,
+    Units, remove_fields, remove_if_there,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
@@ -119,6 +119,8 @@ struct Watcher<'r> {
     /// What is expected on the way, where that is judged
     recorder: Option<&'r mut Recorder>,
     progress: Progress,
+    /// With a space before it, where the deck names one
+    time_unit: String,
     dynamic: Vec<bool>,
     rows: RowCounter,
     modes: ModesWriter,
@@ -179,7 +181,8 @@ impl Observer for Watcher<'_> {
     }
 
     fn progress(&mut self, at: Moment, done: f64) -> Result<(), Failure> {
-        self.progress.tell(done, || format!("time {:.6}, load factor {:.4}", at.time, at.load));
+        let time_unit = &self.time_unit;
+        self.progress.tell(done, || format!("time {:.6}{time_unit}, load factor {:.4}", at.time, at.load));
         match signals::caught() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),
             None => Ok(()),
@@ -238,6 +241,7 @@ pub fn simulate(
         values: Vec::new(),
         recorder,
         progress: Progress::new(name),
+        time_unit: Units::of_deck(&scene.resolved).of_column("time").map_or(String::new(), |unit| format!(" {unit}")),
         modes: ModesWriter::default(),
         fields,
         film,
