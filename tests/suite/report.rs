@@ -204,7 +204,7 @@ fn a_browser_plays_scrubs_and_shows_the_numbers_of_the_history() {
     let folder = Folder::new("report_browser");
     folder.write("deck.toml", DECK);
     assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--report", "--error-bars", "--out", "r"])), 0);
-    play(&folder, "r", &["time", "a@end: position", "tip: position", "b@0.1: position", "energy"]);
+    play(&folder, "r", &["time", "energy", "a@end: position", "tip: position", "b@0.1: position"]);
 }
 
 #[test]

@@ -47,6 +47,7 @@ impl Report<'_> {
             "version": env!("CARGO_PKG_VERSION"),
             "deck": self.record.text(),
             "run": self.record.bare(),
+            "length_unit": units.of_column("x"),
             "history": table(&history, &shown, &columns, &units),
             "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, &units) },
             "scene": film.to_json(&row, &units),
