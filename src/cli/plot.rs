@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// Columns that are drawn where none is named.
 const USUAL: usize = 6;
+/// Displacements that change by less than this part of the largest change are still, but for round-off.
+const STILL: f64 = 1e-9;
 /// Columns that belong to every history.
 const CLOCKS: [&str; 3] = ["stage", "time", "load"];
 
@@ -19,7 +21,7 @@ pub struct Wanted {
     /// Folders of results, or histories (CSV); several are drawn on the same axes
     #[arg(required = true, value_name = "RESULTS")]
     results: Vec<PathBuf>,
-    /// A column, such as tip.ux (default: displacements)
+    /// A column, such as tip.ux (default: displacements that change)
     #[arg(long = "column", value_name = "COLUMN")]
     columns: Vec<String>,
     /// The column of the horizontal axis (default: time; if all stages are static, the load factor, stage by stage)
@@ -39,8 +41,8 @@ struct NamedHistory {
     /// Where it was read
     path: PathBuf,
     history: HistoryReader,
-    /// Of the deck, where run.json lies beside the history
-    units: Option<Units>,
+    /// Of its run, where run.json lies beside the history
+    record: Option<Record>,
     is_reference: bool,
 }
 
@@ -90,9 +92,8 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
             lines.push(Line { name, points, bars, beside: Vec::new(), style: LineStyle::Dashed { colour, dash } });
         }
     }
-    let names = runs.iter().filter(|run| !run.is_reference).map(|run| run.name.as_str());
     let plot = LinePlot {
-        title: names.collect::<Vec<_>>().join(", "),
+        title: title(&runs),
         x: Axis { title: abscissa.title(&units), scale: Scale::Linear },
         y: Axis { title: y_title, scale: Scale::Linear },
         lines,
@@ -107,11 +108,21 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// The title of the deck of one run, else the names of the runs.
+fn title(runs: &[NamedHistory]) -> String {
+    let drawn: Vec<&NamedHistory> = runs.iter().filter(|run| !run.is_reference).collect();
+    let names: Vec<&str> = drawn.iter().map(|run| run.name.as_str()).collect();
+    match &drawn[..] {
+        [run] => run.record.as_ref().and_then(Record::title).unwrap_or(&run.name).into(),
+        _ => names.join(", "),
+    }
+}
+
 /// The units that all runs with a deck share; a stored history has those of the runs that it is compared with.
 fn common_units(runs: &[NamedHistory]) -> Units {
-    let mut known = runs.iter().filter_map(|run| run.units.as_ref());
-    let first = known.next().cloned().unwrap_or_default();
-    if known.all(|units| *units == first) {
+    let mut known = runs.iter().filter_map(|run| run.record.as_ref()).map(Record::units);
+    let first = known.next().unwrap_or_default();
+    if known.all(|units| units == first) {
         return first;
     }
     say::note("warning: the runs have different units, which are left out of the picture");
@@ -213,8 +224,8 @@ fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, Refusal> {
     let folder = file.parent().filter(|_| is_of_run).and_then(|folder| std::fs::canonicalize(folder.join(".")).ok());
     // `results/arm/history.csv` is `arm`.
     let name = folder.as_deref().map_or_else(|| load::without_extension(&file, ".csv"), load::folder_name);
-    let units = folder.and_then(|folder| Record::read(&folder).ok()).map(|record| record.units());
-    Ok(NamedHistory { name, path: path.into(), history, units, is_reference })
+    let record = folder.and_then(|folder| Record::read(&folder).ok());
+    Ok(NamedHistory { name, path: path.into(), history, record, is_reference })
 }
 
 /// Runs of the same name are named by their paths.
@@ -252,7 +263,7 @@ fn find(history: &HistoryReader, name: &str) -> Result<usize, Refusal> {
     })
 }
 
-/// The columns that the user names; else the displacements, or the first ones.
+/// The columns that the user names; else displacements that change, all displacements, or any columns.
 fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refusal> {
     if !wanted.columns.is_empty() {
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
@@ -262,12 +273,23 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
     };
     let moved = |name: &&String| [".ux", ".uy", ".uz"].iter().any(|suffix| name.ends_with(suffix));
     let all: Vec<String> = history.names.iter().filter(shown).cloned().collect();
-    let some: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
-    let usual = if some.is_empty() { all } else { some };
+    let displacements: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
+    let changes: Vec<f64> = displacements.iter().map(|name| change(history, name)).collect();
+    let largest = changes.iter().copied().fold(0.0, f64::max);
+    let changing = displacements.iter().zip(&changes).filter(|(_, change)| **change > STILL * largest);
+    let candidates = [changing.map(|(name, _)| name.clone()).collect(), displacements, all];
+    let usual = candidates.into_iter().find(|names: &Vec<String>| !names.is_empty()).unwrap_or_default();
     if usual.is_empty() {
         return Err(Refusal::of(Status::Wrong, "usage", "the history has no columns to draw".into()));
     }
     Ok(usual.into_iter().take(USUAL).collect())
+}
+
+/// The difference of the largest and the smallest value of a column.
+fn change(history: &HistoryReader, name: &str) -> f64 {
+    let Some(place) = history.names.iter().position(|known| known == name) else { return 0.0 };
+    let values = || history.rows.iter().map(|row| row[place]);
+    values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
 }
 
 /// The time where it advances in a run; else the load factor, of several stages one after the other.

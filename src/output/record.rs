@@ -62,6 +62,11 @@ impl Record {
         self.0["text"].as_str()
     }
 
+    /// The title of the deck.
+    pub fn title(&self) -> Option<&str> {
+        self.0["deck"]["title"].as_str()
+    }
+
     /// Labels of the units of the deck.
     pub fn units(&self) -> Units {
         Units::of_deck(&self.0["deck"])

@@ -46,7 +46,7 @@ fn axes_have_the_units_of_the_deck() {
     let folder = Folder::new("plot_units");
     let units = "units = { length = \"mm\", force = \"N\", time = \"s\" }\n";
     let columns = "columns = [\"u\", \"r\", \"reaction\"]\n";
-    folder.write("arm.toml", &format!("{units}{DECK}{columns}"));
+    folder.write("arm.toml", &format!("title = \"An arm & a tip\"\n{units}{DECK}{columns}"));
     let dynamic = DECK.replace("kind = \"static\"\nsteps = 4", "kind = \"dynamic\"\nend = 0.2\nstep = 0.1");
     folder.write("swing.toml", &format!("{units}{dynamic}"));
     folder.write("metres.toml", &format!("{}{DECK}", units.replace("mm", "m")));
@@ -56,7 +56,7 @@ fn axes_have_the_units_of_the_deck() {
     for (results, words, axes, legend) in [
         ("arm", &["--column", "tip.uz"][..], ["load factor", "tip.uz [mm]"], &["tip.uz"][..]),
         ("swing", &["--column", "tip.uz"], ["time [s]", "tip.uz [mm]"], &["tip.uz"]),
-        ("arm", &[], ["load factor", "displacement [mm]"], &["tip.ux", "tip.uy", "tip.uz"]),
+        ("arm", &[], ["load factor", "displacement [mm]"], &["tip.ux", "tip.uz"]),
         ("arm", &["--column", "tip.ry", "--x", "tip.uz"], ["tip.uz [mm]", "tip.ry [rad]"], &["tip.ry"]),
         ("arm", &["--column", "tip.my", "--column", "tip.uz"], ["load factor", ""], &["tip.my [N·mm]", "tip.uz [mm]"]),
     ] {
@@ -66,6 +66,8 @@ fn axes_have_the_units_of_the_deck() {
             [texts(&folder, "p.svg", "x-title"), texts(&folder, "p.svg", "y-title")].map(|title| title.join(" "));
         assert_eq!(shown, axes, "{words:?}");
         assert_eq!(texts(&folder, "p.svg", "legend"), legend, "{words:?}");
+        let title = if results == "arm" { "An arm &amp; a tip" } else { "swing" };
+        assert_eq!(texts(&folder, "p.svg", "title"), [title]);
         for tick in [texts(&folder, "p.svg", "x-tick"), texts(&folder, "p.svg", "y-tick")].concat() {
             assert!(tick.parse::<f64>().is_ok(), "{tick}");
         }
