@@ -26,7 +26,7 @@ quick:
 
 # Check format and lints
 lint:
-    cargo fmt --check
+    cargo fmt --all --check
     cargo clippy --release --locked --all-targets --all-features -- -D warnings
 
 # Run the commands in docs/, check links, and build the API documentation
