@@ -3,14 +3,14 @@
 //!
 //! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only, `-- --elements 10000,1000000` these.
 
-use beamsim::drive::{Failure, Observer, Run, Snapshot};
-use beamsim::effect::Noise;
-use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::model::{Assembly, Model, StageContext, StageKind};
 use beamsim::scene;
-use beamsim::solve::{Convergence, LinearSolver};
-use beamsim::system::Leftover;
-use beamsim::tensor::Vec3;
+use beamsim_core::effect::Noise;
+use beamsim_core::kernel::{ElementSystem, Weights};
+use beamsim_core::model::{Assembly, Model, StageContext, StageKind};
+use beamsim_core::run::{Failure, Observer, Run, Snapshot};
+use beamsim_core::solve::{Convergence, LinearSolver};
+use beamsim_core::system::Leftover;
+use beamsim_core::tensor::Vec3;
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -3,13 +3,13 @@
 use super::load::Loaded;
 use super::run::status_of;
 use super::{Status, Verdict, json, load, on_threads, say, threads_of};
-use crate::drive::{Failure, Moment, refusal};
-use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use crate::system::StageKind;
-use crate::tensor::{Mat3, Vec3};
-use crate::threads;
+use beamsim_core::model::{Assembly, Share};
+use beamsim_core::run::{Failure, Moment, refusal};
+use beamsim_core::system::StageKind;
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::threads;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

@@ -3,9 +3,9 @@
 use super::compose::Reason;
 use super::mesh::Mesh;
 use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, StageBody};
-use crate::drive::InitialMotion;
-use crate::model::Model;
-use crate::system::{Aspect, Plane, rounded};
+use beamsim_core::model::Model;
+use beamsim_core::run::InitialMotion;
+use beamsim_core::system::{Aspect, Plane, rounded};
 
 /// The plane of a scene, if it has one and the deck does not refuse it.
 pub fn plane(

@@ -2,11 +2,11 @@
 //! as dampers, wound springs and effects over increments.
 
 use crate::random::Random;
-use beamsim::integrate::{Increments, Method, Scheme, Step};
-use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model, StageKind, charts};
 use beamsim::scene;
-use beamsim::system::State;
+use beamsim_core::integrate::{Increments, Method, Scheme, Step};
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::{Assembly, Model, StageKind, charts};
+use beamsim_core::system::State;
 
 const SECTION: &str = r#"
 [point]
@@ -93,14 +93,14 @@ fn scene_of(text: &str) -> (Model, State, Assembly) {
     (model, state, assembly)
 }
 
-fn scatter(assembly: &Assembly, x: &[f64], field: &mut [beamsim::tensor::Vec3], factor: f64) {
-    let mut whole = vec![beamsim::tensor::Vec3::ZERO; field.len()];
+fn scatter(assembly: &Assembly, x: &[f64], field: &mut [beamsim_core::tensor::Vec3], factor: f64) {
+    let mut whole = vec![beamsim_core::tensor::Vec3::ZERO; field.len()];
     assembly.system.pattern.equations.scatter(x, None, &mut whole);
     field.iter_mut().zip(whole).for_each(|(f, w)| *f += w * factor);
 }
 
 fn correct(assembly: &Assembly, step: &Step, x: &[f64], state: &mut State, factor: f64) {
-    let mut dq = vec![beamsim::tensor::Vec3::ZERO; state.q.len()];
+    let mut dq = vec![beamsim_core::tensor::Vec3::ZERO; state.q.len()];
     scatter(assembly, x, &mut dq, factor);
     step.correct(state, &dq);
 }

@@ -1,12 +1,12 @@
 //! Negative pivots of tangents with multipliers against eigenvalues on the space that the constraints leave.
 
 use crate::random::Random;
-use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model, SlotKind};
 use beamsim::scene;
-use beamsim::solve::{LinearSolver, Tangent};
-use beamsim::system::{State, System};
-use beamsim::tensor::Vec3;
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::{Assembly, Model, SlotKind};
+use beamsim_core::solve::{LinearSolver, Tangent};
+use beamsim_core::system::{State, System};
+use beamsim_core::tensor::Vec3;
 use nalgebra::{DMatrix, DVector};
 
 /// The eigenvalues on the space that the constraints leave, of unknowns that are scaled so that they compare.

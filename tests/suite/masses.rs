@@ -1,9 +1,9 @@
 //! Mass matrices that are the same in all directions, added entry by entry, against what adds any element.
 
 use crate::random::Random;
-use beamsim::kernel::ElementSystem;
-use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Pattern, Plane, Symmetry, System};
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::ElementSystem;
+use beamsim_core::system::{Category, Cliques, Direction, Equations, Groups, Layout, Pattern, Plane, Symmetry, System};
+use beamsim_core::tensor::{Mat3, Vec3};
 
 const NODES: usize = 6;
 

@@ -5,17 +5,17 @@
 use crate::dual::Dual;
 use crate::random::Random;
 use crate::tangents::{agree, symmetric};
-use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot, Warning};
-use beamsim::kernel::beam::StiffnessPoint;
-use beamsim::kernel::elastic::{Stiffness, Strain};
-use beamsim::kernel::inertia::{Inertia, Spin, body};
-use beamsim::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
-use beamsim::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
-use beamsim::model::Assembly;
-use beamsim::real::Real;
 use beamsim::scene::{self, Scene};
-use beamsim::system::Plane;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::beam::StiffnessPoint;
+use beamsim_core::kernel::elastic::{Stiffness, Strain};
+use beamsim_core::kernel::inertia::{Inertia, Spin, body};
+use beamsim_core::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
+use beamsim_core::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
+use beamsim_core::model::Assembly;
+use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot, Warning};
+use beamsim_core::scalar::Real;
+use beamsim_core::system::Plane;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::array::from_fn;
 
 /// Derivatives over the unknowns of the largest element.

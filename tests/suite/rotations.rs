@@ -2,10 +2,10 @@
 
 use crate::dual::{Dual, along, jacobian, tensor_rate, values, variables, vector_rate};
 use crate::random::Random;
-use beamsim::model::charts;
-use beamsim::rotation::{Complement, Rotation, complement, log, nearest_turn, principal, relative_angle, unwound};
-use beamsim::system::State;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::model::charts;
+use beamsim_core::rotation::{Complement, Rotation, complement, log, nearest_turn, principal, relative_angle, unwound};
+use beamsim_core::system::State;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
 type Jet = Dual<3>;

@@ -1,15 +1,15 @@
 //! Time schemes: order two for all of them, through changes of chart, with equal and with alternating steps; adaptive steps.
 
 use crate::scenes::{distance, simulate};
-use beamsim::drive::InitialMotion;
-use beamsim::integrate::{Increments, Rotations, Scheme, Step};
-use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, StageKind, charts};
-use beamsim::rotation::Rotation;
 use beamsim::scene;
-use beamsim::solve::{Convergence, LinearSolver, Newton, Work};
-use beamsim::system::State;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::integrate::{Increments, Rotations, Scheme, Step};
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::{Assembly, StageKind, charts};
+use beamsim_core::rotation::Rotation;
+use beamsim_core::run::InitialMotion;
+use beamsim_core::solve::{Convergence, LinearSolver, Newton, Work};
+use beamsim_core::system::State;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 const SCHEMES: [&str; 7] = [
     "scheme = \"lie_generalized_alpha\"",

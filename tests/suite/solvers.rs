@@ -2,15 +2,15 @@
 
 use crate::decks::decks;
 use crate::random::Random;
-use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::model::{Assembly, Model, SlotKind, StageContext, StageKind, charts};
 use beamsim::scene;
-use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, Tangent, is_symmetric};
-use beamsim::system::{
+use beamsim_core::kernel::{ElementSystem, Weights};
+use beamsim_core::model::{Assembly, Model, SlotKind, StageContext, StageKind, charts};
+use beamsim_core::solve::{BlockSolver, GeneralSolver, LinearSolver, Tangent, is_symmetric};
+use beamsim_core::system::{
     Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Memory, Pattern, Plane, State, Symmetry, System,
 };
-use beamsim::tensor::{Mat3, Vec3};
-use beamsim::threads;
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::threads;
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 

@@ -1,13 +1,13 @@
 //! Large scenes on several threads: the same results to the last bit, and the same as without regions but for the order of sums.
 
 use crate::random::Random;
-use beamsim::drive::{Failure, Ledger, Observer, Run, Snapshot};
-use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model};
 use beamsim::scene;
-use beamsim::system::{Memory, State};
-use beamsim::tensor::Vec3;
-use beamsim::threads;
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::{Assembly, Model};
+use beamsim_core::run::{Failure, Ledger, Observer, Run, Snapshot};
+use beamsim_core::system::{Memory, State};
+use beamsim_core::tensor::Vec3;
+use beamsim_core::threads;
 
 /// Cantilevers side by side, tied at their tips, of enough nodes for several regions; effects of every kind that is cut.
 fn deck(stage: &str, order: usize, planar: bool) -> String {
