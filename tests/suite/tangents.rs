@@ -456,8 +456,8 @@ fn rotational_springs_hold_through_whole_turns() {
                 let (stiffness, p) = (random.positive_definite(), random.vector(psi));
                 let moving = variables::<3>(p, 0);
                 let k: Mat3<Dual<3>> = Mat3::constant(stiffness);
-                let wound = moving * (Dual::<3>::one() + Dual::<3>::constant(2.0 * PI * turns) / moving.norm());
-                let energy = wound.dot(k * wound) * 0.5;
+                let unwrapped = moving * (Dual::<3>::one() + Dual::<3>::constant(2.0 * PI * turns) / moving.norm());
+                let energy = unwrapped.dot(k * unwrapped) * 0.5;
                 let (force, tangent) = rotational(stiffness, turns, p);
                 let lifted = rotational(stiffness, turns, moving).0;
                 let what = format!("rotational spring, {turns} turns at P = {p:?}, |P| = {psi}");

@@ -3,12 +3,12 @@
 use super::elastic_element::ElasticElement;
 use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
 use super::planar_elasticity::PlanarElasticity;
-use super::{AT_ONCE, ByOrder, Effect, Energy, Noise, PlanarForm, at_slots, for_each_batch, side_by_side};
+use super::{AT_ONCE, ByOrder, Effect, Energy, PlanarForm, RoundOff, at_slots, for_each_batch, side_by_side};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodePlace, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
-use crate::system::{Aspect, Category, Cliques, Memory, Plane, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::marker::PhantomData;
@@ -83,31 +83,31 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         Category::Internal
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
         for_each_batch!(self.elements, |_first, batch| for element in batch {
-            cliques.push(element.connection.slots());
+            connectivity.push(element.connection.slots());
         });
-        cliques
+        connectivity
     }
 
     fn is_symmetric(&self) -> bool {
         true
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         // Where they are the mesh shows.
         for_each_batch!(self.elements, |_first, batch| for alike in batch.chunk_by(ElasticElement::is_like) {
             for point in alike[0].points() {
-                show(Aspect::Vector(point.tangent));
-                show(Aspect::Tensor(point.stiffness.cn));
-                show(Aspect::Tensor(point.stiffness.cm));
+                show(MirrorData::Vector(point.tangent));
+                show(MirrorData::Tensor(point.stiffness.cn));
+                show(MirrorData::Tensor(point.stiffness.cm));
                 if let Some(cc) = point.stiffness.cc {
-                    show(Aspect::Coupling(cc));
+                    show(MirrorData::Coupling(cc));
                 }
                 if let Some(free) = point.free {
-                    show(Aspect::Vector(free.gamma));
-                    show(Aspect::Axial(free.kappa));
+                    show(MirrorData::Vector(free.gamma));
+                    show(MirrorData::Axial(free.kappa));
                 }
             }
         });
@@ -122,7 +122,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         self.points_before(two.len() + three.len() + four.len())
     }
 
-    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
         let remembered = self.remembered(memory);
         for_each_batch!(self.elements, out.instances(), |first, batch| {
             let part = remembered.get(self.points_before(first)..).unwrap_or_default();
@@ -187,10 +187,14 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         });
     }
 
-    fn noise(&self, at: &State) -> Noise {
-        let mut largest = Noise::default();
+    fn round_off(&self, at: &State) -> RoundOff {
+        let mut largest = RoundOff::default();
         for_each_batch!(self.elements, |_first, batch| {
-            threads::in_order(batch.chunks(AT_ONCE), |part| noise_of(part, at), |noise| largest = largest.or(noise));
+            threads::in_order(
+                batch.chunks(AT_ONCE),
+                |part| noise_of(part, at),
+                |round_off| largest = largest.or(round_off),
+            );
         });
         largest
     }
@@ -203,12 +207,12 @@ const UNSTRAINED: f64 = 1e-14;
 const UNBENT: f64 = 1e-12;
 
 /// The largest round-off of the forces of some elements.
-fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> Noise {
-    let mut largest = Noise::default();
+fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> RoundOff {
+    let mut largest = RoundOff::default();
     for element in batch {
         let nodes = element.connection.nodes.iter();
         let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
-        element.each_noise(u, |noise| largest = largest.or(noise));
+        element.each_noise(u, |round_off| largest = largest.or(round_off));
     }
     largest
 }
@@ -222,7 +226,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     remembered: &[[f64; 6]],
     at: &State,
     weights: Weights,
-    out: &mut Sink,
+    out: &mut Assembler,
 ) {
     let stiffness = weights.stiffness;
     let mut systems = out.lend(2 * N, stiffness != 0.0);
@@ -465,7 +469,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         at: &State,
         stiffness: f64,
         (system, scratch): &mut (ElementSystem, Scratch),
-        out: &mut Sink,
+        out: &mut Assembler,
     ) {
         let sum = Sum { points: self.points(), stresses, free: self.free_amplitude(at) };
         I::evaluate(self.member(), at, stiffness, scratch, system, &sum);

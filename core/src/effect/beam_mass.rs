@@ -3,7 +3,7 @@
 use super::volume::{VolumeElement, VolumeElements};
 use super::{AT_ONCE, ByOrder, Effect, Energy, Momentum, for_each_batch, shared};
 use crate::kernel::Weights;
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, Slot, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
@@ -104,21 +104,21 @@ impl Effect for BeamMass {
         Category::Inertia
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
-        for_each_batch!(self.elements, |_first, batch| batch.iter().for_each(|element| cliques.push(element.u)));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
+        for_each_batch!(self.elements, |_first, batch| batch.iter().for_each(|element| connectivity.push(element.u)));
+        connectivity
     }
 
     fn is_symmetric(&self) -> bool {
         true
     }
 
-    fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
         // On the centre line, which the mesh shows.
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         for_each_batch!(self.elements, out.instances(), |first, batch| {
             for (k, element) in batch.iter().enumerate() {
                 out.add_mass(first + k, &element.times(&at.a), element.mass(), weights.mass);

@@ -1,6 +1,6 @@
 //! Elastic elements as they are kept: what neighbours have in common stands once.
 
-use super::{Connection, Noise, shared};
+use super::{Connection, RoundOff, shared};
 use crate::kernel::beam::StiffnessPoint;
 use crate::scalar::{LANES, Lanes, Pack, each_lane};
 use crate::tensor::Vec3;
@@ -28,12 +28,12 @@ struct Common<const N: usize, const G: usize> {
     arms: [Vec3; N],
     points: [StiffnessPoint<N>; G],
     /// Round-off of the force of each point, and of its moment for slopes of one
-    rounding: [Noise; G],
+    rounding: [RoundOff; G],
 }
 
 impl<const N: usize, const G: usize> Common<N, G> {
     fn new(arms: [Vec3; N], points: [StiffnessPoint<N>; G]) -> Self {
-        let of_point = |point: &StiffnessPoint<N>| Noise {
+        let of_point = |point: &StiffnessPoint<N>| RoundOff {
             force: f64::EPSILON * point.stiffness.cn.max_abs(),
             moment: f64::EPSILON * point.stiffness.cm.max_abs() * PI,
         };
@@ -78,12 +78,12 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// Shows what round-off may leave of the force of each point, where displacements are at most `u`: these and rotations carry a relative
     /// error of one unit in the last place; strains divide it by the element's length, and stiff sections multiply it.
     #[inline]
-    pub fn each_noise(&self, u: f64, mut show: impl FnMut(Noise)) {
+    pub fn each_noise(&self, u: f64, mut show: impl FnMut(RoundOff)) {
         for (point, rounding) in self.common.points.iter().zip(&self.common.rounding) {
             let steepest = point.slope.iter().fold(0.0_f64, |s, d| s.max(d.abs()));
-            let Noise { force: at_rest, moment } = *rounding;
+            let RoundOff { force: at_rest, moment } = *rounding;
             let force = at_rest + at_rest * steepest * u;
-            show(Noise { force, moment: moment * steepest + force * point.weight });
+            show(RoundOff { force, moment: moment * steepest + force * point.weight });
         }
     }
 

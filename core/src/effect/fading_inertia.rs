@@ -9,7 +9,9 @@ use super::{Effect, one_by_one, own_part};
 use crate::kernel::load::force_on_complement;
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::complement;
-use crate::system::{Aspect, Category, Cliques, Fading, Memory, Sink, Slot, StageContext, StageKind, StageSet, State};
+use crate::system::{
+    Assembler, Category, Connectivity, Fading, Memory, MirrorData, Slot, StageContext, StageKind, StageSet, State,
+};
 use crate::tensor::{Mat3, Vec3};
 
 /// The forces at all slots of nodes, see [`State::fading`].
@@ -30,7 +32,7 @@ impl Effect for FadingInertia {
         Category::External
     }
 
-    fn cliques(&self) -> Cliques {
+    fn connectivity(&self) -> Connectivity {
         one_by_one(&self.slots)
     }
 
@@ -43,9 +45,9 @@ impl Effect for FadingInertia {
     }
 
     /// Motion that lies in a plane has forces that do.
-    fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {}
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         if at.fading.is_empty() {
             return;
         }

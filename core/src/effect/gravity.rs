@@ -2,12 +2,12 @@
 
 use super::rigid_body::Body;
 use super::volume::VolumeElements;
-use super::{Effect, inertia_aspects};
+use super::{Effect, inertia_mirror_data};
 use crate::kernel::inertia::Inertia;
 use crate::kernel::load::{Weight, offset_force};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
 /// The weight of all beams. Elements with their mass on the centre line need no rotation and no tangent.
@@ -30,8 +30,8 @@ impl Effect for BeamGravity {
         Category::External
     }
 
-    fn cliques(&self) -> Cliques {
-        self.elements.cliques(Blocks::Both)
+    fn connectivity(&self) -> Connectivity {
+        self.elements.connectivity(Blocks::Both)
     }
 
     fn has_tangent(&self) -> bool {
@@ -42,12 +42,12 @@ impl Effect for BeamGravity {
         true
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        show(Aspect::Vector(self.acceleration));
-        self.elements.each_quantity(|inertia| inertia_aspects(inertia, show));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        show(MirrorData::Vector(self.acceleration));
+        self.elements.each_quantity(|inertia| inertia_mirror_data(inertia, show));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let acceleration = self.acceleration * at.amplitude[self.amplitude];
         self.elements.add(&Weight { acceleration }, at, weights, out);
     }
@@ -73,10 +73,10 @@ impl Effect for BodyGravity {
         Category::External
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
-        self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
+        self.bodies.iter().for_each(|body| connectivity.push([body.node.u, body.node.p]));
+        connectivity
     }
 
     fn has_tangent(&self) -> bool {
@@ -87,12 +87,12 @@ impl Effect for BodyGravity {
         true
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        show(Aspect::Vector(self.acceleration));
-        self.bodies.iter().for_each(|body| inertia_aspects(&body.inertia, show));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        show(MirrorData::Vector(self.acceleration));
+        self.bodies.iter().for_each(|body| inertia_mirror_data(&body.inertia, show));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let mut system = ElementSystem::new(2);
         for k in out.instances() {
             let body = &self.bodies[k];

@@ -9,7 +9,7 @@ use crate::kernel::relative::Relative;
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::{LANES, Lanes, Pack, Real, each_lane, pack};
-use crate::system::{Sink, State};
+use crate::system::{Assembler, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// Where the nodes of an element are, or those of several elements side by side; rotation vectors all in one chart.
@@ -114,12 +114,12 @@ impl<T: Real> Scratch<T> {
 
 impl Scratch<Lanes> {
     /// With systems of a sink, where they are `needed`.
-    pub fn lent(nodes: usize, needed: bool, sink: &mut Sink) -> Self {
+    pub fn lent(nodes: usize, needed: bool, sink: &mut Assembler) -> Self {
         Self { nodes, systems: needed.then(|| [(); 2].map(|()| sink.lend(2 * nodes, true))) }
     }
 
     /// Gives them back.
-    pub fn give_back(self, sink: &mut Sink) {
+    pub fn give_back(self, sink: &mut Assembler) {
         self.systems.into_iter().flatten().for_each(|system| sink.take_back(system));
     }
 }

@@ -6,7 +6,7 @@ use crate::kernel::joint::{End, add_along, add_between, block, cosine, slides};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::{Jet, Real};
-use crate::system::{Category, Cliques, Memory, Node, Sink, Slot, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, Node, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
@@ -374,13 +374,13 @@ impl Effect for Joints {
         !self.damps()
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
-        self.joints.iter().for_each(|joint| cliques.push(joint.slots().into_iter().flatten()));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.joints.iter().for_each(|joint| connectivity.push(joint.slots().into_iter().flatten()));
+        connectivity
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let mut whole = ElementSystem::new(block::COUNT);
         for (k, joint) in self.joints.iter().enumerate() {
             whole.clear();

@@ -5,7 +5,7 @@ use super::volume::VolumeElements;
 use crate::kernel::Weights;
 use crate::kernel::load::{Intensity, Line};
 use crate::kernel::volume::Blocks;
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
 /// Whether the components are spatial or turn with the section.
@@ -40,8 +40,8 @@ impl Effect for LineLoad {
         Category::External
     }
 
-    fn cliques(&self) -> Cliques {
-        self.elements.cliques(Blocks::Both)
+    fn connectivity(&self) -> Connectivity {
+        self.elements.connectivity(Blocks::Both)
     }
 
     fn has_tangent(&self) -> bool {
@@ -49,14 +49,14 @@ impl Effect for LineLoad {
         self.tangent && turns
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         self.elements.each_quantity(|intensity| {
-            show(Aspect::Vector(intensity.force));
-            show(Aspect::Axial(intensity.moment));
+            show(MirrorData::Vector(intensity.force));
+            show(MirrorData::Axial(intensity.moment));
         });
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let amplitudes = &at.amplitude[..];
         match self.kind {
             LineLoadKind::Spatial => self.elements.add(&Line::<false> { amplitudes }, at, weights, out),

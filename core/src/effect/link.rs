@@ -7,7 +7,7 @@
 use super::{Effect, Energy};
 use crate::kernel::{ElementSystem, Weights};
 use crate::scalar::Real;
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// One of them.
@@ -102,21 +102,21 @@ impl Effect for Links {
         self.links.iter().any(|link| link.damping != 0.0)
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
-        self.links.iter().for_each(|link| cliques.push(link.nodes.map(|node| node.u)));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.links.iter().for_each(|link| connectivity.push(link.nodes.map(|node| node.u)));
+        connectivity
     }
 
     fn is_symmetric(&self) -> bool {
         !self.damps()
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.links.iter().flat_map(|link| link.places).for_each(|place| show(Aspect::Place(place)));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.links.iter().flat_map(|link| link.places).for_each(|place| show(MirrorData::Place(place)));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let mut system = ElementSystem::new(2);
         for (k, link) in self.links.iter().enumerate() {
             let on = at.amplitude[link.amplitude];

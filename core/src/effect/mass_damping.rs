@@ -1,11 +1,11 @@
 //! The mass part of Rayleigh damping: alpha M qd, on beams and bodies.
 
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements, inertia_aspects};
+use super::{Effect, VolumeElements, inertia_mirror_data};
 use crate::kernel::inertia::{Drag, Inertia, drag};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 
 /// The damping of beams by the mass of their sections.
 #[derive(Clone, Debug)]
@@ -25,15 +25,15 @@ impl Effect for BeamMassDamping {
         Category::Damping
     }
 
-    fn cliques(&self) -> Cliques {
-        self.elements.cliques(Blocks::Both)
+    fn connectivity(&self) -> Connectivity {
+        self.elements.connectivity(Blocks::Both)
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.elements.each_quantity(|inertia| inertia_aspects(inertia, show));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.elements.each_quantity(|inertia| inertia_mirror_data(inertia, show));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         self.elements.add(&Drag { factor: self.factor }, at, weights, out);
     }
 }
@@ -56,17 +56,17 @@ impl Effect for BodyMassDamping {
         Category::Damping
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
-        self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
+        self.bodies.iter().for_each(|body| connectivity.push([body.node.u, body.node.p]));
+        connectivity
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.bodies.iter().for_each(|body| inertia_aspects(&body.inertia, show));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.bodies.iter().for_each(|body| inertia_mirror_data(&body.inertia, show));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let mut system = ElementSystem::new(2);
         for k in out.instances() {
             let body = &self.bodies[k];

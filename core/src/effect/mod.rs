@@ -31,7 +31,9 @@ use crate::kernel::inertia::Inertia;
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::scalar::{LANES, Lanes, Pack, Real, each_lane};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, Slot, StageContext, StageKind, State};
+use crate::system::{
+    Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, StageKind, State,
+};
 use crate::tensor::{Mat3, Vec3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -70,14 +72,14 @@ impl Momentum {
 
 /// Round-off that an exact zero of the force may show, in force and moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Noise {
+pub struct RoundOff {
     /// Force
     pub force: f64,
     /// Moment
     pub moment: f64,
 }
 
-impl Noise {
+impl RoundOff {
     /// The larger of both.
     pub fn or(self, other: Self) -> Self {
         Self { force: self.force.max(other.force), moment: self.moment.max(other.moment) }
@@ -115,8 +117,8 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// The slots that meet in each instance; [divisible](Cliques::divisible) where many instances make it worth while.
-    fn cliques(&self) -> Cliques;
+    /// The slots that meet in each instance; [divisible](Connectivity::divisible) where many instances make it worth while.
+    fn connectivity(&self) -> Connectivity;
 
     /// Whether its forces depend on the state at all; forces that do not have no tangent.
     fn has_tangent(&self) -> bool {
@@ -139,8 +141,8 @@ pub trait Effect: Send + Sync {
     }
 
     /// Shows what of it decides whether the scene lies in a plane. Unless it does, the scene is never treated in one.
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        show(Aspect::Spatial);
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        show(MirrorData::Spatial);
     }
 
     /// What does its work in a plane that it lies in, where that is less than in space.
@@ -154,7 +156,7 @@ pub trait Effect: Send + Sync {
     }
 
     /// Adds forces, and the tangent of the weights that are not zero.
-    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink);
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler);
 
     /// Remembers what the next tangent is formed with: what unknowns and charts were before they were corrected by `dq`. Rates of `at` may be
     /// those after it.
@@ -217,8 +219,8 @@ pub trait Effect: Send + Sync {
     fn drives(&self, _at: &State, _show: &mut dyn FnMut(f64, f64)) {}
 
     /// The round-off of its forces.
-    fn noise(&self, _at: &State) -> Noise {
-        Noise::default()
+    fn round_off(&self, _at: &State) -> RoundOff {
+        RoundOff::default()
     }
 }
 
@@ -230,7 +232,7 @@ pub trait PlanarForm: Send + Sync {
     }
 
     /// As [`Effect::add`].
-    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink);
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler);
 
     /// As [`Effect::extrapolate`].
     fn extrapolate(&self, _at: &State, _dq: &[Vec3], _memory: &mut Memory) {}
@@ -308,7 +310,7 @@ impl<const N: usize> Connection<N> {
 
 /// Which rows of elements side by side of a batch of this length, before which there are so many instances, a sink takes: it never
 /// takes parts of rows.
-fn own_blocks(before: usize, length: usize, out: &Sink) -> Range<usize> {
+fn own_blocks(before: usize, length: usize, out: &Assembler) -> Range<usize> {
     let own = own_part(before, length, &out.instances());
     own.start.div_ceil(LANES)..own.end.div_ceil(LANES)
 }
@@ -434,16 +436,16 @@ fn own_part(before: usize, length: usize, instances: &Range<usize>) -> Range<usi
 }
 
 /// Instances at one slot each.
-fn one_by_one(slots: &[(Slot, bool)]) -> Cliques {
-    let mut cliques = Cliques::divisible();
-    slots.iter().for_each(|&(slot, _)| cliques.push([slot]));
-    cliques
+fn one_by_one(slots: &[(Slot, bool)]) -> Connectivity {
+    let mut connectivity = Connectivity::divisible();
+    slots.iter().for_each(|&(slot, _)| connectivity.push([slot]));
+    connectivity
 }
 
 /// What of mass properties decides whether they lie in a plane.
-fn inertia_aspects(inertia: &Inertia, show: &mut dyn FnMut(Aspect)) {
-    show(Aspect::Vector(inertia.offset));
-    show(Aspect::Tensor(inertia.about_node));
+fn inertia_mirror_data(inertia: &Inertia, show: &mut dyn FnMut(MirrorData)) {
+    show(MirrorData::Vector(inertia.offset));
+    show(MirrorData::Tensor(inertia.about_node));
 }
 
 /// v . J v / 2

@@ -3,7 +3,7 @@
 use super::Effect;
 use crate::kernel::load::{material_force, material_moment, spatial_moment};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, State};
 use crate::tensor::Vec3;
 
 /// What a load at a node is.
@@ -55,32 +55,32 @@ impl Effect for NodeLoad {
         Category::External
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
         for load in &self.loads {
             match self.kind {
-                NodeLoadKind::SpatialForce => cliques.push([load.node.u]),
-                NodeLoadKind::MaterialForce => cliques.push([load.node.u, load.node.p]),
-                NodeLoadKind::SpatialMoment | NodeLoadKind::MaterialMoment => cliques.push([load.node.p]),
+                NodeLoadKind::SpatialForce => connectivity.push([load.node.u]),
+                NodeLoadKind::MaterialForce => connectivity.push([load.node.u, load.node.p]),
+                NodeLoadKind::SpatialMoment | NodeLoadKind::MaterialMoment => connectivity.push([load.node.p]),
             }
         }
-        cliques
+        connectivity
     }
 
     fn has_tangent(&self) -> bool {
         self.tangent && self.kind != NodeLoadKind::SpatialForce
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for load in &self.loads {
             show(match self.kind {
-                NodeLoadKind::SpatialForce | NodeLoadKind::MaterialForce => Aspect::Vector(load.vector),
-                NodeLoadKind::SpatialMoment | NodeLoadKind::MaterialMoment => Aspect::Axial(load.vector),
+                NodeLoadKind::SpatialForce | NodeLoadKind::MaterialForce => MirrorData::Vector(load.vector),
+                NodeLoadKind::SpatialMoment | NodeLoadKind::MaterialMoment => MirrorData::Axial(load.vector),
             });
         }
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let mut system = ElementSystem::new(if self.kind == NodeLoadKind::MaterialForce { 2 } else { 1 });
         for (k, load) in self.loads.iter().enumerate() {
             let vector = load.vector * at.amplitude[load.amplitude];

@@ -8,7 +8,7 @@ use crate::kernel::elastic::Stress;
 use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
-use crate::system::{Memory, Plane, Sink, Slot, State};
+use crate::system::{Assembler, Memory, Plane, Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
@@ -102,7 +102,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     memory: &[[f64; 6]],
     at: &State,
     weights: Weights,
-    out: &mut Sink,
+    out: &mut Assembler,
 ) {
     let (stiffness, mut alone, mut system) = (weights.stiffness, None, PlanarSystem::zero());
     for number in own_blocks(first, batch.len(), out) {
@@ -166,7 +166,7 @@ fn extrapolate_blocks<const N: usize, const G: usize>(
 }
 
 impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
-    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
         let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
         let (two, three) = (elements.two.len(), elements.three.len());
         let known = |first: usize| {

@@ -5,7 +5,7 @@ use super::{PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::PlanarBody;
 use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, each_lane};
-use crate::system::{Memory, Plane, Sink, Slot, State};
+use crate::system::{Assembler, Memory, Plane, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ impl PlanarBodies {
     }
 
     #[inline(always)]
-    fn add_side_by_side(&self, at: &State, weights: Weights, out: &mut Sink) {
+    fn add_side_by_side(&self, at: &State, weights: Weights, out: &mut Assembler) {
         let (plane, bodies) = (&self.plane, &self.spatial.bodies);
         let normal = plane.normal();
         let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
@@ -75,7 +75,7 @@ impl PlanarForm for PlanarBodies {
         are_centred(&self.spatial.bodies)
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         Instructions::here().run(
             #[inline(always)]
             || self.add_side_by_side(at, weights, out),

@@ -13,7 +13,7 @@
 use super::{Effect, one_by_one, own_part};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::{Rotation, log};
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, Slot, StageContext, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, StageContext, State};
 use crate::tensor::Mat3;
 
 /// At all slots of nodes; nothing without an anchor in the state.
@@ -35,7 +35,7 @@ impl Effect for Resistance {
         Category::Damping
     }
 
-    fn cliques(&self) -> Cliques {
+    fn connectivity(&self) -> Connectivity {
         one_by_one(&self.slots)
     }
 
@@ -48,10 +48,10 @@ impl Effect for Resistance {
     }
 
     /// It pulls back within the plane that a state moves in.
-    fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {}
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
 
     /// The tangent of rotations leaves out what falls with theta.
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let Some(anchor) = &at.anchor else { return };
         let mut system = ElementSystem::new(1);
         for k in own_part(0, self.slots.len(), &out.instances()) {

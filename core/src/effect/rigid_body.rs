@@ -2,12 +2,12 @@
 
 use super::planar_inertia::PlanarBodies;
 use super::{
-    AT_ONCE, Effect, Energy, Momentum, PlanarForm, at_slots, inertia_aspects, motion_of, quadratic, side_by_side,
+    AT_ONCE, Effect, Energy, Momentum, PlanarForm, at_slots, inertia_mirror_data, motion_of, quadratic, side_by_side,
 };
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::scalar::{Instructions, LANES, Pack, Real, each_lane};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Plane, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
@@ -43,16 +43,16 @@ impl Effect for RigidBody {
         Category::Inertia
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::divisible();
-        self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
+        self.bodies.iter().for_each(|body| connectivity.push([body.node.u, body.node.p]));
+        connectivity
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for body in &self.bodies {
-            show(Aspect::Place(body.place));
-            inertia_aspects(&body.inertia, show);
+            show(MirrorData::Place(body.place));
+            inertia_mirror_data(&body.inertia, show);
         }
     }
 
@@ -60,7 +60,7 @@ impl Effect for RigidBody {
         Some(Box::new(PlanarBodies::new(self, *plane)))
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let centred = are_centred(&self.bodies[out.instances()]);
         // Increments of rotation have spins of their own.
         let vectors = at.turns.is_empty().then(Instructions::here);
@@ -102,7 +102,7 @@ impl RigidBody {
         at: &State,
         weights: Weights,
         system: &mut ElementSystem,
-        out: &mut Sink,
+        out: &mut Assembler,
     ) {
         let body = &self.bodies[k];
         let (acceleration, spin) = (at.a[body.node.u as usize], at.spin(body.node.p));
@@ -111,7 +111,7 @@ impl RigidBody {
     }
 
     #[inline(always)]
-    fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Sink) {
+    fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Assembler) {
         let mut systems = out.lend(2, weights != Weights::NONE);
         let (own, before) = (&self.bodies[out.instances()], out.instances().start);
         for first in (0..own.len()).step_by(LANES) {

@@ -6,7 +6,7 @@ use crate::kernel::inertia::Rotary;
 use crate::kernel::volume::Blocks;
 use crate::kernel::{NodeMotion, Weights};
 use crate::rotation::Rotation;
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// All beam elements whose sections have rotary inertia, by J per length in global components of the initial placement.
@@ -27,15 +27,15 @@ impl Effect for RotaryInertia {
         Category::Inertia
     }
 
-    fn cliques(&self) -> Cliques {
-        self.elements.cliques(Blocks::Rotations)
+    fn connectivity(&self) -> Connectivity {
+        self.elements.connectivity(Blocks::Rotations)
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.elements.each_quantity(|j| show(Aspect::Tensor(*j)));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.elements.each_quantity(|j| show(MirrorData::Tensor(*j)));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         self.elements.add(&Rotary { gyroscopic: self.gyroscopic }, at, weights, out);
     }
 

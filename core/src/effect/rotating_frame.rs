@@ -3,11 +3,11 @@
 //! It stands for all inertia of its stage: of steady states, and of small motions about them.
 
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements, inertia_aspects, own_part};
+use super::{Effect, VolumeElements, inertia_mirror_data, own_part};
 use crate::kernel::inertia::{Inertia, SteadilyTurned, steadily_turned};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, StageContext, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, StageContext, State};
 use crate::tensor::Vec3;
 
 /// All mass of the scene in one stage's frame.
@@ -36,23 +36,23 @@ impl Effect for RotatingFrame {
         Category::Inertia
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = self.elements.cliques(Blocks::Both);
-        self.bodies.iter().for_each(|body| cliques.push([body.node.u, body.node.p]));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = self.elements.connectivity(Blocks::Both);
+        self.bodies.iter().for_each(|body| connectivity.push([body.node.u, body.node.p]));
+        connectivity
     }
 
     fn acts(&self, stage: &StageContext) -> bool {
         stage.number == self.stage
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        show(Aspect::Axial(self.spin));
-        self.elements.each_quantity(|(inertia, _)| inertia_aspects(inertia, show));
-        self.bodies.iter().for_each(|body| inertia_aspects(&body.inertia, show));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        show(MirrorData::Axial(self.spin));
+        self.elements.each_quantity(|(inertia, _)| inertia_mirror_data(inertia, show));
+        self.bodies.iter().for_each(|body| inertia_mirror_data(&body.inertia, show));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let spin = self.spin * self.amplitude.map_or(1.0, |number| at.amplitude[number]);
         self.elements.add(&SteadilyTurned { spin, about: self.about }, at, weights, out);
         let first = self.elements.two.len() + self.elements.three.len() + self.elements.four.len();

@@ -1,11 +1,11 @@
 //! Inertia of beam sections with a full 6x6 mass: the mass centre lies off the centre line, or J couples.
 
 use super::volume::VolumeElements;
-use super::{Effect, Energy, Momentum, inertia_aspects, rigid_body};
+use super::{Effect, Energy, Momentum, inertia_mirror_data, rigid_body};
 use crate::kernel::inertia::{Eccentric, Inertia};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{NodeMotion, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 
 /// All beam elements with eccentric mass, by their mass properties per length.
 #[derive(Clone, Debug, Default)]
@@ -25,15 +25,15 @@ impl Effect for SectionInertia {
         Category::Inertia
     }
 
-    fn cliques(&self) -> Cliques {
-        self.elements.cliques(Blocks::Both)
+    fn connectivity(&self) -> Connectivity {
+        self.elements.connectivity(Blocks::Both)
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.elements.each_quantity(|inertia| inertia_aspects(inertia, show));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.elements.each_quantity(|inertia| inertia_mirror_data(inertia, show));
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         self.elements.add(&Eccentric { gyroscopic: self.gyroscopic }, at, weights, out);
     }
 

@@ -3,7 +3,7 @@
 
 use super::{Effect, SomeIncrements};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, StageContext, StageKind, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageKind, State};
 use crate::tensor::Vec3;
 
 /// One straight part: beams that are joined rigidly along a line.
@@ -59,10 +59,10 @@ impl Effect for SpinHold {
         Category::Internal
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
-        self.parts.iter().for_each(|part| cliques.push([part.node.p]));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.parts.iter().for_each(|part| connectivity.push([part.node.p]));
+        connectivity
     }
 
     fn is_symmetric(&self) -> bool {
@@ -76,8 +76,8 @@ impl Effect for SpinHold {
         }
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
-        self.parts.iter().for_each(|part| show(Aspect::Line(part.axis)));
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.parts.iter().for_each(|part| show(MirrorData::Line(part.axis)));
     }
 
     fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
@@ -103,7 +103,7 @@ impl Effect for SpinHold {
         }
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         // An artificial resistance holds spins by itself, with a force that tells by how much.
         if at.anchor.is_some() {
             return;

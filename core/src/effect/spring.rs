@@ -1,14 +1,14 @@
 //! Springs from nodes to ground.
 //!
-//! A rotational spring acts on the rotation vector continued since the start (`State::wound`): wound up by two turns
-//! it pulls with 4 pi times its stiffness, and it does not notice when the node changes its chart. With the wound vector
+//! A rotational spring acts on the rotation vector continued since the start (`State::unwrapped`): unwrapped up by two turns
+//! it pulls with 4 pi times its stiffness, and it does not notice when the node changes its chart. With the unwrapped vector
 //! Pw = P + 2 pi k n, D = dPw/dP and stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
 
 use super::{Effect, Energy};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::{Complement, Rotation, log, nearest_turn, unwound};
 use crate::scalar::Real;
-use crate::system::{Aspect, Category, Cliques, Memory, Node, Sink, Slot, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
@@ -52,26 +52,26 @@ impl Effect for Spring {
         self.springs.iter().any(Instance::is_damped)
     }
 
-    fn cliques(&self) -> Cliques {
-        let mut cliques = Cliques::default();
-        self.springs.iter().for_each(|spring| cliques.push([spring.node.u, spring.node.p]));
-        cliques
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.springs.iter().for_each(|spring| connectivity.push([spring.node.u, spring.node.p]));
+        connectivity
     }
 
     fn is_symmetric(&self) -> bool {
         !self.damps()
     }
 
-    fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for spring in &self.springs {
             let Instance { translation, rotation, translation_damping, rotation_damping, .. } = *spring;
             for tensor in [translation, rotation, translation_damping, rotation_damping] {
-                show(Aspect::Tensor(tensor));
+                show(MirrorData::Tensor(tensor));
             }
         }
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let mut system = ElementSystem::new(2);
         for (k, spring) in self.springs.iter().enumerate() {
             let u = at.q[spring.node.u as usize];
@@ -100,8 +100,9 @@ impl Effect for Spring {
     fn energy(&self, at: &State) -> Energy {
         let one = |spring: &Instance| {
             let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
-            let wound = unwound(p, at.wound_at(spring.node.p));
-            0.5 * at.amplitude[spring.amplitude] * (u.dot(spring.translation * u) + wound.dot(spring.rotation * wound))
+            let unwrapped = unwound(p, at.unwrapped_at(spring.node.p));
+            0.5 * at.amplitude[spring.amplitude]
+                * (u.dot(spring.translation * u) + unwrapped.dot(spring.rotation * unwrapped))
         };
         Energy { kinetic: 0.0, strain: self.springs.iter().map(one).sum() }
     }
@@ -151,16 +152,16 @@ impl Instance {
 /// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an increment X after which
 /// it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
 fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
-    let wound = at.wound_at(slot);
+    let unwrapped = at.unwrapped_at(slot);
     if at.turn(slot).is_none() {
-        return wound_up(stiffness, at.q[slot as usize], wound);
+        return wound_up(stiffness, at.q[slot as usize], unwrapped);
     }
     if stiffness == Mat3::ZERO {
         return (Vec3::ZERO, Mat3::ZERO);
     }
     let increment = at.rotation(slot);
     let total = Rotation::new(log(increment.r));
-    let (force, tangent) = wound_up(stiffness, total.p, wound);
+    let (force, tangent) = wound_up(stiffness, total.p, unwrapped);
     let inverse = total.t_inverse();
     let moment = inverse.transpose_mul(force);
     let spun = inverse.transpose_matmul(tangent - total.c2(moment)) * inverse;
@@ -168,13 +169,13 @@ fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     (t.transpose_mul(moment), t.transpose_matmul(spun * t) + increment.c2(moment))
 }
 
-/// Force and tangent of a rotational spring whose node was last wound by `wound`. At a whole turn P has no axis of its own
+/// Force and tangent of a rotational spring whose node was last unwrapped by `unwrapped`. At a whole turn P has no axis of its own
 /// and keeps the one of before.
-fn wound_up(stiffness: Mat3, p: Vec3, wound: Vec3) -> (Vec3, Mat3) {
+fn wound_up(stiffness: Mat3, p: Vec3, unwrapped: Vec3) -> (Vec3, Mat3) {
     if p.norm() < WHOLE_TURN {
-        (stiffness * unwound(p, wound), stiffness)
+        (stiffness * unwound(p, unwrapped), stiffness)
     } else {
-        rotational(stiffness, nearest_turn(p, wound), p)
+        rotational(stiffness, nearest_turn(p, unwrapped), p)
     }
 }
 
@@ -183,7 +184,7 @@ fn wind<T: Real>(turns: f64, p: Vec3<T>) -> Vec3<T> {
     if turns == 0.0 { p } else { p * (T::one() + T::constant(2.0 * PI * turns) / p.norm()) }
 }
 
-/// Force and tangent of a rotational spring that has been wound by whole `turns`.
+/// Force and tangent of a rotational spring that has been unwrapped by whole `turns`.
 pub fn rotational<T: Real>(stiffness: Mat3, turns: f64, p: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
     let k = Mat3::constant(stiffness);
     if turns == 0.0 {

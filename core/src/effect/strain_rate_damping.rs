@@ -19,7 +19,7 @@ use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Point, Stiffness, Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
 use crate::scalar::Jet;
-use crate::system::{Aspect, Category, Cliques, Memory, RotationRate, Sink, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, RotationRate, State};
 use crate::tensor::{Mat3, Vec3};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -41,15 +41,15 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
         Category::Damping
     }
 
-    fn cliques(&self) -> Cliques {
-        self.elasticity.cliques()
+    fn connectivity(&self) -> Connectivity {
+        self.elasticity.connectivity()
     }
 
-    fn aspects(&self, _show: &mut dyn FnMut(Aspect)) {
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
         // Of the elasticity, which shows itself.
     }
 
-    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         for_each_batch!(self.elasticity.elements, out.instances(), |first, batch| {
             add_batch::<I, _, _>(batch, first, self.factor, at, weights, out);
         });
@@ -62,7 +62,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     factor: f64,
     at: &State,
     weights: Weights,
-    out: &mut Sink,
+    out: &mut Assembler,
 ) {
     let room = RefCell::new(Room::new(2 * N));
     let mut system = ElementSystem::new(2 * N);

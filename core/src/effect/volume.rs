@@ -4,7 +4,7 @@ use super::{AT_ONCE, ByOrder, Connection, for_each_batch, motions, shared, side_
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
 use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, each_lane};
-use crate::system::{Cliques, Sink, State};
+use crate::system::{Assembler, Connectivity, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
@@ -100,20 +100,20 @@ pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, V
 
 impl<Q: Copy> VolumeElements<Q> {
     /// The slots that meet in each element; effects add no others than those that a sink takes.
-    pub fn cliques(&self, blocks: Blocks) -> Cliques {
-        let mut cliques = Cliques::divisible();
+    pub fn connectivity(&self, blocks: Blocks) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
         for_each_batch!(self, |_first, batch| for element in batch {
             let nodes = element.connection.nodes.iter();
             match blocks {
-                Blocks::Rotations => cliques.push(nodes.map(|node| node.p)),
-                Blocks::Both => cliques.push(element.connection.slots()),
+                Blocks::Rotations => connectivity.push(nodes.map(|node| node.p)),
+                Blocks::Both => connectivity.push(element.connection.slots()),
             }
         });
-        cliques
+        connectivity
     }
 
     /// Adds forces and tangents of a kernel.
-    pub fn add<K>(&self, kernel: &K, at: &State, weights: Weights, out: &mut Sink)
+    pub fn add<K>(&self, kernel: &K, at: &State, weights: Weights, out: &mut Assembler)
     where
         K: VolumeKernel<Quantity = Q>,
         K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
@@ -176,7 +176,7 @@ fn add_batch<K, const N: usize>(
     first: usize,
     at: &State,
     weights: Weights,
-    out: &mut Sink,
+    out: &mut Assembler,
 ) where
     K: VolumeKernel,
     K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
@@ -206,7 +206,7 @@ fn add_alone<K: VolumeKernel, const N: usize>(
     number: usize,
     at: &State,
     weights: Weights,
-    out: &mut Sink,
+    out: &mut Assembler,
 ) {
     let mut system = ElementSystem::new(K::BLOCKS.count(N));
     let sum = |nodes: &[NodeMotion; N], weights: Weights, system: &mut ElementSystem| {

@@ -26,7 +26,7 @@ use crate::kernel::Weights;
 use crate::kernel::turn::Turn;
 use crate::model::{Assembly, SlotKind};
 use crate::rotation::{Complement, Rotation, log};
-use crate::system::{Category, Equations, Field, Slot, State, System};
+use crate::system::{Category, DofMap, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 use std::sync::Arc;
@@ -269,7 +269,7 @@ impl CarriedError {
     /// The step is taken from one state to another, both in one chart, with the error that was found at its end.
     pub fn end(
         &mut self,
-        equations: &Equations,
+        dof_map: &DofMap,
         error: &[Vec3],
         (from, to): (&State, &State),
         increments: Option<&Increments>,
@@ -303,9 +303,9 @@ impl CarriedError {
                 if slot.moves {
                     let rings = local.rings(slot, from.a[k], to.a[k]);
                     let [mut of_place, mut of_rate] = local.of(slot, from.a[k], to.a[k]);
-                    if !equations.is_plain(k as Slot) {
-                        of_place -= equations.held_part(k as Slot, of_place);
-                        of_rate -= equations.held_part(k as Slot, of_rate);
+                    if !dof_map.is_plain(k as Slot) {
+                        of_place -= dof_map.held_part(k as Slot, of_place);
+                        of_rate -= dof_map.held_part(k as Slot, of_rate);
                     }
                     // The error of a rate is not felt before the next step has ended.
                     now += of_place;

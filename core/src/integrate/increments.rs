@@ -10,7 +10,7 @@ use crate::kernel::turn::{Carrier, Start, Turn};
 use crate::model::Model;
 use crate::model::charts::DYNAMIC_BAND;
 use crate::rotation::{Rotation, complement, log};
-use crate::system::{Equations, Slot, State};
+use crate::system::{DofMap, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::BTreeMap;
@@ -33,13 +33,13 @@ pub struct Increments {
 
 impl Increments {
     /// For a stage with these equations.
-    pub fn new(model: &Model, equations: &Equations) -> Self {
+    pub fn new(model: &Model, dof_map: &DofMap) -> Self {
         let bodies = bodies_by_rotation(model);
         let carrier = |&slot: &Slot| {
             // A hinge turns about a fixed axis: its spin has one component, its momentum three.
-            let turns_freely = equations.of(slot).iter().all(|&number| number != Equations::HELD);
+            let turns_freely = dof_map.of(slot).iter().all(|&number| number != DofMap::HELD);
             let carrier = bodies.get(&slot).filter(|_| turns_freely).and_then(|(u, body)| {
-                let moves = equations.of(*u).iter().all(|&number| number != Equations::HELD);
+                let moves = dof_map.of(*u).iter().all(|&number| number != DofMap::HELD);
                 momentum(if moves { body.about_centre() } else { body.about_node })
             });
             (slot, carrier.unwrap_or(Carrier::SPIN))

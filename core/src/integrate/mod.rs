@@ -4,13 +4,13 @@
 mod alpha;
 mod carried_error;
 mod increments;
+mod predictor;
 mod time_error;
-mod trend;
 
 pub use alpha::{Rotations, Scheme, Step};
 pub use increments::Increments;
+pub use predictor::Predictor;
 pub use time_error::{Largest, TimeError};
-pub use trend::Trend;
 
 use crate::kernel::Weights;
 use crate::system::State;

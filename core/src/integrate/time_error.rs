@@ -10,7 +10,7 @@ use super::{Increments, Scheme, Step};
 use crate::kernel::Weights;
 use crate::model::charts::DYNAMIC_BAND;
 use crate::model::{Assembly, Model, SlotKind};
-use crate::system::{Equations, Field, Slot, State, System};
+use crate::system::{DofMap, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 use std::f64::consts::PI;
@@ -175,12 +175,12 @@ impl TimeError {
         increments: Option<&Increments>,
     ) {
         if let Some(carried) = &mut self.carried {
-            return carried.end(&system.pattern.equations, error, states, increments);
+            return carried.end(&system.pattern.dof_map, error, states, increments);
         }
         self.steps += 1;
         self.longest = self.longest.filter(|longest| longest.length >= step.length).or(Some(*step));
         if self.steps.is_multiple_of(WIDTH) {
-            self.sum_up(&system.pattern.equations, states.1, increments);
+            self.sum_up(&system.pattern.dof_map, states.1, increments);
             if self.is_worth_carrying() {
                 self.carry(system, states.1, *step);
             }
@@ -188,7 +188,7 @@ impl TimeError {
     }
 
     /// Adds the local errors of the steps since the sum was taken last, up to this state: after some steps, and where the stage is over.
-    pub fn sum_up(&mut self, equations: &Equations, state: &State, increments: Option<&Increments>) {
+    pub fn sum_up(&mut self, dof_map: &DofMap, state: &State, increments: Option<&Increments>) {
         let Some(step) = self.longest.take() else { return };
         let (Scheme { beta, .. }, h2) = (step.scheme, step.length * step.length);
         let factor = (1.0 / 6.0 - beta - 0.5 * step.scheme.lag()).abs() * h2;
@@ -202,8 +202,8 @@ impl TimeError {
                     continue;
                 }
                 let mut change = state.a[k] - std::mem::replace(past, state.a[k]);
-                if !equations.is_plain(k as Slot) {
-                    change -= equations.held_part(k as Slot, change);
+                if !dof_map.is_plain(k as Slot) {
+                    change -= dof_map.held_part(k as Slot, change);
                 }
                 let moved = if kind == SlotKind::Displacement { state.q[k] - start[k] } else { Vec3::ZERO };
                 largest.take(kind, change * factor, moved);

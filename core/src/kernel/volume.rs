@@ -100,10 +100,10 @@ impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
         VolumePoint { shape: self.shape, weight: self.weight, quantity: change(&self.quantity) }
     }
 
-    /// The same point for another scalar, with its quantity lifted by `lift`.
-    pub fn lifted<T: Real, P>(&self, lift: impl Fn(&Q) -> P) -> VolumePoint<N, P, T> {
+    /// The same point for another scalar, with its quantity lifted by `prescribed_increment`.
+    pub fn lifted<T: Real, P>(&self, prescribed_increment: impl Fn(&Q) -> P) -> VolumePoint<N, P, T> {
         let (shape, weight) = (self.shape.map(T::constant), T::constant(self.weight));
-        VolumePoint { shape, weight, quantity: lift(&self.quantity) }
+        VolumePoint { shape, weight, quantity: prescribed_increment(&self.quantity) }
     }
 }
 

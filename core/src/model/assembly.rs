@@ -2,10 +2,10 @@
 
 use super::linear::Linear;
 use super::{Model, StageContext};
-use crate::effect::{Effect, Noise, PlanarForm};
+use crate::effect::{Effect, PlanarForm, RoundOff};
 use crate::kernel::Weights;
 use crate::system::{
-    Category, Cliques, Equations, FrameConflict, Memory, Part, Pattern, Plane, Sink, State, Symmetry, System,
+    Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Part, Pattern, Plane, State, Symmetry, System,
 };
 use crate::tensor::{Vec3, zeros};
 use crate::threads;
@@ -48,7 +48,7 @@ impl Acting {
         std::iter::once(self.effect.category()).chain(self.effect.damps().then_some(Category::Damping))
     }
 
-    fn add(&self, at: &State, weights: Weights, out: &mut Sink) {
+    fn add(&self, at: &State, weights: Weights, out: &mut Assembler) {
         match &self.planar {
             None => self.effect.add(at, &self.memory, weights, out),
             Some(planar) => planar.add(at, &self.memory, weights, out),
@@ -90,20 +90,20 @@ fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
 
 impl Assembly {
     /// The system of what acts in a stage on these equations.
-    pub fn new(stage: &StageContext, equations: Equations, model: &Model) -> Self {
+    pub fn new(stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
         let acting = model.acting(stage);
-        let cliques = threads::map(acting.iter(), |effect| effect.cliques());
-        let acts = |(effect, own): (Arc<dyn Effect>, &Cliques)| Acting::new(effect, equations.plane(), own.len());
-        let effects: Vec<Acting> = acting.into_iter().zip(&cliques).map(acts).collect();
+        let connectivity = threads::map(acting.iter(), |effect| effect.connectivity());
+        let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, dof_map.plane(), own.len());
+        let effects: Vec<Acting> = acting.into_iter().zip(&connectivity).map(acts).collect();
         // What is linear adds its forces by itself.
         let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
         let categories: Vec<Vec<Category>> = effects.iter().map(|acting| acting.categories().collect()).collect();
-        let groups = model.groups(equations.layout());
-        let symmetry = Symmetry::of(cliques.iter().zip(effects.iter().map(Acting::is_symmetric)), &groups);
+        let node_blocks = model.node_blocks(dof_map.layout());
+        let symmetry = Symmetry::of(connectivity.iter().zip(effects.iter().map(Acting::is_symmetric)), &node_blocks);
         Self {
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
             system: System::new(
-                Pattern::new(equations, groups, cliques, symmetry),
+                Pattern::new(dof_map, node_blocks, connectivity, symmetry),
                 model.slots(),
                 everywhere,
                 &categories,
@@ -119,13 +119,13 @@ impl Assembly {
         Ok(())
     }
 
-    /// Forces of the state, and the tangent of the weights; `lift`: see [`System::clear`]. Without weights the tangent is left as
+    /// Forces of the state, and the tangent of the weights; `prescribed_increment`: see [`System::clear`]. Without weights the tangent is left as
     /// it is.
-    pub fn evaluate(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+    pub fn evaluate(&mut self, state: &State, weights: Weights, prescribed_increment: Option<&[Vec3]>) {
         match self.linear.take() {
-            None => self.evaluate_effects(state, weights, lift),
+            None => self.evaluate_effects(state, weights, prescribed_increment),
             Some(mut linear) => {
-                self.evaluate_linear(&mut linear, state, weights, lift);
+                self.evaluate_linear(&mut linear, state, weights, prescribed_increment);
                 self.linear = Some(linear);
             }
         }
@@ -136,20 +136,26 @@ impl Assembly {
         if let Some(linear) = &mut self.linear {
             linear.formed = None;
         }
-        let lift = self.system.lift().map(<[Vec3]>::to_vec);
-        self.evaluate(state, weights, lift.as_deref());
+        let prescribed_increment = self.system.prescribed_increment().map(<[Vec3]>::to_vec);
+        self.evaluate(state, weights, prescribed_increment.as_deref());
     }
 
     /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
-    fn evaluate_linear(&mut self, linear: &mut Linear, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+    fn evaluate_linear(
+        &mut self,
+        linear: &mut Linear,
+        state: &State,
+        weights: Weights,
+        prescribed_increment: Option<&[Vec3]>,
+    ) {
         linear.follow(state);
-        let known =
-            weights == Weights::NONE || (lift.is_none() && linear.formed == Some((weights, self.system.revision)));
+        let known = weights == Weights::NONE
+            || (prescribed_increment.is_none() && linear.formed == Some((weights, self.system.revision)));
         if known {
             self.system.clear_forces();
         } else {
             self.forget();
-            self.evaluate_effects(&linear.origin, weights, lift);
+            self.evaluate_effects(&linear.origin, weights, prescribed_increment);
             self.system.forget_forces();
             linear.formed = Some((weights, self.system.revision));
         }
@@ -157,10 +163,10 @@ impl Assembly {
         linear.add_forces(state, &mut self.system.force);
     }
 
-    fn evaluate_effects(&mut self, state: &State, weights: Weights, lift: Option<&[Vec3]>) {
+    fn evaluate_effects(&mut self, state: &State, weights: Weights, prescribed_increment: Option<&[Vec3]>) {
         let with_tangent = weights != Weights::NONE;
-        debug_assert!(with_tangent || lift.is_none(), "prescribed increments act through the tangent");
-        self.system.begin(with_tangent, lift);
+        debug_assert!(with_tangent || prescribed_increment.is_none(), "prescribed increments act through the tangent");
+        self.system.begin(with_tangent, prescribed_increment);
         // What has just been cleared is still near.
         self.add_effects(state, weights, |part| part.clear(with_tangent));
     }
@@ -225,8 +231,8 @@ impl Assembly {
     }
 
     /// The largest round-off among the effects.
-    pub fn noise(&self, state: &State) -> Noise {
-        self.effects.iter().map(|acting| acting.effect.noise(state)).fold(Noise::default(), Noise::or)
+    pub fn round_off(&self, state: &State) -> RoundOff {
+        self.effects.iter().map(|acting| acting.effect.round_off(state)).fold(RoundOff::default(), RoundOff::or)
     }
 
     /// The largest strain that a field makes, see [`Effect::strain_of`].
@@ -247,9 +253,9 @@ impl Assembly {
             let category = acting.effect.category();
             acting.add(state, Weights::STIFFNESS, &mut self.system.sink(number, category, true));
         }
-        let equations = &self.system.pattern.equations;
-        let mut x = vec![0.0; equations.count()];
-        equations.gather(|slot| field[slot], &mut x);
+        let dof_map = &self.system.pattern.dof_map;
+        let mut x = vec![0.0; dof_map.count()];
+        dof_map.gather(|slot| field[slot], &mut x);
         let others = self.system.multiply(&self.system.values, &x);
         let others: f64 = others.iter().zip(&x).map(|(a, b)| a * b).sum();
         Some(told.iter().flatten().sum::<f64>() + others)

@@ -93,33 +93,33 @@ pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     mixed
 }
 
-/// Carries the wound rotation vectors along with a correction that the state is about to take. A node may turn further than half
+/// Carries the unwrapped rotation vectors along with a correction that the state is about to take. A node may turn further than half
 /// a turn in a load step; how far, only its corrections tell. What is not kept apart goes with the unknowns.
 pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
-    if state.wound.is_empty() {
+    if state.unwrapped.is_empty() {
         return;
     }
-    let State { q, wound, .. } = state;
-    each_rotation(wound, rotations, |k, wound| {
+    let State { q, unwrapped, .. } = state;
+    each_rotation(unwrapped, rotations, |k, unwrapped| {
         let (old, increment) = (q[k], dq[k]);
         let p = old + increment;
-        *wound = match () {
-            () if increment == Vec3::ZERO => *wound,
-            () if *wound == old => p,
-            () if increment.squared() < 1.0 => continued(p, *wound, rotated(old, p)),
-            () => continued(p, *wound, Rotation::new(old).t.transpose_mul(increment)),
+        *unwrapped = match () {
+            () if increment == Vec3::ZERO => *unwrapped,
+            () if *unwrapped == old => p,
+            () if increment.squared() < 1.0 => continued(p, *unwrapped, rotated(old, p)),
+            () => continued(p, *unwrapped, Rotation::new(old).t.transpose_mul(increment)),
         };
     });
 }
 
-/// Shows a state as it was before a correction of its unknowns alone; wound rotation vectors that are the unknowns stay so.
+/// Shows a state as it was before a correction of its unknowns alone; unwrapped rotation vectors that are the unknowns stay so.
 pub fn there_and_back(state: &mut State, dq: &[Vec3], look: impl FnOnce(&State)) {
-    let wound = state.wound.iter().zip(&state.q).enumerate();
-    let unwound: Vec<usize> = wound.filter(|(_, (wound, q))| wound == q).map(|(slot, _)| slot).collect();
+    let unwrapped = state.unwrapped.iter().zip(&state.q).enumerate();
+    let unwound: Vec<usize> = unwrapped.filter(|(_, (unwrapped, q))| unwrapped == q).map(|(slot, _)| slot).collect();
     shift(state, dq, -1.0);
     look(state);
     shift(state, dq, 1.0);
-    unwound.into_iter().for_each(|slot| state.wound[slot] = state.q[slot]);
+    unwound.into_iter().for_each(|slot| state.unwrapped[slot] = state.q[slot]);
 }
 
 fn shift(state: &mut State, dq: &[Vec3], times: f64) {
@@ -142,42 +142,42 @@ fn rotated(old: Vec3, p: Vec3) -> Vec3 {
     log(Rotation::new(p).r * Rotation::new(old).r.transpose())
 }
 
-/// The representative of `p` next to where `turned` carries a wound vector; the carried vector itself near whole turns, where
+/// The representative of `p` next to where `turned` carries a unwrapped vector; the carried vector itself near whole turns, where
 /// there is none. See [`wind`].
-fn continued(p: Vec3, wound: Vec3, turned: Vec3) -> Vec3 {
-    let carried = wound + turned;
+fn continued(p: Vec3, unwrapped: Vec3, turned: Vec3) -> Vec3 {
+    let carried = unwrapped + turned;
     let candidate = unwound(p, carried);
     let together = (candidate - carried).norm() < FAR;
     let near_whole_turn = p.norm() < NEAR_TURN && carried.norm() > PI;
     if together && !near_whole_turn { candidate } else { carried }
 }
 
-/// Continues the wound rotation vectors from the state `before`, and returns the slots where that is ambiguous.
+/// Continues the unwrapped rotation vectors from the state `before`, and returns the slots where that is ambiguous.
 ///
 /// What corrections have carried them by tells the turns; without any it is less than half a turn.
-/// The wound vector is the one of P + 2 pi k n that lies nearest to the old one carried on by the rotation since. Close to a
+/// The unwrapped vector is the one of P + 2 pi k n that lies nearest to the old one carried on by the rotation since. Close to a
 /// whole turn n is no guide: a node that passes it a little aside sees n swing to the other side, and P + 2 pi k n with it.
 /// There the carried one is kept until both come together again; it is ambiguous where they lie far apart.
 pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> {
-    if state.wound.is_empty() {
+    if state.unwrapped.is_empty() {
         return Vec::new();
     }
-    let State { q, wound: carried, .. } = state;
+    let State { q, unwrapped: carried, .. } = state;
     each_rotation(carried, rotations, |k, carried| {
-        let (p, old, wound) = (q[k], before.q[k], before.wound_at(k as Slot));
+        let (p, old, unwrapped) = (q[k], before.q[k], before.unwrapped_at(k as Slot));
         // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away from it.
-        let is_near = wound == old && (p - old).norm() < 0.4 * FAR;
+        let is_near = unwrapped == old && (p - old).norm() < 0.4 * FAR;
         if is_near && (*carried == old || *carried == p) {
             *carried = p;
             return;
         }
-        let (shortest, tracked) = (rotated(old, p), *carried - wound);
+        let (shortest, tracked) = (rotated(old, p), *carried - unwrapped);
         let turned = if tracked.norm() > HALF_TURN { unwound(shortest, tracked) } else { shortest };
-        *carried = continued(p, wound, turned);
+        *carried = continued(p, unwrapped, turned);
     });
     let is_ambiguous = |&slot: &Slot| {
-        let (p, wound) = (q[slot as usize], carried[slot as usize]);
-        p != wound && (unwound(p, wound) - wound).norm() >= FAR
+        let (p, unwrapped) = (q[slot as usize], carried[slot as usize]);
+        p != unwrapped && (unwound(p, unwrapped) - unwrapped).norm() >= FAR
     };
     let mut ambiguous = Vec::new();
     let in_part = |part: &[Slot]| part.iter().copied().filter(is_ambiguous).collect::<Vec<_>>();
@@ -187,14 +187,14 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
 
 /// Takes away turns that only the corrections of an iteration made: they may lead round and round before they find a balance. Where a
 /// node seems to have turned by more than pi since the state `before`, those that have turned by little, or as is `prescribed`, tell
-/// the others: along an element the rotations of neighbours differ by less than pi, and so do their wound vectors. What no such node
+/// the others: along an element the rotations of neighbours differ by less than pi, and so do their unwrapped vectors. What no such node
 /// leads to stays.
 pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: impl Fn(Slot) -> bool) {
     let Charted { elements, rotations } = charted;
-    if state.wound.is_empty() {
+    if state.unwrapped.is_empty() {
         return;
     }
-    let turned = |slot: Slot| (state.wound_at(slot) - before.wound_at(slot)).norm();
+    let turned = |slot: Slot| (state.unwrapped_at(slot) - before.unwrapped_at(slot)).norm();
     let far = |part: Range<usize>| rotations[part].iter().find(|&&slot| turned(slot) > PI);
     if threads::first(rotations.len(), far).is_none() {
         return;
@@ -216,7 +216,7 @@ pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: 
 fn settle(state: &mut State, unsettled: &mut BTreeSet<Slot>, from: Slot, to: Slot) {
     if !unsettled.contains(&from) && unsettled.remove(&to) {
         let [own, p] = [from, to].map(|slot| state.q[slot as usize]);
-        state.wound[to as usize] = continued(p, state.wound[from as usize], rotated(own, p));
+        state.unwrapped[to as usize] = continued(p, state.unwrapped[from as usize], rotated(own, p));
     }
 }
 

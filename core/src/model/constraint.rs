@@ -2,7 +2,7 @@
 
 use super::amplitude::Goal;
 use super::history::Reading;
-use crate::system::{Aspect, Direction, Slot, State};
+use crate::system::{Direction, MirrorData, Slot, State};
 use crate::system::{StageKind, StageSet};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
@@ -18,10 +18,10 @@ pub struct Support {
 
 impl Support {
     /// What of it decides whether the scene lies in a plane: the directions that it holds at each slot.
-    pub fn aspects(&self, show: &mut dyn FnMut(Aspect)) {
+    pub fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for at_slot in self.directions.chunk_by(|a, b| a.slot == b.slot) {
             let held = at_slot.iter().fold(Mat3::ZERO, |sum, direction| sum + direction.axis.outer(direction.axis));
-            show(Aspect::Tensor(held));
+            show(MirrorData::Tensor(held));
         }
     }
 }
@@ -167,9 +167,9 @@ impl Motion {
         match self.kind {
             MotionKind::Translation => (state.q[slot].dot(self.axis), 0.0),
             MotionKind::Rotation => {
-                let wound = state.wound_at(self.slot);
-                let along = wound.dot(self.axis);
-                (along, (wound - self.axis * along).norm())
+                let unwrapped = state.unwrapped_at(self.slot);
+                let along = unwrapped.dot(self.axis);
+                (along, (unwrapped - self.axis * along).norm())
             }
         }
     }
@@ -180,11 +180,11 @@ impl Motion {
     }
 
     /// What of it decides whether the scene lies in a plane.
-    pub fn aspect(&self) -> Aspect {
+    pub fn aspect(&self) -> MirrorData {
         match self.kind {
-            MotionKind::Translation if self.value == 0.0 => Aspect::Line(self.axis),
-            MotionKind::Translation => Aspect::Vector(self.axis),
-            MotionKind::Rotation => Aspect::Axial(self.axis * self.value),
+            MotionKind::Translation if self.value == 0.0 => MirrorData::Line(self.axis),
+            MotionKind::Translation => MirrorData::Vector(self.axis),
+            MotionKind::Rotation => MirrorData::Axial(self.axis * self.value),
         }
     }
 
@@ -254,7 +254,7 @@ impl Motion {
                 0.0
             }
             MotionKind::Rotation => {
-                let (turned, end) = (value - state.wound_at(self.slot).dot(n), n * value);
+                let (turned, end) = (value - state.unwrapped_at(self.slot).dot(n), n * value);
                 state.q[slot] = if state.turn(self.slot).is_some() {
                     n * turned
                 } else {
@@ -263,7 +263,7 @@ impl Motion {
                 };
                 state.v.put(slot, n * rate);
                 state.a.put(slot, n * rate2);
-                if !state.wound.is_empty() || state.q[slot] != end {
+                if !state.unwrapped.is_empty() || state.q[slot] != end {
                     state.wound_apart()[slot] = end;
                 }
                 turned.abs()

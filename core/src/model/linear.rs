@@ -8,7 +8,7 @@ use super::Model;
 use crate::effect::Effect;
 use crate::kernel::Weights;
 use crate::system::{
-    Category, Cliques, Equations, FrameConflict, Layout, Memory, Pattern, Slot, State, Symmetry, System,
+    Category, Connectivity, DofMap, FrameConflict, Layout, Memory, Pattern, Slot, State, Symmetry, System,
 };
 use crate::tensor::Vec3;
 
@@ -38,8 +38,9 @@ impl Linear {
     ) -> Result<Self, FrameConflict> {
         let effects: Vec<&dyn Effect> = effects.collect();
         let slots = model.slots();
-        let cliques: Vec<Cliques> = effects.iter().map(|effect| effect.cliques()).collect();
-        let pattern = Pattern::new(Equations::new(slots, &[])?, model.groups(Layout::Spatial), cliques, Symmetry::None);
+        let connectivity: Vec<Connectivity> = effects.iter().map(|effect| effect.connectivity()).collect();
+        let pattern =
+            Pattern::new(DofMap::new(slots, &[])?, model.node_blocks(Layout::Spatial), connectivity, Symmetry::None);
         let mut origin = about.clone();
         origin.stand_still();
         let mut whole = System::new(pattern, slots, &Category::ALL, &[]);

@@ -4,24 +4,24 @@ mod amplitude;
 mod assembly;
 pub mod charts;
 mod constraint;
+mod effect_size;
 mod history;
 mod linear;
 mod names;
-mod share;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
 pub use amplitude::Amplitude;
 pub use assembly::Assembly;
 pub use constraint::{Jump, Motion, MotionKind, Support};
+pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
-pub use share::Share;
 
 use crate::effect::joint::nearest_angle;
 use crate::effect::{Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{
-    Aspect, Category, Direction, Equations, FrameConflict, Groups, Layout, Node, Plane, Slot, State, System,
+    Category, Direction, DofMap, FrameConflict, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System,
     most_regions,
 };
 use crate::tensor::Vec3;
@@ -113,7 +113,7 @@ pub struct Model {
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
     pub angles: usize,
-    /// The slots on which rotational springs act: how they are wound must be known
+    /// The slots on which rotational springs act: their unwrapped rotation vectors must be known
     pub sprung: Vec<Slot>,
     /// Those of the two sides of each joint that remembers its angle
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
@@ -208,7 +208,7 @@ impl Model {
     }
 
     /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<Equations, StageError> {
+    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<DofMap, StageError> {
         if let Some(jump) = self.settle(stage, kind, state).into_iter().next() {
             return Err(StageError::Jump(jump));
         }
@@ -238,10 +238,10 @@ impl Model {
     }
 
     /// Whether no mass of a stage sits where something is free to move.
-    pub fn lacks_mass(&self, stage: &StageContext, equations: &Equations) -> bool {
-        let is_free = |&slot: &Slot| equations.of(slot).iter().any(|&number| number != Equations::HELD);
+    pub fn lacks_mass(&self, stage: &StageContext, dof_map: &DofMap) -> bool {
+        let is_free = |&slot: &Slot| dof_map.of(slot).iter().any(|&number| number != DofMap::HELD);
         let effects = self.effects.iter().filter(|effect| effect.category() == Category::Inertia && effect.acts(stage));
-        !effects.into_iter().any(|effect| effect.cliques().iter().flatten().any(is_free))
+        !effects.into_iter().any(|effect| effect.connectivity().iter().flatten().any(is_free))
     }
 
     /// The motors of joints that a change of amplitudes moves by more than a joint may be open.
@@ -272,22 +272,22 @@ impl Model {
     }
 
     /// The unknowns that are free in a stage that has begun, in a plane or in space.
-    pub fn number(&self, stage: usize, plane: Option<Plane>) -> Result<Equations, StageError> {
+    pub fn number(&self, stage: usize, plane: Option<Plane>) -> Result<DofMap, StageError> {
         let (slots, held) = (self.slots(), self.held_directions(stage));
         let turns = |slot: Slot| self.kinds[slot as usize] == SlotKind::Rotation;
         let numbered = match plane {
-            None => Equations::new(slots, &held),
-            Some(plane) => Equations::planar(slots, &held, plane, turns),
+            None => DofMap::new(slots, &held),
+            Some(plane) => DofMap::planar(slots, &held, plane, turns),
         };
         numbered.map_err(StageError::Conflict)
     }
 
     /// Shows what decides whether the scene lies in a plane, each with a name.
-    pub fn aspects(&self, show: &mut dyn FnMut(&'static str, Aspect)) {
+    pub fn mirror_data(&self, show: &mut dyn FnMut(&'static str, MirrorData)) {
         for effect in &self.effects {
-            effect.aspects(&mut |aspect| show(effect.name(), aspect));
+            effect.mirror_data(&mut |aspect| show(effect.name(), aspect));
         }
-        self.supports.iter().for_each(|support| support.aspects(&mut |aspect| show("supports", aspect)));
+        self.supports.iter().for_each(|support| support.mirror_data(&mut |aspect| show("supports", aspect)));
         self.motions.iter().for_each(|motion| show("motions", motion.aspect()));
     }
 
@@ -406,16 +406,16 @@ impl Model {
     }
 
     /// The rotation of a node shares the tile of its displacement, which it follows.
-    pub fn groups(&self, layout: Layout) -> Groups {
+    pub fn node_blocks(&self, layout: Layout) -> NodeBlocks {
         let kind = |slot: Slot| self.kinds[slot as usize];
-        Groups::new(self.slots(), layout, |slot| {
+        NodeBlocks::new(self.slots(), layout, |slot| {
             kind(slot) == SlotKind::Rotation && kind(slot - 1) == SlotKind::Displacement
         })
     }
 
     /// How many regions of it can be evaluated at once: one where it is not large.
     pub fn regions(&self) -> usize {
-        most_regions(self.groups(Layout::Spatial).count())
+        most_regions(self.node_blocks(Layout::Spatial).count())
     }
 
     /// The effects that act in a stage.

@@ -88,8 +88,8 @@ impl Place {
     }
 
     /// The rotation vector continued since the start, interpolated like the rotation vectors themselves.
-    pub fn wound(&self, state: &State) -> Vec3 {
-        self.nodes.iter().fold(Vec3::ZERO, |sum, &(node, _, weight)| sum + state.wound_at(node.p) * weight)
+    pub fn unwrapped(&self, state: &State) -> Vec3 {
+        self.nodes.iter().fold(Vec3::ZERO, |sum, &(node, _, weight)| sum + state.unwrapped_at(node.p) * weight)
     }
 
     /// The node, where the place is one.

@@ -46,7 +46,7 @@ pub enum Quantity {
     Load,
 }
 
-/// Groups of columns of a node, with the suffixes of their columns.
+/// NodeBlocks of columns of a node, with the suffixes of their columns.
 pub const NODE_GROUPS: [(&str, &[&str]); 12] = [
     ("u", &["ux", "uy", "uz"]),
     ("x", &["x", "y", "z"]),
@@ -63,7 +63,7 @@ pub const NODE_GROUPS: [(&str, &[&str]); 12] = [
     ("strain", &["G1", "G2", "G3", "K1", "K2", "K3"]),
 ];
 
-/// Groups of columns of the whole scene.
+/// NodeBlocks of columns of the whole scene.
 pub const WHOLE_GROUPS: [(&str, &[&str]); 2] = [
     ("energy", &["kinetic", "strain", "external", "damped", "total"]),
     ("momentum", &["px", "py", "pz", "lx", "ly", "lz", "cx", "cy", "cz"]),
@@ -92,7 +92,7 @@ impl Probe {
             Quantity::Displacement(place) => vector(place.motion(state).u),
             Quantity::Position(place) => vector(place.initial() + place.motion(state).u),
             Quantity::Rotation(place) => vector(principal(place.motion(state).p)),
-            Quantity::Wound(place) => vector(place.wound(state)),
+            Quantity::Wound(place) => vector(place.unwrapped(state)),
             Quantity::Axes(place) => {
                 let axes = Rotation::new(place.motion(state).p).r * place.frame;
                 (0..3).for_each(|k| vector(axes.column(k)));
@@ -108,7 +108,7 @@ impl Probe {
                 vector(spin.rotation.r * spin.acceleration);
             }
             Quantity::Reaction(node) => {
-                let held = |slot: u32| at.system.pattern.equations.held_part(slot, at.system.total(slot as usize));
+                let held = |slot: u32| at.system.pattern.dof_map.held_part(slot, at.system.total(slot as usize));
                 let (force, moment) = at.model.held_by_ground(state, *node);
                 vector(held(node.u) - force);
                 vector(Rotation::new(state.q[node.p as usize]).t_inverse() * (held(node.p) - moment));

@@ -4,10 +4,11 @@
 //! eigenvalues m of K x = -m K' x tell how far away the critical loads are. Each is then followed: the path is continued to
 //! the load found, and looked at again from there, until it is reached.
 
+use super::analysis_results::{CriticalKind, CriticalLoad};
 use super::direction::Direction;
 use super::failure::Failure;
 use super::levels::{LARGEST_CONTRACTION, NO_MOTION, distance};
-use super::run::{CriticalKind, CriticalLoad, Run, Workshop};
+use super::stage_run::{Run, StageRun};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
@@ -56,7 +57,7 @@ const REAL: f64 = 1e-3;
 
 impl Run<'_> {
     /// The critical loads nearest above the present one, then those below it.
-    pub(super) fn run_buckling(&mut self, workshop: &mut Workshop, modes: usize) -> Result<(), Failure> {
+    pub(super) fn run_buckling(&mut self, workshop: &mut StageRun, modes: usize) -> Result<(), Failure> {
         self.stand_still();
         if self.fresh {
             self.state.load = 0.0;
@@ -107,7 +108,7 @@ impl Run<'_> {
     /// some part of this.
     fn follow(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         estimate: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
@@ -179,7 +180,7 @@ impl Run<'_> {
 
     /// How far from a load, relative to it, the tangent of the last point before it looks singular. A structure with a small imperfection has no
     /// critical point there, but its path runs aside as if it had, the more sharply the smaller the imperfection.
-    fn foreseen(&mut self, workshop: &mut Workshop, search: &Search, load: f64, before: usize) -> Result<f64, Failure> {
+    fn foreseen(&mut self, workshop: &mut StageRun, search: &Search, load: f64, before: usize) -> Result<f64, Failure> {
         self.state.copy_from(&search.here);
         let seen = self.critical_loads(workshop, before + 4)?;
         Ok(seen.into_iter().map(|seen| (seen - load).abs() / load.abs()).fold(f64::INFINITY, f64::min))
@@ -188,7 +189,7 @@ impl Run<'_> {
     /// Whether load control follows the path past a load from next to it, with so many negative pivots. The state is then that point.
     fn goes_on(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         search: &Search,
         load: f64,
         negative: Option<usize>,
@@ -202,20 +203,20 @@ impl Run<'_> {
     }
 
     /// The critical load with `before` others between it and the present one, as it looks from here.
-    fn next_critical(&mut self, workshop: &mut Workshop, way: f64, before: usize) -> Result<Option<f64>, Failure> {
+    fn next_critical(&mut self, workshop: &mut StageRun, way: f64, before: usize) -> Result<Option<f64>, Failure> {
         let load = self.state.load;
         let ahead = self.critical_loads(workshop, before + 4)?;
         Ok(ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before))
     }
 
     /// What lies just ahead of the present state: towards a limit point the path moves without bounds.
-    fn kind_of_critical(&mut self, workshop: &mut Workshop, start_rate: f64) -> Result<CriticalKind, Failure> {
+    fn kind_of_critical(&mut self, workshop: &mut StageRun, start_rate: f64) -> Result<CriticalKind, Failure> {
         let runs_away = self.size_of_rate(workshop)? > RUNS_AWAY * start_rate;
         Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
     }
 
     /// How far a unit of load moves the scene at the present state, in lengths of it and radians.
-    fn size_of_rate(&mut self, workshop: &mut Workshop) -> Result<f64, Failure> {
+    fn size_of_rate(&mut self, workshop: &mut StageRun) -> Result<f64, Failure> {
         let Some(Direction { rate, .. }) = self.path_direction(workshop)? else { return Ok(0.0) };
         let sizes = rate.iter().zip(self.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
         Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.model.length)).fold(0.0, f64::max))
@@ -224,7 +225,7 @@ impl Run<'_> {
     /// A structure that an imperfection lets turn aside has no critical point. From smaller loads its tangent looks like that of the perfect one:
     /// there the load at which it seems to be singular does not move, until the imperfection is felt. That load, of the critical
     /// load with `before` others below it; `None` where nothing is seen.
-    fn extrapolate(&mut self, workshop: &mut Workshop, first: f64, before: usize) -> Result<Option<f64>, Failure> {
+    fn extrapolate(&mut self, workshop: &mut StageRun, first: f64, before: usize) -> Result<Option<f64>, Failure> {
         let way = (first - self.state.load).signum();
         let mut last: Option<Sight> = None;
         let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
@@ -254,7 +255,7 @@ impl Run<'_> {
 
     /// Whether the state is on another branch than one before it: it has moved much further than the path goes there, or does not
     /// come back to it.
-    fn has_leapt(&mut self, workshop: &mut Workshop, from: &State) -> Result<bool, Failure> {
+    fn has_leapt(&mut self, workshop: &mut StageRun, from: &State) -> Result<bool, Failure> {
         let (to, step) = (self.state.clone(), self.state.load - from.load);
         self.state.copy_from(from);
         let direction = self.path_direction(workshop)?;
@@ -276,7 +277,7 @@ impl Run<'_> {
     /// Goes from estimate to estimate, each what the critical load looks like from the last.
     fn follow_nearest(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         mut critical: f64,
         before: usize,
         done: &dyn Fn(f64) -> f64,
@@ -326,15 +327,15 @@ impl Run<'_> {
     }
 
     /// Of the tangent at the present state, where it is symmetric.
-    fn negative_pivots(&mut self, workshop: &mut Workshop) -> Option<usize> {
-        let Workshop { assembly, newton, .. } = workshop;
+    fn negative_pivots(&mut self, workshop: &mut StageRun) -> Option<usize> {
+        let StageRun { assembly, newton, .. } = workshop;
         assembly.forget();
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         newton.solver.negative_pivots(&mut Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS))
     }
 
     /// Goes along the path to a load factor in steps that shrink where they must.
-    fn continue_path(&mut self, workshop: &mut Workshop, target: f64) -> Walked {
+    fn continue_path(&mut self, workshop: &mut StageRun, target: f64) -> Walked {
         let start = self.state.load;
         let (mut done, mut part) = (0.0, 1.0_f64);
         self.good.copy_from(&self.state);
@@ -364,7 +365,7 @@ impl Run<'_> {
     }
 
     /// One step along the path: how far it moved, where it came down near by.
-    fn step_along(&mut self, workshop: &mut Workshop, load: f64) -> Option<f64> {
+    fn step_along(&mut self, workshop: &mut StageRun, load: f64) -> Option<f64> {
         self.attempt(workshop, load).ok()?;
         if workshop.newton.contraction > LARGEST_CONTRACTION && !self.is_linear() {
             return None;
@@ -374,13 +375,13 @@ impl Run<'_> {
     }
 
     /// The critical loads as they look from the present state.
-    fn critical_loads(&mut self, workshop: &mut Workshop, modes: usize) -> Result<Vec<f64>, Failure> {
+    fn critical_loads(&mut self, workshop: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
         let Some(Direction { rate: direction, .. }) = self.path_direction(workshop)? else { return Ok(Vec::new()) };
         let size = direction.iter().zip(self.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
         let size = size.map(|(d, kind)| d.norm() * kind.arm(self.model.length) / self.model.length).fold(0.0, f64::max);
         let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
         let varied = self.varied_tangent(workshop, &direction, reach);
-        let Workshop { assembly, newton, .. } = workshop;
+        let StageRun { assembly, newton, .. } = workshop;
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         self.counters.work.factorisations += 1;
         let done = newton.solver.factorise_surely(&assembly.system);
@@ -405,7 +406,7 @@ impl Run<'_> {
     }
 
     /// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r
-    fn varied_tangent(&mut self, workshop: &mut Workshop, direction: &[Vec3], reach: f64) -> Vec<f64> {
+    fn varied_tangent(&mut self, workshop: &mut StageRun, direction: &[Vec3], reach: f64) -> Vec<f64> {
         let assembly = &mut workshop.assembly;
         assembly.forget();
         let mut tangent = |reach: f64| {
@@ -551,7 +552,7 @@ struct Softening<'a> {
 
 impl Operator for Softening<'_> {
     fn size(&self) -> usize {
-        self.system.pattern.equations.count()
+        self.system.pattern.dof_map.count()
     }
 
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {

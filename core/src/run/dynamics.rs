@@ -4,8 +4,8 @@ use super::control::Control;
 use super::failure::Failure;
 use super::grid::Grid;
 use super::guard::Growth;
-use super::run::{Run, Workshop};
-use crate::integrate::{Increments, Rotations, Scheme, Step, TimeError, Trend};
+use super::stage_run::{Run, StageRun};
+use crate::integrate::{Increments, Predictor, Rotations, Scheme, Step, TimeError};
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::NewtonFailure;
@@ -20,22 +20,22 @@ impl Run<'_> {
     /// All steps of a dynamic stage, up to `end` on the run's clock.
     pub(super) fn run_dynamic(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         end: f64,
         step: f64,
         scheme: Scheme,
         adaptive: Option<f64>,
     ) -> Result<(), Failure> {
         workshop.increments = (scheme.rotations == Rotations::Increments)
-            .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.equations));
-        workshop.trend = Trend::new(&self.model);
+            .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.dof_map));
+        workshop.trend = Predictor::new(&self.model);
         self.start_dynamic(workshop, &Step { scheme, length: step })?;
         self.find_rates(workshop);
         let mut before = step;
         match adaptive {
             None => {
                 let first = Step { scheme, length: step };
-                let Workshop { assembly, newton, massive, increments, .. } = &mut *workshop;
+                let StageRun { assembly, newton, massive, increments, .. } = &mut *workshop;
                 let start = (&self.state, increments.as_ref());
                 let duration = end - self.state.time;
                 newton.time_error = Some(TimeError::new(&self.model, assembly, start, massive, (first, duration)));
@@ -52,7 +52,7 @@ impl Run<'_> {
     /// Rows at start + k step, the last one at `end`.
     fn run_fixed(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         end: f64,
         step: f64,
         scheme: Scheme,
@@ -75,7 +75,7 @@ impl Run<'_> {
     /// not settled yet. `next` is the time it ends at, `end` that of the stage.
     fn stride(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         whole: Step,
         before: &mut f64,
         (next, end): (f64, f64),
@@ -110,13 +110,13 @@ impl Run<'_> {
     }
 
     /// What every step is followed by, written or not.
-    fn settle(&mut self, workshop: &mut Workshop, step: &Step) -> Result<(), Failure> {
+    fn settle(&mut self, workshop: &mut StageRun, step: &Step) -> Result<(), Failure> {
         self.accept(workshop)?;
         self.settle_charts(workshop, step);
         Ok(())
     }
 
-    fn settle_charts(&mut self, workshop: &mut Workshop, step: &Step) {
+    fn settle_charts(&mut self, workshop: &mut StageRun, step: &Step) {
         let totals = workshop.increments.is_none();
         if let Some(error) = workshop.newton.time_error.as_mut().filter(|_| totals) {
             error.change_charts(&self.state, &self.model.charted.rotations);
@@ -130,7 +130,7 @@ impl Run<'_> {
     /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller one.
     fn run_adaptive(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         end: f64,
         mut control: Control,
         before: &mut f64,
@@ -173,7 +173,7 @@ impl Run<'_> {
     }
 
     /// One attempt at a step; what was foreseen of it may not be what it fails for.
-    fn advance(&mut self, workshop: &mut Workshop, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
+    fn advance(&mut self, workshop: &mut StageRun, step: Step, before: f64, next: f64) -> Result<(), NewtonFailure> {
         self.good.copy_from(&self.state);
         workshop.trend.reset();
         let mut result = self.attempt_step(workshop, step, before, next);
@@ -192,12 +192,12 @@ impl Run<'_> {
     /// Predict, prescribe, iterate.
     fn attempt_step(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         step: Step,
         before: f64,
         next: f64,
     ) -> Result<(), NewtonFailure> {
-        let Workshop { assembly, newton, increments, trend, massive, rateless, .. } = workshop;
+        let StageRun { assembly, newton, increments, trend, massive, rateless, .. } = workshop;
         if !rateless.is_empty() {
             self.model.steady(&mut self.state);
         }
@@ -211,9 +211,9 @@ impl Run<'_> {
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        trend.begin(&assembly.system.pattern.equations, &mut self.state, &step, newton.scratch());
+        trend.begin(&assembly.system.pattern.dof_map, &mut self.state, &step, newton.scratch());
         newton.solve(&self.model, assembly, &mut self.state, &step, None, &mut self.counters.work)?;
-        trend.end(&assembly.system.pattern.equations, &self.state, &step);
+        trend.end(&assembly.system.pattern.dof_map, &self.state, &step);
         self.refuse_massless_turns(massive)?;
         if let Some(increments) = increments {
             let switched = increments.end(&mut self.state, &self.good);
@@ -250,7 +250,7 @@ impl Run<'_> {
     }
 
     /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.
-    fn complete(&mut self, workshop: &mut Workshop, step: &Step) -> Result<bool, Failure> {
+    fn complete(&mut self, workshop: &mut StageRun, step: &Step) -> Result<bool, Failure> {
         self.accept(workshop)?;
         self.counters.steps += 1;
         self.show(workshop)?;
@@ -262,8 +262,8 @@ impl Run<'_> {
         Ok(false)
     }
 
-    /// A scheme that makes energy from nothing ends the run while its results can still be told from noise.
-    fn refuse_growth(&self, workshop: &mut Workshop) -> Result<(), Failure> {
+    /// A scheme that makes energy from nothing ends the run while its results can still be told from round-off.
+    fn refuse_growth(&self, workshop: &mut StageRun) -> Result<(), Failure> {
         let Some(guard) = &mut workshop.guard else { return Ok(()) };
         let moved = self.model.farthest(&self.good, &self.state);
         let Some(Growth { grown, largest }) = guard.judge(self.bookkeeper.ledger(), moved) else { return Ok(()) };
@@ -271,7 +271,7 @@ impl Run<'_> {
     }
 
     /// Names the failure and goes back to the last good state.
-    fn give_up(&mut self, workshop: &Workshop, failure: NewtonFailure) -> Failure {
+    fn give_up(&mut self, workshop: &StageRun, failure: NewtonFailure) -> Failure {
         let named = self.name_failure(failure, &workshop.assembly.system);
         self.state.copy_from(&self.good);
         named

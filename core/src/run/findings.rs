@@ -1,7 +1,7 @@
 //! What a run finds out beside its rows: points on the way, the stability of ends, warnings.
 
+use super::analysis_results::Event;
 use super::failure::Moment;
-use super::run::Event;
 use super::vibrations::Vibrations;
 use crate::integrate::Largest;
 use crate::warning::{About, WarningKind};

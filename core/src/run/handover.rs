@@ -1,6 +1,6 @@
 //! From a motion to a static stage, see [`crate::effect::fading_inertia`].
 
-use super::run::{Run, Workshop};
+use super::stage_run::{Run, StageRun};
 use crate::effect::fading_inertia;
 use crate::kernel::Weights;
 use crate::model::{SlotKind, StageKind};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 impl Run<'_> {
     /// At the end of a stage: what a static stage that comes is to take over.
-    pub(super) fn hand_over(&mut self, workshop: &mut Workshop) {
+    pub(super) fn hand_over(&mut self, workshop: &mut StageRun) {
         let mut later = self.plan.stages[self.stage + 1..].iter().map(|stage| stage.work.kind());
         match self.plan.stages[self.stage].work.kind() {
             StageKind::Dynamic if later.any(|kind| kind == StageKind::Static) => {
@@ -32,7 +32,7 @@ impl Run<'_> {
     }
 
     /// At the start of a static stage: what it knows itself of inertia, as seen from a frame that rotates, does not fade.
-    pub(super) fn take_over(&mut self, workshop: &mut Workshop) {
+    pub(super) fn take_over(&mut self, workshop: &mut StageRun) {
         if self.state.fading.is_empty() {
             return;
         }

@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, Moment, Tried};
 use super::levels::Approach;
-use super::run::{Plan, Stage, StageWork};
+use super::plan::{Plan, Stage, StageWork};
 use crate::integrate::Scheme;
 use crate::model::StageKind;
 use crate::system::Category;

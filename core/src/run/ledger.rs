@@ -3,7 +3,7 @@
 use crate::model::charts::HALF_TURN;
 use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, log, unwound};
-use crate::system::{Category, Equations, Slot, State, System};
+use crate::system::{Category, DofMap, Slot, State, System};
 use crate::tensor::{Vec3, zeros};
 use crate::threads::{self, PART};
 
@@ -36,7 +36,7 @@ pub(super) struct Bookkeeper {
     /// The largest kinetic + strain energy, or work from outside, of the run so far
     scale: f64,
     q: Vec<Vec3>,
-    wound: Vec<Vec3>,
+    unwrapped: Vec<Vec3>,
     force: Vec<Vec3>,
     drag: Vec<Vec3>,
     drives: Vec<(f64, f64)>,
@@ -72,8 +72,8 @@ impl Bookkeeper {
 
     /// Adds the work of the step that ends here.
     pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
-        let Self { ledger, q, wound, force, drag, .. } = self;
-        let way = Way { kinds: &model.kinds, from: (q, wound), to: (&state.q, &state.wound) };
+        let Self { ledger, q, unwrapped, force, drag, .. } = self;
+        let way = Way { kinds: &model.kinds, from: (q, unwrapped), to: (&state.q, &state.unwrapped) };
         ledger.external += way.work(force, |slot| outside(system, slot));
         ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
         let drives = model.drives(state);
@@ -106,14 +106,14 @@ impl Bookkeeper {
     /// Takes the energies of a state, and where it is.
     fn take(&mut self, model: &Model, state: &State) {
         threads::copy(&mut self.q, &state.q);
-        threads::copy(&mut self.wound, &state.wound);
+        threads::copy(&mut self.unwrapped, &state.unwrapped);
         let energy = model.energy(state);
         (self.ledger.kinetic, self.ledger.strain) = (energy.kinetic, energy.strain);
         self.scale = self.scale.max(energy.kinetic + energy.strain).max(self.ledger.external.abs());
     }
 }
 
-/// The way of all slots from one state to the next, by their unknowns and how far they are wound, where these are no other.
+/// The way of all slots from one state to the next, by their unknowns and their unwrapped rotation vectors where they have some.
 struct Way<'a> {
     kinds: &'a [SlotKind],
     from: (&'a [Vec3], &'a [Vec3]),
@@ -129,8 +129,8 @@ impl Way<'_> {
             for (slot, before) in (PART * number..).zip(before) {
                 let after = after(slot);
                 let before = put(before, after);
-                let wound = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
-                sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), wound);
+                let unwrapped = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
+                sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), unwrapped);
             }
             sum
         };
@@ -152,33 +152,33 @@ fn put(place: &mut Vec3, force: Vec3) -> Vec3 {
 
 /// What acts from outside at a slot: loads, and the forces that hold or move constrained directions.
 fn outside(system: &System, slot: usize) -> Vec3 {
-    let equations: &Equations = &system.pattern.equations;
+    let dof_map: &DofMap = &system.pattern.dof_map;
     let external = system.part_of(Category::External, slot);
-    match equations.is_plain(slot as Slot) {
+    match dof_map.is_plain(slot as Slot) {
         true => -external,
-        false => equations.held_part(slot as Slot, system.total(slot)) - external,
+        false => dof_map.held_part(slot as Slot, system.total(slot)) - external,
     }
 }
 
-/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A rotation tells by `wound` how far it
+/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A rotation tells by `unwrapped` how far it
 /// has gone.
-fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), wound: Vec3) -> f64 {
+fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrapped: Vec3) -> f64 {
     if f0 == Vec3::ZERO && f1 == Vec3::ZERO {
         return 0.0;
     }
     match kind {
         SlotKind::Displacement => 0.5 * (f0 + f1).dot(q1 - q0),
-        SlotKind::Rotation => turning_work(q0, f0, q1, f1, wound),
+        SlotKind::Rotation => turning_work(q0, f0, q1, f1, unwrapped),
         SlotKind::Force | SlotKind::Moment => 0.0,
     }
 }
 
 /// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial moment m = T^-1 f
 /// and the spatial rotation vector from the one state to the other.
-fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3, wound: Vec3) -> f64 {
+fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3, unwrapped: Vec3) -> f64 {
     let (before, after) = (Rotation::new(p0), Rotation::new(p1));
     let shortest = log(after.r * before.r.transpose());
-    let turned = if wound.norm() > HALF_TURN { unwound(shortest, wound) } else { shortest };
+    let turned = if unwrapped.norm() > HALF_TURN { unwound(shortest, unwrapped) } else { shortest };
     let (m0, m1) = (before.t_inverse() * f0, after.t_inverse() * f1);
     0.5 * (m0 + m1).dot(turned)
 }

@@ -1,11 +1,11 @@
 //! How the levels of a static stage are approached, and how a step to another branch is noticed.
 
 use super::failure::Failure;
-use super::run::{Run, Workshop};
+use super::stage_run::{Run, StageRun};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
 use crate::rotation::{Rotation, relative_angle};
-use crate::scalar::Rough;
+use crate::scalar::CompressedField;
 use crate::solve::{Signature, Tangent};
 use crate::system::State;
 use crate::tensor::Vec3;
@@ -71,9 +71,9 @@ pub(super) struct Stability {
 
 impl Stability {
     /// At the start of a stage.
-    pub fn new(run: &mut Run, workshop: &mut Workshop) -> Self {
+    pub fn new(run: &mut Run, workshop: &mut StageRun) -> Self {
         // The start was assembled with its stiffness.
-        let Workshop { assembly, newton, .. } = workshop;
+        let StageRun { assembly, newton, .. } = workshop;
         let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
         let signature = newton.signature(&mut tangent, &mut run.counters.work);
         newton.begin_with(&assembly.system);
@@ -82,11 +82,11 @@ impl Stability {
     }
 
     /// At the run's state; `None` where it is not known.
-    pub fn look(&mut self, run: &mut Run, workshop: &mut Workshop) -> Option<Signature> {
+    pub fn look(&mut self, run: &mut Run, workshop: &mut StageRun) -> Option<Signature> {
         if !self.counts {
             return None;
         }
-        let Workshop { assembly, newton, .. } = workshop;
+        let StageRun { assembly, newton, .. } = workshop;
         let signature = newton.signature_at(assembly, &run.state, &mut run.counters.work);
         // Where nothing tells, nothing will next.
         self.counts = signature.is_some();
@@ -102,7 +102,7 @@ impl Stability {
     pub fn pass(
         &mut self,
         run: &mut Run,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         signature: Option<Signature>,
     ) -> Result<(), Failure> {
         let before = std::mem::replace(&mut self.signature, signature);
@@ -128,7 +128,7 @@ impl Levels {
     /// From the run's state on.
     pub fn new(
         run: &mut Run,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         steps: usize,
         approach: Approach,
         loose: Option<Failure>,
@@ -192,7 +192,7 @@ impl Levels {
         &self,
         model: &Model,
         states: [&State; 2],
-        first: &Rough<3>,
+        first: &CompressedField<3>,
         signature: Option<Signature>,
     ) -> bool {
         let [from, to] = states;
@@ -212,7 +212,7 @@ impl Levels {
 
 /// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
 /// displacements tell.
-fn has_turned_back(model: &Model, from: &State, to: &State, first: &Rough<3>) -> bool {
+fn has_turned_back(model: &Model, from: &State, to: &State, first: &CompressedField<3>) -> bool {
     let [along, moved, expected] = threads::sums(first.len(), |part| {
         let [mut along, mut moved, mut expected] = [0.0; 3];
         for slot in part.filter(|&slot| model.kinds[slot] == SlotKind::Displacement) {

@@ -1,8 +1,9 @@
 //! Small motions about the state that was reached: (s^2 M + s C + K) x = 0.
 
+use super::analysis_results::Mode;
 use super::failure::Failure;
 use super::rigid::{free_spins, rigid_motions};
-use super::run::{Mode, Run, Workshop};
+use super::stage_run::{Run, StageRun};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, StageError};
 use crate::solve::{
@@ -60,7 +61,7 @@ impl Found {
 
 impl Run<'_> {
     /// The modes with the lowest frequencies, and all unstable ones.
-    pub(super) fn run_modal(&mut self, workshop: &mut Workshop, modes: usize) -> Result<(), Failure> {
+    pub(super) fn run_modal(&mut self, workshop: &mut StageRun, modes: usize) -> Result<(), Failure> {
         self.observer.progress(self.moment(), self.static_progress(0.0))?;
         let moving = self.state.clone();
         self.stand_still();
@@ -76,7 +77,7 @@ impl Run<'_> {
         let mut rigid = rigid_motions(&workshop.assembly.system, &self.model, &self.state, &self.plan.places);
         rigid.extend(free_spins(&workshop.assembly.system, &self.model, &self.state));
         self.refuse_massless_mechanisms(workshop, &matrices)?;
-        let Workshop { assembly, newton, .. } = &mut *workshop;
+        let StageRun { assembly, newton, .. } = &mut *workshop;
         let found = self.find_modes(assembly, &mut newton.solver, &matrices, rigid, modes, 0.0)?;
         let found = found
             .ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))?;
@@ -95,12 +96,12 @@ impl Run<'_> {
         self.state.stand_still();
     }
 
-    pub(super) fn warn_out_of_balance(&mut self, workshop: &mut Workshop) {
+    pub(super) fn warn_out_of_balance(&mut self, workshop: &mut StageRun) {
         workshop.assembly.forget();
-        let noise = workshop.assembly.noise(&self.state);
+        let round_off = workshop.assembly.round_off(&self.state);
         workshop.assembly.evaluate(&self.state, Weights::NONE, None);
         let loose = Convergence { tolerance: 1e-5 };
-        let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, noise, None);
+        let (verdict, _) = loose.judge(&self.model, &workshop.assembly.system, round_off, None);
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
             let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
             self.warn(WarningKind::OutOfBalance, message);
@@ -151,8 +152,8 @@ impl Run<'_> {
     }
 
     /// What neither stiffness nor mass holds.
-    fn refuse_massless_mechanisms(&mut self, workshop: &mut Workshop, matrices: &Matrices) -> Result<(), Failure> {
-        let Workshop { assembly, newton, .. } = workshop;
+    fn refuse_massless_mechanisms(&mut self, workshop: &mut StageRun, matrices: &Matrices) -> Result<(), Failure> {
+        let StageRun { assembly, newton, .. } = workshop;
         let shift = first_shift(matrices, &assembly.system);
         matrices.combine(shift, &mut assembly.system.values);
         self.counters.work.factorisations += 1;
@@ -163,10 +164,10 @@ impl Run<'_> {
 
     /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has lost are there again, as far as the
     /// shape is right.
-    fn refine(&mut self, workshop: &mut Workshop, motion: &mut SmallMotion) {
+    fn refine(&mut self, workshop: &mut StageRun, motion: &mut SmallMotion) {
         let Some(ModeShape { unknowns, mass }) = motion.shape.take() else { return };
         let mut field = vec![Vec3::ZERO; self.state.q.len()];
-        workshop.assembly.system.pattern.equations.scatter(&unknowns, None, &mut field);
+        workshop.assembly.system.pattern.dof_map.scatter(&unknowns, None, &mut field);
         let Some(stiffness) = workshop.assembly.stiffness_along(&self.state, &field) else { return };
         let square = -stiffness / mass;
         motion.exponent = match square < 0.0 {
@@ -327,8 +328,8 @@ fn mode(motion: &SmallMotion) -> Mode {
 /// Multipliers have no mass.
 fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
     let pattern = &system.pattern;
-    let is_multiplier: Vec<bool> = (0..pattern.equations.count())
-        .map(|k| model.kinds[pattern.equations.direction(k).slot as usize].is_multiplier())
+    let is_multiplier: Vec<bool> = (0..pattern.dof_map.count())
+        .map(|k| model.kinds[pattern.dof_map.direction(k).slot as usize].is_multiplier())
         .collect();
     for (column, &own) in is_multiplier.iter().enumerate() {
         for entry in pattern.entries(column as u32).filter(|entry| own || is_multiplier[entry.row as usize]) {

@@ -10,9 +10,11 @@
 //! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in the load factor; rotation
 //! vectors follow through the equations, so that no chart enters.
 
+use super::analysis_results::{Event, EventKind};
 use super::direction::Direction;
 use super::failure::Failure;
-use super::run::{Event, EventKind, Run, StageWork, Workshop};
+use super::plan::StageWork;
+use super::stage_run::{Run, StageRun};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, StageError, StageKind, charts};
 use crate::solve::{self, NewtonFailure, Signature, Tangent, Verdict, mechanism, timed};
@@ -106,7 +108,7 @@ pub(super) enum Arrival {
 
 impl Run<'_> {
     /// The path until the load factor first reaches 1, or `until`, or `max_steps`.
-    pub(super) fn run_path(&mut self, workshop: &mut Workshop, steps: usize, max_steps: usize) -> Result<(), Failure> {
+    pub(super) fn run_path(&mut self, workshop: &mut StageRun, steps: usize, max_steps: usize) -> Result<(), Failure> {
         self.start_static(workshop)?;
         let Some(mut path) = Path::new(self, workshop, steps)? else {
             return Err(self.describe(StageError::NothingGrows(StageKind::Static)));
@@ -124,7 +126,7 @@ impl Run<'_> {
     /// cannot pass. `from` is a state further back on the path, `increment` a load increment that is easy there, `level` that between levels.
     pub(super) fn detour(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         from: &State,
         goal: f64,
         increment: f64,
@@ -138,7 +140,7 @@ impl Run<'_> {
     /// Along a path until the load factor reaches `goal` from below, or `until`, or a bound.
     fn go_along(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         path: &mut Path,
         goal: f64,
         bounds: Bounds,
@@ -205,7 +207,7 @@ impl Run<'_> {
     }
 
     /// From a point near it to a load factor itself, not further away than an increment.
-    fn hit(&mut self, workshop: &mut Workshop, goal: Target, point: &mut Point, path: &Path) -> bool {
+    fn hit(&mut self, workshop: &mut StageRun, goal: Target, point: &mut Point, path: &Path) -> bool {
         let Target::Load(load) = goal else { return false };
         self.state.copy_from(&point.state);
         if self.attempt(workshop, load).is_err() {
@@ -222,7 +224,7 @@ impl Run<'_> {
     /// What follows a point of the path: account, row, and a word where something special happened.
     fn arrive(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         path: &mut Path,
         point: Point,
         target: Option<Target>,
@@ -245,7 +247,7 @@ impl Run<'_> {
     /// Names limit and turning points, and branches that were passed: where the signs of pivots changed.
     pub(super) fn tell_stability(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         kind: Option<EventKind>,
         before: Option<Signature>,
         after: Option<Signature>,
@@ -284,7 +286,7 @@ struct Path {
 
 impl Path {
     /// `None` where nothing grows with the load factor.
-    fn new(run: &mut Run, workshop: &mut Workshop, steps: usize) -> Result<Option<Self>, Failure> {
+    fn new(run: &mut Run, workshop: &mut StageRun, steps: usize) -> Result<Option<Self>, Failure> {
         let Some(Direction { rate: direction, .. }) = run.path_direction(workshop)? else { return Ok(None) };
         let mut path = Self::with_measure(run, direction);
         path.here = path.look(run, workshop, &path.here.clone())?;
@@ -294,7 +296,7 @@ impl Path {
 
     /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`: near a limit point the
     /// tangent moves without bounds.
-    fn onward(run: &mut Run, workshop: &mut Workshop, from: &State, increment: f64) -> Result<Option<Self>, Failure> {
+    fn onward(run: &mut Run, workshop: &mut StageRun, from: &State, increment: f64) -> Result<Option<Self>, Failure> {
         let risen = run.state.load - from.load;
         if risen <= 0.0 {
             return Self::new(run, workshop, (1.0 / increment).ceil() as usize);
@@ -353,11 +355,11 @@ impl Path {
     }
 
     /// The point at the run's state: its tangent goes on in the direction of `before`.
-    fn look(&mut self, run: &mut Run, workshop: &mut Workshop, before: &Point) -> Result<Point, Failure> {
+    fn look(&mut self, run: &mut Run, workshop: &mut StageRun, before: &Point) -> Result<Point, Failure> {
         let slots = run.state.q.len();
         let Direction { rate, pull } = run.path_direction(workshop)?.unwrap_or_else(|| Direction::none(slots));
         // The tangent of the last evaluation tells the pivots.
-        let Workshop { assembly, newton, .. } = workshop;
+        let StageRun { assembly, newton, .. } = workshop;
         let mut tangent = Tangent::that_may_go(assembly, &run.state, Weights::STIFFNESS);
         let signature = newton.solver.signature(&mut tangent);
         let along = dot(run, &rate, &before.tangent) * self.scale + before.load_rate;
@@ -377,7 +379,7 @@ impl Path {
     }
 
     /// One step that is neither too hard nor too bent; its length.
-    fn step(&mut self, run: &mut Run, workshop: &mut Workshop) -> Result<(Point, f64), Failure> {
+    fn step(&mut self, run: &mut Run, workshop: &mut StageRun) -> Result<(Point, f64), Failure> {
         loop {
             let length = self.length;
             let failure = match self.advance(run, workshop, length) {
@@ -436,20 +438,20 @@ impl Path {
     }
 
     /// Goes `length` along the tangent and back to the path; leaves the run's state there and returns the iterations.
-    fn advance(&self, run: &mut Run, workshop: &mut Workshop, length: f64) -> Result<usize, NewtonFailure> {
+    fn advance(&self, run: &mut Run, workshop: &mut StageRun, length: f64) -> Result<usize, NewtonFailure> {
         let mut load = self.predict(run, length);
         workshop.assembly.forget();
-        let noise = workshop.assembly.noise(&run.state);
+        let round_off = workshop.assembly.round_off(&run.state);
         let mut last = None;
         let (mut iterations, mut history) = (0, Vec::new());
         loop {
             // Held directions are put where they belong, free of the round-off of predictor and corrections.
             run.model.set_clock(&mut run.state, self.here.state.time, load);
             let pull = run.load_derivative(workshop);
-            let Workshop { assembly, newton, lift, .. } = workshop;
+            let StageRun { assembly, newton, prescribed_increment, .. } = workshop;
             let seconds = &mut run.counters.work.evaluation_seconds;
-            timed(seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(lift)));
-            let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, noise, last);
+            timed(seconds, || assembly.evaluate(&run.state, Weights::STIFFNESS, Some(prescribed_increment)));
+            let (verdict, residual) = newton.convergence.judge(&run.model, &assembly.system, round_off, last);
             history.push(residual.ratio);
             match verdict {
                 Verdict::Converged | Verdict::Noisy => return Ok(iterations),
@@ -487,16 +489,16 @@ impl Path {
     fn correction(
         &self,
         run: &mut Run,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         pull: &[Vec3],
     ) -> Result<(Vec<Vec3>, f64), NewtonFailure> {
-        let Workshop { assembly, newton, lift, .. } = workshop;
+        let StageRun { assembly, newton, prescribed_increment, .. } = workshop;
         let (system, solver, work) = (&assembly.system, &mut newton.solver, &mut run.counters.work);
         let slots = pull.len();
-        let mut back = vec![0.0; system.pattern.equations.count()];
+        let mut back = vec![0.0; system.pattern.dof_map.count()];
         let mut along = back.clone();
         system.right_hand_side_of(pull, &mut along);
-        // The residual's own right-hand side takes no part of the lift.
+        // The residual's own right-hand side takes no part of prescribed increments.
         let total: Vec<Vec3> = (0..slots).map(|slot| system.total(slot)).collect();
         system.right_hand_side_without_lift(&total, &mut back);
         work.factorisations += 1;
@@ -512,8 +514,8 @@ impl Path {
             )));
         }
         let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
-        system.pattern.equations.scatter(&back, None, &mut a);
-        system.pattern.equations.scatter(&along, Some(lift), &mut b);
+        system.pattern.dof_map.scatter(&back, None, &mut a);
+        system.pattern.dof_map.scatter(&along, Some(prescribed_increment), &mut b);
         let part = |d: &[Vec3]| dot(run, &self.here.tangent, d) * self.scale;
         let dl = -part(&a) / (part(&b) + self.here.load_rate);
         Ok((a.iter().zip(&b).map(|(a, b)| *a + *b * dl).collect(), dl))
@@ -523,7 +525,7 @@ impl Path {
     fn nearest(
         &mut self,
         run: &mut Run,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         next: Point,
         length: f64,
         targets: &[Target],
@@ -542,7 +544,7 @@ impl Path {
     fn locate(
         &mut self,
         run: &mut Run,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         end: &Point,
         length: f64,
         target: Target,
@@ -575,7 +577,7 @@ impl Path {
 }
 
 /// Adds a correction; whether nodes changed their charts by it.
-fn correct(run: &mut Run, workshop: &mut Workshop, dq: &[Vec3]) -> bool {
+fn correct(run: &mut Run, workshop: &mut StageRun, dq: &[Vec3]) -> bool {
     workshop.assembly.extrapolate(&run.state, dq);
     charts::carry(&mut run.state, dq, &run.model.charted.rotations);
     run.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);

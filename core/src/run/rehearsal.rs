@@ -2,10 +2,10 @@
 //!
 //! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
 
-use super::run::{InitialMotion, Plan, Stage, StageWork};
+use super::plan::{InitialMotion, Plan, Stage, StageWork};
 use super::start::set_in_motion;
 use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
-use crate::system::{Equations, Slot, State};
+use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
 use std::collections::HashMap;
 
@@ -92,7 +92,7 @@ pub(super) fn lacking(
     stage: &Stage,
     number: usize,
     fading: bool,
-    equations: impl FnOnce() -> Option<Equations>,
+    dof_map: impl FnOnce() -> Option<DofMap>,
 ) -> Option<StageError> {
     let kind = stage.work.kind();
     let grows = matches!(stage.work, StageWork::Path { .. } | StageWork::Buckling { .. });
@@ -100,7 +100,7 @@ pub(super) fn lacking(
         return Some(StageError::NothingGrows(kind));
     }
     let is_modal = kind == StageKind::Modal;
-    let lacks_mass = is_modal && equations().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
+    let lacks_mass = is_modal && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
     lacks_mass.then_some(StageError::NoMass)
 }
 

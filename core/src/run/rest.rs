@@ -6,13 +6,13 @@
 
 use super::failure::{Failure, Moment};
 use super::levels::{LARGEST_UNCOUNTED, distance};
-use super::run::{Run, Workshop};
 use super::space::Space;
+use super::stage_run::{Run, StageRun};
 use crate::effect::resistance::Resistance;
 use crate::integrate::{Equilibrium, Method};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, SlotKind, charts};
-use crate::solve::{Limp, LinearSolver, Newton, NullVector, Signature, Tangent, size};
+use crate::solve::{LinearSolver, Newton, NullVector, Signature, SoftMode, Tangent, size};
 use crate::system::{Anchor, Slot, State, System};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -80,7 +80,7 @@ struct Resisted {
 
 impl Run<'_> {
     /// From the last good state to one at rest at the load factor `target`; `false`, with the last good state, where none is found.
-    pub(super) fn come_to_rest(&mut self, workshop: &mut Workshop, target: f64) -> Result<bool, Failure> {
+    pub(super) fn come_to_rest(&mut self, workshop: &mut StageRun, target: f64) -> Result<bool, Failure> {
         let start = self.good.kept();
         let account = self.bookkeeper.clone();
         let mut resisted = self.resist()?;
@@ -110,9 +110,11 @@ impl Run<'_> {
 
     /// The part of a load increment that prescribed motions begin with.
     fn first_part(&mut self, target: f64) -> f64 {
-        let mut lift = Vec::new();
+        let mut prescribed_increment = Vec::new();
         self.state.copy_all_but_rates(&self.good);
-        let moved = self.set_load(&mut lift, target).map(|moves| if moves { size(&self.model, &lift) } else { 0.0 });
+        let moved = self
+            .set_load(&mut prescribed_increment, target)
+            .map(|moves| if moves { size(&self.model, &prescribed_increment) } else { 0.0 });
         self.state.copy_all_but_rates(&self.good);
         // What turns too far at once tells no size.
         PACE / moved.unwrap_or(PI).max(PACE)
@@ -120,19 +122,19 @@ impl Run<'_> {
 
     fn resist(&self) -> Result<Resisted, Failure> {
         let stage = &self.plan.stages[self.stage];
-        let equations = self.model.number(self.stage, self.plane).map_err(|error| self.describe(error))?;
+        let dof_map = self.model.number(self.stage, self.plane).map_err(|error| self.describe(error))?;
         let slots = self.model.kinds.iter().enumerate().filter(|(_, kind)| !kind.is_multiplier());
         let slots = slots.map(|(slot, kind)| (slot as Slot, *kind == SlotKind::Rotation)).collect();
         let mut model = self.model.clone();
         model.effects.push(Arc::new(Resistance { slots, arm: ARM * model.length }));
-        let assembly = Assembly::new(&stage.context(self.stage), equations, &model);
+        let assembly = Assembly::new(&stage.context(self.stage), dof_map, &model);
         let newton = self.newton_for(stage, &assembly)?;
         Ok(Resisted { assembly, newton, steps: MOST_STEPS })
     }
 
     /// At one load factor: steps against a resistance that fades, until the state is in balance without it. Each step leaves its state as
     /// the good one.
-    fn fall(&mut self, workshop: &mut Workshop, resisted: &mut Resisted, load: f64) -> Result<bool, Failure> {
+    fn fall(&mut self, workshop: &mut StageRun, resisted: &mut Resisted, load: f64) -> Result<bool, Failure> {
         let start = self.good.kept();
         let gentle = self.gentle_resistance(resisted, load);
         let (mut resistance, mut lifts, mut growing) = (gentle, true, 0_usize);
@@ -141,8 +143,8 @@ impl Run<'_> {
         while gentle > 0.0 && resistance <= HARDEST * gentle && resisted.steps > enough {
             self.observer.progress(self.moment(), self.static_progress(start.load))?;
             resisted.steps -= 1;
-            let lift = lifts.then_some(load);
-            if !self.step_against(resisted, resistance, lift) {
+            let prescribed_increment = lifts.then_some(load);
+            if !self.step_against(resisted, resistance, prescribed_increment) {
                 self.counters.cutbacks += 1;
                 resistance *= HARDER;
                 self.state.copy_all_but_rates(&self.good);
@@ -165,7 +167,7 @@ impl Run<'_> {
                 }
                 continue;
             }
-            let Workshop { assembly, newton, .. } = &mut *workshop;
+            let StageRun { assembly, newton, .. } = &mut *workshop;
             let signature = newton.signature_at(assembly, &self.state, &mut self.counters.work);
             if signature.is_none_or(|signature| !signature.tells_unstable()) {
                 self.good.copy_all_but_rates(&self.state);
@@ -191,8 +193,8 @@ impl Run<'_> {
     /// One step from the run's state; in the first, whose load factor is given, prescribed motions come in. `false` where it finds no balance,
     /// or none that is a minimum: with less resistance than some motion gains by the forces there is no way along them.
     fn step_against(&mut self, resisted: &mut Resisted, resistance: f64, first: Option<f64>) -> bool {
-        let mut lift = Vec::new();
-        let moves = match first.map(|load| self.set_load(&mut lift, load)) {
+        let mut prescribed_increment = Vec::new();
+        let moves = match first.map(|load| self.set_load(&mut prescribed_increment, load)) {
             Some(Err(_)) => return false,
             Some(Ok(moves)) => moves,
             None => false,
@@ -200,8 +202,8 @@ impl Run<'_> {
         self.state.anchor = Some(Arc::new(Anchor { resistance, q: self.state.q.clone() }));
         let Resisted { assembly, newton, .. } = resisted;
         let work = &mut self.counters.work;
-        let lift = moves.then_some(&lift[..]);
-        let solved = newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, lift, work);
+        let prescribed_increment = moves.then_some(&prescribed_increment[..]);
+        let solved = newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, prescribed_increment, work);
         let solved = solved.and_then(|()| self.refuse_leaps()).and_then(|()| self.refuse_windings());
         if solved.is_err() {
             return false;
@@ -211,7 +213,7 @@ impl Run<'_> {
     }
 
     /// Whether there is balance without resistance at the last good state; then it is the state of the run.
-    fn balances(&mut self, workshop: &mut Workshop, load: f64) -> bool {
+    fn balances(&mut self, workshop: &mut StageRun, load: f64) -> bool {
         workshop.newton.begin_anew();
         let found = self.attempt(workshop, load).is_ok()
             && workshop.newton.contraction <= LARGEST_UNCOUNTED
@@ -230,7 +232,7 @@ impl Run<'_> {
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
         let Some(softest) = newton.solver.softest(&mut tangent) else { return };
-        let (_, mut motion) = softest.by_slot(&assembly.system.pattern.equations, self.state.q.len());
+        let (_, mut motion) = softest.by_slot(&assembly.system.pattern.dof_map, self.state.q.len());
         let extent = size(&self.model, &motion);
         let scale = if extent > 0.0 { PUSH / extent } else { 0.0 };
         let scales = self.model.kinds.iter().map(|kind| if kind.is_multiplier() { 0.0 } else { scale });
@@ -240,8 +242,8 @@ impl Run<'_> {
     }
 
     /// Refuses a state of rest that leaves a motion which neither loads nor stiffness hold, in the plane of the stage or out of it.
-    pub(super) fn refuse_loose_at_rest(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
-        let Workshop { assembly, newton, .. } = &mut *workshop;
+    pub(super) fn refuse_loose_at_rest(&mut self, workshop: &mut StageRun) -> Result<(), Failure> {
+        let StageRun { assembly, newton, .. } = &mut *workshop;
         self.counters.work.factorisations += 1;
         if let Some(vector) = loose_at_rest(assembly, &mut newton.solver, &self.model, &self.state) {
             return Err(self.name_unheld(vector, &workshop.assembly.system));
@@ -272,16 +274,16 @@ fn loose_at_rest(
     assembly.evaluate(state, Weights::STIFFNESS, None);
     let force = model.largest_force(&assembly.system);
     let mut tangent = Tangent::that_may_go(assembly, state, Weights::STIFFNESS);
-    let limp = Limp::find(solver, &mut tangent, model, false)?;
+    let soft_mode = SoftMode::find(solver, &mut tangent, model, false)?;
     let system = tangent.look();
-    let motion = &limp.vector.motion;
+    let motion = &soft_mode.vector.motion;
     let stiffness: f64 = system.multiply(&system.values, motion).iter().zip(motion).map(|(f, x)| f * x).sum();
-    let (_, by_slot) = limp.vector.by_slot(&system.pattern.equations, state.q.len());
+    let (_, by_slot) = soft_mode.vector.by_slot(&system.pattern.dof_map, state.q.len());
     let largest = |wanted: SlotKind| {
         let slots = by_slot.iter().zip(model.kinds.iter()).filter(|(_, kind)| **kind == wanted);
         slots.map(|(motion, _)| motion.squared()).fold(0.0, f64::max)
     };
     let moves = LOOSE * force / model.length * largest(SlotKind::Displacement);
     let turns = LOOSE_TURN * force * model.length * largest(SlotKind::Rotation);
-    (limp.is_loose() || stiffness.abs() < moves.max(turns)).then_some(limp.vector)
+    (soft_mode.is_loose() || stiffness.abs() < moves.max(turns)).then_some(soft_mode.vector)
 }

@@ -35,14 +35,14 @@ const NO_FORCE_OF_SPIN: f64 = 1e-8;
 /// The spins of straight parts about their own axes against which nothing acts, one number an equation each. The system holds the stiffness of
 /// the state.
 pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
-    let equations = &system.pattern.equations;
+    let dof_map = &system.pattern.dof_map;
     let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
     let mut found = Vec::new();
     let mut field = vec![Vec3::ZERO; state.q.len()];
     let mut look = |increments: &SomeIncrements| {
         increments.iter().for_each(|&(slot, increment)| field[slot as usize] = increment);
-        let mut motion = vec![0.0; equations.count()];
-        equations.gather(|slot| field[slot], &mut motion);
+        let mut motion = vec![0.0; dof_map.count()];
+        dof_map.gather(|slot| field[slot], &mut motion);
         increments.iter().for_each(|&(slot, _)| field[slot as usize] = Vec3::ZERO);
         let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
         let (force, terms) = (system.multiply(&system.values, &motion), system.multiply(&sizes, &absolute));
@@ -65,8 +65,8 @@ pub(super) fn rigid_motions(system: &System, model: &Model, state: &State, place
 
 /// Nodes that are connected, by what acts between them.
 fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
-    let groups = &system.pattern.groups;
-    let mut part_of: Vec<usize> = (0..groups.count()).collect();
+    let node_blocks = &system.pattern.node_blocks;
+    let mut part_of: Vec<usize> = (0..node_blocks.count()).collect();
     fn root(part_of: &mut [usize], mut group: usize) -> usize {
         while part_of[group] != group {
             part_of[group] = part_of[part_of[group]];
@@ -78,14 +78,14 @@ fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
         let (a, b) = (root(&mut part_of, a), root(&mut part_of, b));
         part_of[a.max(b)] = a.min(b);
     };
-    for column in 0..groups.count() {
+    for column in 0..node_blocks.count() {
         system.pattern.rows_of(column).iter().for_each(|&row| join(row as usize, column));
     }
     // Nodes that share a displacement are one part.
-    places.iter().for_each(|(node, _)| join(groups.of(node.u).0, groups.of(node.p).0));
+    places.iter().for_each(|(node, _)| join(node_blocks.of(node.u).0, node_blocks.of(node.p).0));
     let mut parts: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
     for &(node, place) in places {
-        parts.entry(root(&mut part_of, groups.of(node.u).0)).or_default().push((node, place));
+        parts.entry(root(&mut part_of, node_blocks.of(node.u).0)).or_default().push((node, place));
     }
     parts.into_values().collect()
 }
@@ -101,7 +101,7 @@ fn moved(state: &State, node: Node, from_centre: Vec3, number: usize) -> (Vec3, 
 }
 
 fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
-    let equations = &system.pattern.equations;
+    let dof_map = &system.pattern.dof_map;
     let now = |(node, place): &(Node, Vec3)| *place + state.q[node.u as usize];
     let centre = part.iter().fold(Vec3::ZERO, |sum, node| sum + now(node)) * (1.0 / part.len() as f64);
     let extent = part.iter().map(|node| (now(node) - centre).norm()).fold(0.0, f64::max);
@@ -113,7 +113,7 @@ fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &Sta
     for node in part {
         let held_parts: [[f64; 6]; MOTIONS] = std::array::from_fn(|number| {
             let (u, p) = moved(state, node.0, now(node) - centre, number);
-            let (u, p) = (equations.held_part(node.0.u, u), equations.held_part(node.0.p, p) * extent);
+            let (u, p) = (dof_map.held_part(node.0.u, u), dof_map.held_part(node.0.p, p) * extent);
             let [a, b] = [u.0, p.0].map(|v| v.map(|v| v * unit(number)));
             [a[0], a[1], a[2], b[0], b[1], b[2]]
         });
@@ -122,19 +122,19 @@ fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &Sta
     let Some(allowed) = null_space(held, HELD * HELD) else { return Vec::new() };
     // What acts against those that are left.
     let field = |number: usize| {
-        let mut out = vec![0.0; equations.count()];
+        let mut out = vec![0.0; dof_map.count()];
         let mut motion = vec![Vec3::ZERO; state.q.len()];
         for node in part {
             let (u, p) = moved(state, node.0, now(node) - centre, number);
             (motion[node.0.u as usize], motion[node.0.p as usize]) = (u * unit(number), p * unit(number));
         }
-        equations.gather(|slot| motion[slot], &mut out);
+        dof_map.gather(|slot| motion[slot], &mut out);
         out
     };
     let fields: Vec<Vec<f64>> = (0..MOTIONS).map(field).collect();
     let combined = combine(&fields, &allowed);
     let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
-    let mut scale = vec![0.0_f64; equations.count()];
+    let mut scale = vec![0.0_f64; dof_map.count()];
     let mut forces: Vec<Vec<f64>> = Vec::new();
     for (k, motion) in combined.iter().enumerate() {
         let mut force = system.multiply(&system.values, motion);
@@ -147,7 +147,7 @@ fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &Sta
         forces.push(force);
     }
     let mut resisted = DMatrix::<f64>::zeros(forces.len(), forces.len());
-    for row in (0..equations.count()).filter(|&row| scale[row] > 0.0) {
+    for row in (0..dof_map.count()).filter(|&row| scale[row] > 0.0) {
         let parts: Vec<f64> = forces.iter().map(|force| force[row] / scale[row]).collect();
         for (i, a) in parts.iter().enumerate() {
             parts.iter().enumerate().for_each(|(j, b)| resisted[(i, j)] += a * b);
@@ -171,9 +171,9 @@ fn combine(fields: &[Vec<f64>], coefficients: &DMatrix<f64>) -> Vec<Vec<f64>> {
 
 /// How the forces on a part change where they turn with it; one number an equation.
 fn turned_forces(part: &[(Node, Vec3)], system: &System, state: &State, motion: &[f64], turn: Vec3) -> Vec<f64> {
-    let equations = &system.pattern.equations;
+    let dof_map = &system.pattern.dof_map;
     let (mut field, mut change) = (vec![Vec3::ZERO; state.q.len()], vec![Vec3::ZERO; state.q.len()]);
-    equations.scatter(motion, None, &mut field);
+    dof_map.scatter(motion, None, &mut field);
     for (node, _) in part {
         let (u, p) = (node.u as usize, node.p as usize);
         change[u] = turn.cross(system.total(u));
@@ -181,8 +181,8 @@ fn turned_forces(part: &[(Node, Vec3)], system: &System, state: &State, motion: 
         let moment = rotation.t_inverse().transpose_mul(system.total(p));
         change[p] = rotation.c2(moment) * field[p];
     }
-    let mut out = vec![0.0; equations.count()];
-    equations.gather(|slot| change[slot], &mut out);
+    let mut out = vec![0.0; dof_map.count()];
+    dof_map.gather(|slot| change[slot], &mut out);
     out
 }
 

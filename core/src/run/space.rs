@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::findings::{StabilityVerdict, StageStability};
-use super::run::{Run, Workshop};
+use super::stage_run::{Run, StageRun};
 use crate::kernel::Weights;
 use crate::model::Assembly;
 use crate::solve::{LinearSolver, Signature, Tangent, mechanism};
@@ -15,17 +15,17 @@ pub(super) struct Space {
 
 impl Run<'_> {
     /// The present stage in space, where it is treated in a plane: set up once, by the first look.
-    pub(super) fn in_space<'w>(&self, workshop: &'w mut Workshop) -> Result<Option<&'w mut Space>, Failure> {
+    pub(super) fn in_space<'w>(&self, workshop: &'w mut StageRun) -> Result<Option<&'w mut Space>, Failure> {
         if workshop.space.is_none() && self.plane.is_some() {
             workshop.space = Some(self.set_up_in_space(workshop)?);
         }
         Ok(workshop.space.as_mut())
     }
 
-    fn set_up_in_space(&self, in_plane: &Workshop) -> Result<Space, Failure> {
+    fn set_up_in_space(&self, in_plane: &StageRun) -> Result<Space, Failure> {
         let context = self.plan.stages[self.stage].context(self.stage);
-        let equations = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
-        let assembly = Assembly::new(&context, equations, &self.model);
+        let dof_map = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
+        let assembly = Assembly::new(&context, dof_map, &self.model);
         let (solver, system) = (&in_plane.newton.solver, &in_plane.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &self.model.multipliers) {
             Some(solver) => Ok(Space { assembly, solver }),
@@ -36,7 +36,7 @@ impl Run<'_> {
     /// Warns where the state is unstable in space by more than the `negative` pivots that it has in its plane.
     pub(super) fn look_out_of_plane(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         negative: Option<usize>,
     ) -> Result<(), Failure> {
         let Some(in_plane) = negative else { return Ok(()) };
@@ -51,7 +51,7 @@ impl Run<'_> {
 
     /// How many more pivots are negative in space than the `in_plane` ones of a stage that is treated in a plane; none where it is
     /// treated in space, `None` where it is not known.
-    fn count_out_of_plane(&mut self, workshop: &mut Workshop, in_plane: usize) -> Result<Option<usize>, Failure> {
+    fn count_out_of_plane(&mut self, workshop: &mut StageRun, in_plane: usize) -> Result<Option<usize>, Failure> {
         let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(Some(0)) };
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         self.counters.work.factorisations += 1;
@@ -64,7 +64,7 @@ impl Run<'_> {
     /// stage is treated, where it is known; `on_limit`: whether the state is a limit point, with the pivots behind it.
     pub(super) fn conclude_static(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         signature: Option<Signature>,
         on_limit: bool,
     ) -> Result<(), Failure> {
@@ -93,7 +93,7 @@ impl Run<'_> {
 
     /// Refuses what nothing holds in the plane or out of it, with these weights of stiffness, damping and mass and without
     /// velocities.
-    pub(super) fn refuse_loose_in_space(&mut self, workshop: &mut Workshop, weights: Weights) -> Result<(), Failure> {
+    pub(super) fn refuse_loose_in_space(&mut self, workshop: &mut StageRun, weights: Weights) -> Result<(), Failure> {
         let Some(Space { assembly, solver }) = self.in_space(workshop)? else { return Ok(()) };
         let still = self.state.at_rest();
         assembly.evaluate(&still, weights, None);

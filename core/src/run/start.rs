@@ -1,13 +1,14 @@
 //! The start of a dynamic stage: velocities, and accelerations from equilibrium at its first instant.
 
 use super::failure::Failure;
-use super::run::{InitialMotion, Run, Workshop};
+use super::plan::InitialMotion;
+use super::stage_run::{Run, StageRun};
 use crate::integrate::{Method, Step};
 use crate::kernel::Weights;
 use crate::model::{LARGEST_GAP, Model, SlotKind, StageError};
 use crate::rotation::Rotation;
-use crate::solve::{Limp, NewtonFailure, Tangent, mechanism};
-use crate::system::{Equations, Slot, State, System};
+use crate::solve::{NewtonFailure, SoftMode, Tangent, mechanism};
+use crate::system::{DofMap, Slot, State, System};
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 use crate::warning::WarningKind;
@@ -15,15 +16,15 @@ use nalgebra::{Matrix3, SymmetricEigen};
 
 impl Run<'_> {
     /// Gives velocities, sets the clock, solves M a = f_ext - f_int - f_acc(a = 0) on the free directions.
-    pub(super) fn start_dynamic(&mut self, workshop: &mut Workshop, step: &Step) -> Result<(), Failure> {
+    pub(super) fn start_dynamic(&mut self, workshop: &mut StageRun, step: &Step) -> Result<(), Failure> {
         let begins = self.takes_initial_motion();
         if begins {
             let initial = std::mem::take(&mut self.plan.initial);
             initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
         }
-        let equations = &workshop.assembly.system.pattern.equations;
+        let dof_map = &workshop.assembly.system.pattern.dof_map;
         threads::each_part(&mut self.state.v, |start, part| {
-            (start..).zip(part).for_each(|(slot, v)| *v -= equations.held_part(slot as Slot, *v));
+            (start..).zip(part).for_each(|(slot, v)| *v -= dof_map.held_part(slot as Slot, *v));
         });
         self.state.a.fill(Vec3::ZERO);
         let (time, amplitude) = (self.state.time, self.state.amplitude.clone());
@@ -51,7 +52,7 @@ impl Run<'_> {
 
     /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing the joints takes,
     /// [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
-    pub(super) fn close_joints(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn close_joints(&mut self, workshop: &mut StageRun) -> Result<(), Failure> {
         if self.model.multipliers.is_empty() {
             return Ok(());
         }
@@ -68,7 +69,7 @@ impl Run<'_> {
     }
 
     /// A dynamic stage never jumps: neither do joints that a stage before has left open.
-    fn refuse_open_joints(&self, workshop: &Workshop) -> Result<(), Failure> {
+    fn refuse_open_joints(&self, workshop: &StageRun) -> Result<(), Failure> {
         for &slot in &self.model.multipliers {
             let kind = self.model.kinds[slot as usize];
             let size = if kind == SlotKind::Force { self.model.length } else { 1.0 };
@@ -84,7 +85,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn solve_accelerations(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    fn solve_accelerations(&mut self, workshop: &mut StageRun) -> Result<(), Failure> {
         let assembly = &mut workshop.assembly;
         assembly.forget();
         let [_, rates2] = assembly.drift(&self.state);
@@ -114,13 +115,13 @@ impl Run<'_> {
 
     /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`; `None` where mass alone does not
     /// tell the solution, but stiffness holds everything.
-    fn solve_with_mass(&mut self, workshop: &mut Workshop, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
-        let Workshop { assembly, newton, .. } = workshop;
+    fn solve_with_mass(&mut self, workshop: &mut StageRun, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
+        let StageRun { assembly, newton, .. } = workshop;
         let (solver, system) = (&mut newton.solver, &mut assembly.system);
         for &slot in &self.model.multipliers {
             system.replace_force(slot, gaps[slot as usize]);
         }
-        let mut right_hand_side = vec![0.0; system.pattern.equations.count()];
+        let mut right_hand_side = vec![0.0; system.pattern.dof_map.count()];
         system.right_hand_side(&mut right_hand_side);
         let additions = massless_blocks(system, &self.model, &mut right_hand_side);
         additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
@@ -135,20 +136,21 @@ impl Run<'_> {
             return if self.is_held(workshop, &named) { Ok(None) } else { Err(named) };
         }
         let mut solved = vec![Vec3::ZERO; self.state.q.len()];
-        system.pattern.equations.scatter(&right_hand_side, None, &mut solved);
+        system.pattern.dof_map.scatter(&right_hand_side, None, &mut solved);
         Ok(Some(solved))
     }
 
     /// Whether stiffness holds what mass does not resist; a condition of joints that is said twice is none of its business.
-    fn is_held(&self, workshop: &mut Workshop, without_mass: &Failure) -> bool {
+    fn is_held(&self, workshop: &mut StageRun, without_mass: &Failure) -> bool {
         if matches!(without_mass, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
             return false;
         }
-        let Workshop { assembly, newton, .. } = workshop;
+        let StageRun { assembly, newton, .. } = workshop;
         assembly.evaluate(&self.state, Weights::STIFFNESS, None);
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
         newton.solver.factorise_new(&mut tangent).0
-            && Limp::find(&mut newton.solver, &mut tangent, &self.model, false).is_none_or(|limp| !limp.is_loose())
+            && SoftMode::find(&mut newton.solver, &mut tangent, &self.model, false)
+                .is_none_or(|soft_mode| !soft_mode.is_loose())
     }
 }
 
@@ -168,8 +170,8 @@ fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) 
     let mut additions = Vec::new();
     let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
     for slot in (0..model.slots()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
-        let numbers = system.pattern.equations.of(slot as Slot);
-        let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != Equations::HELD).collect();
+        let numbers = system.pattern.dof_map.of(slot as Slot);
+        let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != DofMap::HELD).collect();
         let (block, weight) = with_mass_where_held(system, slot as Slot);
         let mut addition = Mat3::ZERO;
         let symmetric = Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i]));
@@ -192,9 +194,9 @@ fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) 
 /// What a slot has of a mass matrix on its diagonal, and the largest entry of that. A held direction is given as much, so that it does
 /// not count as massless.
 fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
-    let (mut block, numbers) = (system.own_block(slot), system.pattern.equations.of(slot));
+    let (mut block, numbers) = (system.own_block(slot), system.pattern.dof_map.of(slot));
     let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
-    for k in (0..3).filter(|&k| numbers[k] == Equations::HELD) {
+    for k in (0..3).filter(|&k| numbers[k] == DofMap::HELD) {
         block.0[k][k] += weight;
     }
     (block, weight)
@@ -209,8 +211,8 @@ fn is_regular(matrix: &Mat3) -> bool {
 impl Run<'_> {
     /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already: round-off would move them. It is
     /// looked at without velocities, whose forces come and go with them.
-    fn refuse_loose(&mut self, workshop: &mut Workshop, method: &dyn Method) -> Result<(), Failure> {
-        let Workshop { assembly, newton, .. } = &mut *workshop;
+    fn refuse_loose(&mut self, workshop: &mut StageRun, method: &dyn Method) -> Result<(), Failure> {
+        let StageRun { assembly, newton, .. } = &mut *workshop;
         let still = self.state.at_rest();
         assembly.forget();
         assembly.evaluate(&still, method.weights(), None);
@@ -222,7 +224,7 @@ impl Run<'_> {
 
     /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their motion is prescribed; and those
     /// whose velocities do not, either.
-    pub(super) fn find_rates(&self, workshop: &mut Workshop) {
+    pub(super) fn find_rates(&self, workshop: &mut StageRun) {
         let mut moves = vec![false; self.model.slots()];
         self.model.motions.iter().for_each(|motion| moves[motion.slot as usize] = true);
         let mut touched = |weights: Weights| -> Vec<bool> {
@@ -230,7 +232,7 @@ impl Run<'_> {
             workshop.assembly.form_again(&self.state, weights);
             let system = &workshop.assembly.system;
             threads::list(moves.len(), |slot| {
-                let moves = moves[slot] && !system.pattern.equations.is_plain(slot as Slot);
+                let moves = moves[slot] && !system.pattern.dof_map.is_plain(slot as Slot);
                 moves || system.own_block(slot as Slot).max_abs() > 0.0
             })
         };

@@ -3,11 +3,11 @@
 use super::failure::Failure;
 use super::levels::{Approach, Levels, Way};
 use super::path::Arrival;
-use super::run::{Run, Workshop};
+use super::stage_run::{Run, StageRun};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
 use crate::model::charts;
-use crate::solve::{Limp, NewtonFailure, Signature, Tangent};
+use crate::solve::{NewtonFailure, Signature, SoftMode, Tangent};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
@@ -46,7 +46,7 @@ impl Run<'_> {
     /// All levels of a static stage.
     pub(super) fn run_static(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         steps: usize,
         approach: Approach,
     ) -> Result<(), Failure> {
@@ -70,12 +70,12 @@ impl Run<'_> {
     }
 
     /// At rest, at load factor 0; refuses mechanisms before anything is loaded.
-    pub(super) fn start_static(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn start_static(&mut self, workshop: &mut StageRun) -> Result<(), Failure> {
         self.begin_static(workshop)?.map_or(Ok(()), Err)
     }
 
     /// The same, but what nothing holds as long as nothing is loaded is only named.
-    fn begin_static(&mut self, workshop: &mut Workshop) -> Result<Option<Failure>, Failure> {
+    fn begin_static(&mut self, workshop: &mut StageRun) -> Result<Option<Failure>, Failure> {
         self.stand_still();
         let time = self.state.time;
         let held = self.state.q.clone();
@@ -86,7 +86,7 @@ impl Run<'_> {
         self.take_over(workshop);
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
-        let Workshop { assembly, newton, .. } = &mut *workshop;
+        let StageRun { assembly, newton, .. } = &mut *workshop;
         let mut tangent = Tangent::that_may_go(assembly, &self.state, Weights::STIFFNESS);
         self.counters.work.factorisations += 1;
         if self.is_linear() {
@@ -94,11 +94,11 @@ impl Run<'_> {
             tangent = Tangent::that_stays(assembly, &self.state);
             newton.solver.factorise_new(&mut tangent);
         }
-        let limp = Limp::find(&mut newton.solver, &mut tangent, &self.model, self.stage > 0);
+        let soft_mode = SoftMode::find(&mut newton.solver, &mut tangent, &self.model, self.stage > 0);
         // What cannot be factorised as long as nothing is loaded may be held by what the first step brings.
-        if let Some(limp) = limp.filter(|limp| !limp.vector.broke_down) {
-            if limp.is_loose() {
-                let named = self.name_mechanism(Some(limp.vector), &assembly.system);
+        if let Some(soft_mode) = soft_mode.filter(|soft_mode| !soft_mode.vector.broke_down) {
+            if soft_mode.is_loose() {
+                let named = self.name_mechanism(Some(soft_mode.vector), &assembly.system);
                 // Conditions that joints say twice no load makes one.
                 if matches!(&named, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
                     return Err(named);
@@ -106,12 +106,12 @@ impl Run<'_> {
                 self.open_account(workshop)?;
                 return Ok(Some(named));
             }
-            if limp.is_soft() {
+            if soft_mode.is_soft() {
                 self.warn_of_softness();
             }
             // At the start of a run cables and strings are meant to be so.
-            if limp.is_held_by_stress() {
-                let named = self.name_mechanism(Some(limp.vector), &assembly.system);
+            if soft_mode.is_held_by_stress() {
+                let named = self.name_mechanism(Some(soft_mode.vector), &assembly.system);
                 let message = format!("but for the stress it is under at the start of the stage: {named}");
                 self.warn(WarningKind::HeldByStress, message);
             }
@@ -122,7 +122,7 @@ impl Run<'_> {
     }
 
     /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or along the path.
-    fn reach(&mut self, workshop: &mut Workshop, target: f64, levels: &mut Levels) -> Result<Reached, Failure> {
+    fn reach(&mut self, workshop: &mut StageRun, target: f64, levels: &mut Levels) -> Result<Reached, Failure> {
         debug_assert!(
             self.state.q == self.good.q && self.state.load == self.good.load,
             "the last state is not the good one"
@@ -154,7 +154,7 @@ impl Run<'_> {
     /// A level is reached by a motion to a state of rest, where there is one that its loads hold; else the stage ends with `failure`.
     fn rest_at(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         target: f64,
         failure: Failure,
         levels: &mut Levels,
@@ -183,7 +183,7 @@ impl Run<'_> {
         Ok(Reached::Level)
     }
 
-    fn try_step(&mut self, workshop: &mut Workshop, next: f64, levels: &mut Levels) -> Tried {
+    fn try_step(&mut self, workshop: &mut StageRun, next: f64, levels: &mut Levels) -> Tried {
         if let Err(failure) = self.attempt(workshop, next) {
             return Tried::Failed(failure);
         }
@@ -200,7 +200,7 @@ impl Run<'_> {
 
     fn take_step(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         signature: Option<Signature>,
         levels: &mut Levels,
     ) -> Result<(), Failure> {
@@ -220,7 +220,7 @@ impl Run<'_> {
     /// load control ended with, if it did not only seem to jump.
     fn go_around(
         &mut self,
-        workshop: &mut Workshop,
+        workshop: &mut StageRun,
         target: f64,
         failure: Option<NewtonFailure>,
         levels: &mut Levels,
@@ -260,7 +260,7 @@ impl Run<'_> {
     }
 
     /// Load control goes on where a detour has come to its level.
-    fn resume(&mut self, workshop: &mut Workshop, target: f64, increments: u64, levels: &mut Levels) {
+    fn resume(&mut self, workshop: &mut StageRun, target: f64, increments: u64, levels: &mut Levels) {
         self.good.copy_from(&self.state);
         levels.stability.signature = levels.stability.look(self, workshop);
         levels.restart();
@@ -272,29 +272,29 @@ impl Run<'_> {
 
     /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the
     /// state and handed to Newton as increments.
-    pub(super) fn attempt(&mut self, workshop: &mut Workshop, load: f64) -> Result<(), NewtonFailure> {
-        let Workshop { assembly, newton, lift, .. } = workshop;
-        let moves = self.set_load(lift, load)?;
-        let moved = moves.then_some(&lift[..]);
+    pub(super) fn attempt(&mut self, workshop: &mut StageRun, load: f64) -> Result<(), NewtonFailure> {
+        let StageRun { assembly, newton, prescribed_increment, .. } = workshop;
+        let moves = self.set_load(prescribed_increment, load)?;
+        let moved = moves.then_some(&prescribed_increment[..]);
         let work = &mut self.counters.work;
         newton.solve(&self.model, assembly, &mut self.state, &Equilibrium, moved, work)?;
         self.refuse_leaps()?;
         self.refuse_windings()
     }
 
-    /// Sets the load factor; `lift` takes the increments of prescribed motions, which are not in the state yet. Whether there are any.
-    pub(super) fn set_load(&mut self, lift: &mut Vec<Vec3>, load: f64) -> Result<bool, NewtonFailure> {
-        threads::copy(lift, if self.model.motions.is_empty() { &[] } else { &self.state.q });
+    /// Sets the load factor; `prescribed_increment` takes the increments of prescribed motions, which are not in the state yet. Whether there are any.
+    pub(super) fn set_load(&mut self, prescribed_increment: &mut Vec<Vec3>, load: f64) -> Result<bool, NewtonFailure> {
+        threads::copy(prescribed_increment, if self.model.motions.is_empty() { &[] } else { &self.state.q });
         let time = self.state.time;
         if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
-        for (lift, q) in lift.iter_mut().zip(&mut self.state.q) {
-            let before = *lift;
-            *lift = *q - before;
+        for (prescribed_increment, q) in prescribed_increment.iter_mut().zip(&mut self.state.q) {
+            let before = *prescribed_increment;
+            *prescribed_increment = *q - before;
             *q = before;
         }
-        Ok(lift.iter().any(|&v| v != Vec3::ZERO))
+        Ok(prescribed_increment.iter().any(|&v| v != Vec3::ZERO))
     }
 
     pub(super) fn static_progress(&self, load: f64) -> f64 {

@@ -5,9 +5,10 @@
 //! whatever masses M and dampers C there are: det(s^2 M + s C + K) is negative at s = 0 and positive for large s. Without masses no more is
 //! known: for each K that is not symmetric there are masses with which something grows.
 
+use super::analysis_results::Mode;
 use super::failure::Failure;
 use super::modal::grows;
-use super::run::{Mode, Run};
+use super::stage_run::Run;
 use crate::model::{Assembly, StageContext, StageKind};
 use crate::solve::{LinearSolver, Signature, SmallMotion, Tangent};
 
@@ -43,13 +44,13 @@ impl Run<'_> {
         }
         let stage = self.plan.stages[self.stage].context(self.stage);
         let context = StageContext { kind: StageKind::Modal, ..stage };
-        let equations = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
-        let is_massless = self.model.lacks_mass(&context, &equations);
+        let dof_map = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
+        let is_massless = self.model.lacks_mass(&context, &dof_map);
         let is_even_in_space = self.plane.is_none() && signature.is_some_and(|signature| !signature.tells_unstable());
-        if equations.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {
+        if dof_map.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {
             return Ok(Vibrations::Unknown);
         }
-        let mut assembly = Assembly::new(&context, equations, &self.model);
+        let mut assembly = Assembly::new(&context, dof_map, &self.model);
         let Some(mut solver) = LinearSolver::new(&assembly.system, &self.model.multipliers) else {
             return Ok(Vibrations::Unknown);
         };

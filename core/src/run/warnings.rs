@@ -1,9 +1,11 @@
 //! What a run tells its user beside its results, each thing once.
 
+use super::analysis_results::Mode;
 use super::failure::Moment;
 use super::findings::{StageTimeError, Warning};
 use super::guard::{Imbalance, is_unbalanced};
-use super::run::{Mode, Run, StageWork, Workshop};
+use super::plan::StageWork;
+use super::stage_run::{Run, StageRun};
 use super::vibrations::Vibrations;
 use crate::integrate::{Largest, Rotations};
 use crate::model::{StageKind, charts};
@@ -31,7 +33,7 @@ const LEAST_PART: f64 = 0.1;
 
 /// What has been told already.
 #[derive(Clone, Debug)]
-pub(super) struct Told {
+pub(super) struct IssuedWarnings {
     /// That an element turns far from node to node
     pub coarse: bool,
     /// How many limit and branch points
@@ -51,7 +53,7 @@ pub(super) struct Told {
     pub unstable: Option<usize>,
 }
 
-impl Default for Told {
+impl Default for IssuedWarnings {
     fn default() -> Self {
         Self {
             coarse: false,
@@ -108,7 +110,7 @@ impl Run<'_> {
     }
 
     /// An account of the energy that does not close.
-    pub(super) fn warn_of_imbalance(&mut self, workshop: &Workshop) {
+    pub(super) fn warn_of_imbalance(&mut self, workshop: &StageRun) {
         // The energy of the full theory is not that of the linear one.
         if self.is_linear() {
             return;
@@ -122,7 +124,7 @@ impl Run<'_> {
     }
 
     /// An account that time steps do not close, or found open.
-    fn warn_of_scheme(&mut self, workshop: &Workshop) {
+    fn warn_of_scheme(&mut self, workshop: &StageRun) {
         let Some(guard) = &workshop.guard else { return };
         let Some(Imbalance { share, is_own }) = guard.imbalance(self.bookkeeper.scale()) else { return };
         let is_told = std::mem::replace(&mut self.told.unbalanced, true);
@@ -168,11 +170,11 @@ impl Run<'_> {
     }
 
     /// Notes the estimated errors of fixed steps, and warns of steps that are too long.
-    pub(super) fn judge_steps(&mut self, workshop: &mut Workshop) {
+    pub(super) fn judge_steps(&mut self, workshop: &mut StageRun) {
         let StageWork::Dynamic { step, scheme, .. } = self.plan.stages[self.stage].work else { return };
-        let Workshop { assembly, newton, increments, .. } = workshop;
+        let StageRun { assembly, newton, increments, .. } = workshop;
         let Some(error) = &mut newton.time_error else { return };
-        error.sum_up(&assembly.system.pattern.equations, &self.state, increments.as_ref());
+        error.sum_up(&assembly.system.pattern.dof_map, &self.state, increments.as_ref());
         let largest = error.largest();
         self.counters.findings.time_errors.push(StageTimeError { stage: self.stage + 1, largest });
         let Largest { displacement, rotation, moved } = largest;

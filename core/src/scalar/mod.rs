@@ -1,14 +1,14 @@
 //! The scalar of the kernels: `f64` in a run, dual numbers in the tests that hold every tangent
 //! against automatic differentiation, lanes of several elements where speed asks for it.
 
+mod compressed_field;
 mod jet;
 mod lanes;
-mod rough;
 
+pub use compressed_field::CompressedField;
 pub use jet::Jet;
 pub use lanes::{Instructions, LANES, Lanes, Pack};
 pub(crate) use lanes::{each_lane, pack};
-pub use rough::Rough;
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

@@ -16,7 +16,7 @@ impl Columns {
     pub fn new(pattern: &Pattern) -> Self {
         let (mut rows, mut places) = (Vec::new(), Vec::new());
         let mut starts = vec![0];
-        for column in 0..pattern.equations.count() as u32 {
+        for column in 0..pattern.dof_map.count() as u32 {
             let mut entries: Vec<_> = pattern.entries(column).collect();
             // The tile on the diagonal comes between the others, and nodes that share displacements are not in the order of equations.
             entries.sort_unstable_by_key(|entry| entry.row);

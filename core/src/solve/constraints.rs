@@ -11,7 +11,7 @@
 //! multiplier, which is eliminated behind what it ties, has a negative one. The inertia on the space that the constraints leave is
 //! that of the tangent for any W (congruence with [I, C W/2; 0, I]), and so is the solution.
 
-use crate::system::{Equations, Matrix, Pattern, Slot, System};
+use crate::system::{DofMap, Matrix, Pattern, Slot, System};
 use std::collections::BTreeMap;
 
 /// A multiplier gets so many times the stiffness beside it: what it ties is then held even where it has lost its own stiffness.
@@ -21,8 +21,8 @@ const FACTOR: f64 = 8.0;
 pub struct Constraints {
     rows: Vec<Multiplier>,
     additions: Vec<Addition>,
-    /// Groups of multipliers
-    groups: Vec<u32>,
+    /// NodeBlocks of multipliers
+    node_blocks: Vec<u32>,
     /// Of each row
     weights: Vec<f64>,
     values: Vec<f64>,
@@ -53,20 +53,20 @@ struct Addition {
 impl Constraints {
     /// Of these multipliers; `None` where there are none.
     pub fn new(pattern: &Pattern, multipliers: &[Slot]) -> Option<Self> {
-        let equations = multipliers.iter().flat_map(|&slot| pattern.equations.of(slot));
-        let equations: Vec<u32> = equations.filter(|&equation| equation != Equations::HELD).collect();
-        if equations.is_empty() {
+        let dof_map = multipliers.iter().flat_map(|&slot| pattern.dof_map.of(slot));
+        let dof_map: Vec<u32> = dof_map.filter(|&equation| equation != DofMap::HELD).collect();
+        if dof_map.is_empty() {
             return None;
         }
-        let mut is_multiplier = vec![false; pattern.equations.count()];
-        equations.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
+        let mut is_multiplier = vec![false; pattern.dof_map.count()];
+        dof_map.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
         let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
         let mut place = |row: u32, column: u32| {
             let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
             columns.entry(column).or_insert_with(entries).get(&row).copied()
         };
         let (mut rows, mut additions) = (Vec::new(), Vec::new());
-        for (number, &equation) in equations.iter().enumerate() {
+        for (number, &equation) in dof_map.iter().enumerate() {
             let met: Vec<u32> = pattern.entries(equation).map(|entry| entry.row).collect();
             let others = met.into_iter().filter(|&other| !is_multiplier[other as usize]);
             let tie = |other: u32| {
@@ -88,20 +88,20 @@ impl Constraints {
             }
             rows.push(Multiplier { equation, ties });
         }
-        let mut groups: Vec<u32> = multipliers.iter().map(|&slot| pattern.groups.of(slot).0 as u32).collect();
-        groups.sort_unstable();
-        groups.dedup();
+        let mut node_blocks: Vec<u32> = multipliers.iter().map(|&slot| pattern.node_blocks.of(slot).0 as u32).collect();
+        node_blocks.sort_unstable();
+        node_blocks.dedup();
         let weights = vec![0.0; rows.len()];
-        Some(Self { rows, additions, groups, weights, values: Vec::new() })
+        Some(Self { rows, additions, node_blocks, weights, values: Vec::new() })
     }
 
     /// The groups of multipliers.
-    pub fn groups(&self) -> &[u32] {
-        &self.groups
+    pub fn node_blocks(&self) -> &[u32] {
+        &self.node_blocks
     }
 
     /// The equations of multipliers.
-    pub fn equations(&self) -> impl Iterator<Item = usize> {
+    pub fn dof_map(&self) -> impl Iterator<Item = usize> {
         self.rows.iter().map(|row| row.equation as usize)
     }
 

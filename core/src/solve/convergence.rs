@@ -1,8 +1,8 @@
 //! The stop test of Newton's iteration, in terms that do not depend on units.
 
-use crate::effect::Noise;
+use crate::effect::RoundOff;
 use crate::model::{Model, SlotKind};
-use crate::system::{Equations, Plane, Region, Slot, System};
+use crate::system::{DofMap, Plane, Region, Slot, System};
 use crate::tensor::Vec3;
 use crate::threads;
 
@@ -57,8 +57,8 @@ pub enum Verdict {
 impl Convergence {
     /// Judges the forces of `system`, and the [`size`] of the last correction: `None` before the first, infinite where charts have changed
     /// since.
-    pub fn judge(&self, model: &Model, system: &System, noise: Noise, last: Option<f64>) -> (Verdict, Residual) {
-        let residual = self.residual(model, system, noise);
+    pub fn judge(&self, model: &Model, system: &System, round_off: RoundOff, last: Option<f64>) -> (Verdict, Residual) {
+        let residual = self.residual(model, system, round_off);
         if !(residual.ratio.is_finite() && residual.force.is_finite()) {
             return (Verdict::NotFinite, residual);
         }
@@ -72,7 +72,7 @@ impl Convergence {
         (verdict, residual)
     }
 
-    fn residual(&self, model: &Model, system: &System, noise: Noise) -> Residual {
+    fn residual(&self, model: &Model, system: &System, round_off: RoundOff) -> Residual {
         let squares = Peaks::of(model, system, Vec3::squared);
         let peaks = match squares.largest() {
             // Neither has a square overflowed, nor has anything that counts been lost.
@@ -93,13 +93,13 @@ impl Convergence {
             };
             let allowed = match kind {
                 SlotKind::Force | SlotKind::Moment => tolerated,
-                SlotKind::Displacement => tolerated.max(NOISE_FACTOR * noise.force),
-                SlotKind::Rotation => tolerated.max(NOISE_FACTOR * noise.moment),
+                SlotKind::Displacement => tolerated.max(NOISE_FACTOR * round_off.force),
+                SlotKind::Rotation => tolerated.max(NOISE_FACTOR * round_off.moment),
             };
             worst.noisy |= peak.size > tolerated;
             let ratio = if peak.size == 0.0 { 0.0 } else { peak.size / allowed };
             if ratio > worst.ratio {
-                let value = free_part(&system.pattern.equations, peak.slot, system.total(peak.slot as usize));
+                let value = free_part(&system.pattern.dof_map, peak.slot, system.total(peak.slot as usize));
                 worst = Residual { ratio, slot: peak.slot, value, ..worst };
             }
         }
@@ -140,9 +140,9 @@ impl Peaks {
     /// Those in a region.
     fn among(region: &Region, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
         let slots = region.slots.clone();
-        let equations = &system.pattern.equations;
+        let dof_map = &system.pattern.dof_map;
         // Vectors in a tilted plane are rounded aside.
-        let tilted = equations.plane().is_some_and(Plane::is_tilted);
+        let tilted = dof_map.plane().is_some_and(Plane::is_tilted);
         let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
         for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
             let (mut total, mut largest, mut sum) = (Vec3::ZERO, 0.0, 0.0);
@@ -150,8 +150,8 @@ impl Peaks {
                 let size = measure(force[slot]);
                 (total, largest, sum) = (total + force[slot], larger(size, largest), sum + size);
             }
-            let whole = !tilted && equations.is_plain(slot as Slot);
-            let free = if whole { total } else { free_part(equations, slot as Slot, total) };
+            let whole = !tilted && dof_map.is_plain(slot as Slot);
+            let free = if whole { total } else { free_part(dof_map, slot as Slot, total) };
             let held = if whole { 0.0 } else { measure(total - free) };
             let free = measure(free);
             poison += sum * 0.0;
@@ -198,8 +198,8 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 /// The part of a force in the free directions of its slot, global components.
-fn free_part(equations: &Equations, slot: Slot, force: Vec3) -> Vec3 {
-    force - equations.held_part(slot, force)
+fn free_part(dof_map: &DofMap, slot: Slot, force: Vec3) -> Vec3 {
+    force - dof_map.held_part(slot, force)
 }
 
 /// The size of a correction, or of any other motion: its largest vector, displacements over the length of the scene. What is no number

@@ -64,7 +64,7 @@ impl LinearSolver {
     /// Analyses the pattern of a system. `None` where memory for it cannot be had.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
         let constraints = Constraints::new(&system.pattern, multipliers);
-        let late = constraints.as_ref().map_or(&[][..], Constraints::groups);
+        let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
         let blocks = BlockSolver::new(&system.pattern, late);
         Self::by(blocks, constraints, system, multipliers)
     }
@@ -164,11 +164,11 @@ impl LinearSolver {
             return is_factored && blocks.correct(system, held, out);
         }
         let mut x = std::mem::take(&mut self.right_hand_side);
-        x.resize(system.pattern.equations.count(), 0.0);
+        x.resize(system.pattern.dof_map.count(), 0.0);
         system.right_hand_side(&mut x);
         let done = if looks { self.solve(system, &mut x) } else { self.solve_once(system, &mut x) };
         if done {
-            system.pattern.equations.scatter(&x, held, out);
+            system.pattern.dof_map.scatter(&x, held, out);
         }
         self.right_hand_side = x;
         done
@@ -239,7 +239,7 @@ impl LinearSolver {
         if !self.factorise(system) || self.is_positive_definite() {
             return self.factored;
         }
-        let ones = vec![1.0; system.pattern.equations.count()];
+        let ones = vec![1.0; system.pattern.dof_map.count()];
         let mut x = system.multiply(&system.values, &ones);
         self.solve(system, &mut x)
     }

@@ -322,7 +322,7 @@ impl<'a> ModeSearch<'a> {
 
     /// A motion that balances: multiplied from the left with its own x*, m s^2 + c s + k = 0.
     fn check(&self, spectrum: &Spectrum, number: usize, exponent: Complex<f64>) -> Option<SmallMotion> {
-        let n = self.system.pattern.equations.count();
+        let n = self.system.pattern.dof_map.count();
         let [mut re, mut im] = spectrum.vector(number);
         re.truncate(n);
         im.truncate(n);
@@ -348,7 +348,7 @@ impl<'a> ModeSearch<'a> {
 
     /// |K_ii| + shift^2 M_ii, an inner product that every scene has.
     fn diagonal(&self) -> Vec<f64> {
-        let mut out = vec![0.0; self.system.pattern.equations.count()];
+        let mut out = vec![0.0; self.system.pattern.dof_map.count()];
         let Matrices { stiffness, mass, .. } = self.matrices;
         let squared = self.shift * self.shift;
         self.system.pattern.each_diagonal(|k, place| out[k] = stiffness[place].abs() + squared * mass[place]);
@@ -379,14 +379,14 @@ impl Motions<'_, '_> {
 
 impl Operator for Motions<'_, '_> {
     fn size(&self) -> usize {
-        let n = self.search.system.pattern.equations.count();
+        let n = self.search.system.pattern.dof_map.count();
         if self.is_doubled() { 2 * n } else { n }
     }
 
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
         let doubled = self.is_doubled();
         let ModeSearch { system, solver, matrices, shift: e, .. } = &mut *self.search;
-        let (n, e) = (system.pattern.equations.count(), *e);
+        let (n, e) = (system.pattern.dof_map.count(), *e);
         if !doubled {
             let mut out = system.multiply(&matrices.mass, x);
             let done = solver.solve_once(system, &mut out);
@@ -412,7 +412,7 @@ impl Operator for Motions<'_, '_> {
         if !self.is_doubled() {
             return system.multiply(&matrices.mass, x);
         }
-        let (first, second) = x.split_at(system.pattern.equations.count());
+        let (first, second) = x.split_at(system.pattern.dof_map.count());
         let squared = shift * shift;
         let kinetic = |x: &[f64]| system.multiply(&matrices.mass, x).into_iter().map(|v| squared * v);
         let mut out: Vec<f64> = match self.diagonal.is_empty() {
@@ -448,7 +448,7 @@ fn is_skew(system: &System, values: &[f64]) -> bool {
         return false;
     }
     let x: Vec<f64> =
-        (0..system.pattern.equations.count()).map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract()).collect();
+        (0..system.pattern.dof_map.count()).map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract()).collect();
     let y: Vec<f64> = (0..x.len()).map(|k| 0.5 + (k as f64 * 0.414_213_562_373_095).fract()).collect();
     // Random vectors tell: y.C x = -x.C y, and x.C x = 0.
     let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();

@@ -1,18 +1,18 @@
 //! Newton's iteration on one step or load level.
 
 use super::convergence::{Convergence, Residual, Verdict, size};
-use super::foresight::Foresight;
 use super::linear::LinearSolver;
-use super::mechanism::mechanism;
 use super::pivots::Signature;
 use super::refinement::Refinement;
 use super::reuse::Reuse;
+use super::soft_mode::mechanism;
 use super::softest::NullVector;
+use super::stress_predictor::StressPredictor;
 use super::tangent::Tangent;
 use crate::integrate::{Increments, Method, Step, TimeError};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Model, charts};
-use crate::scalar::Rough;
+use crate::scalar::CompressedField;
 use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
 use std::time::Instant;
@@ -108,12 +108,12 @@ pub struct Newton {
     /// The size of the last correction of a solution: `None` before the first, infinite after a change of chart
     last: Option<f64>,
     /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
-    pub first: Rough<3>,
+    pub first: CompressedField<3>,
     /// The largest ratio of a correction of the last solution to the one before it, of those that are no round-off: an iteration that
     /// follows the path contracts
     pub contraction: f64,
     reuse: Reuse,
-    foresight: Foresight,
+    foresight: StressPredictor,
     /// What follows the error of time steps, where something does
     pub time_error: Option<TimeError>,
     /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
@@ -135,10 +135,10 @@ impl Newton {
             solver,
             dq: zeros(system.force[0].len()),
             last: None,
-            first: Rough::default(),
+            first: CompressedField::default(),
             contraction: 0.0,
             reuse: Reuse::new(),
-            foresight: Foresight::default(),
+            foresight: StressPredictor::default(),
             time_error: None,
             given: None,
         }
@@ -174,7 +174,7 @@ impl Newton {
         self.given = Some(system.revision);
     }
 
-    /// Brings the state into balance. `lift` holds increments of held directions that are not in the state yet: they go
+    /// Brings the state into balance. `prescribed_increment` holds increments of held directions that are not in the state yet: they go
     /// in with the first correction, so that the rest of the structure follows them linearly. The forces of the system are then those of
     /// the state; its tangent need not be.
     pub fn solve(
@@ -183,28 +183,29 @@ impl Newton {
         assembly: &mut Assembly,
         state: &mut State,
         method: &dyn Method,
-        mut lift: Option<&[Vec3]>,
+        mut prescribed_increment: Option<&[Vec3]>,
         work: &mut Work,
     ) -> Result<(), NewtonFailure> {
         self.foresight.forget(assembly);
-        let noise = assembly.noise(state);
+        let round_off = assembly.round_off(state);
         let mut iterations = 0;
         (self.last, self.contraction) = (None, 0.0);
         self.first.clear();
         self.reuse.begin(self.given.take() == Some(assembly.system.revision));
         let (mut refinement, mut formed_anew) = (Refinement::default(), false);
         loop {
-            let forms = lift.is_some() || iterations >= self.max_iterations || self.reuse.expects_tangent();
+            let forms =
+                prescribed_increment.is_some() || iterations >= self.max_iterations || self.reuse.expects_tangent();
             let weights = if forms { method.weights() } else { Weights::NONE };
             if forms {
                 self.foresight.foresee(assembly, state, &self.dq);
             }
-            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, lift));
-            let (verdict, residual) = self.convergence.judge(model, &assembly.system, noise, self.last);
+            timed(&mut work.evaluation_seconds, || assembly.evaluate(state, weights, prescribed_increment));
+            let (verdict, residual) = self.convergence.judge(model, &assembly.system, round_off, self.last);
             let noisy = verdict == Verdict::Noisy;
             self.reuse.look(residual.ratio, noisy);
             match verdict {
-                Verdict::Converged if lift.is_none() => {
+                Verdict::Converged if prescribed_increment.is_none() => {
                     if residual.ratio > 0.0 {
                         self.polish(model, assembly, state, method, forms, work);
                     }
@@ -212,7 +213,7 @@ impl Newton {
                     return Ok(());
                 }
                 // Each correction with a new residual refines the solution, until round-off makes it no smaller.
-                Verdict::Noisy if lift.is_none() && iterations > 0 => {
+                Verdict::Noisy if prescribed_increment.is_none() && iterations > 0 => {
                     let last = self.last.unwrap_or_default();
                     let refined = refinement.look(model, &self.dq, last, size(model, &state.q));
                     if refined.stalls() && !self.reuse.is_own() && !formed_anew {
@@ -237,7 +238,7 @@ impl Newton {
                 if !forms {
                     self.form(assembly, state, method, work);
                 }
-                self.reuse.form(lift.is_some());
+                self.reuse.form(prescribed_increment.is_some());
                 // What one tangent leaves tells nothing of the corrections with another one.
                 refinement = Refinement::default();
             } else {
@@ -245,7 +246,7 @@ impl Newton {
             }
             self.show_rates(assembly, state, method, work);
             let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
-            if !self.find_correction(&mut tangent, lift.take(), work) {
+            if !self.find_correction(&mut tangent, prescribed_increment.take(), work) {
                 return Err(NewtonFailure::Singular(mechanism(&mut self.solver, &mut tangent, model)));
             }
             iterations += 1;
@@ -360,20 +361,31 @@ impl Newton {
         NewtonFailure::NotConverged { residual, history: self.reuse.history.clone() }
     }
 
-    /// Solves J dq = -g; held directions take their part of `lift`. `false` where there is no solution.
-    fn find_correction(&mut self, tangent: &mut Tangent, lift: Option<&[Vec3]>, work: &mut Work) -> bool {
+    /// Solves J dq = -g; held directions take their part of `prescribed_increment`. `false` where there is no solution.
+    fn find_correction(
+        &mut self,
+        tangent: &mut Tangent,
+        prescribed_increment: Option<&[Vec3]>,
+        work: &mut Work,
+    ) -> bool {
         work.iterations += 1;
         // What an older tangent leaves is more than what the solver does.
-        self.substitute(tangent, lift, self.reuse.is_own(), work)
+        self.substitute(tangent, prescribed_increment, self.reuse.is_own(), work)
     }
 
     /// The same, with a look at what the solver leaves or without.
-    fn substitute(&mut self, tangent: &mut Tangent, lift: Option<&[Vec3]>, looks: bool, work: &mut Work) -> bool {
+    fn substitute(
+        &mut self,
+        tangent: &mut Tangent,
+        prescribed_increment: Option<&[Vec3]>,
+        looks: bool,
+        work: &mut Work,
+    ) -> bool {
         let Self { solver, dq, .. } = self;
         timed(&mut work.solve_seconds, || {
             let (done, new) = solver.factorise_new(tangent);
             work.factorisations += u64::from(new);
-            done && solver.correct(tangent.system(), looks || new, lift, dq)
+            done && solver.correct(tangent.system(), looks || new, prescribed_increment, dq)
         })
     }
 

@@ -101,7 +101,7 @@ impl Pivots {
     /// Its order of elimination serves for both where the solver has one. `None` where memory cannot be had.
     fn beside(solver: &LinearSolver, system: &System) -> Option<Self> {
         let constraints = Constraints::new(&system.pattern, &solver.multipliers);
-        let late = constraints.as_ref().map_or(&[][..], Constraints::groups);
+        let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
         let blocks = match solver.blocks() {
             Some(blocks) => blocks.symmetric_beside(&system.pattern)?,
             None => BlockSolver::symmetric(&system.pattern, late)?,
@@ -135,9 +135,9 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
         0.0 => largest.sqrt(),
         diagonal => diagonal.abs().sqrt(),
     };
-    let roots: Vec<f64> = (0..width * pattern.groups.count()).map(root).collect();
+    let roots: Vec<f64> = (0..width * pattern.node_blocks.count()).map(root).collect();
     let roots: Vec<&[f64]> = roots.chunks_exact(width).collect();
-    (0..pattern.groups.count()).all(|column| {
+    (0..pattern.node_blocks.count()).all(|column| {
         let beside = pattern.rows_of(column).iter().map(|&row| row as usize);
         let beside = beside.filter(|&row| row > column && !pattern.symmetry.halves());
         let rows = std::iter::once(column).chain(beside);

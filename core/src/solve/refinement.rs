@@ -1,7 +1,7 @@
 //! Corrections of a solution whose residual is round-off.
 
 use crate::model::Model;
-use crate::scalar::Rough;
+use crate::scalar::CompressedField;
 use crate::tensor::Vec3;
 
 /// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
@@ -10,7 +10,7 @@ const FINE: f64 = 1e-8;
 /// Follows corrections that refine a solution whose residual is round-off.
 #[derive(Default)]
 pub(super) struct Refinement {
-    before: Rough<3>,
+    before: CompressedField<3>,
     /// Its size
     size: f64,
     /// The last correction over the unknowns; after a change of chart there is none.

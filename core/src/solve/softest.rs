@@ -4,7 +4,7 @@ use super::linear::LinearSolver;
 use super::tangent::Tangent;
 use crate::kernel::WIDTH;
 use crate::scalar::Instructions;
-use crate::system::{Equations, System};
+use crate::system::{DofMap, System};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::ops::Range;
@@ -29,10 +29,10 @@ impl NullVector {
     }
 
     /// The slot that moves most, told by entries that compare, and the motion of every slot.
-    pub fn by_slot(&self, equations: &Equations, slots: usize) -> (usize, Vec<Vec3>) {
+    pub fn by_slot(&self, dof_map: &DofMap, slots: usize) -> (usize, Vec<Vec3>) {
         let field = |entries: &[f64]| {
             let mut field = vec![Vec3::ZERO; slots];
-            equations.scatter(entries, None, &mut field);
+            dof_map.scatter(entries, None, &mut field);
             field
         };
         let compared = field(&self.entries);
@@ -57,7 +57,7 @@ impl LinearSolver {
     /// Unknowns are scaled by their diagonal, so that forces and moments compare.
     pub fn softest(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
         let system = tangent.look();
-        if system.pattern.equations.count() == 0 {
+        if system.pattern.dof_map.count() == 0 {
             return None;
         }
         let diagonal = diagonal(system);
@@ -65,7 +65,7 @@ impl LinearSolver {
         let scale = scales(system, diagonal);
         let broke_down = !(if tangent.stays() { self.factored } else { self.factorise_new(tangent).0 });
         if let Some(empty) = empty {
-            let mut entries = vec![0.0; tangent.system().pattern.equations.count()];
+            let mut entries = vec![0.0; tangent.system().pattern.dof_map.count()];
             entries[empty] = 1.0;
             return Some(NullVector { motion: entries.clone(), entries, held: false, broke_down });
         }
@@ -95,7 +95,7 @@ impl LinearSolver {
     fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
         let Some(constraints) = self.constraints() else { return false };
         let mut multipliers = vec![0.0; motion.len()];
-        constraints.equations().for_each(|k| multipliers[k] = motion[k]);
+        constraints.dof_map().for_each(|k| multipliers[k] = motion[k]);
         let largest = |of_multipliers: bool| {
             let kind = entries.iter().zip(&multipliers).filter(|(_, m)| (**m != 0.0) == of_multipliers);
             kind.fold(0.0_f64, |largest, (entry, _)| largest.max(entry.abs()))
@@ -118,7 +118,7 @@ impl LinearSolver {
         if !self.factorise(&shifted) {
             return None;
         }
-        let mut x = vec![1.0; system.pattern.equations.count()];
+        let mut x = vec![1.0; system.pattern.dof_map.count()];
         for _ in 0..3 {
             if !self.solve_once(&shifted, &mut x) {
                 return None;
@@ -131,10 +131,10 @@ impl LinearSolver {
 }
 
 fn diagonal(system: &System) -> Vec<f64> {
-    let mut diagonal = vec![0.0; system.pattern.equations.count()];
+    let mut diagonal = vec![0.0; system.pattern.dof_map.count()];
     system.pattern.each_region(&mut diagonal, |region, own| {
-        let (groups, first) = (region.groups.clone(), region.equations.start);
-        system.pattern.each_diagonal_of(groups, |equation, place| own[equation - first] = system.values[place]);
+        let (node_blocks, first) = (region.node_blocks.clone(), region.dof_map.start);
+        system.pattern.each_diagonal_of(node_blocks, |equation, place| own[equation - first] = system.values[place]);
     });
     diagonal
 }
@@ -187,7 +187,7 @@ fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
         sums.iter().flat_map(|sum| [sum.sum, sum.lost]).for_each(|term| whole.add(term));
         squares += part.iter().sum::<f64>();
     };
-    let parts = threads::parts(system.pattern.groups.count());
+    let parts = threads::parts(system.pattern.node_blocks.count());
     threads::in_order(parts, |columns| stiffness_of_columns(system, x, columns), add);
     if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }

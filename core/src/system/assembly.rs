@@ -1,8 +1,8 @@
 //! Forces and tangent of the whole scene.
 
+use super::assembler::{Assembler, Part};
 use super::pattern::{Pattern, Symmetry, Tile, WIDTH, transposed};
 use super::regions::{self, Region};
-use super::sink::{Part, Sink};
 use super::state::Slot;
 use super::storage::{Tiles, as_tiles};
 use super::values::Values;
@@ -39,7 +39,7 @@ pub struct Leftover {
 impl Leftover {
     /// Of each row of a group's tile what is left, and the size that it is compared with.
     fn take<const W: usize>(&mut self, pattern: &Pattern) -> &mut [[[f64; W]; 2]] {
-        let length = 2 * W * pattern.groups.count();
+        let length = 2 * W * pattern.node_blocks.count();
         self.residuals.resize(self.residuals.len().max(length), 0.0);
         self.residuals[..length].as_chunks_mut::<W>().0.as_chunks_mut::<2>().0
     }
@@ -98,7 +98,7 @@ pub struct System {
     /// Whether factors have taken the place of its tiles on the diagonal
     holds_factors: bool,
     /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
-    lift: Vec<Vec3>,
+    prescribed_increment: Vec<Vec3>,
     lifts: bool,
     lifted: Vec<f64>,
     /// Systems of elements that stand side by side, kept between evaluations; the first of all regions, the others of each
@@ -125,16 +125,16 @@ impl System {
             values: vec![0.0; values],
             revision: 0,
             holds_factors: false,
-            lift: Vec::new(),
+            prescribed_increment: Vec::new(),
             lifts: false,
             lifted: Vec::new(),
         }
     }
 
-    /// Sets forces and tangent to zero. `lift` holds increments of the held directions that the next correction
+    /// Sets forces and tangent to zero. `prescribed_increment` holds increments of the held directions that the next correction
     /// shall take with it.
-    pub fn clear(&mut self, lift: Option<&[Vec3]>) {
-        self.begin(true, lift);
+    pub fn clear(&mut self, prescribed_increment: Option<&[Vec3]>) {
+        self.begin(true, prescribed_increment);
         self.each_part(|part| part.clear(true));
     }
 
@@ -147,16 +147,16 @@ impl System {
     }
 
     /// Begins an evaluation for which each part is still to be [cleared](Part::clear).
-    pub fn begin(&mut self, with_tangent: bool, lift: Option<&[Vec3]>) {
+    pub fn begin(&mut self, with_tangent: bool, prescribed_increment: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
         self.holds_factors &= !with_tangent;
-        if self.lifts || lift.is_some() {
+        if self.lifts || prescribed_increment.is_some() {
             self.lifted.clear();
-            self.lifted.resize(self.pattern.equations.count(), 0.0);
+            self.lifted.resize(self.pattern.dof_map.count(), 0.0);
         }
-        self.lifts = lift.is_some();
-        if let Some(lift) = lift {
-            threads::copy(&mut self.lift, lift);
+        self.lifts = prescribed_increment.is_some();
+        if let Some(prescribed_increment) = prescribed_increment {
+            threads::copy(&mut self.prescribed_increment, prescribed_increment);
         }
     }
 
@@ -243,7 +243,7 @@ impl System {
     }
 
     fn product<const W: usize>(&self, values: &[f64], x: &mut [f64]) {
-        let mut sums = vec![[0.0; W]; self.pattern.groups.count()];
+        let mut sums = vec![[0.0; W]; self.pattern.node_blocks.count()];
         self.each_product::<W, _>(
             values,
             x,
@@ -272,13 +272,13 @@ impl System {
         regions::each(
             regions,
             of_rows,
-            |region| region.groups.end,
+            |region| region.node_blocks.end,
             |region, part| {
                 Instructions::here().run(
                     #[inline(always)]
                     || {
-                        for column in region.groups.clone() {
-                            let (own, x_own) = (column - region.groups.start, self.pattern.part::<W>(column, x));
+                        for column in region.node_blocks.clone() {
+                            let (own, x_own) = (column - region.node_blocks.start, self.pattern.part::<W>(column, x));
                             tiles.own.with(
                                 column,
                                 #[inline(always)]
@@ -286,7 +286,7 @@ impl System {
                             );
                             for tile in self.pattern.tiles_of(column) {
                                 let row = self.pattern.rows[tile] as usize;
-                                let Some(of_row) = part.get_mut(row.wrapping_sub(region.groups.start)) else {
+                                let Some(of_row) = part.get_mut(row.wrapping_sub(region.node_blocks.start)) else {
                                     continue;
                                 };
                                 show(of_row, &tiles.beside[tile], &x_own);
@@ -376,7 +376,7 @@ impl System {
         self.pattern.join(|group| &residuals[2 * group], out);
     }
 
-    /// The right-hand side of the correction: -g - J lift on the free equations.
+    /// The right-hand side of the correction: -g - J du on the free equations.
     pub fn right_hand_side(&self, out: &mut [f64]) {
         let total =
             |region: &Region, slot: usize| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot]);
@@ -386,25 +386,25 @@ impl System {
     /// The part of a group of that, row by row.
     #[inline(always)]
     pub fn right_hand_side_at<const W: usize>(&self, group: usize) -> [f64; W] {
-        let Pattern { equations, groups, .. } = &self.pattern;
+        let Pattern { dof_map, node_blocks, .. } = &self.pattern;
         let (region, own_equations, mut own) =
             (self.pattern.region_of(group), self.pattern.equations_of(group), [0.0; W]);
         let force = |slot: u32| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot as usize]);
-        let slots = groups.members(group);
-        if !self.lifts && equations.are_components(slots.clone()) && 3 * slots.len() == W {
+        let slots = node_blocks.members(group);
+        if !self.lifts && dof_map.are_components(slots.clone()) && 3 * slots.len() == W {
             slots.zip(own.as_chunks_mut().0).for_each(|(slot, own)| *own = (-force(slot)).0);
             return own;
         }
-        if W == 3 && !self.lifts && equations.are_planar(slots.clone()) {
+        if W == 3 && !self.lifts && dof_map.are_planar(slots.clone()) {
             let (u, p) = (slots.start, slots.start + 1);
-            let (across, about) = (equations.to_local(u, -force(u)), equations.to_local(p, -force(p)));
+            let (across, about) = (dof_map.to_local(u, -force(u)), dof_map.to_local(p, -force(p)));
             own.copy_from_slice(&[across.0[0], across.0[1], about.0[2]]);
             return own;
         }
         for slot in slots {
             let force = force(slot);
-            let (local, own) = (equations.to_local(slot, force), &mut own[..own_equations.len()]);
-            equations.each_of(slot as usize, local, own_equations.start, own, |own, entry| *own = -entry);
+            let (local, own) = (dof_map.to_local(slot, force), &mut own[..own_equations.len()]);
+            dof_map.each_of(slot as usize, local, own_equations.start, own, |own, entry| *own = -entry);
         }
         if self.lifts {
             own.iter_mut().zip(&self.lifted[own_equations]).for_each(|(own, lifted)| *own -= lifted);
@@ -413,8 +413,8 @@ impl System {
     }
 
     /// The increments of held directions that the next correction takes with it.
-    pub fn lift(&self) -> Option<&[Vec3]> {
-        self.lifts.then_some(&self.lift)
+    pub fn prescribed_increment(&self) -> Option<&[Vec3]> {
+        self.lifts.then_some(&self.prescribed_increment)
     }
 
     /// The same for other forces than those that were assembled.
@@ -429,14 +429,14 @@ impl System {
     }
 
     fn fill_right_hand_side(&self, force: impl Fn(&Region, usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
-        let equations = &self.pattern.equations;
+        let dof_map = &self.pattern.dof_map;
         self.pattern.each_region(out, |region, out| {
             for slot in region.slots.clone() {
-                let local = equations.to_local(slot as Slot, force(region, slot));
-                equations.each_of(slot, local, region.equations.start, out, |out, entry| *out = -entry);
+                let local = dof_map.to_local(slot as Slot, force(region, slot));
+                dof_map.each_of(slot, local, region.dof_map.start, out, |out, entry| *out = -entry);
             }
             if self.lifts {
-                let lifted = &self.lifted[region.equations.clone()];
+                let lifted = &self.lifted[region.dof_map.clone()];
                 out.iter_mut().zip(lifted).for_each(|(out, lifted)| *out -= lifted);
             }
         });
@@ -449,11 +449,11 @@ impl System {
 
     /// What each region adds to.
     fn parts(&mut self) -> Vec<Part<'_>> {
-        let Self { pattern, acting_in, force, values, lift, lifts, lifted, rooms, .. } = self;
+        let Self { pattern, acting_in, force, values, prescribed_increment, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
         let storage = &pattern.storage;
-        let places = |region: &Region| [storage.on_diagonal(&region.groups), storage.beside(&region.tiles)];
+        let places = |region: &Region| [storage.on_diagonal(&region.node_blocks), storage.beside(&region.tiles)];
         let mut forces = force.each_mut().map(|force| threads::split(force, ends(|r| r.slots.end)).into_iter());
         let (own, beside) = values.split_at_mut(storage.boundary());
         let own = threads::split(own, regions.iter().map(|region| places(region)[0].end));
@@ -464,7 +464,7 @@ impl System {
             let lists = [&mut own, &mut beside].map(|list| list.next().unwrap_or_default());
             Values::part(storage, lists, places(region).map(|range| range.start))
         });
-        let mut lifted = threads::split(lifted, ends(|r| r.equations.end)).into_iter();
+        let mut lifted = threads::split(lifted, ends(|r| r.dof_map.end)).into_iter();
         let stretches = values.zip(&mut rooms[1..]).enumerate();
         let part = |(region, (values, room)): (usize, _)| Part {
             pattern,
@@ -472,7 +472,7 @@ impl System {
             region: Some(region),
             force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
             values,
-            lift: lifts.then_some(&lift[..]),
+            prescribed_increment: lifts.then_some(&prescribed_increment[..]),
             lifted: lifted.next().unwrap_or_default(),
             room,
         };
@@ -487,15 +487,15 @@ impl System {
             region: None,
             force: self.force.each_mut().map(|force| &mut force[..]),
             values: Values::all(&self.pattern.storage, &mut self.values),
-            lift: self.lifts.then_some(&self.lift[..]),
+            prescribed_increment: self.lifts.then_some(&self.prescribed_increment[..]),
             lifted: &mut self.lifted,
             room: &mut self.rooms[0],
         }
     }
 
     /// The sink of all instances of effect number `effect`.
-    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool) -> Sink<'_> {
-        let all = 0..self.pattern.places[effect].cliques.len();
+    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool) -> Assembler<'_> {
+        let all = 0..self.pattern.places[effect].connectivity.len();
         self.whole().into_sink(effect, category, with_tangent, all)
     }
 }
@@ -505,7 +505,7 @@ fn acting_in(pattern: &Pattern, everywhere: &[Category], of_effects: &[Vec<Categ
     let first = Category::ALL.map(|category| category == Category::Internal || everywhere.contains(&category));
     let mut acts = vec![first; pattern.regions.len()];
     for (categories, places) in of_effects.iter().zip(&pattern.places) {
-        let touched = regions::touched(&places.cliques, &pattern.groups, &pattern.regions);
+        let touched = regions::touched(&places.connectivity, &pattern.node_blocks, &pattern.regions);
         for (acts, _) in acts.iter_mut().zip(touched).filter(|(_, touched)| *touched) {
             categories.iter().for_each(|&category| acts[category as usize] = true);
         }

@@ -1,7 +1,7 @@
 //! The sparsity pattern of the tangent in tiles, and for each element the places its blocks go to, worked out once.
 
-use super::equations::Equations;
-use super::groups::{Groups, SLOTS};
+use super::dof_map::DofMap;
+use super::node_blocks::{NodeBlocks, SLOTS};
 use super::regions::{self, Region, Shares};
 use super::runs::Runs;
 use super::state::Slot;
@@ -32,14 +32,14 @@ pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
 
 /// The slots that meet in each instance of an effect: one clique an element.
 #[derive(Clone, Debug, Default)]
-pub struct Cliques {
+pub struct Connectivity {
     slots: Vec<Slot>,
     instances: Runs,
     pub(super) divisible: bool,
 }
 
-impl Cliques {
-    /// Of an effect that adds no others than the [instances that a sink takes](super::Sink::instances), so that regions of a large scene
+impl Connectivity {
+    /// Of an effect that adds no others than the [instances that a sink takes](super::Assembler::instances), so that regions of a large scene
     /// can be evaluated at once.
     pub fn divisible() -> Self {
         Self { divisible: true, ..Self::default() }
@@ -81,8 +81,8 @@ impl Cliques {
 
 /// Where the blocks of one effect's instances go.
 #[derive(Clone, Debug)]
-pub(super) struct Places {
-    pub cliques: Cliques,
+pub(super) struct ScatterMap {
+    pub connectivity: Connectivity,
     /// Whether each instance couples whole nodes, whose tiles it adds to in one go
     pub whole: bool,
     /// By instance and then by rows of blocks: where a block is added to, or [`NOT_KEPT`]. Blocks are those of whole nodes, or else
@@ -94,7 +94,7 @@ pub(super) struct Places {
     pub shares: Shares,
 }
 
-impl Places {
+impl ScatterMap {
     #[inline]
     pub fn of(&self, k: usize) -> &[u32] {
         &self.values[self.of_instances.get(k)]
@@ -113,12 +113,12 @@ pub enum Symmetry {
 }
 
 impl Symmetry {
-    /// Of what effects add with these cliques, each with whether it is symmetric.
-    pub fn of<'a>(effects: impl IntoIterator<Item = (&'a Cliques, bool)>, groups: &Groups) -> Self {
-        let one = |slots: &[Slot]| slots.windows(2).all(|pair| groups.of(pair[0]).0 == groups.of(pair[1]).0);
-        let of_effect = |(cliques, symmetric): (&Cliques, bool)| match symmetric {
+    /// Of what effects add with this connectivity, each with whether it is symmetric.
+    pub fn of<'a>(effects: impl IntoIterator<Item = (&'a Connectivity, bool)>, node_blocks: &NodeBlocks) -> Self {
+        let one = |slots: &[Slot]| slots.windows(2).all(|pair| node_blocks.of(pair[0]).0 == node_blocks.of(pair[1]).0);
+        let of_effect = |(connectivity, symmetric): (&Connectivity, bool)| match symmetric {
             true => Self::Whole,
-            false if cliques.iter().all(one) => Self::BetweenGroups,
+            false if connectivity.iter().all(one) => Self::BetweenGroups,
             false => Self::None,
         };
         effects.into_iter().map(of_effect).min().unwrap_or(Self::Whole)
@@ -138,9 +138,9 @@ impl Symmetry {
 #[derive(Clone, Debug)]
 pub struct Pattern {
     /// The equations that the rows and columns stand for.
-    pub equations: Equations,
+    pub dof_map: DofMap,
     /// The slots of tiles
-    pub groups: Groups,
+    pub node_blocks: NodeBlocks,
     /// How symmetric each tangent is
     pub symmetry: Symmetry,
     /// Where the values stand
@@ -157,7 +157,7 @@ pub struct Pattern {
     pub regions: Vec<Region>,
     /// Tiles whose rows lie in another region than their columns: column and number
     pub between: Vec<(usize, usize)>,
-    pub(super) places: Vec<Places>,
+    pub(super) places: Vec<ScatterMap>,
 }
 
 /// A tile above the diagonal that is not kept.
@@ -179,15 +179,15 @@ pub struct Entry {
 }
 
 impl Pattern {
-    /// The pattern of several effects, given by the cliques of each.
-    pub fn new(equations: Equations, groups: Groups, effects: Vec<Cliques>, symmetry: Symmetry) -> Self {
-        let (column_starts, rows) = compressed_columns(&groups, &effects, symmetry.halves());
-        let regions = regions::cut(&groups, &equations, &column_starts);
-        let storage = Storage::new(groups.width(), groups.count(), symmetry == Symmetry::Whole);
+    /// The pattern of several effects, given by the connectivity of each.
+    pub fn new(dof_map: DofMap, node_blocks: NodeBlocks, effects: Vec<Connectivity>, symmetry: Symmetry) -> Self {
+        let (column_starts, rows) = compressed_columns(&node_blocks, &effects, symmetry.halves());
+        let regions = regions::cut(&node_blocks, &dof_map, &column_starts);
+        let storage = Storage::new(node_blocks.width(), node_blocks.count(), symmetry == Symmetry::Whole);
         let (idle, between, places) = (Vec::new(), Vec::new(), Vec::new());
         let mut pattern = Self {
-            equations,
-            groups,
+            dof_map,
+            node_blocks,
             symmetry,
             storage,
             column_starts,
@@ -198,10 +198,10 @@ impl Pattern {
             between,
             places,
         };
-        debug_assert!((0..pattern.groups.count()).all(|group| pattern.is_ascending(group)), "rows out of order");
+        debug_assert!((0..pattern.node_blocks.count()).all(|group| pattern.is_ascending(group)), "rows out of order");
         pattern.idle = pattern.idle();
         pattern.between = pattern.between();
-        pattern.places = threads::map(effects.into_iter(), |cliques| pattern.places_of(cliques));
+        pattern.places = threads::map(effects.into_iter(), |connectivity| pattern.places_of(connectivity));
         pattern
     }
 
@@ -213,7 +213,7 @@ impl Pattern {
     /// The rows of a tile.
     #[inline]
     pub fn width(&self) -> usize {
-        self.groups.width()
+        self.node_blocks.width()
     }
 
     /// The number of values: those of all tiles that are kept.
@@ -242,14 +242,14 @@ impl Pattern {
         if self.symmetry.halves() { Mirrors::new(&self.column_starts, &self.rows) } else { Mirrors::default() }
     }
 
-    /// The equations of a group's rows, [`Equations::HELD`] for those without.
+    /// The equations of a group's rows, [`DofMap::HELD`] for those without.
     #[inline]
     pub fn numbers(&self, group: usize) -> impl Iterator<Item = u32> {
-        let mut numbers = [Equations::HELD; WIDTH];
-        for slot in self.groups.members(group) {
-            let (_, first) = self.groups.row(slot);
+        let mut numbers = [DofMap::HELD; WIDTH];
+        for slot in self.node_blocks.members(group) {
+            let (_, first) = self.node_blocks.row(slot);
             // In a plane slots share rows, each of which is free in one of them at most.
-            for (row, number) in numbers[first..].iter_mut().zip(self.equations.of(slot)) {
+            for (row, number) in numbers[first..].iter_mut().zip(self.dof_map.of(slot)) {
                 *row = number.min(*row);
             }
         }
@@ -269,12 +269,12 @@ impl Pattern {
     /// The same of numbers of the group's own equations.
     #[inline(always)]
     pub fn spread<const W: usize>(&self, group: usize, own: [f64; W]) -> [f64; W] {
-        let equations = self.equations_of(group);
-        if equations.len() == W {
+        let dof_map = self.equations_of(group);
+        if dof_map.len() == W {
             return own;
         }
         let mut numbers = self.numbers(group);
-        let of_row = |number: u32| own.get((number as usize).wrapping_sub(equations.start)).copied();
+        let of_row = |number: u32| own.get((number as usize).wrapping_sub(dof_map.start)).copied();
         std::array::from_fn(|_| numbers.next().and_then(of_row).unwrap_or(0.0))
     }
 
@@ -283,7 +283,7 @@ impl Pattern {
     fn gathered<const W: usize>(&self, group: usize, part: &[f64; W]) -> [f64; W] {
         let mut own = *part;
         if self.equations_of(group).len() != W {
-            let free = self.numbers(group).zip(part).filter(|(number, _)| *number != Equations::HELD);
+            let free = self.numbers(group).zip(part).filter(|(number, _)| *number != DofMap::HELD);
             own.iter_mut().zip(free).for_each(|(own, (_, &value))| *own = value);
         }
         own
@@ -298,21 +298,22 @@ impl Pattern {
 
     /// Whether the equations of a group are in the order of its rows.
     fn is_ascending(&self, group: usize) -> bool {
-        self.numbers(group).filter(|&number| number != Equations::HELD).is_sorted()
+        self.numbers(group).filter(|&number| number != DofMap::HELD).is_sorted()
     }
 
     /// The equations of a group; where they are as many as a tile is wide, those of its rows in their order.
     #[inline(always)]
     pub fn equations_of(&self, group: usize) -> Range<usize> {
-        self.equations.before(self.groups.first_slot(group))..self.equations.before(self.groups.first_slot(group + 1))
+        self.dof_map.before(self.node_blocks.first_slot(group))
+            ..self.dof_map.before(self.node_blocks.first_slot(group + 1))
     }
 
     /// The reverse of [`Pattern::part`], for parts that are found by their groups.
     pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
         self.each_region(out, |region, out| {
-            for group in region.groups.clone() {
-                let (equations, part, start) = (self.equations_of(group), part(group), region.equations.start);
-                let out = &mut out[equations.start - start..equations.end - start];
+            for group in region.node_blocks.clone() {
+                let (dof_map, part, start) = (self.equations_of(group), part(group), region.dof_map.start);
+                let out = &mut out[dof_map.start - start..dof_map.end - start];
                 match out.first_chunk_mut::<W>() {
                     Some(out) => *out = *part,
                     None => {
@@ -336,24 +337,24 @@ impl Pattern {
             out,
             |region| region.slots.end,
             |region, out| {
-                for group in region.groups.clone() {
-                    let (slots, part) = (self.groups.members(group), part(group));
+                for group in region.node_blocks.clone() {
+                    let (slots, part) = (self.node_blocks.members(group), part(group));
                     let first = slots.start as usize - region.slots.start;
                     let out = &mut out[first..first + slots.len()];
-                    if 3 * slots.len() == W && self.equations.are_components(slots.clone()) {
+                    if 3 * slots.len() == W && self.dof_map.are_components(slots.clone()) {
                         out.iter_mut().zip(part.as_chunks().0).for_each(|(out, part)| *out = Vec3(*part));
                         continue;
                     }
                     if let ([x, y, angle], [across, about], None) = (&part[..], &mut *out, held)
-                        && self.equations.are_planar(slots.clone())
+                        && self.dof_map.are_planar(slots.clone())
                     {
-                        *across = self.equations.to_global(slots.start, Vec3([*x, *y, 0.0]));
-                        *about = self.equations.to_global(slots.start + 1, Vec3([0.0, 0.0, *angle]));
+                        *across = self.dof_map.to_global(slots.start, Vec3([*x, *y, 0.0]));
+                        *about = self.dof_map.to_global(slots.start + 1, Vec3([0.0, 0.0, *angle]));
                         continue;
                     }
-                    let (own, equations) = (self.gathered(group, part), self.equations_of(group));
+                    let (own, dof_map) = (self.gathered(group, part), self.equations_of(group));
                     for (slot, out) in slots.zip(out) {
-                        *out = self.equations.at(slot as usize, &own[..equations.len()], equations.start, held);
+                        *out = self.dof_map.at(slot as usize, &own[..dof_map.len()], dof_map.start, held);
                     }
                 }
             },
@@ -366,13 +367,13 @@ impl Pattern {
         match &self.regions[..] {
             [all] => all,
             // All but the last are as long as the first.
-            regions => &regions[group / regions[0].groups.len()],
+            regions => &regions[group / regions[0].node_blocks.len()],
         }
     }
 
     /// Does something for each region with what belongs to its equations, one number each.
     pub fn each_region(&self, out: &mut [f64], work: impl Fn(&Region, &mut [f64]) + Send + Sync) {
-        regions::each(&self.regions, out, |region| region.equations.end, work);
+        regions::each(&self.regions, out, |region| region.dof_map.end, work);
     }
 
     /// The entries of an equation's column, tile by tile.
@@ -380,7 +381,7 @@ impl Pattern {
         let ((group, c), storage) = (self.row_of(column), &self.storage);
         let free = |group: usize| {
             let numbers = self.numbers(group).enumerate();
-            numbers.filter(|&(_, row)| row != Equations::HELD).map(|(r, row)| (row, r))
+            numbers.filter(|&(_, row)| row != DofMap::HELD).map(|(r, row)| (row, r))
         };
         let in_tile = move |row: usize, tile: usize| {
             free(row).map(move |(row, r)| Entry { row, place: storage.entry(tile, r, c) })
@@ -397,16 +398,16 @@ impl Pattern {
     /// The number of entries between equations.
     pub fn nonzeros(&self) -> usize {
         let meetings = self.meetings();
-        let free = |group: usize| self.numbers(group).filter(|&n| n != Equations::HELD).count();
+        let free = |group: usize| self.numbers(group).filter(|&n| n != DofMap::HELD).count();
         let column = |c: usize| free(c) * (free(c) + meetings.of(c).map(|row| free(row as usize)).sum::<usize>());
-        (0..self.groups.count()).map(column).sum()
+        (0..self.node_blocks.count()).map(column).sum()
     }
 
     /// The entries of a slot and itself in the directions that are not held: row and column in its own directions, and where they are.
     pub fn own_entries(&self, slot: Slot) -> impl Iterator<Item = ([usize; 2], usize)> {
-        let ((group, first), storage) = (self.groups.row(slot), &self.storage);
-        let numbers = self.equations.of(slot);
-        let free = move || (0..3).filter(move |&k| numbers[k] != Equations::HELD);
+        let ((group, first), storage) = (self.node_blocks.row(slot), &self.storage);
+        let numbers = self.dof_map.of(slot);
+        let free = move || (0..3).filter(move |&k| numbers[k] != DofMap::HELD);
         let column =
             move |c: usize| free().map(move |r| ([r, c], storage.entry(storage.own(group), first + r, first + c)));
         free().flat_map(column)
@@ -415,7 +416,7 @@ impl Pattern {
     /// Where an entry is stored, perhaps with its mirror image: `None` for held directions, and for pairs
     /// that no effect couples.
     pub fn find(&self, row: u32, column: u32) -> Option<usize> {
-        if row == Equations::HELD || column == Equations::HELD {
+        if row == DofMap::HELD || column == DofMap::HELD {
             return None;
         }
         let (row, column) = (self.row_of(row), self.row_of(column));
@@ -432,20 +433,20 @@ impl Pattern {
             pattern.tiles_of(column).start + rows.partition_point(|&row| (row as usize) < column)
                 ..pattern.tiles_of(column).end
         };
-        let count = self.groups.count();
+        let count = self.node_blocks.count();
         let meet = |column: usize| self.rows[lower(self, column)] == other.rows[lower(other, column)];
-        count == other.groups.count() && (0..count).all(meet)
+        count == other.node_blocks.count() && (0..count).all(meet)
     }
 
     /// Shows each equation and where its entry of the diagonal is stored.
     pub fn each_diagonal(&self, show: impl FnMut(usize, usize)) {
-        self.each_diagonal_of(0..self.groups.count(), show);
+        self.each_diagonal_of(0..self.node_blocks.count(), show);
     }
 
     /// The same of some groups.
-    pub fn each_diagonal_of(&self, groups: Range<usize>, mut show: impl FnMut(usize, usize)) {
-        for group in groups {
-            for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != Equations::HELD) {
+    pub fn each_diagonal_of(&self, node_blocks: Range<usize>, mut show: impl FnMut(usize, usize)) {
+        for group in node_blocks {
+            for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != DofMap::HELD) {
                 show(number as usize, self.storage.entry(self.storage.own(group), r, r));
             }
         }
@@ -453,8 +454,8 @@ impl Pattern {
 
     /// The group and the row of the tile of an equation.
     fn row_of(&self, equation: u32) -> (usize, usize) {
-        let (slot, k) = self.equations.origin(equation as usize);
-        let (group, first) = self.groups.row(slot);
+        let (slot, k) = self.dof_map.origin(equation as usize);
+        let (group, first) = self.node_blocks.row(slot);
         (group, first + k as usize)
     }
 
@@ -475,56 +476,56 @@ impl Pattern {
 
     fn idle(&self) -> Vec<(u32, u8)> {
         let rows = |group: usize| (0..).zip(self.numbers(group)).map(move |(r, number)| (group as u32, r, number));
-        let held = (0..self.groups.count()).flat_map(rows).filter(|&(.., number)| number == Equations::HELD);
+        let held = (0..self.node_blocks.count()).flat_map(rows).filter(|&(.., number)| number == DofMap::HELD);
         held.map(|(group, r, _)| (group, r)).collect()
     }
 
     fn between(&self) -> Vec<(usize, usize)> {
         let mut between = Vec::new();
         for region in &self.regions {
-            for column in region.groups.clone() {
-                let elsewhere = |tile: &usize| !region.groups.contains(&(self.rows[*tile] as usize));
+            for column in region.node_blocks.clone() {
+                let elsewhere = |tile: &usize| !region.node_blocks.contains(&(self.rows[*tile] as usize));
                 between.extend(self.tiles_of(column).filter(elsewhere).map(|tile| (column, tile)));
             }
         }
         between
     }
 
-    fn places_of(&self, cliques: Cliques) -> Places {
-        let whole = cliques.iter().all(|slots| self.is_whole(slots));
+    fn places_of(&self, connectivity: Connectivity) -> ScatterMap {
+        let whole = connectivity.iter().all(|slots| self.is_whole(slots));
         let step = if whole { SLOTS } else { 1 };
-        let mut places = Places {
+        let mut places = ScatterMap {
             whole,
-            values: Vec::with_capacity(cliques.iter().map(|slots| (slots.len() / step).pow(2)).sum()),
+            values: Vec::with_capacity(connectivity.iter().map(|slots| (slots.len() / step).pow(2)).sum()),
             of_instances: Runs::default(),
-            special: Vec::with_capacity(cliques.len()),
-            shares: Shares::new(&cliques, &self.groups, &self.regions),
-            cliques: Cliques::default(),
+            special: Vec::with_capacity(connectivity.len()),
+            shares: Shares::new(&connectivity, &self.node_blocks, &self.regions),
+            connectivity: Connectivity::default(),
         };
-        for slots in cliques.iter() {
+        for slots in connectivity.iter() {
             let before = places.values.len();
-            let corners = || slots.iter().step_by(step).map(|&slot| self.groups.row(slot));
+            let corners = || slots.iter().step_by(step).map(|&slot| self.node_blocks.row(slot));
             for (i, r) in corners() {
                 let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
-                    // Cliques are what the pattern was made of.
+                    // Connectivity are what the pattern was made of.
                     true => self.tile(i, j).map(|tile| self.storage.target(tile, r, c) as u32),
                     false => Some(NOT_KEPT),
                 };
                 places.values.extend(corners().filter_map(place));
             }
             places.of_instances.push(places.values.len() - before);
-            places.special.push(!slots.iter().all(|&slot| self.equations.is_plain(slot)));
+            places.special.push(!slots.iter().all(|&slot| self.dof_map.is_plain(slot)));
         }
         places.of_instances.shrink_to_fit();
-        places.cliques = cliques;
-        places.cliques.shrink();
+        places.connectivity = connectivity;
+        places.connectivity.shrink();
         places
     }
 
     /// Whether these slots are those of nodes, each after the other.
     fn is_whole(&self, slots: &[Slot]) -> bool {
         let pair = |pair: &[Slot]| match *pair {
-            [u, p] => self.groups.members(self.groups.of(u).0).eq([u, p]),
+            [u, p] => self.node_blocks.members(self.node_blocks.of(u).0).eq([u, p]),
             _ => false,
         };
         slots.chunks(SLOTS).all(pair)
@@ -532,17 +533,19 @@ impl Pattern {
 }
 
 /// Column by column the other groups that a group meets; where `halves` do those that come after it.
-fn compressed_columns(groups: &Groups, effects: &[Cliques], halves: bool) -> (Vec<u32>, Vec<u32>) {
+fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves: bool) -> (Vec<u32>, Vec<u32>) {
     let is_kept = |column: u32, row: u32| row > column || (row != column && !halves);
     let kept = |met: &[u32], column: u32| met.iter().filter(|&&row| is_kept(column, row)).count() as u32;
     // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
-    let mut column_starts = vec![0_u32; groups.count() + 1];
+    let mut column_starts = vec![0_u32; node_blocks.count() + 1];
     let ends = &mut column_starts[1..];
-    each_meeting(groups, effects, &mut |met| met.iter().for_each(|&column| ends[column as usize] += kept(met, column)));
+    each_meeting(node_blocks, effects, &mut |met| {
+        met.iter().for_each(|&column| ends[column as usize] += kept(met, column))
+    });
     let mut room = 0;
     ends.iter_mut().for_each(|end| room += std::mem::replace(end, room));
     let mut rows = vec![0_u32; room as usize];
-    each_meeting(groups, effects, &mut |met| {
+    each_meeting(node_blocks, effects, &mut |met| {
         for &column in met {
             let end = &mut ends[column as usize];
             for &row in met.iter().filter(|&&row| is_kept(column, row)) {
@@ -631,11 +634,11 @@ fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
 }
 
 /// Shows the groups that meet in each instance.
-fn each_meeting(groups: &Groups, effects: &[Cliques], show: &mut dyn FnMut(&[u32])) {
+fn each_meeting(node_blocks: &NodeBlocks, effects: &[Connectivity], show: &mut dyn FnMut(&[u32])) {
     let mut met = Vec::new();
-    for clique in effects.iter().flat_map(Cliques::iter) {
+    for clique in effects.iter().flat_map(Connectivity::iter) {
         met.clear();
-        met.extend(clique.iter().map(|&slot| groups.of(slot).0 as u32));
+        met.extend(clique.iter().map(|&slot| node_blocks.of(slot).0 as u32));
         met.dedup();
         show(&met);
     }

@@ -20,7 +20,7 @@ const NO_PLANE: f64 = 1e-6;
 
 /// Something that a scene is made of, as a mirror sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Aspect {
+pub enum MirrorData {
     /// A place
     Place(Vec3),
     /// A displacement, velocity or force
@@ -37,7 +37,7 @@ pub enum Aspect {
     Spatial,
 }
 
-impl fmt::Display for Aspect {
+impl fmt::Display for MirrorData {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (what, v) = match self {
             Self::Place(v) => ("the place", v),
@@ -61,7 +61,7 @@ pub fn rounded(v: Vec3) -> String {
 }
 
 /// Shows the parts of a scene, each with whose it is.
-pub type Shown<'a> = dyn Fn(&mut dyn FnMut(&'static str, Aspect)) + 'a;
+pub type Shown<'a> = dyn Fn(&mut dyn FnMut(&'static str, MirrorData)) + 'a;
 
 /// A plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +120,7 @@ impl Plane {
     }
 
     /// Whether something is its own mirror image; places are compared with `origin`, a point of the plane, in a scene so long.
-    fn mirrors(&self, aspect: &Aspect, origin: Vec3, length: f64) -> bool {
+    fn mirrors(&self, aspect: &MirrorData, origin: Vec3, length: f64) -> bool {
         let e = self.normal();
         // Its own image where it maps the normal to the normal, and the plane to itself.
         let across = |m: Mat3| {
@@ -129,19 +129,19 @@ impl Plane {
             (left - along).norm().max((right - along).norm())
         };
         match *aspect {
-            Aspect::Place(x) => (x - origin).dot(e).abs() <= ROUND_OFF * length.max(x.norm()),
-            Aspect::Vector(v) => self.is_along(v),
-            Aspect::Axial(v) => self.is_normal(v),
-            Aspect::Line(v) => self.is_along(v) || self.is_normal(v),
-            Aspect::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
+            MirrorData::Place(x) => (x - origin).dot(e).abs() <= ROUND_OFF * length.max(x.norm()),
+            MirrorData::Vector(v) => self.is_along(v),
+            MirrorData::Axial(v) => self.is_normal(v),
+            MirrorData::Line(v) => self.is_along(v) || self.is_normal(v),
+            MirrorData::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
             // What turns in the plane strains aside, and the other way about.
-            Aspect::Coupling(m) => {
+            MirrorData::Coupling(m) => {
                 let (right, left) = (m * e, m.transpose_mul(e));
                 let along = right.dot(e);
                 let rest = m - right.outer(e) - e.outer(left) + e.outer(e).scale(along);
                 rest.max_abs().max(along.abs()) <= ROUND_OFF * m.max_abs()
             }
-            Aspect::Spatial => false,
+            MirrorData::Spatial => false,
         }
     }
 
@@ -218,28 +218,28 @@ impl Search {
         search
     }
 
-    fn each_span(&mut self, aspect: &Aspect, show: impl Fn(&mut Span, Vec3)) {
+    fn each_span(&mut self, aspect: &MirrorData, show: impl Fn(&mut Span, Vec3)) {
         let Some(v) = self.vector(aspect) else { return };
-        if matches!(aspect, Aspect::Place(_)) {
+        if matches!(aspect, MirrorData::Place(_)) {
             show(&mut self.places, v);
         }
         show(&mut self.vectors, v);
     }
 
-    fn look(&mut self, name: &'static str, aspect: &Aspect) {
+    fn look(&mut self, name: &'static str, aspect: &MirrorData) {
         match *aspect {
-            Aspect::Place(x) => _ = self.origin.get_or_insert(x),
-            Aspect::Axial(v) if v != Vec3::ZERO && self.axial.is_none() => self.axial = Some(v),
-            Aspect::Spatial if self.spatial.is_none() => self.spatial = Some(name),
+            MirrorData::Place(x) => _ = self.origin.get_or_insert(x),
+            MirrorData::Axial(v) if v != Vec3::ZERO && self.axial.is_none() => self.axial = Some(v),
+            MirrorData::Spatial if self.spatial.is_none() => self.spatial = Some(name),
             _ => {}
         }
         self.each_span(aspect, Span::measure);
     }
 
-    fn vector(&self, aspect: &Aspect) -> Option<Vec3> {
+    fn vector(&self, aspect: &MirrorData) -> Option<Vec3> {
         match *aspect {
-            Aspect::Place(x) => self.origin.map(|origin| x - origin),
-            Aspect::Vector(v) => v.normalized().map(|v| v * self.length),
+            MirrorData::Place(x) => self.origin.map(|origin| x - origin),
+            MirrorData::Vector(v) => v.normalized().map(|v| v * self.length),
             _ => None,
         }
     }
@@ -251,7 +251,7 @@ impl Search {
     }
 
     /// The first that is not its own image in a plane, with whose it is.
-    fn first_apart(&self, plane: &Plane, shown: &Shown) -> Option<(&'static str, Aspect)> {
+    fn first_apart(&self, plane: &Plane, shown: &Shown) -> Option<(&'static str, MirrorData)> {
         let mut apart = None;
         shown(&mut |name, aspect| {
             if apart.is_none() && !plane.mirrors(&aspect, self.origin.unwrap_or(Vec3::ZERO), self.length) {
@@ -268,7 +268,7 @@ mod tests {
 
     const TILTED: Vec3 = Vec3([0.36, 0.48, 0.8]);
 
-    fn plane_of(parts: &[Aspect]) -> Result<Plane, String> {
+    fn plane_of(parts: &[MirrorData]) -> Result<Plane, String> {
         Plane::of(1.0, &|show| parts.iter().for_each(|&aspect| show("part", aspect)))
     }
 
@@ -284,31 +284,35 @@ mod tests {
 
     #[test]
     fn loads_turn_a_line_into_a_plane() {
-        let line = [Aspect::Place(Vec3::ZERO), Aspect::Place(Vec3::UNIT[0])];
+        let line = [MirrorData::Place(Vec3::ZERO), MirrorData::Place(Vec3::UNIT[0])];
         assert!(plane_of(&line).unwrap_err().contains("one line"));
         let with = |aspect| plane_of(&[line[0], line[1], aspect]);
-        assert_eq!(with(Aspect::Vector(Vec3::UNIT[1])).unwrap().normal(), Vec3::UNIT[2]);
-        assert_eq!(with(Aspect::Axial(Vec3::UNIT[1] * -1.0)).unwrap().normal(), Vec3::UNIT[1]);
-        assert!(with(Aspect::Axial(Vec3::UNIT[0])).is_err(), "torsion leaves every plane");
-        let apart =
-            plane_of(&[line[0], line[1], Aspect::Vector(Vec3::UNIT[1]), Aspect::Vector(Vec3([0.0, 1.0, -0.5]))]);
+        assert_eq!(with(MirrorData::Vector(Vec3::UNIT[1])).unwrap().normal(), Vec3::UNIT[2]);
+        assert_eq!(with(MirrorData::Axial(Vec3::UNIT[1] * -1.0)).unwrap().normal(), Vec3::UNIT[1]);
+        assert!(with(MirrorData::Axial(Vec3::UNIT[0])).is_err(), "torsion leaves every plane");
+        let apart = plane_of(&[
+            line[0],
+            line[1],
+            MirrorData::Vector(Vec3::UNIT[1]),
+            MirrorData::Vector(Vec3([0.0, 1.0, -0.5])),
+        ]);
         assert_eq!(
             apart.unwrap_err(),
             "part: the vector [0.0, 1.0, -0.5] is not its own image in a plane that all else shares"
         );
     }
 
-    /// Places alone would tell the normal of a shallow arch to a few digits only.
+    /// ScatterMap alone would tell the normal of a shallow arch to a few digits only.
     #[test]
     fn shallow_scenes_lie_in_the_plane_of_their_loads() {
         let plane = Plane::normal_to(TILTED).unwrap();
         let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
         let arch = |k: i32| {
             let x = f64::from(k) / 20.0;
-            Aspect::Place(a * x + b * (1e-4 * x * (1.0 - x)) + e * (1e-16 * f64::from(k % 3 - 1)))
+            MirrorData::Place(a * x + b * (1e-4 * x * (1.0 - x)) + e * (1e-16 * f64::from(k % 3 - 1)))
         };
-        let places: Vec<Aspect> = (0..=20).map(arch).collect();
-        for load in [Aspect::Vector(b * -3.0), Aspect::Vector(a + b), Aspect::Axial(e * 2.0)] {
+        let places: Vec<MirrorData> = (0..=20).map(arch).collect();
+        for load in [MirrorData::Vector(b * -3.0), MirrorData::Vector(a + b), MirrorData::Axial(e * 2.0)] {
             let found = plane_of(&[&places[..], &[load]].concat()).unwrap();
             assert!((found.normal() - e).norm() < 1e-13 || (found.normal() + e).norm() < 1e-13);
         }
@@ -319,8 +323,8 @@ mod tests {
     fn what_leaves_the_plane_of_places_is_named() {
         let places = [Vec3::ZERO, Vec3::UNIT[0], Vec3([1.0, 1.0, 0.0])];
         let aside = Plane::of(1.0, &|show| {
-            places.iter().for_each(|&place| show("beams", Aspect::Place(place)));
-            show("load", Aspect::Vector(Vec3([3.0, -8.0, 1.0])));
+            places.iter().for_each(|&place| show("beams", MirrorData::Place(place)));
+            show("load", MirrorData::Vector(Vec3([3.0, -8.0, 1.0])));
         });
         assert!(aside.unwrap_err().starts_with("load:"));
     }
@@ -329,15 +333,19 @@ mod tests {
     fn what_stands_aside_by_more_than_round_off_makes_a_scene_spatial() {
         let plane = Plane::normal_to(TILTED).unwrap();
         let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
-        let base = [Aspect::Place(a), Aspect::Place(b * 0.5), Aspect::Vector(a + b)];
+        let base = [MirrorData::Place(a), MirrorData::Place(b * 0.5), MirrorData::Vector(a + b)];
         let with = |aspect| plane_of(&[&base[..], &[aspect]].concat());
         let fits = |aspect| with(aspect).is_ok_and(|found| (found.normal() - e).norm() < 1e-13);
-        assert!(fits(Aspect::Place(a * 3.0 + e * 1e-16)) && !fits(Aspect::Place(a * 3.0 + e * 1e-11)));
-        assert!(fits(Aspect::Line(e)) && fits(Aspect::Line(a)) && !fits(Aspect::Line(a + e)));
-        assert!(fits(Aspect::Axial(e)) && !fits(Aspect::Axial(e + a * 1e-9)));
+        assert!(fits(MirrorData::Place(a * 3.0 + e * 1e-16)) && !fits(MirrorData::Place(a * 3.0 + e * 1e-11)));
+        assert!(fits(MirrorData::Line(e)) && fits(MirrorData::Line(a)) && !fits(MirrorData::Line(a + e)));
+        assert!(fits(MirrorData::Axial(e)) && !fits(MirrorData::Axial(e + a * 1e-9)));
         let section = a.outer(a) + b.outer(b).scale(3.0) + a.outer(b) + b.outer(a) + e.outer(e).scale(7.0);
-        assert!(fits(Aspect::Tensor(section)) && !fits(Aspect::Tensor(section + a.outer(e).scale(1e-9))));
-        assert!(fits(Aspect::Coupling(a.outer(e))) && fits(Aspect::Coupling(e.outer(a) + b.outer(e))));
-        assert!(!fits(Aspect::Coupling(e.outer(e))) && !fits(Aspect::Coupling(a.outer(b))) && !fits(Aspect::Spatial));
+        assert!(fits(MirrorData::Tensor(section)) && !fits(MirrorData::Tensor(section + a.outer(e).scale(1e-9))));
+        assert!(fits(MirrorData::Coupling(a.outer(e))) && fits(MirrorData::Coupling(e.outer(a) + b.outer(e))));
+        assert!(
+            !fits(MirrorData::Coupling(e.outer(e)))
+                && !fits(MirrorData::Coupling(a.outer(b)))
+                && !fits(MirrorData::Spatial)
+        );
     }
 }

@@ -3,9 +3,9 @@
 //! Regions are cut by the scene alone. Elements between regions, and effects that are not cut, come after all regions, in their order:
 //! a sum has the same terms in the same order on any number of threads.
 
-use super::equations::Equations;
-use super::groups::Groups;
-use super::pattern::Cliques;
+use super::dof_map::DofMap;
+use super::node_blocks::NodeBlocks;
+use super::pattern::Connectivity;
 use crate::scalar::LANES;
 use crate::threads;
 use std::ops::Range;
@@ -19,11 +19,11 @@ pub struct Region {
     /// Its place among all
     pub number: usize,
     /// Columns of tiles
-    pub groups: Range<usize>,
+    pub node_blocks: Range<usize>,
     /// Their slots
     pub slots: Range<usize>,
     /// Their equations
-    pub equations: Range<usize>,
+    pub dof_map: Range<usize>,
     /// The tiles in these columns beside the diagonal
     pub tiles: Range<usize>,
 }
@@ -37,15 +37,15 @@ pub struct Shares {
 
 impl Shares {
     /// Of instances that couple these slots.
-    pub fn new(cliques: &Cliques, groups: &Groups, regions: &[Region]) -> Self {
-        if regions.len() < 2 || !cliques.divisible {
-            let all = std::iter::once(0..cliques.len());
+    pub fn new(connectivity: &Connectivity, node_blocks: &NodeBlocks, regions: &[Region]) -> Self {
+        if regions.len() < 2 || !connectivity.divisible {
+            let all = std::iter::once(0..connectivity.len());
             return Self { inside: vec![Vec::new(); regions.len()], others: all.collect() };
         }
-        let region = |slot: u32| region_of(slot, groups, regions);
+        let region = |slot: u32| region_of(slot, node_blocks, regions);
         let mut out = Self { inside: vec![Vec::new(); regions.len()], others: Vec::new() };
-        for row in rows(cliques) {
-            let mut slots = row.clone().flat_map(|k| cliques.get(k));
+        for row in rows(connectivity) {
+            let mut slots = row.clone().flat_map(|k| connectivity.get(k));
             let first = slots.next().map(|&slot| region(slot));
             let own = first.filter(|first| slots.all(|&slot| region(slot) == *first));
             let runs = own.map_or(&mut out.others, |own| &mut out.inside[own]);
@@ -64,25 +64,25 @@ impl Shares {
 }
 
 /// All regions but the last are of the same length.
-fn region_of(slot: u32, groups: &Groups, regions: &[Region]) -> usize {
-    groups.of(slot).0 / regions[0].groups.len()
+fn region_of(slot: u32, node_blocks: &NodeBlocks, regions: &[Region]) -> usize {
+    node_blocks.of(slot).0 / regions[0].node_blocks.len()
 }
 
 /// Whether something of an effect lies in each region, or between it and others.
-pub fn touched(cliques: &Cliques, groups: &Groups, regions: &[Region]) -> Vec<bool> {
+pub fn touched(connectivity: &Connectivity, node_blocks: &NodeBlocks, regions: &[Region]) -> Vec<bool> {
     let mut touched = vec![false; regions.len()];
-    for &slot in cliques.iter().flatten() {
-        touched[region_of(slot, groups, regions)] = true;
+    for &slot in connectivity.iter().flatten() {
+        touched[region_of(slot, node_blocks, regions)] = true;
     }
     touched
 }
 
 /// Instances that stand side by side: of one shape, as many as there are lanes.
-fn rows(cliques: &Cliques) -> impl Iterator<Item = Range<usize>> {
+fn rows(connectivity: &Connectivity) -> impl Iterator<Item = Range<usize>> {
     let mut start = 0;
     std::iter::from_fn(move || {
-        let shape = |k: usize| cliques.get(k).len();
-        let most = cliques.len().min(start + LANES);
+        let shape = |k: usize| connectivity.get(k).len();
+        let most = connectivity.len().min(start + LANES);
         let end = (start + 1..most).find(|&k| shape(k) != shape(start)).unwrap_or(most);
         let row = start..end;
         start = end;
@@ -110,16 +110,16 @@ pub fn most(nodes: usize) -> usize {
 }
 
 /// Cuts a scene; all of it is one region where it is not large.
-pub fn cut(all_groups: &Groups, equations: &Equations, column_starts: &[u32]) -> Vec<Region> {
+pub fn cut(all_groups: &NodeBlocks, dof_map: &DofMap, column_starts: &[u32]) -> Vec<Region> {
     let all = all_groups.count();
     let count = most(all);
     let length = all.div_ceil(count).max(1);
     let region = |number: usize| {
-        let groups = (length * number).min(all)..(length * (number + 1)).min(all);
-        let slots = all_groups.first_slot(groups.start)..all_groups.first_slot(groups.end);
-        let equations = equations.before(slots.start)..equations.before(slots.end);
-        let tiles = column_starts[groups.start] as usize..column_starts[groups.end] as usize;
-        Region { number, groups, slots, equations, tiles }
+        let node_blocks = (length * number).min(all)..(length * (number + 1)).min(all);
+        let slots = all_groups.first_slot(node_blocks.start)..all_groups.first_slot(node_blocks.end);
+        let dof_map = dof_map.before(slots.start)..dof_map.before(slots.end);
+        let tiles = column_starts[node_blocks.start] as usize..column_starts[node_blocks.end] as usize;
+        Region { number, node_blocks, slots, dof_map, tiles }
     };
     (0..all.div_ceil(length).max(1)).map(region).collect()
 }

@@ -63,9 +63,9 @@ pub struct State {
     /// For each beam element the nodes that are converted into the chart of the first; frozen while Newton iterates.
     pub mixed: Vec<Conversion>,
     /// For each rotation slot the rotation vector continued without jumps since the start; valid at the last converged
-    /// state. It tells a wound spring, and the columns `rc`, which of the turns they are in. Empty as long as no chart has changed:
+    /// state. It tells a unwrapped spring, and the columns `rc`, which of the turns they are in. Empty as long as no chart has changed:
     /// then `q` itself goes on without jumps.
-    pub wound: Vec<Vec3>,
+    pub unwrapped: Vec<Vec3>,
     /// First and second derivative over time of each factor of a load.
     pub amplitude_rates: Vec<[f64; 2]>,
     /// For each slot what inertia and damping did when a motion ended in a static stage; empty where none did.
@@ -92,7 +92,7 @@ impl State {
             algorithmic: Field::none(),
             amplitude: vec![0.0; amplitudes],
             mixed: vec![0; elements],
-            wound: Vec::new(),
+            unwrapped: Vec::new(),
             amplitude_rates: vec![[0.0; 2]; amplitudes],
             fading: Arc::default(),
             anchor: None,
@@ -112,7 +112,7 @@ impl State {
             algorithmic: self.algorithmic.clone(),
             amplitude: self.amplitude.clone(),
             mixed: self.mixed.clone(),
-            wound: self.wound.clone(),
+            unwrapped: self.unwrapped.clone(),
             amplitude_rates: self.amplitude_rates.clone(),
             fading: self.fading.clone(),
             anchor: self.anchor.clone(),
@@ -170,7 +170,7 @@ impl State {
         threads::copy(&mut self.q, &other.q);
         self.amplitude.copy_from_slice(&other.amplitude);
         self.mixed.copy_from_slice(&other.mixed);
-        threads::copy(&mut self.wound, &other.wound);
+        threads::copy(&mut self.unwrapped, &other.unwrapped);
         self.amplitude_rates.copy_from_slice(&other.amplitude_rates);
         self.fading.clone_from(&other.fading);
         self.anchor.clone_from(&other.anchor);
@@ -178,18 +178,18 @@ impl State {
         self.turns.clone_from(&other.turns);
     }
 
-    /// The wound rotation vector at a slot.
+    /// The unwrapped rotation vector at a slot.
     #[inline]
-    pub fn wound_at(&self, slot: Slot) -> Vec3 {
-        *self.wound.get(slot as usize).unwrap_or(&self.q[slot as usize])
+    pub fn unwrapped_at(&self, slot: Slot) -> Vec3 {
+        *self.unwrapped.get(slot as usize).unwrap_or(&self.q[slot as usize])
     }
 
     /// All of them, kept apart from `q` from here on.
     pub fn wound_apart(&mut self) -> &mut [Vec3] {
-        if self.wound.is_empty() {
-            threads::copy(&mut self.wound, &self.q);
+        if self.unwrapped.is_empty() {
+            threads::copy(&mut self.unwrapped, &self.q);
         }
-        &mut self.wound
+        &mut self.unwrapped
     }
 
     /// The step that a rotation is in, where its unknown is an increment.

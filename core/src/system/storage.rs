@@ -23,15 +23,15 @@ pub struct Storage {
 
 impl Storage {
     /// Of tiles so wide; `keeps_upper` where those on the diagonal are symmetric, and only that half is kept.
-    pub(super) fn new(width: usize, groups: usize, keeps_upper: bool) -> Self {
+    pub(super) fn new(width: usize, node_blocks: usize, keeps_upper: bool) -> Self {
         let whole = width * width;
         let own = if keeps_upper { upper_length(width) } else { whole };
-        Self { width, keeps_upper, lengths: [own, whole], boundary: own * groups }
+        Self { width, keeps_upper, lengths: [own, whole], boundary: own * node_blocks }
     }
 
     /// The numbers of these tiles on the diagonal.
-    pub(super) fn on_diagonal(&self, groups: &Range<usize>) -> Range<usize> {
-        self.own(groups.start)..self.own(groups.end)
+    pub(super) fn on_diagonal(&self, node_blocks: &Range<usize>) -> Range<usize> {
+        self.own(node_blocks.start)..self.own(node_blocks.end)
     }
 
     /// The numbers of these tiles beside it.

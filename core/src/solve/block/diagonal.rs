@@ -9,24 +9,24 @@ pub struct Diagonal<'a, S> {
     /// The row or the group of the first
     first: usize,
     /// The group of each row, where they stand by groups
-    groups: Option<&'a [u32]>,
+    node_blocks: Option<&'a [u32]>,
 }
 
 impl<'a, S> Diagonal<'a, S> {
     /// Row by row from the first on.
     pub fn by_rows(tiles: S, first: usize) -> Self {
-        Self { tiles, first, groups: None }
+        Self { tiles, first, node_blocks: None }
     }
 
     /// Group by group from the first on; `order` tells the group of each row.
     pub fn by_groups(tiles: S, first: usize, order: &'a [u32]) -> Self {
-        Self { tiles, first, groups: Some(order) }
+        Self { tiles, first, node_blocks: Some(order) }
     }
 
     /// Where the tile of a row is; rows of other pieces lie beyond.
     #[inline(always)]
     fn place(&self, row: usize) -> usize {
-        self.groups.map_or(row, |order| order[row] as usize).wrapping_sub(self.first)
+        self.node_blocks.map_or(row, |order| order[row] as usize).wrapping_sub(self.first)
     }
 }
 

@@ -216,7 +216,7 @@ impl Elimination {
         let row_of = &self.row_of;
         self.below = vec![Source::NOWHERE; self.later.len()];
         self.above = if pattern.symmetry.halves() { Vec::new() } else { self.below.clone() };
-        for column in 0..pattern.groups.count() {
+        for column in 0..pattern.node_blocks.count() {
             for tile in pattern.tiles_of(column) {
                 let (i, j) = (row_of[pattern.rows[tile] as usize], row_of[column]);
                 // Tiles stand by their columns.
@@ -269,11 +269,11 @@ impl Later {
     }
 }
 
-/// Groups as a range, where they follow each other in some order.
-fn run(groups: &[u32]) -> Option<Range<usize>> {
-    let Some((least, most)) = groups.iter().min().zip(groups.iter().max()) else { return Some(0..0) };
+/// NodeBlocks as a range, where they follow each other in some order.
+fn run(node_blocks: &[u32]) -> Option<Range<usize>> {
+    let Some((least, most)) = node_blocks.iter().min().zip(node_blocks.iter().max()) else { return Some(0..0) };
     let range = *least as usize..*most as usize + 1;
-    (range.len() == groups.len()).then_some(range)
+    (range.len() == node_blocks.len()).then_some(range)
 }
 
 /// Where row `i` keeps its block with the later row `j`.

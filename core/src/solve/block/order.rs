@@ -130,8 +130,8 @@ impl Neighbours {
 pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order> {
     let meetings = &pattern.meetings();
     let order = match multipliers {
-        [] => minimum_degree(pattern.groups.count(), &pattern.column_starts, &pattern.rows)?,
-        _ => constrained(pattern.groups.count(), meetings, multipliers)?,
+        [] => minimum_degree(pattern.node_blocks.count(), &pattern.column_starts, &pattern.rows)?,
+        _ => constrained(pattern.node_blocks.count(), meetings, multipliers)?,
     };
     let neighbours = Neighbours::new(meetings, &order, most)?;
     if order.len() < LEAST || !multipliers.is_empty() {
@@ -161,11 +161,11 @@ fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
 
 /// That of least degree among all other groups, and each multiplier right behind the last group that it meets: with everything after it
 /// clamped, what it ties is there, so that its pivot has the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
-fn constrained(groups: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
-    let mut is_multiplier = vec![false; groups];
+fn constrained(node_blocks: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
+    let mut is_multiplier = vec![false; node_blocks];
     multipliers.iter().for_each(|&group| is_multiplier[group as usize] = true);
-    let others: Vec<u32> = (0..groups as u32).filter(|&group| !is_multiplier[group as usize]).collect();
-    let mut number_of = vec![NONE; groups];
+    let others: Vec<u32> = (0..node_blocks as u32).filter(|&group| !is_multiplier[group as usize]).collect();
+    let mut number_of = vec![NONE; node_blocks];
     (0..).zip(&others).for_each(|(number, &group)| number_of[group as usize] = number);
     let (mut starts, mut rows) = (vec![0], Vec::new());
     for &group in &others {
@@ -317,18 +317,18 @@ fn in_branches(mut trees: Vec<(u32, Reverse<u32>)>, enough: usize) -> Vec<Vec<u3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::{Cliques, Equations, Groups, Layout, Symmetry};
+    use crate::system::{Connectivity, DofMap, Layout, NodeBlocks, Symmetry};
 
     /// Three chains of nodes that meet in node 0, one of them in a ladder, which fills up.
     fn star(length: u32) -> Pattern {
         let node = |chain: u32, k: u32| if k == 0 { 0 } else { chain * length + k };
         let rungs = (2..length).map(|k| [node(0, k - 2), node(0, k)]);
         let steps = (0..3).flat_map(|chain| (1..=length).map(move |k| [node(chain, k - 1), node(chain, k)]));
-        let mut cliques = Cliques::default();
-        steps.chain(rungs).for_each(|[a, b]| cliques.push([2 * a, 2 * a + 1, 2 * b, 2 * b + 1]));
+        let mut connectivity = Connectivity::default();
+        steps.chain(rungs).for_each(|[a, b]| connectivity.push([2 * a, 2 * a + 1, 2 * b, 2 * b + 1]));
         let slots = 2 * (3 * length as usize + 1);
-        let groups = Groups::new(slots, Layout::Spatial, |slot| slot % 2 == 1);
-        Pattern::new(Equations::new(slots, &[]).unwrap(), groups, vec![cliques], Symmetry::Whole)
+        let node_blocks = NodeBlocks::new(slots, Layout::Spatial, |slot| slot % 2 == 1);
+        Pattern::new(DofMap::new(slots, &[]).unwrap(), node_blocks, vec![connectivity], Symmetry::Whole)
     }
 
     /// What is permuted is what would be found.

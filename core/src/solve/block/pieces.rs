@@ -213,18 +213,19 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
 
 /// A tangent's tiles on the diagonal, piece by piece.
 fn within<'a, T>(elimination: &'a Elimination, tiles: &'a [T]) -> Vec<Diagonal<'a, &'a [T]>> {
-    let of_piece =
-        |groups: &Range<usize>| Diagonal::by_groups(&tiles[groups.clone()], groups.start, &elimination.order);
+    let of_piece = |node_blocks: &Range<usize>| {
+        Diagonal::by_groups(&tiles[node_blocks.clone()], node_blocks.start, &elimination.order)
+    };
     elimination.runs.iter().map(of_piece).collect()
 }
 
 /// The same to factorise them.
 fn within_mut<'a, T>(elimination: &'a Elimination, tiles: &'a mut [T]) -> Vec<Diagonal<'a, &'a mut [T]>> {
     let mut runs: Vec<(usize, &Range<usize>)> = elimination.runs.iter().enumerate().collect();
-    runs.sort_by_key(|(_, groups)| (groups.start, groups.end));
-    let parts = threads::split(tiles, runs.iter().map(|(_, groups)| groups.end));
-    let of_piece = |((piece, groups), part): ((usize, &Range<usize>), _)| {
-        (piece, Diagonal::by_groups(part, groups.start, &elimination.order))
+    runs.sort_by_key(|(_, node_blocks)| (node_blocks.start, node_blocks.end));
+    let parts = threads::split(tiles, runs.iter().map(|(_, node_blocks)| node_blocks.end));
+    let of_piece = |((piece, node_blocks), part): ((usize, &Range<usize>), _)| {
+        (piece, Diagonal::by_groups(part, node_blocks.start, &elimination.order))
     };
     let mut pieces: Vec<(usize, _)> = runs.into_iter().zip(parts).map(of_piece).collect();
     pieces.sort_by_key(|(piece, _)| *piece);

@@ -15,8 +15,8 @@
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
-use crate::scalar::Rough;
-use crate::system::{Equations, State};
+use crate::scalar::CompressedField;
+use crate::system::{DofMap, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use nalgebra::{SMatrix, SVector};
@@ -48,7 +48,7 @@ type Factors = [f64; MOST];
 
 /// The corrections of the last steps of a stage.
 #[derive(Default)]
-pub struct Trend {
+pub struct Predictor {
     /// What corrections are compared by: of each slot its kind, and of each kind a factor of squares
     kinds: Arc<Vec<SlotKind>>,
     weights: [f64; SlotKind::ALL.len()],
@@ -78,12 +78,12 @@ struct Past {
     /// What makes corrections of steps of different lengths comparable
     rate: f64,
     /// c by equation: what is held is not corrected. A guess needs few digits.
-    correction: Rough<1>,
+    correction: CompressedField<1>,
     /// Its products with itself and with those before it, where there are any
     products: [f64; MOST + 1],
 }
 
-impl Trend {
+impl Predictor {
     /// For a stage of a scene.
     pub fn new(model: &Model) -> Self {
         let weight = |kind: SlotKind| if kind.is_multiplier() { 0.0 } else { kind.scale(model.length).powi(-2) };
@@ -101,38 +101,38 @@ impl Trend {
     }
 
     /// Adds what is foreseen to the prediction of a step.
-    pub fn begin(&mut self, equations: &Equations, state: &mut State, step: &Step, scratch: &mut [Vec3]) {
-        self.predicted.resize(equations.count(), 0.0);
-        equations.gather(|slot| state.q[slot], &mut self.predicted);
+    pub fn begin(&mut self, dof_map: &DofMap, state: &mut State, step: &Step, scratch: &mut [Vec3]) {
+        self.predicted.resize(dof_map.count(), 0.0);
+        dof_map.gather(|slot| state.q[slot], &mut self.predicted);
         let Some(factors) = self.factors(step.length) else { return };
         self.has_foreseen = true;
         let past: [_; MOST] = self.corrections();
         let of = |equation| past.iter().zip(&factors).map(move |(past, factor)| past.get(equation)[0] * factor);
-        equations.scatter_found(|equation| of(equation).sum(), scratch);
+        dof_map.scatter_found(|equation| of(equation).sum(), scratch);
         step.correct(state, scratch);
     }
 
     /// Takes note of a step that has come to its end, with the unknowns that it was predicted in.
-    pub fn end(&mut self, equations: &Equations, state: &State, step: &Step) {
+    pub fn end(&mut self, dof_map: &DofMap, state: &State, step: &Step) {
         let mut change = std::mem::take(&mut self.predicted);
-        equations.gather_change(|slot| state.q[slot], &mut change);
+        dof_map.gather_change(|slot| state.q[slot], &mut change);
         // Into the memory of one that nobody asks for any more.
         let forgotten = if self.past.len() > MOST { self.past.pop_back() } else { None };
         let mut correction = forgotten.unwrap_or_default().correction;
         correction.take(change.len(), |equation| [change[equation]]);
-        equations.fill(|slot| self.weights[self.kinds[slot] as usize], &mut change);
+        dof_map.fill(|slot| self.weights[self.kinds[slot] as usize], &mut change);
         self.learn(step.length, correction, &change);
         self.predicted = change;
     }
 
     /// Learns from a step of this length with its correction; `weights` are the factors of squares.
-    fn learn(&mut self, length: f64, correction: Rough<1>, weights: &[f64]) {
+    fn learn(&mut self, length: f64, correction: CompressedField<1>, weights: &[f64]) {
         let rate = length.powi(-GROWTH);
         self.past.push_front(Past { length, rate, correction, products: [0.0; MOST + 1] });
         let all: [_; MOST + 1] = self.corrections();
-        let products = threads::sums(weights.len(), |equations| {
+        let products = threads::sums(weights.len(), |dof_map| {
             let mut sums = [0.0; MOST + 1];
-            for equation in equations {
+            for equation in dof_map {
                 let own = all[0].get(equation)[0] * weights[equation];
                 sums.iter_mut().zip(&all).for_each(|(sum, one)| *sum += own * one.get(equation)[0]);
             }
@@ -150,7 +150,7 @@ impl Trend {
     }
 
     /// The last corrections, the latest first; in the place of what is not known stands the first of them.
-    fn corrections<const N: usize>(&self) -> [&Rough<1>; N] {
+    fn corrections<const N: usize>(&self) -> [&CompressedField<1>; N] {
         from_fn(|number| &self.past.get(number).unwrap_or(&self.past[0]).correction)
     }
 
@@ -225,24 +225,24 @@ mod tests {
     use super::*;
 
     /// Has seen steps of these lengths with these corrections.
-    fn with<const N: usize>(steps: &[(f64, [f64; N])]) -> Trend {
-        let mut trend = Trend::default();
+    fn with<const N: usize>(steps: &[(f64, [f64; N])]) -> Predictor {
+        let mut trend = Predictor::default();
         steps.iter().for_each(|(length, correction)| learn(&mut trend, *length, correction));
         trend
     }
 
-    fn learn(trend: &mut Trend, length: f64, correction: &[f64]) {
-        let mut rough = Rough::default();
+    fn learn(trend: &mut Predictor, length: f64, correction: &[f64]) {
+        let mut rough = CompressedField::default();
         rough.take(correction.len(), |k| [correction[k]]);
         trend.learn(length, rough, &vec![1.0; correction.len()]);
     }
 
     /// Of steps of one second with one number.
-    fn after(corrections: impl IntoIterator<Item = f64>) -> Trend {
+    fn after(corrections: impl IntoIterator<Item = f64>) -> Predictor {
         with(&corrections.into_iter().map(|c| (1.0, [c])).collect::<Vec<_>>())
     }
 
-    fn foreseen(trend: &Trend, length: f64) -> Option<Vec<f64>> {
+    fn foreseen(trend: &Predictor, length: f64) -> Option<Vec<f64>> {
         let factors = trend.factors(length)?;
         let past: [_; MOST] = trend.corrections();
         let of = |k| (0..MOST).map(|step| past[step].get(k)[0] * factors[step]).sum();
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[track_caller]
-    fn assert_foreseen(trend: &Trend, length: f64, wanted: &[f64], share: f64) {
+    fn assert_foreseen(trend: &Predictor, length: f64, wanted: &[f64], share: f64) {
         let Some(foreseen) = foreseen(trend, length) else { panic!("nothing is foreseen") };
         let largest = wanted.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= share * largest;
@@ -273,7 +273,7 @@ mod tests {
 
     #[test]
     fn the_first_steps_already_tell() {
-        assert!(foreseen(&Trend::default(), 1.0).is_none() && foreseen(&after([2.0]), 1.0).is_none());
+        assert!(foreseen(&Predictor::default(), 1.0).is_none() && foreseen(&after([2.0]), 1.0).is_none());
         // What halves goes on to halve, what turns round goes on to do so.
         assert_foreseen(&after([4.0, 2.0]), 1.0, &[1.0], 1e-5);
         assert_foreseen(&after([4.0, -4.0]), 1.0, &[4.0], 1e-5);
@@ -295,8 +295,8 @@ mod tests {
 
     #[test]
     fn what_comes_without_rule_is_not_foreseen() {
-        let noise = |step: u32| from_fn::<f64, 500, _>(|k| f64::from(1000 * step + k as u32).powi(2).sin());
-        let trend = with(&(0..20).map(|step| (1.0, noise(step))).collect::<Vec<_>>());
+        let round_off = |step: u32| from_fn::<f64, 500, _>(|k| f64::from(1000 * step + k as u32).powi(2).sin());
+        let trend = with(&(0..20).map(|step| (1.0, round_off(step))).collect::<Vec<_>>());
         let Some(factors) = trend.factors(1.0) else { panic!("there is a past") };
         assert!(factors.iter().all(|factor| factor.abs() < 0.15), "{factors:?}");
         assert_eq!(after([0.0; 5]).factors(1.0), None);
@@ -341,7 +341,7 @@ mod tests {
     fn what_is_learnt_does_not_depend_on_threads() {
         let learnt = || {
             let count = 5 * threads::PART;
-            let mut trend = Trend::default();
+            let mut trend = Predictor::default();
             for step in 1..=6 {
                 let correction: Vec<f64> = (0..count).map(|k| (k as f64 * f64::from(step * step)).sin()).collect();
                 learn(&mut trend, 1.0, &correction);

@@ -1,313 +1,24 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
 use super::failure::{Failure, Moment, Place, Tried, place, refusal, refusal_help};
-use super::findings::{Findings, Warning};
 use super::guard::EnergyGuard;
-use super::ledger::{Bookkeeper, Ledger};
-use super::levels::Approach;
+use super::ledger::Bookkeeper;
+use super::observer::{Counters, Observer, Snapshot};
+use super::plan::{Plan, Stage, StageWork, Until};
 use super::rehearsal::lacking;
 use super::space::Space;
-use super::warnings::Told;
-use crate::integrate::{Increments, Scheme, Trend};
-use crate::model::{Assembly, Model, StageContext, StageError, StageKind, charts};
-use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector, Work};
-use crate::system::{Node, Plane, Slot, State, System};
+use super::warnings::IssuedWarnings;
+use crate::integrate::{Increments, Predictor};
+use crate::model::{Assembly, Model, StageError, charts};
+use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector};
+use crate::system::{Plane, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
 use std::f64::consts::PI;
-use std::fmt;
-use std::sync::Arc;
 
 /// Strains that may be left where an iteration ends.
 const TOLERATED_STRAIN: f64 = 1e-9;
-
-/// What is to be done.
-#[derive(Clone)]
-pub struct Plan {
-    /// The scene
-    pub model: Model,
-    /// Velocities at the start of the first dynamic stage
-    pub initial: Vec<InitialMotion>,
-    /// The stages in their order
-    pub stages: Vec<Stage>,
-    /// Rows of dynamic stages are wanted at multiples of this time.
-    pub interval: Option<f64>,
-    /// Whether the energy account is asked for
-    pub energy: bool,
-    /// Whether somebody looks at continued rotation vectors
-    pub continued: bool,
-    /// The initial places of all nodes, where a modal stage asks for them
-    pub places: Vec<(Node, Vec3)>,
-}
-
-/// Velocities given to nodes: velocity + spin x (place - about).
-#[derive(Clone, Debug)]
-pub struct InitialMotion {
-    /// The nodes with their initial places
-    pub nodes: Vec<(Node, Vec3)>,
-    /// Velocity
-    pub velocity: Vec3,
-    /// Spatial angular velocity
-    pub spin: Vec3,
-    /// The point it turns about
-    pub about: Vec3,
-}
-
-/// One stage.
-#[derive(Clone)]
-pub struct Stage {
-    /// What is done
-    pub work: StageWork,
-    /// Newton's tolerance
-    pub tolerance: f64,
-    /// Newton's limit
-    pub max_iterations: usize,
-    /// Ends the stage early
-    pub until: Option<Until>,
-    /// Whether it is seen from a rotating frame
-    pub rotating: bool,
-}
-
-impl Stage {
-    /// As effects see it, at this place among the stages.
-    pub fn context(&self, number: usize) -> StageContext {
-        StageContext { number, kind: self.work.kind(), rotating: self.rotating }
-    }
-}
-
-/// A small motion exp(s t), s = growth + i omega.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mode {
-    /// Imaginary part of s, not negative
-    pub omega: f64,
-    /// Real part of s; positive: it grows.
-    pub growth: f64,
-}
-
-impl Mode {
-    /// |s|
-    pub fn size(&self) -> f64 {
-        self.omega.hypot(self.growth)
-    }
-}
-
-/// A load factor at which the tangent loses its stiffness.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CriticalLoad {
-    /// The load factor
-    pub load: f64,
-    /// What lies there
-    pub kind: CriticalKind,
-}
-
-/// Kinds of critical loads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CriticalKind {
-    /// Another branch begins; the path goes on.
-    Branch,
-    /// The load is stationary.
-    Limit,
-    /// The path has no critical point that was reached: the load at which the tangent, extrapolated from smaller loads, would be singular
-    Estimate,
-}
-
-impl CriticalKind {
-    /// Its name in buckling.csv
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Branch => "branch",
-            Self::Limit => "limit",
-            Self::Estimate => "estimate",
-        }
-    }
-}
-
-/// What a stage does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum StageWork {
-    /// Equal load levels
-    Static {
-        /// Their number
-        steps: usize,
-        /// What it may do where one is not reached at once
-        approach: Approach,
-    },
-    /// A path that may pass limit points
-    Path {
-        /// The first increment is that of one of so many load levels
-        steps: usize,
-        /// Most increments
-        max_steps: usize,
-    },
-    /// Small motions
-    Modal {
-        /// How many modes
-        modes: usize,
-    },
-    /// Critical loads
-    Buckling {
-        /// How many
-        modes: usize,
-    },
-    /// Time steps
-    Dynamic {
-        /// Time on the run's clock at which it ends
-        end: f64,
-        /// Step, or the first one
-        step: f64,
-        /// The method
-        scheme: Scheme,
-        /// Tolerance of the errors of all steps, where they adapt to it
-        adaptive: Option<f64>,
-        /// The part of the largest energies so far by which the total may grow
-        energy_limit: f64,
-    },
-}
-
-impl StageWork {
-    /// Its kind.
-    pub fn kind(&self) -> StageKind {
-        match self {
-            Self::Static { .. } | Self::Path { .. } => StageKind::Static,
-            Self::Modal { .. } => StageKind::Modal,
-            Self::Buckling { .. } => StageKind::Buckling,
-            Self::Dynamic { .. } => StageKind::Dynamic,
-        }
-    }
-}
-
-/// A condition that ends a stage at the first row beyond it.
-#[derive(Clone)]
-pub struct Until {
-    /// The watched column
-    pub column: Arc<dyn Fn(&Snapshot) -> f64 + Send + Sync>,
-    /// Ends below this
-    pub below: Option<f64>,
-    /// Ends above this
-    pub above: Option<f64>,
-}
-
-/// What an observer sees of a converged state.
-pub struct Snapshot<'a> {
-    /// Stage, from 1
-    pub stage: usize,
-    /// The state
-    pub state: &'a State,
-    /// Its forces
-    pub system: &'a System,
-    /// The scene
-    pub model: &'a Model,
-    /// The energy account, where it is kept
-    pub ledger: Ledger,
-    /// Work so far
-    pub counters: &'a Counters,
-}
-
-impl Snapshot<'_> {
-    /// When it is.
-    pub fn moment(&self) -> Moment {
-        Moment { stage: self.stage, time: self.state.time, load: self.state.load }
-    }
-}
-
-/// Watches a run. It cannot change it, only end it.
-pub trait Observer {
-    /// A converged state: the start, a load level, a time step.
-    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure>;
-
-    /// The modes of a stage (from 1).
-    fn modes(&mut self, _stage: usize, _modes: &[Mode]) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// The critical loads of a stage (from 1).
-    fn buckling(&mut self, _stage: usize, _loads: &[CriticalLoad]) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// Something that is not a failure.
-    fn warn(&mut self, _warning: &Warning) {}
-
-    /// How far the run has come, from 0 to 1; called at each attempt. It may end the run.
-    fn progress(&mut self, _at: Moment, _done: f64) -> Result<(), Failure> {
-        Ok(())
-    }
-}
-
-/// Something special on a path of equilibrium.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Event {
-    /// Where
-    pub at: Moment,
-    /// What
-    pub kind: EventKind,
-    /// How many pivots of the tangent are negative behind it, where that is known
-    pub negative_pivots: Option<usize>,
-}
-
-/// Kinds of special points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventKind {
-    /// The load factor is stationary.
-    Limit,
-    /// The displacement that the loads do work on is stationary.
-    Turning,
-    /// The number of negative pivots changed: a bifurcation, or a limit point of load control.
-    Branch,
-}
-
-impl EventKind {
-    /// Its name in run.json
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Limit => "limit point",
-            Self::Turning => "turning point",
-            Self::Branch => "branch or limit point passed",
-        }
-    }
-
-    /// The warning that tells of it.
-    pub(super) fn warning(self) -> WarningKind {
-        match self {
-            Self::Limit => WarningKind::LimitPoint,
-            Self::Turning => WarningKind::TurningPoint,
-            Self::Branch => WarningKind::BranchPoint,
-        }
-    }
-}
-
-impl fmt::Display for Event {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Moment { stage, load, .. } = self.at;
-        write!(f, "{} in stage {stage} at load factor {load}", self.kind.name())?;
-        match self.negative_pivots {
-            None => Ok(()),
-            Some(0) => f.write_str(": stable behind it"),
-            Some(1) => f.write_str(": unstable behind it, 1 negative pivot"),
-            Some(n) => write!(f, ": unstable behind it, {n} negative pivots"),
-        }
-    }
-}
-
-/// Work done in a run, and what it found out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Counters {
-    /// Converged levels and time steps
-    pub steps: u64,
-    /// Attempts that were taken back: a level or step whose Newton failed, or whose error was too large
-    pub cutbacks: u64,
-    /// Mixed elements, summed over converged states
-    pub mixed_elements: u64,
-    /// Events, stability, warnings
-    pub findings: Findings,
-    /// Iterations, factorisations, chart switches, seconds
-    pub work: Work,
-    /// Evaluations of instances by effect
-    pub evaluations: Vec<(&'static str, u64)>,
-    /// The linear solvers that were used
-    pub linear_solvers: Vec<&'static str>,
-}
 
 /// A run in progress.
 pub struct Run<'o> {
@@ -323,7 +34,7 @@ pub struct Run<'o> {
     /// Whether loads act for the first time in this stage
     pub(super) fresh: bool,
     started: bool,
-    pub(super) told: Told,
+    pub(super) told: IssuedWarnings,
     /// Whether round-off takes the stiffness of the softest motion of the stage
     pub(super) soft: bool,
     /// The plane that the stage is treated in
@@ -337,18 +48,18 @@ pub struct Run<'o> {
 }
 
 /// What one stage works with.
-pub(super) struct Workshop {
+pub(super) struct StageRun {
     pub assembly: Assembly,
     pub newton: Newton,
     /// Where a static stage is treated in a plane, once it has been looked at in space
     pub space: Option<Space>,
     /// Increments of prescribed directions in a load step; known where there are any
-    pub lift: Vec<Vec3>,
+    pub prescribed_increment: Vec<Vec3>,
     pub until: Option<Until>,
     /// Where the unknowns of time steps are increments of rotation
     pub increments: Option<Increments>,
     /// How time steps go on
-    pub trend: Trend,
+    pub trend: Predictor,
     /// For each slot whether its accelerations mean something; known in dynamic stages
     pub massive: Vec<bool>,
     /// The slots whose velocities enter no force: they have neither inertia nor damping; known in dynamic stages
@@ -372,7 +83,7 @@ impl<'o> Run<'o> {
             stage: 0,
             fresh: true,
             started: false,
-            told: Told::default(),
+            told: IssuedWarnings::default(),
             soft: false,
             plane: None,
             origin: None,
@@ -417,8 +128,8 @@ impl<'o> Run<'o> {
     }
 
     /// Strains that Newton leaves have an energy of their own, of the stiffest section along the length of the scene.
-    fn energy_guard(&self, workshop: &Workshop, limit: f64) -> EnergyGuard {
-        let round_off = workshop.assembly.noise(&self.state).force;
+    fn energy_guard(&self, workshop: &StageRun, limit: f64) -> EnergyGuard {
+        let round_off = workshop.assembly.round_off(&self.state).force;
         let stiffest = round_off / f64::EPSILON;
         EnergyGuard::new(limit, stiffest * self.model.length * TOLERATED_STRAIN * TOLERATED_STRAIN, round_off)
     }
@@ -430,28 +141,28 @@ impl<'o> Run<'o> {
     }
 
     /// Settles loads and constraints of the stage, and analyses the pattern of its unknowns.
-    fn open_stage(&mut self, stage: &Stage) -> Result<Workshop, Failure> {
+    fn open_stage(&mut self, stage: &Stage) -> Result<StageRun, Failure> {
         let kind = stage.work.kind();
         (self.soft, self.cutbacks_before) = (false, self.counters.cutbacks);
         self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
         let begun = self.model.begin_stage(self.stage, kind, &self.state);
-        let equations = begun.map_err(|error| self.describe(error))?;
+        let dof_map = begun.map_err(|error| self.describe(error))?;
         let fading = !self.state.fading.is_empty();
-        if let Some(error) = lacking(&self.model, stage, self.stage, fading, || Some(equations.clone())) {
+        if let Some(error) = lacking(&self.model, stage, self.stage, fading, || Some(dof_map.clone())) {
             return Err(self.describe(error));
         }
-        self.plane = equations.plane().copied();
+        self.plane = dof_map.plane().copied();
         self.warn_of_space(kind);
-        let assembly = Assembly::new(&stage.context(self.stage), equations, &self.model);
+        let assembly = Assembly::new(&stage.context(self.stage), dof_map, &self.model);
         let newton = self.newton_for(stage, &assembly)?;
-        Ok(Workshop {
+        Ok(StageRun {
             assembly,
             newton,
             space: None,
-            lift: Vec::new(),
+            prescribed_increment: Vec::new(),
             until: stage.until.clone(),
             increments: None,
-            trend: Trend::default(),
+            trend: Predictor::default(),
             massive: Vec::new(),
             rateless: Vec::new(),
             guard: None,
@@ -469,7 +180,7 @@ impl<'o> Run<'o> {
 
     /// Where the stage is linear, it is so about the state in which the first such stage began, and the springs and loads that act when it
     /// begins itself.
-    pub(super) fn linearise(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn linearise(&mut self, workshop: &mut StageRun) -> Result<(), Failure> {
         if !self.is_linear() {
             return Ok(());
         }
@@ -497,7 +208,7 @@ impl<'o> Run<'o> {
     }
 
     /// Opens the energy account of the stage; at the start of the run also writes the first row.
-    pub(super) fn open_account(&mut self, workshop: &mut Workshop) -> Result<(), Failure> {
+    pub(super) fn open_account(&mut self, workshop: &mut StageRun) -> Result<(), Failure> {
         if self.keeps_account(workshop) {
             self.bookkeeper.open(&self.model, &self.state, &workshop.assembly.system);
         } else {
@@ -515,7 +226,7 @@ impl<'o> Run<'o> {
     }
 
     /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
-    pub(super) fn accept(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+    pub(super) fn accept(&mut self, workshop: &StageRun) -> Result<(), Failure> {
         self.continue_to_state()?;
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
@@ -548,7 +259,7 @@ impl<'o> Run<'o> {
     }
 
     /// Energies are counted where somebody asks for them, or watches them.
-    fn keeps_account(&self, workshop: &Workshop) -> bool {
+    fn keeps_account(&self, workshop: &StageRun) -> bool {
         self.plan.energy || workshop.guard.is_some()
     }
 
@@ -558,7 +269,7 @@ impl<'o> Run<'o> {
     }
 
     /// Shows a row to the observer.
-    pub(super) fn show(&mut self, workshop: &Workshop) -> Result<(), Failure> {
+    pub(super) fn show(&mut self, workshop: &StageRun) -> Result<(), Failure> {
         // The observer is borrowed beside what it looks at.
         let Self { observer, state, model, counters, bookkeeper, stage, .. } = self;
         let ledger = bookkeeper.ledger();
@@ -566,7 +277,7 @@ impl<'o> Run<'o> {
         observer.row(&Snapshot { stage: *stage + 1, state, system, model, ledger, counters })
     }
 
-    fn snapshot<'a>(&'a self, workshop: &'a Workshop) -> Snapshot<'a> {
+    fn snapshot<'a>(&'a self, workshop: &'a StageRun) -> Snapshot<'a> {
         Snapshot {
             stage: self.stage + 1,
             state: &self.state,
@@ -578,7 +289,7 @@ impl<'o> Run<'o> {
     }
 
     /// Whether the stage shall end at the present row.
-    pub(super) fn is_over(&self, workshop: &Workshop) -> bool {
+    pub(super) fn is_over(&self, workshop: &StageRun) -> bool {
         let Some(until) = &workshop.until else { return false };
         let value = (until.column)(&self.snapshot(workshop));
         until.below.is_some_and(|bound| value < bound) || until.above.is_some_and(|bound| value > bound)
@@ -592,11 +303,11 @@ impl<'o> Run<'o> {
         Err(Failure::NonFinite { at: self.moment(), effect: Some("the motion"), node: self.model.node_at(slot) })
     }
 
-    /// Counts turns; a wound spring whose node leaves its axis near a whole turn has no law that would go on.
+    /// Counts turns; a rotational spring whose node leaves its axis near a whole turn has no law that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
         if self.is_linear() {
             // Rotations of any size, without charts.
-            self.state.wound.clear();
+            self.state.unwrapped.clear();
         }
         let is_prescribed = |slot: Slot| self.model.motions.iter().any(|motion| motion.slot == slot && motion.acts());
         charts::unwind(&mut self.state, &self.good, &self.model.charted, is_prescribed);
@@ -635,14 +346,14 @@ impl<'o> Run<'o> {
     /// Where a spring or the spring of a joint seems to have been wound by more than half a turn since the last good state nobody knows
     /// whether that were the load or the corrections on their way to the balance: smaller levels tell.
     pub(super) fn refuse_windings(&self) -> Result<(), NewtonFailure> {
-        let turned = |slot: Slot| self.state.wound_at(slot) - self.good.wound_at(slot);
+        let turned = |slot: Slot| self.state.unwrapped_at(slot) - self.good.unwrapped_at(slot);
         let of_joint = |[a, b]: [Option<Slot>; 2]| {
             let [start, end] = [a, b].map(|slot| slot.map_or(Vec3::ZERO, turned));
             (a.or(b).unwrap_or_default(), (end - start).norm())
         };
         let springs = self.model.sprung.iter().map(|&slot| (slot, turned(slot).norm()));
-        let mut wound = springs.chain(self.model.sprung_joints.iter().copied().map(of_joint));
-        match wound.find(|&(_, angle)| angle > PI) {
+        let mut unwrapped = springs.chain(self.model.sprung_joints.iter().copied().map(of_joint));
+        match unwrapped.find(|&(_, angle)| angle > PI) {
             Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
             None => Ok(()),
         }
@@ -699,7 +410,7 @@ impl<'o> Run<'o> {
 
     /// Where a motion moves most.
     pub(super) fn place_of(&self, vector: &NullVector, system: &System) -> Place {
-        let (largest, motion) = vector.by_slot(&system.pattern.equations, self.model.slots());
+        let (largest, motion) = vector.by_slot(&system.pattern.dof_map, self.model.slots());
         place(&self.model, largest, motion[largest])
     }
 

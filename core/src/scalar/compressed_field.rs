@@ -4,12 +4,12 @@ use crate::threads;
 
 /// Vectors of N numbers with six digits each: what is only compared or guessed with, never what results are made of.
 #[derive(Clone, Debug, Default)]
-pub struct Rough<const N: usize> {
+pub struct CompressedField<const N: usize> {
     /// The upper half of each number: sign, exponent and twenty bits
     vectors: Vec<[u32; N]>,
 }
 
-impl<const N: usize> Rough<N> {
+impl<const N: usize> CompressedField<N> {
     /// Takes so many vectors over what was there, into the memory that it has.
     #[inline]
     pub fn take(&mut self, count: usize, vector: impl Fn(usize) -> [f64; N] + Send + Sync) {
@@ -56,7 +56,7 @@ mod tests {
     fn six_digits_are_kept_of_any_size() {
         for size in [1e-300, 1e-30, 1.0, 1e300] {
             let numbers: Vec<[f64; 2]> = (0..5000).map(|k| [f64::from(k).sin() * size, size]).collect();
-            let mut rough = Rough::default();
+            let mut rough = CompressedField::default();
             rough.take(numbers.len(), |k| numbers[k]);
             let near = |k: usize| (0..2).all(|n| (rough.get(k)[n] - numbers[k][n]).abs() <= 1e-6 * numbers[k][n].abs());
             assert!(rough.len() == numbers.len() && (0..numbers.len()).all(near), "{size}");
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_stays_none() {
-        let mut rough = Rough::default();
+        let mut rough = CompressedField::default();
         rough.take(3, |k| [[-0.5, f64::NAN, f64::NEG_INFINITY][k]]);
         assert_eq!((rough.get(0), rough.get(2)), ([-0.5], [f64::NEG_INFINITY]));
         assert!(rough.get(1)[0].is_nan());

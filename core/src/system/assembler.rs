@@ -1,9 +1,9 @@
 //! Where effects add their forces and tangents: to the whole system, or to the part of it that belongs to a region.
 
 use super::assembly::Category;
-use super::equations::Equations;
-use super::groups::Groups;
-use super::pattern::{Pattern, Places, TILE, WIDTH};
+use super::dof_map::DofMap;
+use super::node_blocks::NodeBlocks;
+use super::pattern::{Pattern, ScatterMap, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
 use super::values::{BlockMut, Values};
@@ -24,7 +24,7 @@ pub struct Part<'a> {
     /// Of its tiles
     pub(super) values: Values<'a>,
     /// Of all slots, where increments are prescribed
-    pub(super) lift: Option<&'a [Vec3]>,
+    pub(super) prescribed_increment: Option<&'a [Vec3]>,
     /// Of its equations
     pub(super) lifted: &'a mut [f64],
     pub(super) room: &'a mut Vec<ElementSystem<Lanes>>,
@@ -45,11 +45,26 @@ impl<'a> Part<'a> {
     }
 
     /// The sink of these instances of effect number `effect`.
-    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool, instances: Range<usize>) -> Sink<'_> {
-        let Part { pattern, acting, region, force, values, lift, lifted, room } = self;
+    pub fn sink(
+        &mut self,
+        effect: usize,
+        category: Category,
+        with_tangent: bool,
+        instances: Range<usize>,
+    ) -> Assembler<'_> {
+        let Part { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
         let force = force.each_mut().map(|force| &mut force[..]);
         let values = values.reborrow();
-        let part = Part { pattern, acting, region: *region, force, values, lift: *lift, lifted, room };
+        let part = Part {
+            pattern,
+            acting,
+            region: *region,
+            force,
+            values,
+            prescribed_increment: *prescribed_increment,
+            lifted,
+            room,
+        };
         part.into_sink(effect, category, with_tangent, instances)
     }
 
@@ -60,8 +75,8 @@ impl<'a> Part<'a> {
         category: Category,
         with_tangent: bool,
         instances: Range<usize>,
-    ) -> Sink<'a> {
-        let Part { pattern, acting, region, force, values, lift, lifted, room } = self;
+    ) -> Assembler<'a> {
+        let Part { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
         debug_assert!(acting.contains(&(category as usize)), "forces of a category that nothing clears");
         let start = region.map(|region| &pattern.regions[region]);
         let [internal, inertia, external, damping] = force;
@@ -71,16 +86,16 @@ impl<'a> Part<'a> {
             Category::External => (external, Some(damping)),
             Category::Damping => (damping, None),
         };
-        Sink {
+        Assembler {
             places: &pattern.places[effect],
             pattern,
             instances,
             first_slot: start.map_or(0, |region| region.slots.start),
-            first_equation: start.map_or(0, |region| region.equations.start),
+            first_equation: start.map_or(0, |region| region.dof_map.start),
             force,
             damping,
             values,
-            lift,
+            prescribed_increment,
             lifted,
             room,
             with_tangent,
@@ -104,13 +119,13 @@ fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
 
 /// Row and column that the block of two slots of an instance begins with in its tile.
 #[inline(always)]
-fn corner(groups: &Groups, slots: &[Slot], pair: [usize; 2]) -> [usize; 2] {
-    pair.map(|number| groups.row(slots[number]).1)
+fn corner(node_blocks: &NodeBlocks, slots: &[Slot], pair: [usize; 2]) -> [usize; 2] {
+    pair.map(|number| node_blocks.row(slots[number]).1)
 }
 
 /// Through this an effect adds the force and tangent of its instances.
-pub struct Sink<'a> {
-    places: &'a Places,
+pub struct Assembler<'a> {
+    places: &'a ScatterMap,
     pattern: &'a Pattern,
     instances: Range<usize>,
     /// What stretches begin with
@@ -121,7 +136,7 @@ pub struct Sink<'a> {
     /// And those that damp, where these are not the same
     damping: Option<&'a mut [Vec3]>,
     values: Values<'a>,
-    lift: Option<&'a [Vec3]>,
+    prescribed_increment: Option<&'a [Vec3]>,
     lifted: &'a mut [f64],
     room: &'a mut Vec<ElementSystem<Lanes>>,
     with_tangent: bool,
@@ -129,8 +144,8 @@ pub struct Sink<'a> {
     may_damp: bool,
 }
 
-impl Sink<'_> {
-    /// The instances that it takes: all of them, unless the effect is [divisible](super::Cliques::divisible).
+impl Assembler<'_> {
+    /// The instances that it takes: all of them, unless the effect is [divisible](super::Connectivity::divisible).
     pub fn instances(&self) -> Range<usize> {
         self.instances.clone()
     }
@@ -156,7 +171,7 @@ impl Sink<'_> {
     #[inline]
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
         let (forces, first_slot) = (&mut *self.force, self.first_slot);
-        for (force, &slot) in element.forces().iter().zip(self.places.cliques.get(k)) {
+        for (force, &slot) in element.forces().iter().zip(self.places.connectivity.get(k)) {
             forces[slot as usize - first_slot] += Vec3(*force);
         }
         match () {
@@ -195,13 +210,13 @@ impl Sink<'_> {
     /// Whether the tangent of an instance has entries to leave out, or to turn. In a plane all have.
     #[inline(always)]
     fn is_constrained(&self, k: usize) -> bool {
-        self.with_tangent && (self.places.special[k] || self.pattern.equations.plane().is_some())
+        self.with_tangent && (self.places.special[k] || self.pattern.dof_map.plane().is_some())
     }
 
     #[inline(always)]
     fn add_forces(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
         let (forces, first_slot) = (&mut *self.force, self.first_slot);
-        for (force, &slot) in elements.forces().iter().zip(self.places.cliques.get(k)) {
+        for (force, &slot) in elements.forces().iter().zip(self.places.connectivity.get(k)) {
             forces[slot as usize - first_slot] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
         }
     }
@@ -233,7 +248,7 @@ impl Sink<'_> {
         }
     }
 
-    /// Adds instances that lie in the plane, as [`Sink::add_lanes`] does those in space; each couples whole nodes.
+    /// Adds instances that lie in the plane, as [`Assembler::add_lanes`] does those in space; each couples whole nodes.
     #[inline(always)]
     pub fn add_planar<const N: usize>(
         &mut self,
@@ -252,7 +267,7 @@ impl Sink<'_> {
                 continue;
             }
             let (all, first_slot) = (&mut *self.force, self.first_slot);
-            for (force, &slot) in forces.as_flattened().iter().zip(self.places.cliques.get(first + lane)) {
+            for (force, &slot) in forces.as_flattened().iter().zip(self.places.connectivity.get(first + lane)) {
                 all[slot as usize - first_slot] += Vec3(force.0.map(|component| component.0[lane]));
             }
             if !self.with_tangent {
@@ -273,10 +288,10 @@ impl Sink<'_> {
     #[inline(always)]
     pub fn add_mass<const N: usize>(&mut self, k: usize, forces: &[Vec3; N], mass: &[[f64; N]; N], weight: f64) {
         let (all, first_slot) = (&mut *self.force, self.first_slot);
-        for (force, &slot) in forces.iter().zip(self.places.cliques.get(k)) {
+        for (force, &slot) in forces.iter().zip(self.places.connectivity.get(k)) {
             all[slot as usize - first_slot] += *force;
         }
-        match self.pattern.equations.plane() {
+        match self.pattern.dof_map.plane() {
             _ if !self.with_tangent || weight == 0.0 => {}
             _ if self.places.special[k] => self.add_constrained_mass(k, N, mass.as_flattened(), weight),
             None => self.add_free_mass::<N, WIDTH, 3>(k, mass, weight),
@@ -292,9 +307,9 @@ impl Sink<'_> {
         mass: &[[f64; N]; N],
         weight: f64,
     ) {
-        let (slots, groups) = (self.places.cliques.get(k), &self.pattern.groups);
+        let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
         for (number, (entry, &place)) in mass.as_flattened().iter().zip(self.places.of(k)).enumerate() {
-            let corner = || corner(groups, slots, [number / N, number % N]);
+            let corner = || corner(node_blocks, slots, [number / N, number % N]);
             self.values.block(place, corner).add_along_diagonal::<W, DIRECTIONS>(entry * weight);
         }
     }
@@ -302,21 +317,23 @@ impl Sink<'_> {
     /// The same where directions are held or moved: between slots with other axes it is their cosine that counts.
     #[cold]
     fn add_constrained_mass(&mut self, k: usize, nodes: usize, mass: &[f64], weight: f64) {
-        let slots = self.places.cliques.get(k);
-        let (width, directions) = self.pattern.equations.plane().map_or((WIDTH, 3), |_| (3, 2));
-        let frame = |slot: Slot| self.pattern.equations.frame(slot).unwrap_or(Mat3::IDENTITY);
+        let slots = self.places.connectivity.get(k);
+        let (width, directions) = self.pattern.dof_map.plane().map_or((WIDTH, 3), |_| (3, 2));
+        let frame = |slot: Slot| self.pattern.dof_map.frame(slot).unwrap_or(Mat3::IDENTITY);
         for (number, entry) in mass.iter().enumerate() {
             let (i, j) = (slots[number / nodes], slots[number % nodes]);
-            let (rows, columns) = (self.pattern.equations.of(i), self.pattern.equations.of(j));
+            let (rows, columns) = (self.pattern.dof_map.of(i), self.pattern.dof_map.of(j));
             let cosines = frame(i).transpose_matmul(frame(j));
-            let lift = self.lift.map(|lift| self.pattern.equations.to_local(j, lift[j as usize]));
+            let prescribed_increment = self
+                .prescribed_increment
+                .map(|prescribed_increment| self.pattern.dof_map.to_local(j, prescribed_increment[j as usize]));
             for c in 0..directions {
-                for r in (0..directions).filter(|&r| rows[r] != Equations::HELD) {
+                for r in (0..directions).filter(|&r| rows[r] != DofMap::HELD) {
                     let value = cosines.0[r][c] * entry * weight;
-                    match (columns[c], lift) {
-                        (Equations::HELD, None) => {}
-                        (Equations::HELD, Some(lift)) => {
-                            self.lifted[rows[r] as usize - self.first_equation] += value * lift.0[c];
+                    match (columns[c], prescribed_increment) {
+                        (DofMap::HELD, None) => {}
+                        (DofMap::HELD, Some(prescribed_increment)) => {
+                            self.lifted[rows[r] as usize - self.first_equation] += value * prescribed_increment.0[c];
                         }
                         _ => self.block(k, number / nodes, number % nodes).add(width, r, c, value),
                     }
@@ -327,28 +344,29 @@ impl Sink<'_> {
 
     /// Whether some slot of an instance has other axes than the plane.
     fn has_turned_axes(&self, plane: &Plane, k: usize) -> bool {
-        let is_turned = |&slot: &Slot| self.pattern.equations.frame(slot).is_some_and(|frame| frame != *plane.axes());
-        self.places.cliques.get(k).iter().any(is_turned)
+        let is_turned = |&slot: &Slot| self.pattern.dof_map.frame(slot).is_some_and(|frame| frame != *plane.axes());
+        self.places.connectivity.get(k).iter().any(is_turned)
     }
 
     /// Adds the tangent of one lane entry by entry, where directions are held or nodes may share displacements: each goes to where those
     /// of its slots meet, or pushes with the increment that is prescribed.
     fn add_planar_entries<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
-        let (slots, places) = (self.places.cliques.get(k), self.places.of(k));
+        let (slots, places) = (self.places.connectivity.get(k), self.places.of(k));
         let unknown = |node: usize, direction: usize| {
             let (number, slot) = (2 * node + direction / 2, slots[2 * node + direction / 2]);
-            (number, slot, self.pattern.equations.of(slot)[direction])
+            (number, slot, self.pattern.dof_map.of(slot)[direction])
         };
         for (i, tiles) in elements.tangent.iter().enumerate() {
             for (j, tile) in tiles.iter().enumerate() {
                 for (entry, value) in tile.iter().enumerate() {
                     let ((row, _, to), (column, slot, from)) = (unknown(i, entry % 3), unknown(j, entry / 3));
-                    if to == Equations::HELD {
+                    if to == DofMap::HELD {
                         continue;
                     }
-                    if from == Equations::HELD {
-                        if let Some(lift) = self.lift {
-                            let increment = self.pattern.equations.to_local(slot, lift[slot as usize]).0[entry / 3];
+                    if from == DofMap::HELD {
+                        if let Some(prescribed_increment) = self.prescribed_increment {
+                            let increment =
+                                self.pattern.dof_map.to_local(slot, prescribed_increment[slot as usize]).0[entry / 3];
                             self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
                         }
                         continue;
@@ -374,11 +392,13 @@ impl Sink<'_> {
     /// that are prescribed instead. `pick` takes the instance's number from each entry.
     #[inline(always)]
     fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let (slots, width) = (self.places.cliques.get(k), self.pattern.groups.width());
+        let (slots, width) = (self.places.connectivity.get(k), self.pattern.node_blocks.width());
         let across = slots.len().div_ceil(2);
         for (column, &j) in slots.iter().enumerate() {
-            let (columns, turn) = (self.pattern.equations.of(j), self.pattern.equations.frame(j));
-            let lift = self.lift.map(|lift| self.pattern.equations.to_local(j, lift[j as usize]));
+            let (columns, turn) = (self.pattern.dof_map.of(j), self.pattern.dof_map.frame(j));
+            let prescribed_increment = self
+                .prescribed_increment
+                .map(|prescribed_increment| self.pattern.dof_map.to_local(j, prescribed_increment[j as usize]));
             for (row, &i) in slots.iter().enumerate() {
                 let tile = &tiles[row / 2 * across + column / 2];
                 let mut block = Mat3::ZERO;
@@ -387,19 +407,20 @@ impl Sink<'_> {
                         block.0[r][c] = pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
                     }
                 }
-                if let Some(frame) = self.pattern.equations.frame(i) {
+                if let Some(frame) = self.pattern.dof_map.frame(i) {
                     block = frame.transpose_matmul(block);
                 }
                 if let Some(frame) = turn {
                     block = block * frame;
                 }
-                let rows = self.pattern.equations.of(i);
+                let rows = self.pattern.dof_map.of(i);
                 for c in 0..3 {
-                    for r in (0..3).filter(|&r| rows[r] != Equations::HELD) {
-                        match (columns[c], lift) {
-                            (Equations::HELD, None) => {}
-                            (Equations::HELD, Some(lift)) => {
-                                self.lifted[rows[r] as usize - self.first_equation] += block.0[r][c] * lift.0[c];
+                    for r in (0..3).filter(|&r| rows[r] != DofMap::HELD) {
+                        match (columns[c], prescribed_increment) {
+                            (DofMap::HELD, None) => {}
+                            (DofMap::HELD, Some(prescribed_increment)) => {
+                                self.lifted[rows[r] as usize - self.first_equation] +=
+                                    block.0[r][c] * prescribed_increment.0[c];
                             }
                             _ => self.block(k, row, column).add(width, r, c, block.0[r][c]),
                         }
@@ -412,13 +433,14 @@ impl Sink<'_> {
     /// What is kept of the block of two slots of an instance.
     #[inline(always)]
     fn block(&mut self, k: usize, row: usize, column: usize) -> BlockMut<'_> {
-        let (places, slots, groups) = (self.places.of(k), self.places.cliques.get(k), &self.pattern.groups);
-        let corner = || corner(groups, slots, [row, column]);
+        let (places, slots, node_blocks) =
+            (self.places.of(k), self.places.connectivity.get(k), &self.pattern.node_blocks);
+        let corner = || corner(node_blocks, slots, [row, column]);
         match self.places.whole {
             false => self.values.block(places[row * slots.len() + column], corner),
             true => {
                 let place = places[row / 2 * slots.len().div_ceil(2) + column / 2];
-                self.values.tile(place).within(groups.width(), corner())
+                self.values.tile(place).within(node_blocks.width(), corner())
             }
         }
     }
@@ -426,12 +448,12 @@ impl Sink<'_> {
     /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
     #[inline(always)]
     fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let (slots, groups) = (self.places.cliques.get(k), &self.pattern.groups);
+        let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
         for (number, &place) in self.places.of(k).iter().enumerate() {
             let (row, column) = (number / blocks, number % blocks);
             let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
             let block = &tile[column % 2 * 3 * WIDTH + row % 2 * 3..][..2 * WIDTH + 3];
-            let corner = || corner(groups, slots, [row, column]);
+            let corner = || corner(node_blocks, slots, [row, column]);
             self.values.block(place, corner).add_block::<WIDTH>(|r, c| pick(&block[WIDTH * c + r]));
         }
     }
@@ -439,7 +461,7 @@ impl Sink<'_> {
     /// Adds forces of instance `k` that damp, block by block; their tangent goes with the others.
     pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
         debug_assert!(self.may_damp, "an effect that damps says so");
-        for (&slot, &force) in self.places.cliques.get(k).iter().zip(force) {
+        for (&slot, &force) in self.places.connectivity.get(k).iter().zip(force) {
             self.damping.as_deref_mut().unwrap_or(self.force)[slot as usize - self.first_slot] += force;
         }
     }

@@ -8,7 +8,7 @@ pub const SLOTS: usize = 2;
 
 /// The slots of a scene in groups of one or two.
 #[derive(Clone, Debug)]
-pub struct Groups {
+pub struct NodeBlocks {
     slots: usize,
     /// Where not all groups are pairs
     uneven: Option<Uneven>,
@@ -49,7 +49,7 @@ pub enum Layout {
     Planar,
 }
 
-impl Groups {
+impl NodeBlocks {
     /// Of so many slots; `joins` tells which of them share the group of the one before.
     pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
         let second = |slot: Slot| !slot.is_multiple_of(SLOTS as Slot);
@@ -112,20 +112,25 @@ mod tests {
 
     #[test]
     fn slots_that_join_share_a_group() {
-        let groups = Groups::new(6, Layout::Spatial, |slot| [1, 2, 5].contains(&slot));
-        let members: Vec<_> = (0..groups.count()).map(|group| groups.members(group)).collect();
+        let node_blocks = NodeBlocks::new(6, Layout::Spatial, |slot| [1, 2, 5].contains(&slot));
+        let members: Vec<_> = (0..node_blocks.count()).map(|group| node_blocks.members(group)).collect();
         assert_eq!(members, [0..2, 2..3, 3..4, 4..6]);
-        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| groups.of(slot)), [(0, 0), (0, 1), (1, 0), (2, 0), (3, 0), (3, 1)]);
-        assert_eq!((groups.row(1), groups.first_slot(4), groups.slots()), ((0, 3), 6, 6));
-        assert_eq!(Groups::new(0, Layout::Planar, |_| true).count(), 0);
+        assert_eq!(
+            [0, 1, 2, 3, 4, 5].map(|slot| node_blocks.of(slot)),
+            [(0, 0), (0, 1), (1, 0), (2, 0), (3, 0), (3, 1)]
+        );
+        assert_eq!((node_blocks.row(1), node_blocks.first_slot(4), node_blocks.slots()), ((0, 3), 6, 6));
+        assert_eq!(NodeBlocks::new(0, Layout::Planar, |_| true).count(), 0);
     }
 
     #[test]
     fn pairs_need_no_list() {
-        let groups = Groups::new(8, Layout::Spatial, |slot| slot % 2 == 1);
-        let members: Vec<_> = (0..groups.count()).map(|group| groups.members(group)).collect();
+        let node_blocks = NodeBlocks::new(8, Layout::Spatial, |slot| slot % 2 == 1);
+        let members: Vec<_> = (0..node_blocks.count()).map(|group| node_blocks.members(group)).collect();
         assert_eq!(members, [0..2, 2..4, 4..6, 6..8]);
-        assert_eq!((groups.of(5), groups.row(5), groups.first_slot(4)), ((2, 1), (2, 3), 8));
-        assert!(groups.uneven.is_none() && Groups::new(7, Layout::Spatial, |slot| slot % 2 == 1).uneven.is_some());
+        assert_eq!((node_blocks.of(5), node_blocks.row(5), node_blocks.first_slot(4)), ((2, 1), (2, 3), 8));
+        assert!(
+            node_blocks.uneven.is_none() && NodeBlocks::new(7, Layout::Spatial, |slot| slot % 2 == 1).uneven.is_some()
+        );
     }
 }

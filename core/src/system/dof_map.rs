@@ -1,6 +1,6 @@
 //! Which unknowns are free: the numbering of the equations, and turned axes at constrained slots.
 
-use super::groups::Layout;
+use super::node_blocks::Layout;
 use super::plane::Plane;
 use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
@@ -33,7 +33,7 @@ const GLOBAL: u32 = u32::MAX;
 
 /// The numbers of the free equations, slot by slot.
 #[derive(Clone, Debug)]
-pub struct Equations {
+pub struct DofMap {
     /// The number of the first equation of each slot, and behind the last slot that of all
     first: Vec<u32>,
     /// What is free at each slot
@@ -76,7 +76,7 @@ impl Freedom {
     }
 }
 
-impl Equations {
+impl DofMap {
     /// The number of a direction that is no equation.
     pub const HELD: u32 = u32::MAX;
 
@@ -400,14 +400,14 @@ mod tests {
     fn global_axes_need_no_frame_and_turned_ones_are_completed() {
         let slanted = Vec3([0.6, 0.8, 0.0]);
         let held = [Direction { slot: 0, axis: Vec3::UNIT[1] }, Direction { slot: 1, axis: slanted }];
-        let equations = Equations::new(3, &held).unwrap();
-        assert_eq!(equations.count(), 7);
-        assert_eq!(equations.of(0), [0, Equations::HELD, 1]);
-        let origins: Vec<_> = (0..7).map(|equation| equations.origin(equation)).collect();
+        let dof_map = DofMap::new(3, &held).unwrap();
+        assert_eq!(dof_map.count(), 7);
+        assert_eq!(dof_map.of(0), [0, DofMap::HELD, 1]);
+        let origins: Vec<_> = (0..7).map(|equation| dof_map.origin(equation)).collect();
         assert_eq!(origins, [(0, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)]);
-        assert_eq!([0, 1, 2, 3].map(|slot| equations.before(slot)), [0, 2, 4, 7]);
-        assert!(equations.frame(0).is_none());
-        let frame = equations.frame(1).unwrap();
+        assert_eq!([0, 1, 2, 3].map(|slot| dof_map.before(slot)), [0, 2, 4, 7]);
+        assert!(dof_map.frame(0).is_none());
+        let frame = dof_map.frame(1).unwrap();
         assert!((frame.transpose_matmul(frame) - Mat3::IDENTITY).max_abs() < 1e-15);
         assert_eq!(frame.column(0), slanted);
     }
@@ -415,7 +415,7 @@ mod tests {
     #[test]
     fn a_direction_that_is_neither_new_nor_orthogonal_is_a_conflict() {
         let held = [Direction { slot: 0, axis: Vec3::UNIT[0] }, Direction { slot: 0, axis: Vec3([0.6, 0.8, 0.0]) }];
-        assert_eq!(Equations::new(1, &held).unwrap_err(), FrameConflict { slot: 0 });
+        assert_eq!(DofMap::new(1, &held).unwrap_err(), FrameConflict { slot: 0 });
     }
 
     #[test]
@@ -425,28 +425,28 @@ mod tests {
         let turns = |slot: Slot| slot % 2 == 1;
         let slanted = a * 0.6 + b * 0.8;
         let held = [(2, slanted), (3, e), (4, b), (4, e), (5, a)].map(|(slot, axis)| Direction { slot, axis });
-        let equations = Equations::planar(6, &held, plane, turns).unwrap();
-        let free = |slot: Slot| equations.of(slot).map(|number| number != Equations::HELD);
+        let dof_map = DofMap::planar(6, &held, plane, turns).unwrap();
+        let free = |slot: Slot| dof_map.of(slot).map(|number| number != DofMap::HELD);
         assert_eq!((free(0), free(1)), ([true, true, false], [false, false, true]));
         assert_eq!((free(2), free(3)), ([false, true, false], [false; 3]));
         assert_eq!((free(4), free(5)), ([true, false, false], [false, false, true]));
-        assert!((equations.frame(2).unwrap().column(0) - slanted).norm() < 1e-15);
-        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| equations.is_plain(slot)), [true, true, false, false, false, true]);
+        assert!((dof_map.frame(2).unwrap().column(0) - slanted).norm() < 1e-15);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| dof_map.is_plain(slot)), [true, true, false, false, false, true]);
         let all = Vec3::UNIT.map(|axis| Direction { slot: 0, axis });
-        assert_eq!(Equations::planar(2, &all, plane, turns).unwrap().count(), 1);
-        let flat = Equations::planar(2, &[], Plane::normal_to(Vec3::UNIT[2]).unwrap(), turns).unwrap();
+        assert_eq!(DofMap::planar(2, &all, plane, turns).unwrap().count(), 1);
+        let flat = DofMap::planar(2, &[], Plane::normal_to(Vec3::UNIT[2]).unwrap(), turns).unwrap();
         assert!(flat.frame(0).is_none() && flat.frame(1).is_none());
     }
 
     #[test]
     fn what_is_scattered_is_gathered_again() {
         let held = [Direction { slot: 0, axis: Vec3([0.6, 0.0, 0.8]) }];
-        let equations = Equations::new(1, &held).unwrap();
+        let dof_map = DofMap::new(1, &held).unwrap();
         let mut field = [Vec3::ZERO];
-        equations.scatter(&[2.0, 3.0], Some(&[Vec3([0.6, 0.0, 0.8])]), &mut field);
+        dof_map.scatter(&[2.0, 3.0], Some(&[Vec3([0.6, 0.0, 0.8])]), &mut field);
         assert!((field[0].dot(held[0].axis) - 1.0).abs() < 1e-15);
         let mut again = [0.0; 2];
-        equations.gather(|slot| field[slot], &mut again);
+        dof_map.gather(|slot| field[slot], &mut again);
         assert!((again[0] - 2.0).abs() < 1e-15 && (again[1] - 3.0).abs() < 1e-15);
     }
 }

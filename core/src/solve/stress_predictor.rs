@@ -7,11 +7,11 @@ use crate::tensor::Vec3;
 
 /// Whether there is something that stress can be foreseen from.
 #[derive(Default)]
-pub(super) struct Foresight {
+pub(super) struct StressPredictor {
     is_pending: bool,
 }
 
-impl Foresight {
+impl StressPredictor {
     /// The next tangent is that of the state itself.
     pub fn forget(&mut self, assembly: &mut Assembly) {
         assembly.forget();

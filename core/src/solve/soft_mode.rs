@@ -7,7 +7,7 @@ use super::tangent::Tangent;
 use crate::model::Model;
 
 /// The softest motion of a tangent.
-pub struct Limp {
+pub struct SoftMode {
     /// The motion
     pub vector: NullVector,
     /// Whether it strains what it moves
@@ -20,7 +20,7 @@ pub struct Limp {
 /// than this, up to condition numbers of 1e13.
 const NO_STRAIN: f64 = 1e-3;
 
-impl Limp {
+impl SoftMode {
     /// The softest motion of a tangent; one that stays is the one that `solver` has tried to factorise. Whether it strains is asked where
     /// the tangent has no stiffness against it, or else where `stress` may be all that holds it.
     pub fn find(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model, stress: bool) -> Option<Self> {
@@ -29,7 +29,7 @@ impl Limp {
         if vector.held && !stress {
             return Some(Self { vector, strains: true, moves: true });
         }
-        let (largest, motion) = vector.by_slot(&assembly.system.pattern.equations, state.q.len());
+        let (largest, motion) = vector.by_slot(&assembly.system.pattern.dof_map, state.q.len());
         // What moves may be the multiplier of a condition that is said twice: no strain stands in its way.
         let moves = !model.kinds[largest].is_multiplier();
         let size = if moves { size(model, &motion) } else { 0.0 };
@@ -55,7 +55,7 @@ impl Limp {
     }
 }
 
-/// A motion that nothing holds, of a tangent; see [`Limp::find`].
+/// A motion that nothing holds, of a tangent; see [`SoftMode::find`].
 pub fn mechanism(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model) -> Option<NullVector> {
-    Limp::find(solver, tangent, model, false).filter(Limp::is_loose).map(|limp| limp.vector)
+    SoftMode::find(solver, tangent, model, false).filter(SoftMode::is_loose).map(|soft_mode| soft_mode.vector)
 }
