@@ -3,13 +3,13 @@
 use super::load::Loaded;
 use super::run::status_of;
 use super::{Status, Verdict, json, load, on_threads, say, threads_of};
-use crate::drive::{Failure, Moment, refusal};
-use crate::model::{Assembly, Share};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use crate::system::StageKind;
-use crate::tensor::{Mat3, Vec3};
-use crate::threads;
+use beamsim_core::model::{Assembly, EffectSize};
+use beamsim_core::run::{Failure, Moment, refusal};
+use beamsim_core::system::StageKind;
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::threads;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -50,7 +50,7 @@ fn tell(scene: &Scene) -> Result<(), String> {
     for reason in &scene.reasons {
         let mark = if reason.active { "on " } else { "off" };
         let share = shares.iter().find(|share| reason.active && share.name == reason.name);
-        let added = share.map_or(String::new(), |Share { instances, unknowns, entries, .. }| {
+        let added = share.map_or(String::new(), |EffectSize { instances, unknowns, entries, .. }| {
             format!(
                 " ({instances} in the first stage; {unknowns} unknowns and {entries} entries of the matrix come from nothing else)"
             )
@@ -213,7 +213,7 @@ const VECTORS_IN_DYNAMICS: usize = 27;
 const VECTORS_IN_SPACE: usize = 6;
 
 /// Unknowns, entries of the tangent, memory, and what each effect adds to them; and whether the first stage can begin.
-fn tell_size(scene: &Scene) -> Result<Vec<Share>, String> {
+fn tell_size(scene: &Scene) -> Result<Vec<EffectSize>, String> {
     let mut model = scene.plan.model.clone();
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();

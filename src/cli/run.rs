@@ -3,7 +3,6 @@
 use super::accuracy::{Aimed, Target};
 use super::progress::Progress;
 use super::{Status, Verdict, json, load, on_threads, report, say, signals, threads_of};
-use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
 use crate::output::{
     Beside, FieldsWriter, Film, HistoryWriter, ModesWriter, Outcome, PartFile, Reached, Record, Row, RowCounter, Rows,
     remove_fields, remove_if_there,
@@ -11,7 +10,8 @@ use crate::output::{
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
 use crate::study::{self, Recorder};
-use crate::threads;
+use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
+use beamsim_core::threads;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -223,7 +223,7 @@ pub fn simulate(
     let names = || scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
     let history = folder.map(|folder| HistoryWriter::create(folder, names(), beside)).transpose();
     let dynamic: Vec<bool> =
-        scene.plan.stages.iter().map(|s| s.work.kind() == crate::model::StageKind::Dynamic).collect();
+        scene.plan.stages.iter().map(|s| s.work.kind() == beamsim_core::model::StageKind::Dynamic).collect();
     let timed = dynamic.iter().all(|dynamic| *dynamic);
     let fields = folder.filter(|_| scene.vtk).map(|folder| FieldsWriter::create(folder, scene.figure(), timed));
     let (history, fields, opened) = match (history, fields.transpose()) {

@@ -4,7 +4,7 @@ use super::diagnostic::{Diagnostic, Spanned};
 use super::geometry::InterpolationWord;
 use super::reader::{Context, Item, Table, choose};
 use super::{Deck, StageBody};
-use crate::warning::WarningKind;
+use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
 /// `[cost]`; what is left out is chosen by the study.

@@ -1,7 +1,7 @@
 //! What is wrong with a deck, where, and what was probably meant.
 
-use crate::warning::WarningKind;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use beamsim_core::warning::WarningKind;
 use std::ops::Range;
 
 /// A range of bytes in the deck.

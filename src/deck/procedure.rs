@@ -4,7 +4,7 @@ use super::cost::SCHEMES;
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
 use super::geometry::{PointRef, read_point};
 use super::reader::{Context, Item, Table, kind_of};
-use crate::warning::WarningKind;
+use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
 /// `[[stage]]`

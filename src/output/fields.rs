@@ -4,9 +4,9 @@
 
 use super::Row;
 use super::files::{PartFile, about};
-use crate::drive::{Moment, Snapshot};
-use crate::probe::{Figure, Look};
-use crate::system::State;
+use beamsim_core::probe::{Figure, Look};
+use beamsim_core::run::{Moment, Snapshot};
+use beamsim_core::system::State;
 use std::fmt::Write;
 use std::fs;
 use std::io;

@@ -1,7 +1,7 @@
 //! history.csv: one row a load level or time step, one column a number.
 
 use super::files::{PartFile, remove_if_there};
-use crate::drive::Moment;
+use beamsim_core::run::Moment;
 use std::fmt::Write;
 use std::fs::File;
 use std::io;

@@ -1,7 +1,7 @@
 //! modes.csv and buckling.csv: what modal and buckling stages find.
 
 use super::files::{PartFile, remove_if_there};
-use crate::drive::{CriticalLoad, Mode};
+use beamsim_core::run::{CriticalLoad, Mode};
 use std::io;
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! run.json: what was simulated, what it took, how it ended.
 
-use crate::drive::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
-use crate::integrate::Largest;
 use crate::scene::Scene;
+use beamsim_core::integrate::Largest;
+use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
 use serde_json::{Map, Value, json};
 use std::fmt::{self, Display, Formatter};
 use std::path::Path;

@@ -3,10 +3,10 @@
 use super::compose::Composition;
 use super::mesh::Mesh;
 use crate::deck::{self, Deck, Diagnostic, LoadTarget, MotionWhat, SectionBody, Spanned, StageBody};
-use crate::model::{StageSet, Support};
-use crate::system::Direction;
-use crate::tensor::{Mat3, Vec3};
-use crate::warning::WarningKind;
+use beamsim_core::model::{StageSet, Support};
+use beamsim_core::system::Direction;
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::warning::WarningKind;
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::HashSet;
 

@@ -5,10 +5,10 @@ use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
-use crate::drive::Driven;
-use crate::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
-use crate::system::{Direction, Node, Slot};
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
+use beamsim_core::run::Driven;
+use beamsim_core::system::{Direction, Node, Slot};
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
 

@@ -1,11 +1,11 @@
 //! The shape of a scene, for pictures.
 
 use super::mesh::{Mesh, MeshBeam};
-use crate::effect::beam_elasticity::StressField;
-use crate::effect::link;
-use crate::effect::rigid_body::Body;
-use crate::probe::{BeamPoint, Figure, Line, LinePoint, Place};
-use crate::tensor::Mat3;
+use beamsim_core::effect::beam_elasticity::StressField;
+use beamsim_core::effect::link;
+use beamsim_core::effect::rigid_body::Body;
+use beamsim_core::probe::{BeamPoint, Figure, Line, LinePoint, Place};
+use beamsim_core::tensor::Mat3;
 use nalgebra::Matrix6;
 use std::sync::Arc;
 

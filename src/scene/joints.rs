@@ -5,8 +5,8 @@
 use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use crate::effect::joint::Kind;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::effect::joint::Kind;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// A joint as found on the mesh.
 pub struct FoundJoint<'a> {

@@ -4,10 +4,10 @@ use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
 use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use crate::kernel::{MAX_NODES, shape};
-use crate::model::Names;
-use crate::system::Node;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::{MAX_NODES, shape};
+use beamsim_core::model::Names;
+use beamsim_core::system::Node;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
 

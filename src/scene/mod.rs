@@ -22,16 +22,16 @@ pub use section::{MassPerLength, SectionMatrices};
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
 };
-use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
-use crate::effect::beam_elasticity::StressField;
-use crate::effect::link;
-use crate::effect::rigid_body::Body;
-use crate::integrate::Scheme;
-use crate::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
-use crate::probe::{Figure, Probe, Quantity};
-use crate::system::Node;
-use crate::tensor::{Mat3, Vec3};
-use crate::warning::WarningKind;
+use beamsim_core::effect::beam_elasticity::StressField;
+use beamsim_core::effect::link;
+use beamsim_core::effect::rigid_body::Body;
+use beamsim_core::integrate::Scheme;
+use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
+use beamsim_core::probe::{Figure, Probe, Quantity};
+use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
+use beamsim_core::system::Node;
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::warning::WarningKind;
 use constraints::SceneConstraints;
 use output::Columns;
 use std::sync::Arc;
@@ -326,7 +326,7 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
     for stage in &deck.stages {
         let until = stage.until.as_ref().and_then(|until| match columns.find(&until.column) {
             Ok((probe, component)) => {
-                let column = Arc::new(move |at: &crate::drive::Snapshot| {
+                let column = Arc::new(move |at: &beamsim_core::run::Snapshot| {
                     let mut values = Vec::new();
                     probe.read(at, &mut values);
                     values[component]

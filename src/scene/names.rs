@@ -2,8 +2,8 @@
 
 use super::mesh::{Mesh, MeshBeam, shape_at};
 use crate::deck::{Deck, Diagnostic, InterpolationWord, PointRef, Spanned, nearest, one_of};
-use crate::probe::Place;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::probe::Place;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// What a name stands for.
 #[derive(Clone, Debug)]

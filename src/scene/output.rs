@@ -3,8 +3,8 @@
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
 use crate::deck::{Deck, Diagnostic, Spanned, nearest};
-use crate::effect::beam_elasticity::StressField;
-use crate::probe::{BeamPoint, NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
+use beamsim_core::effect::beam_elasticity::StressField;
+use beamsim_core::probe::{BeamPoint, NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
 use std::sync::Arc;
 
 /// Finds probes by name.

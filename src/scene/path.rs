@@ -1,7 +1,7 @@
 //! Centre lines: straight pieces and circular arcs, and the section axes along them.
 
 use crate::deck::{self, Diagnostic, PointRef, Span, Spanned};
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
 /// One piece of a centre line.

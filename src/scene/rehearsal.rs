@@ -2,9 +2,9 @@
 
 use super::compose::DrivenTable;
 use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
-use crate::drive::{Driven, HistoryJump, JumpKind, Plan, refusal, refusal_help, rehearse};
-use crate::model::{StageError, StageKind};
-use crate::warning::WarningKind;
+use beamsim_core::model::{StageError, StageKind};
+use beamsim_core::run::{Driven, HistoryJump, JumpKind, Plan, refusal, refusal_help, rehearse};
+use beamsim_core::warning::WarningKind;
 
 /// Refuses stages that cannot begin, and warns where histories jump.
 pub fn tell(deck: &Deck, plan: &Plan, tables: &[DrivenTable], diagnostics: &mut Vec<Diagnostic>) {

@@ -1,9 +1,9 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
 use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned};
-use crate::kernel::elastic::Stiffness;
-use crate::kernel::inertia::Inertia;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::elastic::Stiffness;
+use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
 use std::f64::consts::PI;
 

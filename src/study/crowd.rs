@@ -1,6 +1,6 @@
 //! Work that is done side by side, each piece once, in an order of the caller's.
 
-use crate::threads;
+use beamsim_core::threads;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::mpsc::{self, Sender};

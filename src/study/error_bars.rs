@@ -7,11 +7,11 @@ use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::cost::{Family, Mesher, Pace, Patience, Point, Refusal, Sampler, dynamic_stages, trial};
 use super::outcome::{Outcome, Presence};
 use crate::deck::{Deck, Diagnostic, Path, PointRef, Spanned, StageBody};
-use crate::drive::Failure;
 use crate::output::Beside;
 use crate::scene::Scene;
-use crate::tensor::Vec3;
-use crate::threads;
+use beamsim_core::run::Failure;
+use beamsim_core::tensor::Vec3;
+use beamsim_core::threads;
 use std::thread::{self, ScopedJoinHandle};
 
 /// The step tolerance of a companion whose steps adapt, over that of the run.

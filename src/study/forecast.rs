@@ -1,7 +1,7 @@
 //! How long a run will take, from its first moments on this machine.
 
-use crate::drive::{Counters, Failure, Moment, Observer, Run, Snapshot, StageWork};
 use crate::scene::Scene;
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, StageWork};
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 

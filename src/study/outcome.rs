@@ -1,11 +1,11 @@
 //! A run of a scene: all its outputs, and what they took.
 
 use crate::deck::{Diagnostic, Spanned, is_named, nearest};
-use crate::drive::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
-use crate::model::StageKind;
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
 use crate::study::Recorder;
+use beamsim_core::model::StageKind;
+use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
 use std::time::Instant;
 
 /// The outputs of a run, and what it took.

@@ -1,9 +1,9 @@
 //! Expectations held against a run.
 
 use crate::deck::{Instant, Reduce};
-use crate::drive::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
-use crate::probe::Probe;
 use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
+use beamsim_core::probe::Probe;
+use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
 
 /// Follows the expected columns through every converged state.
 pub struct Recorder {

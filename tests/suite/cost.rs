@@ -1,11 +1,11 @@
 //! The study of what accuracy costs.
 
 use beamsim::deck::{self, Accuracy, Deck, Spanned};
-use beamsim::drive::Failure;
 use beamsim::scene::{self, Scene};
 use beamsim::study::accuracy::{Found, reach};
 use beamsim::study::cost::{Against, Expected, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
 use beamsim::study::error_bars::error_bars;
+use beamsim_core::run::Failure;
 use std::path::Path;
 
 fn read(text: &str) -> (Deck, Scene) {

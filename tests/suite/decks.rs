@@ -1,8 +1,8 @@
 //! Every deck in `decks/` holds its own expectations.
 
-use beamsim::drive::{CriticalLoad, Failure, Mode, Observer, Run, Snapshot};
 use beamsim::scene;
 use beamsim::study::{Recorder, judge};
+use beamsim_core::run::{CriticalLoad, Failure, Mode, Observer, Run, Snapshot};
 use std::path::{Path, PathBuf};
 
 struct Watcher(Recorder);

@@ -1,10 +1,10 @@
 //! Effects that are forced off, and the study that takes them out one by one.
 
 use beamsim::deck::{self, EffectWord};
-use beamsim::drive::{Counters, CriticalLoad, Failure, Observer, Run, Snapshot, Warning};
 use beamsim::scene;
 use beamsim::study::ablation::{Ablation, ablate};
-use beamsim::tensor::Vec3;
+use beamsim_core::run::{Counters, CriticalLoad, Failure, Observer, Run, Snapshot, Warning};
+use beamsim_core::tensor::Vec3;
 
 /// The state of the last node, row by row.
 #[derive(Default)]
@@ -130,7 +130,7 @@ fn without_gyroscopic_moments_nothing_tumbles() {
     };
     let spin = |effects: &str| {
         let [_, p, _, rate] = last(&body(effects));
-        beamsim::rotation::Rotation::new(p).t * rate
+        beamsim_core::rotation::Rotation::new(p).t * rate
     };
     assert!((spin("[effects]\ngyroscopic = false\n") - Vec3([0.01, 3.0, 0.0])).norm() < 1e-5);
     assert!((spin("") - Vec3([0.01, 3.0, 0.0])).norm() > 1.0);

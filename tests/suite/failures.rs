@@ -1,8 +1,8 @@
 //! Runs that must end in a named failure, with the right node and direction.
 
 use crate::scenes::attempt;
-use beamsim::drive::{Failure, Mode, Observer, Run, Snapshot};
 use beamsim::scene;
+use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot};
 
 const ARM: &str = r#"
 [point]

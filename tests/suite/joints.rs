@@ -3,16 +3,16 @@
 use crate::dual::{Dual, values, variables, with_room};
 use crate::random::Random;
 use crate::tangents::{agree, symmetric};
-use beamsim::effect::link;
-use beamsim::kernel::inertia::{Derivatives, Inertia, Spin, body, drag, steadily_turned};
-use beamsim::kernel::joint::{End, add_along, add_between, block, cosine, slides};
-use beamsim::kernel::turn::{Carrier, Start, StepCoefficients, Turn};
-use beamsim::kernel::volume::VolumeForce;
-use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::real::Real;
-use beamsim::rotation::Rotation;
-use beamsim::system::Node;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::effect::link;
+use beamsim_core::kernel::inertia::{Derivatives, Inertia, Spin, body, drag, steadily_turned};
+use beamsim_core::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Turn};
+use beamsim_core::kernel::volume::VolumeForce;
+use beamsim_core::kernel::{ElementSystem, Weights};
+use beamsim_core::rotation::Rotation;
+use beamsim_core::scalar::Real;
+use beamsim_core::system::Node;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// u_A, P_A, u_B, P_B and two times three multipliers.
 type Wide = Dual<18>;

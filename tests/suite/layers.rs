@@ -6,14 +6,22 @@ use std::path::{Path, PathBuf};
 /// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of warnings.
 #[rustfmt::skip]
 const ORDER: [&str; 18] = [
-    "warning", "threads", "real", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "drive", "probe",
+    "warning", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "run", "probe",
     "deck", "scene", "output", "study", "cli",
 ];
 
 /// Crates that only some places may use; a place is a file or a folder.
 const CRATES: [(&str, &[&str]); 14] = [
-    ("rayon", &["src/threads.rs"]),
-    ("faer", &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/krylov.rs", "src/solve/block/order.rs"]),
+    ("rayon", &["core/src/threads.rs"]),
+    (
+        "faer",
+        &[
+            "core/src/solve/columns.rs",
+            "core/src/solve/general.rs",
+            "core/src/solve/krylov.rs",
+            "core/src/solve/block/order.rs",
+        ],
+    ),
     ("toml", &["src/deck/"]),
     ("toml_edit", &["src/deck/"]),
     ("annotate_snippets", &["src/deck/"]),
@@ -117,7 +125,8 @@ fn occurrences<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = (usize,
 /// The modules of the library that a text names, with their lines.
 fn imported_modules(code: &str) -> Vec<(usize, String)> {
     let mut modules = Vec::new();
-    for (line, _, after) in occurrences(code, "crate") {
+    let here = occurrences(code, "crate");
+    for (line, _, after) in here.chain(occurrences(code, "beamsim_core")) {
         let Some(path) = after.strip_prefix("::") else { continue };
         if path.starts_with('{') {
             modules.extend(names_in_braces(path).into_iter().map(|name| (line, name.to_string())));
@@ -146,10 +155,10 @@ fn lines_with_crate(code: &str, name: &str) -> Vec<usize> {
 fn library() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
-    for path in rust_files(&root.join("src")) {
+    for path in [root.join("core/src"), root.join("src")].iter().flat_map(|folder| rust_files(folder)) {
         let below = path.strip_prefix(root).expect("a path below the package");
         let name = below.to_string_lossy().replace('\\', "/");
-        if name == "src/main.rs" || name == "src/lib.rs" {
+        if name == "src/main.rs" || name.ends_with("src/lib.rs") {
             continue;
         }
         let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -159,9 +168,9 @@ fn library() -> Vec<(String, String)> {
     files
 }
 
-/// The module that a file belongs to: `src/kernel/beam.rs` to kernel, `src/real.rs` to real.
+/// The module that a file belongs to: `core/src/kernel/beam.rs` to kernel, `core/src/tensor.rs` to tensor.
 fn module_of(file: &str) -> &str {
-    leading_word(file.trim_start_matches("src/"))
+    leading_word(file.trim_start_matches("core/").trim_start_matches("src/"))
 }
 
 #[test]
@@ -197,10 +206,10 @@ fn crates_are_used_only_in_their_rooms() {
 
 #[test]
 fn the_reader_of_imports_reads() {
-    let text = "//! [`crate::study`]\nuse crate::real::Real; // crate::cli\n/* crate::deck\n*/\nlet a = crate::tensor::Vec3::ZERO;\nuse crate::{kernel::{beam, load}, system};\nfn mycrate::x() {}\n";
+    let text = "//! [`crate::study`]\nuse beamsim_core::scalar::Real; // crate::cli\n/* crate::deck\n*/\nlet a = crate::tensor::Vec3::ZERO;\nuse crate::{kernel::{beam, load}, system};\nfn mycrate::x() {}\n";
     let found = imported_modules(&without_comments(text));
     let expected =
-        [(2_usize, "real"), (5, "tensor"), (6, "kernel"), (6, "system")].map(|(line, name)| (line, name.to_string()));
+        [(5_usize, "tensor"), (6, "kernel"), (6, "system"), (2, "scalar")].map(|(line, name)| (line, name.to_string()));
     assert_eq!(found, expected);
     let text = "use toml::de;\nuse toml_edit::Item;\nlet a: toml::Value;\nuse super::toml::x;\nuse toml;\nlet toml = 1;\nx(::toml::y);\n";
     assert_eq!(lines_with_crate(text, "toml"), [1, 3, 5, 7]);
@@ -209,11 +218,11 @@ fn the_reader_of_imports_reads() {
     assert_eq!(may_import("deck", "tensor"), Ok(false));
     assert_eq!(may_import("deck", "deck"), Ok(true));
     assert_eq!(may_import("deck", "warning"), Ok(true));
-    assert_eq!(may_import("drive", "deck"), Ok(false));
+    assert_eq!(may_import("run", "deck"), Ok(false));
     assert_eq!(may_import("scene", "deck"), Ok(true));
     assert_eq!(may_import("scene", "output"), Ok(false));
     assert_eq!(may_import("study", "cli"), Ok(false));
     assert!(may_import("kernel", "attic").is_err());
-    assert_eq!(module_of("src/real.rs"), "real");
-    assert_eq!(module_of("src/kernel/beam.rs"), "kernel");
+    assert_eq!(module_of("core/src/tensor.rs"), "tensor");
+    assert_eq!(module_of("core/src/kernel/beam.rs"), "kernel");
 }

@@ -3,10 +3,10 @@
 
 use crate::random::Random;
 use crate::scenes::{attempt, simulate};
-use beamsim::drive::Failure;
-use beamsim::model::SlotKind;
-use beamsim::rotation::Rotation;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::model::SlotKind;
+use beamsim_core::rotation::Rotation;
+use beamsim_core::run::Failure;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// A rigid motion of a part of the scene: about a point and an axis, or along a direction.
 enum Free {

@@ -3,10 +3,10 @@
 use crate::decks::decks;
 use crate::random::Random;
 use beamsim::deck::{self, Axes, Deck, Diagnostic, Frame, Load, MotionWhat, Path, PointRef, SectionBody, SpringBody};
-use beamsim::drive::{Failure, Observer, Run, Snapshot};
-use beamsim::rotation::Rotation;
 use beamsim::scene;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::rotation::Rotation;
+use beamsim_core::run::{Failure, Observer, Run, Snapshot};
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// Place and rotation of each node, at one row of the output.
 struct Row {

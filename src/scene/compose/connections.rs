@@ -2,14 +2,14 @@
 
 use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{self, Diagnostic, JointKind};
-use crate::drive::Driven;
-use crate::effect::joint::{self, Joints};
-use crate::effect::link::{self, Links};
-use crate::effect::spring::{self, Spring};
-use crate::model::{Amplitude, SlotKind, StageSet, Support};
 use crate::scene::joints::FoundJoint;
-use crate::system::Direction;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::effect::joint::{self, Joints};
+use beamsim_core::effect::link::{self, Links};
+use beamsim_core::effect::spring::{self, Spring};
+use beamsim_core::model::{Amplitude, SlotKind, StageSet, Support};
+use beamsim_core::run::Driven;
+use beamsim_core::system::Direction;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 impl Composer<'_> {
     pub(super) fn springs(&mut self) {

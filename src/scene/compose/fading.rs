@@ -2,9 +2,9 @@
 
 use super::Composer;
 use crate::deck::{EffectWord, StageBody};
-use crate::effect::Effect;
-use crate::effect::fading_inertia::FadingInertia;
-use crate::model::StageSet;
+use beamsim_core::effect::Effect;
+use beamsim_core::effect::fading_inertia::FadingInertia;
+use beamsim_core::model::StageSet;
 use std::collections::BTreeSet;
 
 impl Composer<'_> {

@@ -2,19 +2,19 @@
 
 use super::{Composer, SWITCHED_OFF, push_volume};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
-use crate::effect::beam_mass::BeamMass;
-use crate::effect::gravity::{BeamGravity, BodyGravity};
-use crate::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
-use crate::effect::rigid_body::{Body, RigidBody};
-use crate::effect::rotary_inertia::RotaryInertia;
-use crate::effect::rotating_frame::RotatingFrame;
-use crate::effect::section_inertia::SectionInertia;
-use crate::effect::{ByOrder, VolumeElements};
-use crate::kernel::inertia::Inertia;
 use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
 use crate::scene::names;
 use crate::scene::section::MassPerLength;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::effect::beam_mass::BeamMass;
+use beamsim_core::effect::gravity::{BeamGravity, BodyGravity};
+use beamsim_core::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
+use beamsim_core::effect::rigid_body::{Body, RigidBody};
+use beamsim_core::effect::rotary_inertia::RotaryInertia;
+use beamsim_core::effect::rotating_frame::RotatingFrame;
+use beamsim_core::effect::section_inertia::SectionInertia;
+use beamsim_core::effect::{ByOrder, VolumeElements};
+use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
 impl Composer<'_> {

@@ -2,13 +2,13 @@
 
 use super::{Composer, push_volume};
 use crate::deck::{self, Diagnostic, EffectWord, Frame, InterpolationWord, LoadTarget, LoadVector};
-use crate::effect::line_load::{LineLoad, LineLoadKind};
-use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
-use crate::effect::{ByOrder, Effect};
-use crate::kernel::load::Intensity;
 use crate::scene::mesh::{BeamElement, Rule, Station};
 use crate::scene::names;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::effect::line_load::{LineLoad, LineLoadKind};
+use beamsim_core::effect::node_load::{self, NodeLoad, NodeLoadKind};
+use beamsim_core::effect::{ByOrder, Effect};
+use beamsim_core::kernel::load::Intensity;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 impl Composer<'_> {
     /// Loads at nodes, and beside them those that line loads on relative beams leave there.

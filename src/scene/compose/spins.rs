@@ -2,13 +2,13 @@
 
 use super::Composer;
 use crate::deck::{EffectWord, Frame, JointKind, Load, LoadTarget, MotionWhat, Spanned, StageBody};
-use crate::effect::Effect;
-use crate::effect::spin_hold::{HeldIn, Instance, SpinHold};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use crate::scene::section::SectionMatrices;
-use crate::system::Slot;
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::effect::Effect;
+use beamsim_core::effect::spin_hold::{HeldIn, Instance, SpinHold};
+use beamsim_core::system::Slot;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
 
 /// What is nearer to a straight line is one, relative to its length.

@@ -5,9 +5,9 @@ mod present;
 mod table;
 
 use crate::deck::{Deck, Diagnostic, EffectWord};
-use crate::drive::Failure;
 use crate::scene::{self, Scene};
 use crate::study::outcome::{Outcome, columns};
+use beamsim_core::run::Failure;
 use change::changes;
 use present::acts;
 

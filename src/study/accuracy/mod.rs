@@ -22,9 +22,9 @@ pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 
 use super::cost::{Crew, Family, Mesher, Options, Pace, Patience, Point, Refusal, Sampler};
 use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
-use crate::drive::Failure;
 use crate::scene::Scene;
 use crate::study::Outcome;
+use beamsim_core::run::Failure;
 use search::Search;
 
 /// From this accuracy on, cubic elements are cheaper than quadratic ones.

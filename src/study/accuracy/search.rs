@@ -5,8 +5,8 @@ use super::estimate::{Fall, Share, Source, left_by_newton};
 use super::round::{Round, Trials};
 use super::{CUBIC, Found, coarser, is_offer, scaled};
 use crate::deck::{Accuracy, StageBody};
-use crate::drive::Failure;
 use crate::study::cost::{Crew, Family, Mesher, Pace, Point, Refusal, Sampler, Trial};
+use beamsim_core::run::Failure;
 
 /// The first mesh over that of the deck, in nodes; and where steps cost nothing and a loose accuracy is wanted.
 const FIRST_MESH: f64 = 0.5;

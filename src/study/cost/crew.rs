@@ -6,9 +6,9 @@ use super::sample::Sampler;
 use super::trial::{self, Patience, Seconds, Trial};
 use super::{Options, Refusal, Run, Timing};
 use crate::deck::Deck;
-use crate::drive::{Failure, Moment};
 use crate::study::crowd::side_by_side;
 use crate::study::outcome::Outcome;
+use beamsim_core::run::{Failure, Moment};
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 

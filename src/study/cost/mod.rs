@@ -24,10 +24,10 @@ pub(in crate::study) use grid::{Mesher, dynamic_stages};
 pub(in crate::study) use sample::{Sampler, Samples};
 
 use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord, StageBody};
-use crate::drive::Failure;
 use crate::output::HistoryReader;
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, columns, find_column};
+use beamsim_core::run::Failure;
 use grid::Grid;
 use std::time::Duration;
 

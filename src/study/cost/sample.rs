@@ -4,11 +4,11 @@ use super::grid::{Pace, dynamic_stages};
 use super::order::Expected;
 use super::places::Places;
 use crate::deck::{Deck, Diagnostic, NormWord, Path, StageBody};
-use crate::probe::Quantity;
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, columns, columns_of_history};
 use crate::study::scale::{kind, scales};
 use crate::study::{Recorder, expected_values};
+use beamsim_core::probe::Quantity;
 use std::f64::consts::TAU;
 
 /// Instants of a stage that are compared, at most.

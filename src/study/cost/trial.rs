@@ -3,10 +3,10 @@
 use super::grid::equal_part;
 use super::sample::{Sampler, Samples};
 use crate::deck::{Deck, StageBody};
-use crate::drive::Failure;
 use crate::scene::Scene;
 use crate::study::outcome::Outcome;
 use crate::study::variant::Variant;
+use beamsim_core::run::Failure;
 use cpu_time::ThreadTime;
 use std::time::Instant;
 

@@ -1,10 +1,10 @@
 //! One point of a sweep.
 
-use crate::drive::{Failure, Warning};
 use crate::study::error_bars::of_expected;
 use crate::study::outcome::Outcome as Run;
 use crate::study::variant::Variant;
 use crate::study::{Recorder, expected_values};
+use beamsim_core::run::{Failure, Warning};
 
 /// What came of a point.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,0 +1,121 @@
+//! Holds spins that nothing resists: a straight part between ball joints may spin about its own axis without any force, in statics
+//! always and in a dynamic stage without rotary inertia; then round-off alone would tell by how much.
+
+use super::{Effect, SomeIncrements};
+use crate::kernel::{ElementSystem, Weights};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageKind, State};
+use crate::tensor::Vec3;
+
+/// One straight part: beams that are joined rigidly along a line.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// A node in the middle of a beam
+    pub node: Node,
+    /// All its nodes
+    pub nodes: Vec<Node>,
+    /// The axis at the start, a unit vector
+    pub axis: Vec3,
+    /// GJ/L, moment per angle
+    pub stiffness: f64,
+}
+
+/// The hold in load levels and time steps, as part of GJ/L: residuals that Newton tolerates may not turn the beam by much, and the swing of a
+/// beam that sags must not notice.
+const HOLD: f64 = 1e-3;
+
+/// The same where no mass stands beside it: modes must not notice at all.
+const HOLD_IN_MODES: f64 = 1e-8;
+
+/// The stages in which spins are held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldIn {
+    /// Dynamic and modal ones
+    Motion,
+    /// Static ones, and searches for critical loads
+    Statics,
+}
+
+/// All such parts.
+///
+/// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness against corrections
+/// t.T dP about the axis t, and keeps predictions from carrying spins on, so that what no force asks for does not happen.
+#[derive(Clone, Debug)]
+pub struct SpinHold {
+    /// The parts
+    pub parts: Vec<Instance>,
+    /// Where
+    pub held_in: HeldIn,
+}
+
+impl Effect for SpinHold {
+    fn name(&self) -> &'static str {
+        match self.held_in {
+            HeldIn::Motion => "hold of spins without inertia",
+            HeldIn::Statics => "hold of free spins",
+        }
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.parts.iter().for_each(|part| connectivity.push([part.node.p]));
+        connectivity
+    }
+
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    fn acts(&self, stage: &StageContext) -> bool {
+        match stage.kind {
+            StageKind::Dynamic | StageKind::Modal => self.held_in == HeldIn::Motion,
+            StageKind::Static | StageKind::Buckling => self.held_in == HeldIn::Statics,
+        }
+    }
+
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.parts.iter().for_each(|part| show(MirrorData::Line(part.axis)));
+    }
+
+    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
+        // A material spin about the axis of each node of a part: what has no inertia is no mode.
+        let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
+        for part in parts {
+            let spin = |node: &Node| (node.p, at.rotation(node.p).t_inverse() * part.axis);
+            show(&part.nodes.iter().map(spin).collect::<Vec<_>>());
+        }
+    }
+
+    fn steady(&self, at: &mut State) {
+        // What is held in statics may spin by its inertia.
+        let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
+        for part in parts {
+            for node in &part.nodes {
+                let (rotation, p) = (at.rotation(node.p), node.p as usize);
+                let about = rotation.t_inverse() * part.axis;
+                for rate in [&mut at.v[p], &mut at.a[p]] {
+                    *rate -= about * part.axis.dot(rotation.t * *rate);
+                }
+            }
+        }
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        // An artificial resistance holds spins by itself, with a force that tells by how much.
+        if at.anchor.is_some() {
+            return;
+        }
+        let among_modes = self.held_in == HeldIn::Motion && weights.mass == 0.0;
+        let hold = weights.stiffness * if among_modes { HOLD_IN_MODES } else { HOLD };
+        let mut system = ElementSystem::new(1);
+        for (k, part) in self.parts.iter().enumerate() {
+            system.clear();
+            let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
+            system.add_tangent(0, 0, about.outer(about).scale(part.stiffness * hold));
+            out.add(k, &system);
+        }
+    }
+}

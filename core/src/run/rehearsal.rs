@@ -1,0 +1,356 @@
+//! What can be told of the stages of a plan before anything is computed: which of them cannot begin, and where histories jump.
+//!
+//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
+
+use super::plan::{InitialMotion, Plan, Stage, StageWork};
+use super::start::set_in_motion;
+use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
+use crate::system::{DofMap, Slot, State};
+use crate::tensor::Vec3;
+use std::collections::HashMap;
+
+/// Values of a history that agree to this part of the larger one are the same.
+const SAME_VALUE: f64 = 1e-9;
+
+/// Velocities that agree to this part of the larger one are the same: those of initial motions come from other numbers.
+const SAME_VELOCITY: f64 = 1e-6;
+
+/// Axes with this cosine are the same.
+const SAME_AXIS: f64 = 1.0 - 1e-9;
+
+/// What is known of a plan beforehand.
+#[derive(Debug, Default)]
+pub struct Rehearsal {
+    /// Stages, from 0, that cannot begin
+    pub refusals: Vec<(usize, StageError)>,
+    /// Where what histories drive jumps
+    pub jumps: Vec<HistoryJump>,
+}
+
+/// Something driven by a history jumps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HistoryJump {
+    /// The stage, from 0
+    pub stage: usize,
+    /// What jumps
+    pub what: Driven,
+    /// How
+    pub how: JumpKind,
+}
+
+/// What a history drives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Driven {
+    /// What has the amplitude with this number
+    Amplitude(usize),
+    /// The motion with this number
+    Motion(usize),
+    /// The motor of the joint with this multiplier
+    Motor(Slot),
+}
+
+/// How something jumps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JumpKind {
+    /// From one value to another where a stage begins
+    Value {
+        /// At the end of the stage before
+        from: f64,
+        /// At the start of this one
+        to: f64,
+    },
+    /// From one velocity to another where a dynamic stage begins
+    Velocity {
+        /// What its nodes have
+        from: f64,
+        /// What it begins with
+        to: f64,
+    },
+    /// In its velocity, within a stage
+    Kink {
+        /// The run's clock
+        time: f64,
+    },
+    /// It has no finite value, velocity or acceleration where the stage begins.
+    NotFinite,
+}
+
+/// Goes through all stages of a plan.
+pub fn rehearse(plan: &Plan) -> Rehearsal {
+    let mut rehearser = Rehearser::new(plan);
+    for (number, stage) in plan.stages.iter().enumerate() {
+        rehearser.begin(number, stage);
+        rehearser.end(number, stage);
+    }
+    rehearser.found
+}
+
+/// What a stage lacks to begin with, whatever the state: a load that grows, or mass. `fading`: whether what a motion left may fade
+/// with the load factor.
+pub(super) fn lacking(
+    model: &Model,
+    stage: &Stage,
+    number: usize,
+    fading: bool,
+    dof_map: impl FnOnce() -> Option<DofMap>,
+) -> Option<StageError> {
+    let kind = stage.work.kind();
+    let grows = matches!(stage.work, StageWork::Path { .. } | StageWork::Buckling { .. });
+    if grows && !fading && !stage.rotating && model.is_idle() {
+        return Some(StageError::NothingGrows(kind));
+    }
+    let is_modal = kind == StageKind::Modal;
+    let lacks_mass = is_modal && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
+    lacks_mass.then_some(StageError::NoMass)
+}
+
+struct Rehearser<'p> {
+    model: Model,
+    state: State,
+    initial: &'p [InitialMotion],
+    found: Rehearsal,
+    /// For each motion whether where its node is depends on nothing but motions and supports
+    determined: Vec<bool>,
+    /// Whether the stages so far end where they say, and not at an `until`
+    sure: bool,
+    /// What computed the state before this one
+    before: Option<Before>,
+    has_moved: bool,
+}
+
+/// What is known of the last static or dynamic stage.
+struct Before {
+    number: usize,
+    /// For each amplitude its rate at the end
+    rates: Vec<f64>,
+    /// For each motion that acted its velocity at the end
+    velocities: Vec<Option<f64>>,
+}
+
+/// What motions and supports hold of a slot.
+#[derive(Default)]
+struct HeldAxes {
+    axes: Vec<Vec3>,
+    /// Whether it is a rotation that is prescribed as a whole
+    turned: bool,
+}
+
+impl<'p> Rehearser<'p> {
+    fn new(plan: &'p Plan) -> Self {
+        let model = plan.model.clone();
+        Self {
+            state: model.rest(),
+            initial: &plan.initial,
+            found: Rehearsal::default(),
+            determined: vec![true; model.motions.len()],
+            model,
+            sure: true,
+            before: None,
+            has_moved: false,
+        }
+    }
+
+    fn begin(&mut self, number: usize, stage: &Stage) {
+        let kind = stage.work.kind();
+        let clock = self.state.time;
+        let fresh = number == 0 || self.model.has_fresh_loads(number);
+        let jumps = self.model.settle(number, kind, &self.state);
+        if self.sure {
+            let certain = jumps.into_iter().filter(|jump| self.determined[jump.motion]);
+            self.found.refusals.extend(certain.map(|jump| (number, StageError::Jump(jump))));
+            self.look_at_hinges(number);
+            self.look_at_amplitudes(number, kind);
+            self.look_at_static_motions(number, kind);
+        }
+        let fading = self.has_moved && kind == StageKind::Static;
+        let lacks = lacking(&self.model, stage, number, fading, || self.model.number(number, None).ok());
+        self.found.refusals.extend(lacks.map(|error| (number, error)));
+        let amplitude = self.state.amplitude.clone();
+        self.state.load = match kind {
+            StageKind::Static => 0.0,
+            StageKind::Dynamic => 1.0,
+            StageKind::Buckling if fresh => 0.0,
+            StageKind::Modal | StageKind::Buckling => self.state.load,
+        };
+        if kind != StageKind::Dynamic {
+            let load = self.state.load;
+            self.model.set_clock(&mut self.state, clock, load);
+            return;
+        }
+        let begins = !std::mem::replace(&mut self.has_moved, true);
+        if begins {
+            self.state.stand_still();
+            self.initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
+        }
+        let given = self.state.v.clone();
+        self.model.set_clock(&mut self.state, clock, 1.0);
+        if !self.sure {
+            return;
+        }
+        let motors = self.model.motor_jumps(&amplitude, &self.state);
+        self.found.refusals.extend(motors.into_iter().map(|jump| (number, StageError::MotorJump(jump))));
+        let given = begins.then_some(&given[..]);
+        self.look_at_velocities(number, given);
+        self.look_at_motors(number, begins);
+        if let StageWork::Dynamic { end, .. } = stage.work {
+            self.look_at_kinks(number, end);
+        }
+    }
+
+    /// Rotations that motions have turned.
+    fn look_at_hinges(&mut self, number: usize) {
+        if self.model.motions.iter().any(|motion| motion.kind == MotionKind::Rotation) {
+            let turned = self.model.refuse_turned_hinges(number, &self.state);
+            self.found.refusals.extend(turned.err().map(|error| (number, error)));
+        }
+    }
+
+    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in the one before.
+    fn look_at_amplitudes(&mut self, number: usize, kind: StageKind) {
+        let Some(before) = &self.before else { return };
+        let load = if kind == StageKind::Static { 0.0 } else { 1.0 };
+        for (k, amplitude) in self.model.amplitudes.iter().enumerate() {
+            let (from, [to, ..]) = (amplitude.reached(), amplitude.at(self.state.time, load));
+            if amplitude.follows_history() && amplitude.acts_in(before.number) && differ(from, to, SAME_VALUE) {
+                let how = JumpKind::Value { from, to };
+                self.found.jumps.push(HistoryJump { stage: number, what: Driven::Amplitude(k), how });
+            }
+        }
+    }
+
+    /// In dynamic stages they are refused.
+    fn look_at_static_motions(&mut self, number: usize, kind: StageKind) {
+        if self.before.is_none() || kind != StageKind::Static {
+            return;
+        }
+        for (k, motion) in self.model.motions.iter().enumerate() {
+            let ((from, _), to) = (motion.reached(&self.state), motion.start(self.state.time));
+            let jumps = motion.follows_history() && motion.is_apart(from, to, self.model.length);
+            if self.determined[k] && jumps {
+                let how = JumpKind::Value { from, to };
+                self.found.jumps.push(HistoryJump { stage: number, what: Driven::Motion(k), how });
+            }
+        }
+    }
+
+    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give, where they do.
+    fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>) {
+        for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
+            let [value, rate, rate2] = motion.at(self.state.time, 1.0);
+            let from = match (given, &self.before) {
+                (Some(given), _) => Some(velocity_along(motion, given, rate)),
+                (None, Some(before)) => before.velocities[k],
+                (None, None) => Some(0.0),
+            };
+            let how = if ![value, rate, rate2].iter().all(|value| value.is_finite()) {
+                Some(JumpKind::NotFinite)
+            } else {
+                let fastest =
+                    motion.history.as_ref().and_then(Reading::fastest).map(|rate| (rate * motion.value).abs());
+                from.and_then(|from| velocity_jump(from, rate, fastest, given.is_some()))
+            };
+            self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motion(k), how }));
+        }
+    }
+
+    /// The same of motors. `begins`: initial motions set the scene in motion.
+    fn look_at_motors(&mut self, number: usize, begins: bool) {
+        // How fast a joint turns that a static stage has turned before is known to nobody yet.
+        if begins && self.before.is_some() && !self.initial.is_empty() {
+            return;
+        }
+        let (state, before, jumps) = (&self.state, &self.before, &mut self.found.jumps);
+        let amplitudes = &self.model.amplitudes;
+        self.model.each_motor(state, &mut |motor| {
+            let to = motor.value * state.amplitude_rates[motor.amplitude][0];
+            let from = match before {
+                Some(before) if !begins => motor.value * before.rates[motor.amplitude],
+                _ => motor.speed,
+            };
+            let fastest = amplitudes[motor.amplitude].fastest().map(|rate| (rate * motor.value).abs());
+            let how = velocity_jump(from, to, fastest, begins);
+            jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motor(motor.slot), how }));
+        });
+    }
+
+    /// Velocities that jump within a dynamic stage.
+    fn look_at_kinks(&mut self, number: usize, end: f64) {
+        let (clock, jumps) = (self.state.time, &mut self.found.jumps);
+        let mut look = |next: Option<f64>, what: Driven| {
+            let how = next.filter(|&time| time < end).map(|time| JumpKind::Kink { time });
+            jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
+        };
+        for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
+            look(motion.next_kink(clock), Driven::Motion(k));
+        }
+        let amplitudes = &self.model.amplitudes;
+        self.model.each_motor(&self.state, &mut |motor| {
+            look(amplitudes[motor.amplitude].next_kink(clock), Driven::Motor(motor.slot));
+        });
+    }
+
+    fn end(&mut self, number: usize, stage: &Stage) {
+        let kind = stage.work.kind();
+        let (time, load) = match stage.work {
+            StageWork::Dynamic { end, .. } => (end, 1.0),
+            StageWork::Static { .. } | StageWork::Path { .. } => (self.state.time, 1.0),
+            StageWork::Modal { .. } | StageWork::Buckling { .. } => (self.state.time, self.state.load),
+        };
+        self.model.set_clock(&mut self.state, time, load);
+        self.model.end_stage(&self.state);
+        self.sure &= stage.until.is_none();
+        if !matches!(kind, StageKind::Static | StageKind::Dynamic) {
+            return;
+        }
+        self.before = Some(Before {
+            number,
+            rates: self.model.amplitudes.iter().map(|amplitude| amplitude.rate_before(time)).collect(),
+            velocities: self.model.motions.iter().map(|m| m.acts().then(|| m.velocity_before(time))).collect(),
+        });
+        self.look_for_loose_ends(number);
+    }
+
+    /// Finds the motions whose nodes motions and supports of this stage alone do not hold.
+    fn look_for_loose_ends(&mut self, stage: usize) {
+        let mut held: HashMap<Slot, HeldAxes> = HashMap::new();
+        for motion in &self.model.motions {
+            let held = held.entry(motion.slot).or_default();
+            if motion.acts() {
+                held.axes.push(motion.axis);
+                held.turned |= motion.kind == MotionKind::Rotation;
+            }
+        }
+        let supports = self.model.supports.iter().filter(|support| support.stages.contains(stage));
+        for direction in supports.flat_map(|support| &support.directions) {
+            if let Some(held) = held.get_mut(&direction.slot) {
+                held.axes.push(direction.axis);
+            }
+        }
+        for (determined, motion) in self.determined.iter_mut().zip(&self.model.motions) {
+            let Some(HeldAxes { axes, turned }) = held.get(&motion.slot) else { continue };
+            let along = |axis: Vec3| axes.iter().any(|other| other.dot(axis).abs() > SAME_AXIS);
+            let whole = *turned || Vec3::UNIT.into_iter().all(along);
+            *determined &= whole || (motion.kind == MotionKind::Translation && along(motion.axis));
+        }
+    }
+}
+
+/// The velocity that a motion's node has along it; that of a rotation about another axis is none that it could go on with.
+fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
+    let own = given[motion.slot as usize];
+    let along = own.dot(motion.axis);
+    let aside = (own - motion.axis * along).norm();
+    let fits = motion.kind == MotionKind::Translation || aside <= SAME_VELOCITY * rate.abs();
+    if fits { along } else { 0.0 }
+}
+
+/// What initial motions give a motion that begins at rest is none of its business: the scene begins with the velocity of the motion.
+fn velocity_jump(from: f64, to: f64, fastest: Option<f64>, begins: bool) -> Option<JumpKind> {
+    let noticed = fastest.is_none_or(|fastest| (to - from).abs() > NOTICED * fastest);
+    let jumps = noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);
+    jumps.then_some(JumpKind::Velocity { from, to })
+}
+
+fn differ(a: f64, b: f64, same: f64) -> bool {
+    (a - b).abs() > same * a.abs().max(b.abs())
+}
