@@ -19,7 +19,7 @@ test:
 test-one NAME:
     cargo test --release --test suite {{NAME}}
 
-# Compile everything and run the unit tests in src/
+# Compile everything and run the unit tests in src/ and core/src/
 quick:
     cargo check --all-targets
     cargo test --release --lib
