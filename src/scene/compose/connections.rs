@@ -1,9 +1,9 @@
 //! Springs, cables and joints.
 
 use super::{Composer, DrivenTable, stage_set};
-use crate::deck::{self, Diagnostic, JointKind};
+use crate::deck::{self, Diagnostic};
 use crate::scene::joints::FoundJoint;
-use beamsim_core::effect::joint::{self, Joints};
+use beamsim_core::effect::joint::{Drive, FreeCoordinate, Joint, Joints, Motor, SpringDamper};
 use beamsim_core::effect::link::{self, Links};
 use beamsim_core::effect::spring::{self, Spring};
 use beamsim_core::model::{Amplitude, SlotKind, StageSet, Support};
@@ -78,7 +78,7 @@ impl Composer<'_> {
 
     /// Joints that need multipliers, and springs and dampers of those that do not.
     pub(super) fn joints(&mut self, connections: &[FoundJoint]) {
-        let joints: Vec<joint::Instance> = connections.iter().filter_map(|c| self.joint(c)).collect();
+        let joints: Vec<Joint> = connections.iter().filter_map(|c| self.joint(c)).collect();
         if joints.is_empty() {
             let why = if connections.is_empty() {
                 "no [[joint]]"
@@ -91,80 +91,76 @@ impl Composer<'_> {
         self.push(Joints { joints }, reason);
     }
 
-    fn joint(&mut self, connection: &FoundJoint) -> Option<joint::Instance> {
-        let joint = connection.joint;
+    /// `None` where supports or shared nodes do all its work, or where something is wrong.
+    fn joint(&mut self, connection: &FoundJoint) -> Option<Joint> {
+        let (joint, kind) = (connection.joint, connection.joint.kind);
         let node = |k: usize| connection.nodes[k].map(|node| self.mesh.nodes[node].node);
         let nodes = [node(0), node(1)];
         let place = |k: usize| connection.nodes[k].map_or(connection.place, |node| self.mesh.nodes[node].place);
         let places = [place(0), place(1)];
-        let sprung = joint.stiffness != 0.0 || joint.damping != 0.0;
         let support = connection.is_support();
-        let mut kind = connection.kind();
-        if support {
-            // Supports hold it; what is left is its drive, or the one direction of a universal joint.
-            match joint.kind {
-                JointKind::Universal => kind.held = [true; 3],
-                _ if sprung => kind.normal = &[],
-                _ => return None,
-            }
-            if joint.motor.is_some() {
-                return None;
-            }
+        let normal = if support { kind.ground.normal } else { kind.normal };
+        let is_sprung = joint.stiffness != 0.0 || joint.damping != 0.0;
+        // The motor of a support is a motion of its node.
+        if support && (joint.motor.is_some() || (normal.is_empty() && !is_sprung)) {
+            return None;
         }
-        let motor = match &joint.motor {
+        let drive = match kind.driven {
+            Some(coordinate) => self.drive(joint, coordinate)?,
             None => None,
-            Some((value, history)) => {
-                let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
-                Some(joint::Motor { value: *value, amplitude })
-            }
         };
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
-        if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.held[0]) {
+        if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.shares_displacement()) {
             let message = "these parts share their displacement through another joint at the same point";
             let diagnostic = Diagnostic::error(message, joint.span.clone());
             self.diagnostics.push(diagnostic.help("give the parts points of their own, and join these"));
             return None;
         }
-        if !sprung && motor.is_none() && shared && kind.normal.is_empty() {
+        if shared && drive.is_none() && normal.is_empty() {
             return None;
         }
-        let turns = sprung && joint.kind == JointKind::Revolute;
-        let mut instance = joint::Instance {
-            kind,
-            nodes,
-            places,
-            arms: connection.arms,
-            axes: connection.axes,
-            along: None,
-            between: None,
-            drive: joint::Drive { stiffness: joint.stiffness, damping: joint.damping, motor },
-            angle: turns.then_some(self.out.angles),
-        };
+        let turns = is_sprung && kind.driven == Some(FreeCoordinate::Angle);
+        let angle = turns.then_some(self.out.angles);
         self.out.angles += usize::from(turns);
         self.out.sprung_joints.extend(turns.then(|| nodes.map(|node| node.map(|node| node.p))));
         self.out.jointed.extend(connection.nodes.into_iter().flatten());
-        if !shared && !support {
-            instance.along = Some(self.multiplier(SlotKind::Force, connection));
-        }
-        if !kind.normal.is_empty() || (motor.is_some() && joint.kind == JointKind::Revolute) {
-            instance.between = Some(self.multiplier(SlotKind::Moment, connection));
-        }
-        if let Some((_, history)) = &joint.motor {
-            let slot = if joint.kind == JointKind::Prismatic { instance.along } else { instance.between };
-            let table = |slot| DrivenTable {
-                drives: Driven::Motor(slot),
-                what: "motor",
-                span: joint.span.clone(),
-                history: history.clone(),
-            };
-            self.out.driven.extend(slot.map(table));
-        }
-        for slot in [instance.along, instance.between].into_iter().flatten() {
-            let used = instance.used(slot);
+        let motor = match drive {
+            Some(Drive::Motor(coordinate, _)) => Some(coordinate),
+            Some(Drive::Spring(..)) | None => None,
+        };
+        let has_along = !shared && !support;
+        let has_between = !normal.is_empty() || motor == Some(FreeCoordinate::Angle);
+        let along = has_along.then(|| self.multiplier(SlotKind::Force, connection));
+        let between = has_between.then(|| self.multiplier(SlotKind::Moment, connection));
+        let driven = motor.and_then(|coordinate| match coordinate {
+            FreeCoordinate::Angle => between,
+            FreeCoordinate::Slide => along,
+        });
+        self.out.driven.extend(driven.map(|slot| DrivenTable {
+            drives: Driven::Motor(slot),
+            what: "motor",
+            span: joint.span.clone(),
+            history: joint.motor.as_ref().and_then(|(_, history)| history.clone()),
+        }));
+        let (held, arms, axes) = (kind.held, connection.arms, connection.axes);
+        let found = Joint { held, normal, nodes, places, arms, axes, along, between, drive, angle };
+        for slot in [along, between].into_iter().flatten() {
+            let used = found.used(slot);
             let directions = (0..3).filter(|&k| !used[k]).map(|k| Direction { slot, axis: Vec3::UNIT[k] }).collect();
             self.out.idle_multipliers.push(Support { directions, stages: StageSet::default() });
         }
-        Some(instance)
+        Some(found)
+    }
+
+    /// What acts on the free coordinate of a joint: a motor takes the place of spring and damper. The outer `None` is an unknown history.
+    fn drive(&mut self, joint: &deck::Joint, coordinate: FreeCoordinate) -> Option<Option<Drive>> {
+        if let Some((value, history)) = &joint.motor {
+            let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
+            return Some(Some(Drive::Motor(coordinate, Motor { value: *value, amplitude })));
+        }
+        let (stiffness, damping) = (joint.stiffness, joint.damping);
+        let is_sprung = stiffness != 0.0 || damping != 0.0;
+        Some(is_sprung.then_some(Drive::Spring(coordinate, SpringDamper { stiffness, damping })))
     }
 
     fn multiplier(&mut self, kind: SlotKind, connection: &FoundJoint) -> u32 {

@@ -1,7 +1,7 @@
 //! Straight parts whose spin about their own axis nothing resists.
 
 use super::Composer;
-use crate::deck::{EffectWord, Frame, JointKind, Load, LoadTarget, MotionWhat, Spanned, StageBody};
+use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned, StageBody};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use crate::scene::section::SectionMatrices;
@@ -184,7 +184,7 @@ impl Composer<'_> {
         let named = |name: &Spanned<String>| self.mesh.find_node(self.deck, name).ok().map(|(number, _)| slot(number));
         let held = self.deck.supports.iter().filter(|support| support.fix[3..].contains(&true));
         let turned = self.deck.motions.iter().filter(|m| matches!(m.what, MotionWhat::Rotation { .. }));
-        let joined = connections.iter().filter(|connection| connection.joint.kind != JointKind::Spherical);
+        let joined = connections.iter().filter(|connection| connection.joint.kind.holds_rotation());
         let aside = connections.iter().filter(|connection| connection.arms != [Vec3::ZERO; 2]);
         let sprung = self.out.springs.iter().filter(|s| s.rotation != Mat3::ZERO || s.rotation_damping != Mat3::ZERO);
         let heavy = self.deck.bodies.iter().filter(|body| body.offset != [0.0; 3]);
