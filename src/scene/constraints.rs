@@ -119,7 +119,7 @@ pub fn constraints(
     SceneConstraints { supports, motions, driven }
 }
 
-/// What acts on the state instead of the forces.
+/// The constraints of a scene on the unknowns of its nodes.
 pub struct SceneConstraints {
     /// Supports
     pub supports: Vec<Support>,
@@ -194,7 +194,7 @@ fn read_motion(
     })
 }
 
-/// Whether earlier tables hold all three directions of the slot, whenever this one holds its own.
+/// Earlier tables hold all three directions of the slot, whenever this one holds its own.
 fn spanned(earlier: &[Held], b: &Held) -> bool {
     let always = |a: &&Held| a.direction.slot == b.direction.slot && (a.stages.0.is_none() || a.stages == b.stages);
     let axes: Vec<Vec3> = earlier.iter().filter(always).map(|a| a.direction.axis).collect();

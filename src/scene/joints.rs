@@ -17,12 +17,12 @@ pub struct FoundJoint<'a> {
     pub arms: [Vec3; 2],
     /// e_1 (the axis), e_2, e_3 as columns
     pub axes: Mat3,
-    /// Where it sits
+    /// Its place at the start
     pub place: Vec3,
 }
 
 impl FoundJoint<'_> {
-    /// Whether it joins one node to ground without an arm: a support and a motion of this node do its work.
+    /// It joins one node to ground without an arm: a support and a motion of this node do its work.
     pub fn is_support(&self) -> bool {
         self.nodes[0].is_none() && self.arms[1] == Vec3::ZERO
     }

@@ -4,8 +4,8 @@ use crate::dual::{Dual, values, variables, with_room};
 use crate::random::Random;
 use crate::scenes::simulate;
 use crate::tangents::{agree, symmetric};
-use beamsim_core::effect::joint::{Joint, JointKind};
-use beamsim_core::effect::link;
+use beamsim_core::effect::joint::{FreeCoordinate, Joint, JointKind};
+use beamsim_core::effect::spring::Link;
 use beamsim_core::kernel::inertia::{Derivatives, Inertia, Spin, body, drag, steadily_turned};
 use beamsim_core::kernel::joint::{End, add_along, add_between, block, cosine, slides};
 use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Turn};
@@ -224,6 +224,39 @@ columns = ["u", "r"]
     }
 }
 
+/// The JSON Schema lists the kinds of joints in their order, and asks of each the keys that the reader asks for.
+#[test]
+fn the_schema_knows_the_rows_of_all_joints() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/deck/schema.json");
+    let schema: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let joint = &schema["properties"]["joint"]["items"];
+    let words: Vec<&str> = JointKind::ALL.iter().map(|kind| kind.word).collect();
+    assert_eq!(joint["properties"]["kind"]["enum"], serde_json::json!(words));
+    for kind in JointKind::ALL {
+        let is_of_kind = |rule: &&serde_json::Value| {
+            let of = &rule["if"]["properties"]["kind"];
+            of["const"] == kind.word || of["enum"].as_array().is_some_and(|words| words.iter().any(|w| w == kind.word))
+        };
+        let rules: Vec<_> = joint["then"]["allOf"].as_array().unwrap().iter().filter(is_of_kind).collect();
+        let is_required = |key: &str| {
+            let required = rules.iter().filter_map(|rule| rule["then"]["required"].as_array());
+            required.flatten().any(|word| word == key)
+        };
+        let is_refused = |key: &str| rules.iter().any(|rule| rule["then"]["properties"][key]["not"].is_object());
+        for (key, axes) in [("axis", 1), ("axes", 2)] {
+            assert_eq!(is_required(key), kind.axes == axes, "`{key}` of {kind:?} joints");
+            assert!(is_refused(key) || kind.axes == axes, "`{key}` of {kind:?} joints");
+        }
+        for key in ["stiffness", "damping", "history"] {
+            assert_eq!(is_refused(key), kind.driven.is_none(), "`{key}` of {kind:?} joints");
+        }
+        for coordinate in [FreeCoordinate::Angle, FreeCoordinate::Slide] {
+            let key = coordinate.word();
+            assert_eq!(is_refused(key), kind.driven != Some(coordinate), "`{key}` of {kind:?} joints");
+        }
+    }
+}
+
 #[test]
 fn cables_pull_along_themselves() {
     let node = Node { u: 0, p: 1 };
@@ -231,7 +264,7 @@ fn cables_pull_along_themselves() {
     for tension_only in [false, true] {
         for _ in 0..20 {
             let length = random.range(0.2, 1.6);
-            let link = link::Instance {
+            let link = Link {
                 nodes: [node, node],
                 places: [Vec3::ZERO; 2],
                 stiffness: 3.0,

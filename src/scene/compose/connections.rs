@@ -4,11 +4,10 @@ use super::{Composer, DrivenTable, stage_set};
 use crate::deck::{self, Diagnostic};
 use crate::scene::joints::FoundJoint;
 use beamsim_core::effect::joint::{Drive, FreeCoordinate, Joint, Joints, Motor, SpringDamper};
-use beamsim_core::effect::link::{self, Links};
-use beamsim_core::effect::spring::{self, Spring};
+use beamsim_core::effect::spring::{GroundSpring, GroundSprings, Link, Links};
 use beamsim_core::model::{Amplitude, SlotKind, StageSet, Support};
 use beamsim_core::run::Driven;
-use beamsim_core::system::Direction;
+use beamsim_core::system::{Direction, Node};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 impl Composer<'_> {
@@ -19,7 +18,7 @@ impl Composer<'_> {
             let Some((node, _)) = self.node(at) else { continue };
             let axes = crate::scene::constraints::axes(*axes);
             let turned = |k: [f64; 3]| axes * Mat3::diagonal(k) * axes.transpose();
-            springs.push(spring::Instance {
+            springs.push(GroundSpring {
                 node: self.mesh.nodes[node].node,
                 translation: turned([k[0], k[1], k[2]]),
                 rotation: turned([k[3], k[4], k[5]]),
@@ -33,7 +32,7 @@ impl Composer<'_> {
         } else {
             let reason = format!("{} [[spring]] table(s)", springs.len());
             self.out.springs = springs.clone();
-            self.push(Spring { springs }, reason);
+            self.push(GroundSprings { springs }, reason);
         }
     }
 
@@ -58,7 +57,7 @@ impl Composer<'_> {
                 self.diagnostics.push(Diagnostic::error(message, spring.span.clone()));
                 continue;
             }
-            links.push(link::Instance {
+            links.push(Link {
                 nodes: [a.node, b.node],
                 places: [a.place, b.place],
                 stiffness: *stiffness,
@@ -93,22 +92,19 @@ impl Composer<'_> {
 
     /// `None` where supports or shared nodes do all its work, or where something is wrong.
     fn joint(&mut self, connection: &FoundJoint) -> Option<Joint> {
-        let (joint, kind) = (connection.joint, connection.joint.kind);
-        let node = |k: usize| connection.nodes[k].map(|node| self.mesh.nodes[node].node);
-        let nodes = [node(0), node(1)];
-        let place = |k: usize| connection.nodes[k].map_or(connection.place, |node| self.mesh.nodes[node].place);
-        let places = [place(0), place(1)];
+        let joint = connection.joint;
+        let kind = joint.kind;
         let support = connection.is_support();
         let normal = if support { kind.ground.normal } else { kind.normal };
-        let is_sprung = joint.stiffness != 0.0 || joint.damping != 0.0;
         // The motor of a support is a motion of its node.
-        if support && (joint.motor.is_some() || (normal.is_empty() && !is_sprung)) {
+        if support && (joint.motor.is_some() || (normal.is_empty() && !is_sprung(joint))) {
             return None;
         }
         let drive = match kind.driven {
             Some(coordinate) => self.drive(joint, coordinate)?,
             None => None,
         };
+        let nodes = connection.nodes.map(|node| node.map(|node| self.mesh.nodes[node].node));
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
         if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.shares_displacement()) {
             let message = "these parts share their displacement through another joint at the same point";
@@ -119,48 +115,59 @@ impl Composer<'_> {
         if shared && drive.is_none() && normal.is_empty() {
             return None;
         }
-        let turns = is_sprung && kind.driven == Some(FreeCoordinate::Angle);
-        let angle = turns.then_some(self.out.angles);
-        self.out.angles += usize::from(turns);
-        self.out.sprung_joints.extend(turns.then(|| nodes.map(|node| node.map(|node| node.p))));
-        self.out.jointed.extend(connection.nodes.into_iter().flatten());
-        let motor = match drive {
-            Some(Drive::Motor(coordinate, _)) => Some(coordinate),
-            Some(Drive::Spring(..)) | None => None,
-        };
+        let turns = matches!(drive, Some(Drive::Motor(FreeCoordinate::Angle, _)));
         let has_along = !shared && !support;
-        let has_between = !normal.is_empty() || motor == Some(FreeCoordinate::Angle);
-        let along = has_along.then(|| self.multiplier(SlotKind::Force, connection));
-        let between = has_between.then(|| self.multiplier(SlotKind::Moment, connection));
-        let driven = motor.and_then(|coordinate| match coordinate {
-            FreeCoordinate::Angle => between,
-            FreeCoordinate::Slide => along,
-        });
-        self.out.driven.extend(driven.map(|slot| DrivenTable {
+        let has_between = !normal.is_empty() || turns;
+        let found = Joint {
+            held: kind.held,
+            normal,
+            nodes,
+            places: connection.nodes.map(|node| node.map_or(connection.place, |node| self.mesh.nodes[node].place)),
+            arms: connection.arms,
+            axes: connection.axes,
+            along: has_along.then(|| self.multiplier(SlotKind::Force, connection)),
+            between: has_between.then(|| self.multiplier(SlotKind::Moment, connection)),
+            drive,
+            angle: self.remembered_angle(joint, nodes),
+        };
+        self.out.jointed.extend(connection.nodes.into_iter().flatten());
+        self.out.driven.extend(found.motor_slot().map(|slot| DrivenTable {
             drives: Driven::Motor(slot),
             what: "motor",
             span: joint.span.clone(),
             history: joint.motor.as_ref().and_then(|(_, history)| history.clone()),
         }));
-        let (held, arms, axes) = (kind.held, connection.arms, connection.axes);
-        let found = Joint { held, normal, nodes, places, arms, axes, along, between, drive, angle };
-        for slot in [along, between].into_iter().flatten() {
-            let used = found.used(slot);
-            let directions = (0..3).filter(|&k| !used[k]).map(|k| Direction { slot, axis: Vec3::UNIT[k] }).collect();
-            self.out.idle_multipliers.push(Support { directions, stages: StageSet::default() });
-        }
+        self.hold_idle_multipliers(&found);
         Some(found)
     }
 
-    /// What acts on the free coordinate of a joint: a motor takes the place of spring and damper. The outer `None` is an unknown history.
+    /// The number of a joint's angle among those that the state remembers, where a spring or damper turns.
+    fn remembered_angle(&mut self, joint: &deck::Joint, nodes: [Option<Node>; 2]) -> Option<usize> {
+        if !is_sprung(joint) || joint.kind.driven != Some(FreeCoordinate::Angle) {
+            return None;
+        }
+        self.out.sprung_joints.push(nodes.map(|node| node.map(|node| node.p)));
+        self.out.angles += 1;
+        Some(self.out.angles - 1)
+    }
+
+    /// Components of multipliers that a joint does not use are held at zero.
+    fn hold_idle_multipliers(&mut self, joint: &Joint) {
+        for slot in [joint.along, joint.between].into_iter().flatten() {
+            let used = joint.used(slot);
+            let directions = (0..3).filter(|&k| !used[k]).map(|k| Direction { slot, axis: Vec3::UNIT[k] }).collect();
+            self.out.idle_multipliers.push(Support { directions, stages: StageSet::default() });
+        }
+    }
+
+    /// The drive of a joint on its free coordinate: a motor takes the place of spring and damper. The outer `None` is an unknown history.
     fn drive(&mut self, joint: &deck::Joint, coordinate: FreeCoordinate) -> Option<Option<Drive>> {
         if let Some((value, history)) = &joint.motor {
             let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
             return Some(Some(Drive::Motor(coordinate, Motor { value: *value, amplitude })));
         }
-        let (stiffness, damping) = (joint.stiffness, joint.damping);
-        let is_sprung = stiffness != 0.0 || damping != 0.0;
-        Some(is_sprung.then_some(Drive::Spring(coordinate, SpringDamper { stiffness, damping })))
+        let spring = SpringDamper { stiffness: joint.stiffness, damping: joint.damping };
+        Some(is_sprung(joint).then_some(Drive::Spring(coordinate, spring)))
     }
 
     fn multiplier(&mut self, kind: SlotKind, connection: &FoundJoint) -> u32 {
@@ -169,4 +176,9 @@ impl Composer<'_> {
         self.out.multipliers.push((kind, node));
         (self.mesh.slots() + self.out.multipliers.len() - 1) as u32
     }
+}
+
+/// A joint with a spring or a damper.
+fn is_sprung(joint: &deck::Joint) -> bool {
+    joint.stiffness != 0.0 || joint.damping != 0.0
 }

@@ -4,8 +4,7 @@ use super::{Composer, push_volume};
 use crate::deck::{self, Diagnostic, EffectWord, Frame, InterpolationWord, LoadTarget, LoadVector};
 use crate::scene::mesh::{BeamElement, Rule, Station};
 use crate::scene::names;
-use beamsim_core::effect::line_load::{LineLoad, LineLoadKind};
-use beamsim_core::effect::node_load::{self, NodeLoad, NodeLoadKind};
+use beamsim_core::effect::load::{LineLoad, LineLoadKind, NodeForce, NodeLoad, NodeLoadKind};
 use beamsim_core::effect::{ByOrder, Effect};
 use beamsim_core::kernel::load::Intensity;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -23,7 +22,7 @@ impl Composer<'_> {
             let node = self.mesh.nodes[node].node;
             for (vector, kind) in [(load.force, force_kind(load)), (load.moment, force_kind(load) + 1)] {
                 if let Some(vector) = vector {
-                    loads[kind].push(node_load::Instance { node, vector: frame * Vec3(vector.start), amplitude });
+                    loads[kind].push(NodeForce { node, vector: frame * Vec3(vector.start), amplitude });
                 }
             }
         }
@@ -119,7 +118,7 @@ impl Composer<'_> {
 }
 
 /// Loads at nodes by kind: forces and moments fixed in space, then those that turn with the section.
-pub(super) type NodeLoads = [Vec<node_load::Instance>; 4];
+pub(super) type NodeLoads = [Vec<NodeForce>; 4];
 
 /// The place of a load's forces among [`NodeLoads`]; that of its moments is the next.
 fn force_kind(load: &deck::Load) -> usize {
@@ -133,7 +132,7 @@ fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &BeamElement
         for (vector, kind) in [(force, force_kind(load)), (moment, force_kind(load) + 1)] {
             if vector != Vec3::ZERO {
                 let vector = vector * station.weight;
-                out[kind].push(node_load::Instance { node: element.mesh.nodes[node].node, vector, amplitude });
+                out[kind].push(NodeForce { node: element.mesh.nodes[node].node, vector, amplitude });
             }
         }
     }

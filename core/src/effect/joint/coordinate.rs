@@ -27,7 +27,7 @@ pub(super) struct Rate {
     pub over_unknown: [Vec3; 4],
 }
 
-/// The same angle in (-pi, pi].
+/// An angle without its whole turns, in (-pi, pi].
 pub fn nearest_angle(angle: f64) -> f64 {
     angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }

@@ -73,7 +73,7 @@ impl Joint {
         }
     }
 
-    /// Whether a damper acts on it.
+    /// A damper acts on it.
     pub(super) fn damps(&self) -> bool {
         self.spring().is_some_and(|(_, spring)| spring.damping != 0.0)
     }

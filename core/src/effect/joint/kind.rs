@@ -109,12 +109,12 @@ impl JointKind {
         Self::ALL.into_iter().find(|kind| kind.word == word)
     }
 
-    /// Whether A and B have one displacement, so that nodes at the same point can share its unknowns.
+    /// A and B have one displacement: nodes at one point can share its unknowns.
     pub fn shares_displacement(&self) -> bool {
         self.held == POINT
     }
 
-    /// Whether it takes hold of the rotation of its ends.
+    /// It takes hold of the rotation of its ends.
     pub fn holds_rotation(&self) -> bool {
         !self.normal.is_empty()
     }

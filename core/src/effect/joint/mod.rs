@@ -9,12 +9,12 @@ pub use coordinate::nearest_angle;
 pub use drive::{Drive, Motor, SpringDamper};
 pub use kind::{FreeCoordinate, GroundHold, JointKind, NormalPair};
 
-use super::{Effect, Energy, MotorState};
+use super::{Constraint, Driven, Effect, Energy, MotorState, Roles, TangentForm};
 use crate::kernel::joint::{End, add_along, add_between, block, cosine, slides};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::{Jet, Real};
-use crate::system::{Assembler, Category, Connectivity, Memory, Node, Slot, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 
 /// One joint.
@@ -64,7 +64,7 @@ impl Joint {
         [displacement(a), rotation(a), displacement(b), rotation(b), self.along, self.between]
     }
 
-    /// Whether forces act at its ends, beside moments.
+    /// Forces act at its ends, beside moments.
     fn pulls(&self) -> bool {
         let slides = self.spring().is_some_and(|(on, _)| on == FreeCoordinate::Slide);
         self.along.is_some() || slides
@@ -107,13 +107,22 @@ impl Joint {
         self.motor_on(FreeCoordinate::Angle).map(|motor| (motor, self.normal.len()))
     }
 
-    /// Which gaps along the axes are closed: those that are held, and that of a motor that slides.
+    /// The axes along which gaps are closed: those that are held, and that of a motor that slides.
     fn closed_along(&self) -> [bool; 3] {
         let driven = self.motor_on(FreeCoordinate::Slide).is_some();
         [self.held[0] || driven, self.held[1], self.held[2]]
     }
 
-    /// Which of the multipliers of a slot are used.
+    /// The slot of its motor's multiplier.
+    pub fn motor_slot(&self) -> Option<Slot> {
+        let (on, _) = self.motor()?;
+        match on {
+            FreeCoordinate::Angle => self.between,
+            FreeCoordinate::Slide => self.along,
+        }
+    }
+
+    /// The multipliers of a slot that are used.
     pub fn used(&self, slot: Slot) -> [bool; 3] {
         if self.along == Some(slot) {
             return self.closed_along();
@@ -200,14 +209,19 @@ impl Effect for Joints {
         self.joints.iter().any(Joint::damps)
     }
 
-    fn is_symmetric(&self) -> bool {
-        !self.damps()
-    }
-
     fn connectivity(&self) -> Connectivity {
         let mut connectivity = Connectivity::default();
         self.joints.iter().for_each(|joint| connectivity.push(joint.slots().into_iter().flatten()));
         connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::symmetric(!self.damps())
+    }
+
+    /// Joints have no kernel for planes.
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        show(MirrorData::Spatial);
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
@@ -233,25 +247,12 @@ impl Effect for Joints {
         self.joints.iter().map(|joint| joint.strain_of(at, field, length)).fold(0.0, f64::max)
     }
 
-    fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3) {
-        let mut sum = (Vec3::ZERO, Vec3::ZERO);
-        for joint in self.joints.iter().filter(|joint| joint.nodes == [None, Some(node)]) {
-            let mut own = ElementSystem::new(block::COUNT);
-            joint.hold(at, &joint.ends(at), Weights::NONE, &mut own);
-            sum.0 += own.force_block(block::U_B);
-            sum.1 += own.force_block(block::P_B);
-        }
-        sum
+    fn roles(&self) -> Roles<'_> {
+        Roles { constraint: Some(self), driven: Some(self), ..Roles::NONE }
     }
+}
 
-    fn remember(&self, at: &mut State) {
-        for joint in &self.joints {
-            if let Some(number) = joint.angle {
-                at.angles[number] = joint.coordinate(FreeCoordinate::Angle, at, &joint.ends(at)).value;
-            }
-        }
-    }
-
+impl Constraint for Joints {
     fn drift(&self, at: &State, rates: &mut [Vec3], rates2: &mut [Vec3]) {
         for joint in &self.joints {
             let gaps = joint.moving_gaps(at);
@@ -263,14 +264,20 @@ impl Effect for Joints {
         }
     }
 
+    fn remember(&self, at: &mut State) {
+        for joint in &self.joints {
+            if let Some(number) = joint.angle {
+                at.angles[number] = joint.coordinate(FreeCoordinate::Angle, at, &joint.ends(at)).value;
+            }
+        }
+    }
+
     fn motors(&self, at: &State, show: &mut dyn FnMut(MotorState)) {
         for joint in &self.joints {
-            let Some((on, Motor { value, amplitude })) = joint.motor() else { continue };
-            let (turns, slot) = match on {
-                FreeCoordinate::Angle => (true, joint.between),
-                FreeCoordinate::Slide => (false, joint.along),
+            let (Some((on, Motor { value, amplitude })), Some(slot)) = (joint.motor(), joint.motor_slot()) else {
+                continue;
             };
-            let Some(slot) = slot else { continue };
+            let turns = on == FreeCoordinate::Angle;
             let speed = joint.rate(at, &joint.coordinate(on, at, &joint.ends(at))).value;
             show(MotorState { slot, value, amplitude, turns, speed });
         }
@@ -285,6 +292,19 @@ impl Effect for Joints {
         self.joints.iter().filter_map(turn).max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
+    fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3) {
+        let mut sum = (Vec3::ZERO, Vec3::ZERO);
+        for joint in self.joints.iter().filter(|joint| joint.nodes == [None, Some(node)]) {
+            let mut own = ElementSystem::new(block::COUNT);
+            joint.hold(at, &joint.ends(at), Weights::NONE, &mut own);
+            sum.0 += own.force_block(block::U_B);
+            sum.1 += own.force_block(block::P_B);
+        }
+        sum
+    }
+}
+
+impl Driven for Joints {
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for joint in &self.joints {
             let Some((on, motor)) = joint.motor() else { continue };
