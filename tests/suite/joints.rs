@@ -7,7 +7,7 @@ use crate::tangents::{agree, symmetric};
 use beamsim_core::effect::joint::{FreeCoordinate, Joint, JointKind};
 use beamsim_core::effect::spring::Link;
 use beamsim_core::kernel::inertia::{Derivatives, Inertia, Spin, body, drag, steadily_turned};
-use beamsim_core::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use beamsim_core::kernel::joint::{DirectionPair, End, GapFactors, add_along, add_between, block, cosine, slides};
 use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Turn};
 use beamsim_core::kernel::volume::VolumeForce;
 use beamsim_core::kernel::{ElementSystem, Weights};
@@ -69,9 +69,9 @@ impl Scene {
     }
 
     /// The directions that stay normal.
-    fn pairs<T: Real>(&self) -> Vec<(Vec3<T>, Vec3<T>)> {
+    fn pairs<T: Real>(&self) -> Vec<DirectionPair<T>> {
         let e = |k: usize| Vec3::constant(self.joint.axes.column(k));
-        self.joint.normal.iter().map(|&(i, j)| (e(i), e(j))).collect()
+        self.joint.normal.iter().map(|&(i, j)| DirectionPair { a: e(i), b: e(j) }).collect()
     }
 
     /// lambda . gaps, in the order of the blocks.
@@ -92,13 +92,13 @@ impl Scene {
     fn forces<T: Real>(&self, fields: &[Vec3<T>; 6]) -> ElementSystem<T> {
         let mut out = ElementSystem::new(block::COUNT);
         let ends = self.ends(fields);
-        add_along(&self.joint.axes, &self.joint.arms, &ends, fields[4], (0.0, 0.0), &mut out);
+        add_along(&self.joint.axes, &self.joint.arms, &ends, fields[4], GapFactors::NONE, &mut out);
         let mut along = slides(&self.joint.axes, &self.joint.arms, &ends[0], &ends[1]);
         (0..3).filter(|&k| !self.joint.held[k]).for_each(|k| along.0[k] = T::constant(0.0));
         out.add_force(block::ALONG, along);
         let mut between = Vec3::zero();
         for (k, pair) in self.pairs().into_iter().enumerate() {
-            add_between(pair, &ends, fields[5].0[k], (0.0, 0.0), k, &mut out);
+            add_between(pair, &ends, fields[5].0[k], GapFactors::NONE, k, &mut out);
             between.0[k] = cosine(pair, &ends[0], &ends[1]);
         }
         out.add_force(block::BETWEEN, between);

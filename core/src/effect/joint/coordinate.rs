@@ -2,7 +2,7 @@
 
 use super::{FreeCoordinate, Joint};
 use crate::kernel::ElementSystem;
-use crate::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use crate::kernel::joint::{DirectionPair, End, GapFactors, add_along, add_between, block, cosine, slides};
 use crate::system::State;
 use crate::tensor::Vec3;
 use std::f64::consts::PI;
@@ -33,18 +33,18 @@ pub fn nearest_angle(angle: f64) -> f64 {
 }
 
 impl Coordinate {
-    /// Adds the forces of a multiplier on this coordinate, `weight` times their tangent, and `couple` times the multiplier's own row and
-    /// column, number `row` of its block.
-    pub fn add_multiplier(&self, multiplier: f64, (weight, couple): (f64, f64), row: usize, out: &mut ElementSystem) {
+    /// Adds the forces of a multiplier on this coordinate, their tangent, and the multiplier's own row and column, number `row` of its
+    /// block.
+    pub fn add_multiplier(&self, multiplier: f64, factors: GapFactors, row: usize, out: &mut ElementSystem) {
         let mut unit = Vec3::ZERO;
-        unit.0[row] = couple;
+        unit.0[row] = factors.multiplier;
         for k in 0..4 {
             out.add_force(k, self.gradient[k] * multiplier);
             let column = self.gradient[k].outer(unit);
             out.add_tangent(k, block::BETWEEN, column);
             out.add_tangent(block::BETWEEN, k, column.transpose());
             for j in 0..4 {
-                out.add_tangent(k, j, self.hessian.tangent_block(k, j).scale(multiplier * weight));
+                out.add_tangent(k, j, self.hessian.tangent_block(k, j).scale(multiplier * factors.forces));
             }
         }
     }
@@ -67,7 +67,7 @@ impl Joint {
     /// How far B has slid along e_1 of A.
     fn slide_of(&self, ends: &[End; 2]) -> Coordinate {
         let mut own = ElementSystem::new(block::COUNT);
-        add_along(&self.axes, &self.arms, ends, Vec3::UNIT[0], (1.0, 0.0), &mut own);
+        add_along(&self.axes, &self.arms, ends, Vec3::UNIT[0], GapFactors::HESSIAN, &mut own);
         Coordinate {
             value: slides(&self.axes, &self.arms, &ends[0], &ends[1]).0[0],
             gradient: [0, 1, 2, 3].map(|k| own.force_block(k)),
@@ -82,13 +82,14 @@ impl Joint {
     /// ```
     pub(super) fn angle_of(&self, ends: &[End; 2]) -> Coordinate {
         let e = |k: usize| self.axes.column(k);
-        let part = |directions: (Vec3, Vec3)| {
+        let part = |a: Vec3, b: Vec3| {
+            let directions = DirectionPair { a, b };
             let mut own = ElementSystem::new(block::COUNT);
-            add_between(directions, ends, 1.0, (1.0, 0.0), 0, &mut own);
+            add_between(directions, ends, 1.0, GapFactors::HESSIAN, 0, &mut own);
             (cosine(directions, &ends[0], &ends[1]), own)
         };
-        let (c, dc) = part((e(1), e(1)));
-        let (s, ds) = part((e(1), -e(2)));
+        let (c, dc) = part(e(1), e(1));
+        let (s, ds) = part(e(1), -e(2));
         let scale = 1.0 / (c * c + s * s);
         let gradient: [Vec3; 4] = std::array::from_fn(|k| (ds.force_block(k) * c - dc.force_block(k) * s) * scale);
         let mut hessian = ElementSystem::new(block::COUNT);

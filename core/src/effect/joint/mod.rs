@@ -10,7 +10,7 @@ pub use drive::{Drive, Motor, SpringDamper};
 pub use kind::{FreeCoordinate, GroundHold, JointKind, NormalPair};
 
 use super::{Constraint, Driven, Effect, Energy, MotorState, Roles, TangentForm};
-use crate::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use crate::kernel::joint::{DirectionPair, End, GapFactors, add_along, add_between, block, cosine, slides};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
 use crate::scalar::{Jet, Real};
@@ -97,9 +97,9 @@ impl Joint {
     }
 
     /// The pairs of directions that stay normal.
-    fn pairs<T: Real>(&self) -> Vec<(Vec3<T>, Vec3<T>)> {
+    fn pairs<T: Real>(&self) -> Vec<DirectionPair<T>> {
         let e = |k: usize| Vec3::<T>::constant(self.axes.column(k));
-        self.normal.iter().map(|&(i, k)| (e(i), e(k))).collect()
+        self.normal.iter().map(|&(i, k)| DirectionPair { a: e(i), b: e(k) }).collect()
     }
 
     /// The motor of its angle, with the row of its multiplier: behind those of the pairs.
@@ -159,8 +159,9 @@ impl Joint {
         }
         if let Some((motor, row)) = self.turning_motor() {
             let e = |k: usize| Vec3::<Jet>::constant(self.axes.column(k));
-            let sine = -cosine((e(1), e(2)), &ends[0], &ends[1]);
-            between.0[row] = sine.atan2(cosine((e(1), e(1)), &ends[0], &ends[1])) - motor.course(at);
+            let cosine_of = |b: Vec3<Jet>| cosine(DirectionPair { a: e(1), b }, &ends[0], &ends[1]);
+            let sine = -cosine_of(e(2));
+            between.0[row] = sine.atan2(cosine_of(e(1))) - motor.course(at);
         }
         Gaps { along, between }
     }
@@ -178,7 +179,7 @@ impl Joint {
     fn hold(&self, at: &State, ends: &[End; 2], weights: Weights, out: &mut ElementSystem) {
         // Without a stiffness in the tangent the multipliers belong to accelerations.
         let couple = if weights.stiffness != 0.0 { weights.stiffness } else { weights.mass };
-        let factors = (weights.stiffness, couple);
+        let factors = GapFactors { forces: weights.stiffness, multiplier: couple };
         let gaps = self.gaps(at, ends);
         if self.pulls() {
             let force = self.multipliers(at, self.along);
