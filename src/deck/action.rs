@@ -1,9 +1,10 @@
 //! What acts on a scene: supports, motions, joints, bodies, springs, loads, initial velocities, histories.
 
-use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
+use super::diagnostic::{Diagnostic, Span, Spanned, nearest, one_of};
 use super::expression::Expression;
 use super::geometry::{check_name, matrix, read_point};
 use super::reader::{Context, Item, Table, kind_of};
+use beamsim_core::effect::joint::JointKind;
 use toml::de::DeValue;
 
 /// Two orthonormal directions; the third follows.
@@ -96,21 +97,6 @@ pub enum JointParts {
         /// Where the joint sits; left out: at the last of them
         at: Option<Spanned<super::PointRef>>,
     },
-}
-
-/// Kinds of joints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointKind {
-    /// Rotations are free.
-    Spherical,
-    /// Turns about its axis.
-    Revolute,
-    /// Turns about one axis of the first part and one of the second.
-    Universal,
-    /// Slides along its axis.
-    Prismatic,
-    /// Holds everything.
-    Rigid,
 }
 
 /// `[[body]]`
@@ -449,14 +435,8 @@ const JOINT_KEYS: [&str; 11] =
 pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Joint> {
     let table = Table::new(context, item, "[[joint]]", &JOINT_KEYS)?;
     table.required("kind")?;
-    let kinds = ["spherical", "revolute", "universal", "prismatic", "rigid"];
-    let kind = table.word("kind", &kinds).map(|word| match word.value {
-        "spherical" => JointKind::Spherical,
-        "revolute" => JointKind::Revolute,
-        "universal" => JointKind::Universal,
-        "prismatic" => JointKind::Prismatic,
-        _ => JointKind::Rigid,
-    });
+    let words = JointKind::ALL.map(|kind| kind.word);
+    let kind = table.word("kind", &words).and_then(|word| JointKind::of_word(word.value));
     let parts = read_joint_parts(&table);
     let (kind, parts) = (kind?, parts?);
     let axes = read_joint_axes(&table, kind);
@@ -511,10 +491,10 @@ fn read_joint_parts(table: &Table) -> Option<JointParts> {
 
 fn read_joint_axes(table: &Table, kind: JointKind) -> Option<Vec<[f64; 3]>> {
     let context = table.context;
-    let wanted = match kind {
-        JointKind::Revolute | JointKind::Prismatic => Some("axis"),
-        JointKind::Universal => Some("axes"),
-        JointKind::Spherical | JointKind::Rigid => None,
+    let wanted = match kind.axes {
+        0 => None,
+        1 => Some("axis"),
+        _ => Some("axes"),
     };
     for key in ["axis", "axes"].into_iter().filter(|key| table.has(key) && Some(*key) != wanted) {
         let message = match wanted {
@@ -550,18 +530,26 @@ fn read_joint_axes(table: &Table, kind: JointKind) -> Option<Vec<[f64; 3]>> {
     }
 }
 
-/// Springs, dampers and motors act on the one free direction of a revolute or prismatic joint.
+/// Refuses springs, dampers and motors of joints that have no free coordinate for them, and motors of another coordinate.
 fn refuse_drive_of_others(table: &Table, kind: JointKind) {
-    let own: &[&str] = match kind {
-        JointKind::Revolute => &["stiffness", "damping", "angle", "history"],
-        JointKind::Prismatic => &["stiffness", "damping", "displacement", "history"],
-        _ => &[],
-    };
+    let own = kind.driven.map(|coordinate| ["stiffness", "damping", coordinate.word(), "history"]);
     let keys = ["stiffness", "damping", "angle", "displacement", "history"];
-    for key in keys.into_iter().filter(|key| table.has(key) && !own.contains(key)) {
-        let message = format!("this kind of joint has no `{key}`");
-        table.context.report(Diagnostic::error(message, table.key_span(key)));
+    for key in keys.into_iter().filter(|key| table.has(key) && !own.is_some_and(|own| own.contains(key))) {
+        let help = match kind.driven {
+            Some(coordinate) => format!("its motor is `{}`", coordinate.word()),
+            None => format!(
+                "springs, dampers and motors belong to joints with one free coordinate: {}",
+                one_of(driven_kinds())
+            ),
+        };
+        let message = format!("a {} joint has no `{key}`", kind.word);
+        table.context.report(Diagnostic::error(message, table.key_span(key)).help(help));
     }
+}
+
+/// The words of the joints that may have a spring, a damper or a motor.
+fn driven_kinds() -> Vec<&'static str> {
+    JointKind::ALL.iter().filter(|kind| kind.driven.is_some()).map(|kind| kind.word).collect()
 }
 
 pub(super) fn read_body<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Body> {

@@ -21,8 +21,8 @@ mod sweep;
 
 pub use accuracy::{Accuracy, is_named};
 pub use action::{
-    Axes, Body, Frame, HistoryBody, HistoryTable, HistoryUse, Initial, InitialTarget, Joint, JointKind, JointParts,
-    Load, LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,
+    Axes, Body, Frame, HistoryBody, HistoryTable, HistoryUse, Initial, InitialTarget, Joint, JointParts, Load,
+    LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,
 };
 pub use cost::{Cost, NormWord};
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};

@@ -5,6 +5,7 @@ use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
+use beamsim_core::effect::joint::FreeCoordinate;
 use beamsim_core::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
 use beamsim_core::run::Driven;
 use beamsim_core::system::{Direction, Node, Slot};
@@ -90,7 +91,7 @@ pub fn constraints(
     };
     for connection in connections.iter().filter(|connection| connection.is_support()) {
         let Some(node) = connection.nodes[1].map(|node| mesh.nodes[node].node) else { continue };
-        let directions = directions(connection.held(), connection.axes, node.u, node.p);
+        let directions = directions(connection.joint.kind.ground.components, connection.axes, node.u, node.p);
         note(&mut held, &directions, &StageSet::default(), &connection.joint.span, "joint to ground");
         supports.push(Support { directions, stages: StageSet::default() });
         match ground_motor(deck, histories, connection, node) {
@@ -118,7 +119,7 @@ pub fn constraints(
     SceneConstraints { supports, motions, driven }
 }
 
-/// What acts on the state instead of the forces.
+/// The constraints of a scene on the unknowns of its nodes.
 pub struct SceneConstraints {
     /// Supports
     pub supports: Vec<Support>,
@@ -138,11 +139,12 @@ fn ground_motor(
     let Some((value, name)) = &connection.joint.motor else { return Ok(None) };
     let history = find_history(deck, histories, name.as_ref())?;
     let axis = connection.axes.column(0);
-    let (kind, slot) = match connection.joint.kind {
-        deck::JointKind::Prismatic => (MotionKind::Translation, node.u),
-        _ => (MotionKind::Rotation, node.p),
-    };
-    Ok(Some(Motion::new(kind, slot, axis, *value, history, StageSet::default())))
+    let motion = |(kind, slot): (MotionKind, Slot)| Motion::new(kind, slot, axis, *value, history, StageSet::default());
+    let driven = connection.joint.kind.driven.map(|coordinate| match coordinate {
+        FreeCoordinate::Angle => (MotionKind::Rotation, node.p),
+        FreeCoordinate::Slide => (MotionKind::Translation, node.u),
+    });
+    Ok(driven.map(motion))
 }
 
 /// The history that a table names.
@@ -192,7 +194,7 @@ fn read_motion(
     })
 }
 
-/// Whether earlier tables hold all three directions of the slot, whenever this one holds its own.
+/// Earlier tables hold all three directions of the slot, whenever this one holds its own.
 fn spanned(earlier: &[Held], b: &Held) -> bool {
     let always = |a: &&Held| a.direction.slot == b.direction.slot && (a.stages.0.is_none() || a.stages == b.stages);
     let axes: Vec<Vec3> = earlier.iter().filter(always).map(|a| a.direction.axis).collect();

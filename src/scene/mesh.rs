@@ -3,7 +3,7 @@
 use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
+use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
 use beamsim_core::kernel::{MAX_NODES, shape};
 use beamsim_core::model::Names;
 use beamsim_core::system::Node;
@@ -283,7 +283,7 @@ impl Mesh {
                 }
                 // The first beam may have been parted from the point before.
                 let first = beams.first().and_then(|first| self.parted.get(&(first.value.clone(), point.clone())));
-                let shares = (joint.kind != JointKind::Prismatic).then_some(first.copied().unwrap_or(main));
+                let shares = joint.kind.shares_displacement().then_some(first.copied().unwrap_or(main));
                 self.names.give(self.slots, &format!("{point} ({})", second.value));
                 let node = self.add_node(place, shares);
                 self.parted.insert(key, node);

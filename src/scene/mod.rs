@@ -22,9 +22,9 @@ pub use section::{MassPerLength, SectionMatrices};
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
 };
-use beamsim_core::effect::beam_elasticity::StressField;
-use beamsim_core::effect::link;
-use beamsim_core::effect::rigid_body::Body;
+use beamsim_core::effect::elasticity::StressField;
+use beamsim_core::effect::inertia::Body;
+use beamsim_core::effect::spring::Link;
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
 use beamsim_core::probe::{Figure, Probe, Quantity};
@@ -59,7 +59,7 @@ pub struct Scene {
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables between nodes
-    pub links: Vec<link::Instance>,
+    pub links: Vec<Link>,
     /// The deck with expressions replaced by numbers
     pub resolved: serde_json::Value,
     /// What knows of resultants

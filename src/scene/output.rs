@@ -3,7 +3,7 @@
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
 use crate::deck::{Deck, Diagnostic, Spanned, nearest};
-use beamsim_core::effect::beam_elasticity::StressField;
+use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{BeamPoint, NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
 use std::sync::Arc;
 

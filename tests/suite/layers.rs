@@ -3,12 +3,17 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of warnings.
+/// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of warnings and
+/// [`DECK_ROWS`].
 #[rustfmt::skip]
 const ORDER: [&str; 18] = [
     "warning", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "run", "probe",
     "deck", "scene", "output", "study", "cli",
 ];
+
+/// Tables of data whose rows carry the deck's words: `deck` reads these words from the one table that the mechanics use, so that a new row
+/// is a new word.
+const DECK_ROWS: [&str; 1] = ["beamsim_core::effect::joint::JointKind"];
 
 /// Crates that only some places may use; a place is a file or a folder.
 const CRATES: [(&str, &[&str]); 14] = [
@@ -176,7 +181,10 @@ fn module_of(file: &str) -> &str {
 #[test]
 fn imports_run_only_downward() {
     let mut faults = Vec::new();
-    for (file, code) in library() {
+    for (file, mut code) in library() {
+        if module_of(&file) == "deck" {
+            DECK_ROWS.iter().for_each(|row| code = code.replace(row, ""));
+        }
         for (line, to) in imported_modules(&code) {
             match may_import(module_of(&file), &to) {
                 Ok(true) => {}

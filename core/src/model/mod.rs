@@ -18,7 +18,7 @@ pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Effect, Energy, Momentum, MotorState};
+use crate::effect::{Constraint, Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{
     Category, Direction, DofMap, FrameConflict, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System,
@@ -261,9 +261,14 @@ impl Model {
         jumps
     }
 
+    /// The effects that close gaps by multipliers.
+    fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
+        self.effects.iter().filter_map(|effect| effect.roles().constraint)
+    }
+
     /// Shows the motors of joints.
     pub fn each_motor(&self, state: &State, show: &mut dyn FnMut(MotorState)) {
-        self.effects.iter().for_each(|effect| effect.motors(state, show));
+        self.constraints().for_each(|constraint| constraint.motors(state, show));
     }
 
     /// Whether stages of a kind are linear in the displacements.
@@ -374,7 +379,7 @@ impl Model {
             state.amplitude_rates[k] = [rate, rate2];
         }
         let mut too_far = None;
-        for turned in self.effects.iter().filter_map(|effect| effect.turned(&before, &state.amplitude)) {
+        for turned in self.constraints().filter_map(|constraint| constraint.turned(&before, &state.amplitude)) {
             if turned.1 > LARGEST_TURN {
                 too_far = Some(turned);
             }
@@ -434,27 +439,28 @@ impl Model {
         sum
     }
 
-    /// What joints to ground do to a node, see [`Effect::held_by_ground`].
+    /// What joints to ground do to a node, see [`Constraint::held_by_ground`].
     pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
-        let parts = self.effects.iter().map(|effect| effect.held_by_ground(state, node));
+        let parts = self.constraints().map(|constraint| constraint.held_by_ground(state, node));
         parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
     }
 
     /// What is driven from outside: each coordinate with the derivative of the energy over it.
     pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
-        self.effects.iter().for_each(|effect| effect.drives(state, &mut |x, force| all.push((x, force))));
+        let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);
+        driven.for_each(|driven| driven.drives(state, &mut |x, force| all.push((x, force))));
         all
     }
 
-    /// Before a step is predicted, see [`Effect::steady`].
+    /// Before a step is predicted, see [`FreeSpins::steady`].
     pub fn steady(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.steady(state));
+        self.effects.iter().filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
     }
 
     /// After a converged state: turns of joints are counted, multipliers have no rates.
     pub fn remember(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.remember(state));
+        self.constraints().for_each(|constraint| constraint.remember(state));
         for &slot in &self.multipliers {
             let slot = slot as usize;
             [&mut state.v, &mut state.a, &mut state.algorithmic]
@@ -467,7 +473,7 @@ impl Model {
     /// Mass and momenta.
     pub fn momentum(&self, state: &State) -> Momentum {
         let mut sum = Momentum::default();
-        self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
+        self.effects.iter().filter_map(|effect| effect.roles().masses).for_each(|mass| sum.add(mass.momentum(state)));
         sum
     }
 }

@@ -3,7 +3,7 @@
 use super::Composer;
 use crate::deck::{EffectWord, StageBody};
 use beamsim_core::effect::Effect;
-use beamsim_core::effect::fading_inertia::FadingInertia;
+use beamsim_core::effect::inertia::FadingInertia;
 use beamsim_core::model::StageSet;
 use std::collections::BTreeSet;
 

@@ -5,13 +5,10 @@ use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
 use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
 use crate::scene::names;
 use crate::scene::section::MassPerLength;
-use beamsim_core::effect::beam_mass::BeamMass;
-use beamsim_core::effect::gravity::{BeamGravity, BodyGravity};
-use beamsim_core::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
-use beamsim_core::effect::rigid_body::{Body, RigidBody};
-use beamsim_core::effect::rotary_inertia::RotaryInertia;
-use beamsim_core::effect::rotating_frame::RotatingFrame;
-use beamsim_core::effect::section_inertia::SectionInertia;
+use beamsim_core::effect::inertia::{
+    BeamMass, BeamMassDamping, Body, BodyMassDamping, RigidBody, RotaryInertia, RotatingFrame, SectionInertia,
+};
+use beamsim_core::effect::load::{BeamGravity, BodyGravity};
 use beamsim_core::effect::{ByOrder, VolumeElements};
 use beamsim_core::kernel::inertia::Inertia;
 use beamsim_core::tensor::{Mat3, Vec3};

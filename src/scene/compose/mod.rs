@@ -10,13 +10,13 @@ use super::constraints::find_history;
 use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh, Rule, Station};
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
-use beamsim_core::effect::beam_elasticity::{BeamElasticity, ElasticElements, StressField};
-use beamsim_core::effect::elastic_element::ElasticElement;
-use beamsim_core::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
-use beamsim_core::effect::rigid_body::Body;
-use beamsim_core::effect::strain_rate_damping::StrainRateDamping;
+use beamsim_core::effect::elasticity::{
+    BeamElasticity, ElasticElement, ElasticElements, Interpolation, RelativeVectors, StrainRateDamping, StressField,
+    TotalVectors,
+};
+use beamsim_core::effect::inertia::Body;
+use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::effect::{Connection, Effect, VolumeElement, VolumeElements};
-use beamsim_core::effect::{link, spring};
 use beamsim_core::kernel::beam::StiffnessPoint;
 use beamsim_core::kernel::elastic::Strain;
 use beamsim_core::kernel::volume::VolumePoint;
@@ -64,9 +64,9 @@ pub struct Composition {
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables between nodes
-    pub links: Vec<link::Instance>,
+    pub links: Vec<Link>,
     /// Springs to ground
-    pub springs: Vec<spring::Instance>,
+    pub springs: Vec<GroundSpring>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
     pub multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses

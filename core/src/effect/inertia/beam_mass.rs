@@ -1,7 +1,7 @@
 //! Translational inertia of beams without eccentric mass: consistent mass matrices, which never change and know no charts.
 
-use super::volume::{VolumeElement, VolumeElements};
-use super::{AT_ONCE, ByOrder, Effect, Energy, Momentum, for_each_batch, shared};
+use crate::effect::volume::{VolumeElement, VolumeElements};
+use crate::effect::{AT_ONCE, ByOrder, Effect, Energy, Masses, Momentum, Roles, TangentForm, for_each_batch, shared};
 use crate::kernel::Weights;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, State};
 use crate::tensor::Vec3;
@@ -25,7 +25,7 @@ struct MassElement<const N: usize> {
     common: Arc<Common<N>>,
 }
 
-/// What neighbours share.
+/// The data that neighbours share.
 #[derive(Debug, PartialEq)]
 struct Common<const N: usize> {
     /// The initial places of the nodes as seen from the first
@@ -83,7 +83,7 @@ impl BeamMass {
         Self { elements: ByOrder { two: matrices(two), three: matrices(three), four: matrices(four) } }
     }
 
-    /// Whether no element has mass.
+    /// No element has mass.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
@@ -110,8 +110,8 @@ impl Effect for BeamMass {
         connectivity
     }
 
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
     }
 
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
@@ -135,6 +135,16 @@ impl Effect for BeamMass {
         Energy { kinetic, strain: 0.0 }
     }
 
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { masses: Some(self), ..Roles::NONE }
+    }
+}
+
+impl Masses for BeamMass {
     fn momentum(&self, at: &State) -> Momentum {
         let mut sum = Momentum::default();
         for_each_batch!(self.elements, |_first, batch| for element in batch {

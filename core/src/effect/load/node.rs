@@ -1,12 +1,12 @@
 //! Forces and moments at nodes: fixed in space, or turning with the section.
 
-use super::Effect;
+use crate::effect::{Effect, Roles, TangentForm};
 use crate::kernel::load::{material_force, material_moment, spatial_moment};
 use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, State};
 use crate::tensor::Vec3;
 
-/// What a load at a node is.
+/// Kinds of loads at nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeLoadKind {
     /// A force fixed in space: no tangent.
@@ -19,10 +19,10 @@ pub enum NodeLoadKind {
     MaterialMoment,
 }
 
-/// One load.
+/// A force or a moment at a node.
 #[derive(Clone, Copy, Debug)]
-pub struct Instance {
-    /// Where it acts
+pub struct NodeForce {
+    /// The node it acts at
     pub node: Node,
     /// Its components: spatial, or material in global axes of the initial placement
     pub vector: Vec3,
@@ -33,11 +33,11 @@ pub struct Instance {
 /// All loads at nodes of one kind.
 #[derive(Clone, Debug)]
 pub struct NodeLoad {
-    /// What they are
+    /// Their kind
     pub kind: NodeLoadKind,
     /// The loads
-    pub loads: Vec<Instance>,
-    /// Whether the tangent knows how they turn
+    pub loads: Vec<NodeForce>,
+    /// The tangent follows how they turn
     pub tangent: bool,
 }
 
@@ -67,8 +67,8 @@ impl Effect for NodeLoad {
         connectivity
     }
 
-    fn has_tangent(&self) -> bool {
-        self.tangent && self.kind != NodeLoadKind::SpatialForce
+    fn tangent(&self) -> TangentForm {
+        if self.tangent && self.kind != NodeLoadKind::SpatialForce { TangentForm::General } else { TangentForm::None }
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -103,5 +103,13 @@ impl Effect for NodeLoad {
             }
             out.add(k, &system);
         }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }

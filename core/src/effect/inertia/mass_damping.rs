@@ -1,11 +1,13 @@
 //! The mass part of Rayleigh damping: alpha M qd, on beams and bodies.
 
+use super::inertia_mirror_data;
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements, inertia_mirror_data};
+use crate::effect::{Effect, Roles, TangentForm, VolumeElements};
 use crate::kernel::inertia::{Drag, Inertia, drag};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
+use crate::tensor::Vec3;
 
 /// The damping of beams by the mass of their sections.
 #[derive(Clone, Debug)]
@@ -29,12 +31,24 @@ impl Effect for BeamMassDamping {
         self.elements.connectivity(Blocks::Both)
     }
 
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
+    }
+
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         self.elements.each_quantity(|inertia| inertia_mirror_data(inertia, show));
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         self.elements.add(&Drag { factor: self.factor }, at, weights, out);
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }
 
@@ -62,6 +76,10 @@ impl Effect for BodyMassDamping {
         connectivity
     }
 
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
+    }
+
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         self.bodies.iter().for_each(|body| inertia_mirror_data(&body.inertia, show));
     }
@@ -75,5 +93,13 @@ impl Effect for BodyMassDamping {
             force.write(weights, &mut system);
             out.add(k, &system);
         }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }

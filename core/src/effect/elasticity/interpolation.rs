@@ -1,8 +1,8 @@
 //! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and carries what the kernel
 //! gives back to the nodes of the scene.
 
-use super::elastic_element::Member;
-use super::{Connection, after_displacement, at_slots};
+use super::element::Member;
+use crate::effect::{Connection, after_displacement, at_slots};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::Stress;
 use crate::kernel::relative::Relative;
@@ -65,7 +65,7 @@ fn bases<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [M
     })
 }
 
-/// What is summed over the points of an element.
+/// A sum of forces and tangents over the points of an element.
 pub trait PointSum<const N: usize, T: Real> {
     /// Adds the force and `stiffness` times the tangent, for nodes that the kernel sees so.
     fn add(&self, nodes: &[NodePlace<T>; N], stiffness: f64, out: &mut ElementSystem<T>);
@@ -79,7 +79,7 @@ pub trait PointSum<const N: usize, T: Real> {
     }
 }
 
-/// Whether the only point of an element stands half way between two nodes.
+/// An element of two nodes, with its only point half way between them.
 pub const fn is_half_way(nodes: usize, points: usize) -> bool {
     nodes == 2 && points == 1
 }
@@ -173,13 +173,13 @@ fn extrapolated<const N: usize, const G: usize, T: Real>(
 
 /// A way to interpolate rotations.
 pub trait Interpolation: Send + Sync + 'static {
-    /// What their elasticity is called
+    /// The name of their elasticity
     const NAME: &'static str;
-    /// What their damping by strain rates is called
+    /// The name of their damping by strain rates
     const DAMPING_NAME: &'static str;
-    /// Whether what the kernel gives is carried back to other nodes, for which systems are needed
+    /// Forces and tangents of the kernel are carried back to other nodes, which takes systems to work in
     const CARRIES_BACK: bool;
-    /// What it makes of an element
+    /// An element as its kernel sees it
     type View<const N: usize, T: Real>: View<N, T>;
 
     /// An element, its nodes in one chart.

@@ -1,18 +1,20 @@
 //! Inertia of beam sections with a full 6x6 mass: the mass centre lies off the centre line, or J couples.
 
-use super::volume::VolumeElements;
-use super::{Effect, Energy, Momentum, inertia_mirror_data, rigid_body};
+use super::{inertia_mirror_data, rigid_body};
+use crate::effect::volume::VolumeElements;
+use crate::effect::{Effect, Energy, Masses, Momentum, Roles, TangentForm};
 use crate::kernel::inertia::{Eccentric, Inertia};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{NodeMotion, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
+use crate::tensor::Vec3;
 
 /// All beam elements with eccentric mass, by their mass properties per length.
 #[derive(Clone, Debug, Default)]
 pub struct SectionInertia {
     /// The elements
     pub elements: VolumeElements<Inertia>,
-    /// Whether forces that spins have without accelerations count
+    /// Spins have forces without accelerations
     pub gyroscopic: bool,
 }
 
@@ -27,6 +29,10 @@ impl Effect for SectionInertia {
 
     fn connectivity(&self) -> Connectivity {
         self.elements.connectivity(Blocks::Both)
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -46,6 +52,16 @@ impl Effect for SectionInertia {
         Energy { kinetic, strain: 0.0 }
     }
 
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { masses: Some(self), ..Roles::NONE }
+    }
+}
+
+impl Masses for SectionInertia {
     fn momentum(&self, at: &State) -> Momentum {
         let mut sum = Momentum::default();
         let momentum = |sum: &mut Momentum, inertia: &Inertia, w: f64, place, motion: &NodeMotion| {

@@ -1,7 +1,7 @@
 //! Inertia of bodies at nodes in a scene that lies in a plane.
 
 use super::rigid_body::{RigidBody, are_centred};
-use super::{PlanarForm, at_slots, own_blocks};
+use crate::effect::{PlanarForm, at_slots, own_blocks};
 use crate::kernel::planar::PlanarBody;
 use crate::kernel::{ElementSystem, PlanarSystem, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, each_lane};

@@ -1,14 +1,14 @@
 //! Forces and moments per initial length along beams: fixed in space, or turning with the section.
 
-use super::Effect;
-use super::volume::VolumeElements;
+use crate::effect::volume::VolumeElements;
+use crate::effect::{Effect, Roles, TangentForm};
 use crate::kernel::Weights;
 use crate::kernel::load::{Intensity, Line};
 use crate::kernel::volume::Blocks;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
-/// Whether the components are spatial or turn with the section.
+/// The frame of the components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineLoadKind {
     /// Fixed in space
@@ -20,11 +20,11 @@ pub enum LineLoadKind {
 /// All line loads of one kind.
 #[derive(Clone, Debug)]
 pub struct LineLoad {
-    /// What they are
+    /// Their frame
     pub kind: LineLoadKind,
     /// The loaded elements
     pub elements: VolumeElements<Intensity>,
-    /// Whether the tangent knows how they turn
+    /// The tangent follows how they turn
     pub tangent: bool,
 }
 
@@ -44,9 +44,9 @@ impl Effect for LineLoad {
         self.elements.connectivity(Blocks::Both)
     }
 
-    fn has_tangent(&self) -> bool {
+    fn tangent(&self) -> TangentForm {
         let turns = self.kind == LineLoadKind::Material || self.elements.any(|line| line.moment != Vec3::ZERO);
-        self.tangent && turns
+        if self.tangent && turns { TangentForm::General } else { TangentForm::None }
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -62,5 +62,13 @@ impl Effect for LineLoad {
             LineLoadKind::Spatial => self.elements.add(&Line::<false> { amplitudes }, at, weights, out),
             LineLoadKind::Material => self.elements.add(&Line::<true> { amplitudes }, at, weights, out),
         }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }

@@ -11,10 +11,10 @@
 //! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s, whatever its interpolation. b_k is
 //! its force under a unit stress, and G_k qd the rate of that: a jet along the motion brings both.
 
-use super::beam_elasticity::BeamElasticity;
-use super::elastic_element::{ElasticElement, Member};
+use super::beam::BeamElasticity;
+use super::element::{ElasticElement, Member};
 use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
-use super::{Effect, after_displacement, for_each_batch};
+use crate::effect::{Effect, Roles, TangentForm, after_displacement, for_each_batch};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Point, Stiffness, Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
@@ -45,6 +45,10 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
         self.elasticity.connectivity()
     }
 
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
+    }
+
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
         // Of the elasticity, which shows itself.
     }
@@ -53,6 +57,14 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
         for_each_batch!(self.elasticity.elements, out.instances(), |first, batch| {
             add_batch::<I, _, _>(batch, first, self.factor, at, weights, out);
         });
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }
 

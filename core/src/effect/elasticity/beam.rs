@@ -1,9 +1,12 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
-use super::elastic_element::ElasticElement;
+use super::element::ElasticElement;
 use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
-use super::planar_elasticity::PlanarElasticity;
-use super::{AT_ONCE, ByOrder, Effect, Energy, PlanarForm, RoundOff, at_slots, for_each_batch, side_by_side};
+use super::planar::PlanarElasticity;
+use crate::effect::{
+    AT_ONCE, ByOrder, Driven, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints, TangentForm, at_slots,
+    for_each_batch, side_by_side,
+};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Strain, Stress};
 use crate::kernel::{ElementSystem, NodePlace, Weights};
@@ -91,8 +94,8 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         connectivity
     }
 
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -117,11 +120,6 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         Some(Box::new(PlanarElasticity::new(self, *plane)))
     }
 
-    fn memory_points(&self) -> usize {
-        let ByOrder { two, three, four } = &self.elements;
-        self.points_before(two.len() + three.len() + four.len())
-    }
-
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
         let remembered = self.remembered(memory);
         for_each_batch!(self.elements, out.instances(), |first, batch| {
@@ -140,14 +138,6 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         });
     }
 
-    fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
-        for_each_batch!(self.elements, |first, batch| {
-            let own = &mut memory.points[self.points_before(first)..self.points_before(first + batch.len())];
-            extrapolate_batch::<I, _, _>(batch, at, dq, own);
-        });
-        memory.valid = true;
-    }
-
     fn energy(&self, at: &State) -> Energy {
         let mut strain = 0.0;
         for_each_batch!(self.elements, |_first, batch| {
@@ -164,6 +154,25 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         largest
     }
 
+    fn roles(&self) -> Roles<'_> {
+        Roles { stresses: Some(self), driven: Some(self), ..Roles::NONE }
+    }
+}
+
+impl<I: Interpolation> StressPoints for BeamElasticity<I> {
+    fn memory_points(&self) -> usize {
+        let ByOrder { two, three, four } = &self.elements;
+        self.points_before(two.len() + three.len() + four.len())
+    }
+
+    fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
+        for_each_batch!(self.elements, |first, batch| {
+            let own = &mut memory.points[self.points_before(first)..self.points_before(first + batch.len())];
+            extrapolate_batch::<I, _, _>(batch, at, dq, own);
+        });
+        memory.valid = true;
+    }
+
     fn stiffness_along(&self, at: &State, field: &[Vec3]) -> Option<f64> {
         let mut sum = 0.0;
         for_each_batch!(self.elements, |_first, batch| for element in batch {
@@ -172,6 +181,20 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         Some(sum)
     }
 
+    fn round_off(&self, at: &State) -> RoundOff {
+        let mut largest = RoundOff::default();
+        for_each_batch!(self.elements, |_first, batch| {
+            threads::in_order(
+                batch.chunks(AT_ONCE),
+                |part| noise_of(part, at),
+                |round_off| largest = largest.or(round_off),
+            );
+        });
+        largest
+    }
+}
+
+impl<I: Interpolation> Driven for BeamElasticity<I> {
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element
@@ -185,18 +208,6 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
                 .sum();
             show(element.free_amplitude(at), pull);
         });
-    }
-
-    fn round_off(&self, at: &State) -> RoundOff {
-        let mut largest = RoundOff::default();
-        for_each_batch!(self.elements, |_first, batch| {
-            threads::in_order(
-                batch.chunks(AT_ONCE),
-                |part| noise_of(part, at),
-                |round_off| largest = largest.or(round_off),
-            );
-        });
-        largest
     }
 }
 
@@ -253,7 +264,7 @@ pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement
     (ElementSystem::new(2 * N), Scratch::new(N))
 }
 
-/// What is remembered of the points of element k.
+/// The remembered stresses of the points of element k.
 pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
     let own = remembered.get(k * G..(k + 1) * G)?;
     Some(std::array::from_fn(|g| unpack(&own[g])))

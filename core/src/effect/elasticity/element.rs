@@ -1,6 +1,6 @@
 //! Elastic elements as they are kept: what neighbours have in common stands once.
 
-use super::{Connection, RoundOff, shared};
+use crate::effect::{Connection, RoundOff, shared};
 use crate::kernel::beam::StiffnessPoint;
 use crate::scalar::{LANES, Lanes, Pack, each_lane};
 use crate::tensor::Vec3;
@@ -21,7 +21,7 @@ pub struct ElasticElement<const N: usize, const G: usize> {
     common: Arc<Common<N, G>>,
 }
 
-/// What neighbours share.
+/// The data that neighbours share.
 #[derive(Debug, PartialEq)]
 struct Common<const N: usize, const G: usize> {
     /// The initial places of the nodes as seen from the first
@@ -56,7 +56,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         Self { connection, free: free.map(|number| number as u32), length, common }
     }
 
-    /// Whether it shares all with another element.
+    /// It shares all data with another element.
     pub fn is_like(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.common, &other.common)
     }

@@ -1,9 +1,9 @@
 //! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a node.
 
-use super::beam_elasticity::{BeamElasticity, stresses_of, workspace};
-use super::elastic_element::ElasticElement;
+use super::beam::{BeamElasticity, stresses_of, workspace};
+use super::element::ElasticElement;
 use super::interpolation::Interpolation;
-use super::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
+use crate::effect::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
 use crate::kernel::elastic::Stress;
 use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
@@ -157,7 +157,7 @@ fn extrapolate_blocks<const N: usize, const G: usize>(
         in_one_turn(&mut nodes);
         for g in 0..G {
             let stress = block.points[g].extrapolated_stress(&nodes, free(elements, at), &change);
-            let packed = super::beam_elasticity::packed(&in_space(stress, plane.axes()));
+            let packed = super::beam::packed(&in_space(stress, plane.axes()));
             for k in 0..elements.len() {
                 out[(start + k) * G + g] = packed.map(|lanes| lanes.0[k]);
             }
@@ -166,6 +166,10 @@ fn extrapolate_blocks<const N: usize, const G: usize>(
 }
 
 impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
         let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
         let (two, three) = (elements.two.len(), elements.three.len());

@@ -1,8 +1,8 @@
 //! Weight of beams and bodies: forces fixed in space at the mass centres.
 
-use super::rigid_body::Body;
-use super::volume::VolumeElements;
-use super::{Effect, inertia_mirror_data};
+use crate::effect::inertia::{Body, inertia_mirror_data};
+use crate::effect::volume::VolumeElements;
+use crate::effect::{Effect, Roles, TangentForm};
 use crate::kernel::inertia::Inertia;
 use crate::kernel::load::{Weight, offset_force};
 use crate::kernel::volume::Blocks;
@@ -34,12 +34,12 @@ impl Effect for BeamGravity {
         self.elements.connectivity(Blocks::Both)
     }
 
-    fn has_tangent(&self) -> bool {
-        self.elements.any(|inertia| inertia.offset != Vec3::ZERO)
-    }
-
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        if self.elements.any(|inertia| inertia.offset != Vec3::ZERO) {
+            TangentForm::Symmetric
+        } else {
+            TangentForm::None
+        }
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -50,6 +50,14 @@ impl Effect for BeamGravity {
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let acceleration = self.acceleration * at.amplitude[self.amplitude];
         self.elements.add(&Weight { acceleration }, at, weights, out);
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }
 
@@ -79,12 +87,12 @@ impl Effect for BodyGravity {
         connectivity
     }
 
-    fn has_tangent(&self) -> bool {
-        self.bodies.iter().any(|body| body.inertia.offset != Vec3::ZERO)
-    }
-
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        if self.bodies.iter().any(|body| body.inertia.offset != Vec3::ZERO) {
+            TangentForm::Symmetric
+        } else {
+            TangentForm::None
+        }
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -107,5 +115,13 @@ impl Effect for BodyGravity {
             }
             out.add(k, &system);
         }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }

@@ -1,7 +1,7 @@
 //! Rotary inertia of beam sections without eccentric mass: mass, gyroscopic and centrifugal terms ((51), (52), (68)–(71)).
 
-use super::volume::VolumeElements;
-use super::{Effect, Energy, Momentum, quadratic};
+use crate::effect::volume::VolumeElements;
+use crate::effect::{Effect, Energy, Masses, Momentum, Roles, TangentForm, quadratic};
 use crate::kernel::inertia::Rotary;
 use crate::kernel::volume::Blocks;
 use crate::kernel::{NodeMotion, Weights};
@@ -14,7 +14,7 @@ use crate::tensor::{Mat3, Vec3};
 pub struct RotaryInertia {
     /// The elements
     pub elements: VolumeElements<Mat3>,
-    /// Whether forces that spins have without accelerations count
+    /// Spins have forces without accelerations
     pub gyroscopic: bool,
 }
 
@@ -29,6 +29,10 @@ impl Effect for RotaryInertia {
 
     fn connectivity(&self) -> Connectivity {
         self.elements.connectivity(Blocks::Rotations)
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -47,6 +51,16 @@ impl Effect for RotaryInertia {
         Energy { kinetic, strain: 0.0 }
     }
 
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { masses: Some(self), ..Roles::NONE }
+    }
+}
+
+impl Masses for RotaryInertia {
     fn momentum(&self, at: &State) -> Momentum {
         let mut angular = Vec3::ZERO;
         let momentum = |sum: &mut Vec3, j: &Mat3, w: f64, _, motion: &NodeMotion| {

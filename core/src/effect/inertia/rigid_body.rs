@@ -1,8 +1,10 @@
 //! Rigid bodies at nodes, with their mass centre at an offset.
 
-use super::planar_inertia::PlanarBodies;
-use super::{
-    AT_ONCE, Effect, Energy, Momentum, PlanarForm, at_slots, inertia_mirror_data, motion_of, quadratic, side_by_side,
+use super::inertia_mirror_data;
+use super::planar::PlanarBodies;
+use crate::effect::{
+    AT_ONCE, Effect, Energy, Masses, Momentum, PlanarForm, Roles, TangentForm, at_slots, motion_of, quadratic,
+    side_by_side,
 };
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
@@ -26,11 +28,11 @@ pub struct Body {
 /// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at their nodes.
 #[derive(Clone, Debug)]
 pub struct RigidBody {
-    /// What they are
+    /// The effect's name
     pub name: &'static str,
     /// The bodies
     pub bodies: Vec<Body>,
-    /// Whether forces that spins have without accelerations count
+    /// Spins have forces without accelerations
     pub gyroscopic: bool,
 }
 
@@ -47,6 +49,10 @@ impl Effect for RigidBody {
         let mut connectivity = Connectivity::divisible();
         self.bodies.iter().for_each(|body| connectivity.push([body.node.u, body.node.p]));
         connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -76,20 +82,30 @@ impl Effect for RigidBody {
         }
     }
 
-    fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
-        self.bodies.iter().for_each(|body| show(body.node, &body.inertia));
-    }
-
     fn energy(&self, at: &State) -> Energy {
         let mut kinetic = 0.0;
         threads::in_order(self.bodies.chunks(AT_ONCE), |bodies| energy_of(bodies, at), |own| kinetic += own);
         Energy { kinetic, strain: 0.0 }
     }
 
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { masses: Some(self), ..Roles::NONE }
+    }
+}
+
+impl Masses for RigidBody {
     fn momentum(&self, at: &State) -> Momentum {
         let mut sum = Momentum::default();
         self.bodies.iter().for_each(|b| sum.add(momentum(&b.inertia, b.place, &at.motion(b.node), 1.0)));
         sum
+    }
+
+    fn bodies(&self, show: &mut dyn FnMut(Node, &Inertia)) {
+        self.bodies.iter().for_each(|body| show(body.node, &body.inertia));
     }
 }
 
@@ -147,7 +163,7 @@ impl RigidBody {
     }
 }
 
-/// Whether every mass centre is at its node.
+/// Every mass centre is at its node.
 pub(super) fn are_centred(bodies: &[Body]) -> bool {
     bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
 }

@@ -2,8 +2,9 @@
 //!
 //! It stands for all inertia of its stage: of steady states, and of small motions about them.
 
+use super::inertia_mirror_data;
 use super::rigid_body::Body;
-use super::{Effect, VolumeElements, inertia_mirror_data, own_part};
+use crate::effect::{Effect, Roles, TangentForm, VolumeElements, own_part};
 use crate::kernel::inertia::{Inertia, SteadilyTurned, steadily_turned};
 use crate::kernel::volume::Blocks;
 use crate::kernel::{ElementSystem, Weights};
@@ -42,6 +43,10 @@ impl Effect for RotatingFrame {
         connectivity
     }
 
+    fn tangent(&self) -> TangentForm {
+        TangentForm::General
+    }
+
     fn acts(&self, stage: &StageContext) -> bool {
         stage.number == self.stage
     }
@@ -64,5 +69,13 @@ impl Effect for RotatingFrame {
             force.write(weights, &mut system);
             out.add(first + k, &system);
         }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }

@@ -4,16 +4,16 @@
 //! n = (x_b - x_a)/l,   F = k (l - l0) + c dl/dt,   f_b = F n = -f_a
 //! ```
 
-use super::{Effect, Energy};
+use crate::effect::{Effect, Energy, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
 use crate::scalar::Real;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// One of them.
+/// A spring or cable between two nodes.
 #[derive(Clone, Copy, Debug)]
-pub struct Instance {
-    /// Its ends
+pub struct Link {
+    /// The nodes at its ends
     pub nodes: [Node; 2],
     /// Their initial places
     pub places: [Vec3; 2],
@@ -29,11 +29,11 @@ pub struct Instance {
     pub amplitude: usize,
 }
 
-/// All of them.
+/// All springs and cables between nodes.
 #[derive(Clone, Debug)]
 pub struct Links {
     /// The springs and cables
-    pub links: Vec<Instance>,
+    pub links: Vec<Link>,
 }
 
 /// The force at the second node and its derivatives over its place and velocity, relative to the first.
@@ -49,7 +49,7 @@ pub struct Pull<T = f64> {
     pub over_velocity: Mat3<T>,
 }
 
-impl Instance {
+impl Link {
     /// The pull over the vector `d` from the first node to the second, and its rate.
     pub fn pull<T: Real>(&self, d: Vec3<T>, rate: Vec3<T>) -> Pull<T> {
         let zero = Pull {
@@ -108,8 +108,8 @@ impl Effect for Links {
         connectivity
     }
 
-    fn is_symmetric(&self) -> bool {
-        !self.damps()
+    fn tangent(&self) -> TangentForm {
+        TangentForm::symmetric(!self.damps())
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -138,7 +138,7 @@ impl Effect for Links {
     }
 
     fn energy(&self, at: &State) -> Energy {
-        let one = |link: &Instance| {
+        let one = |link: &Link| {
             let stretch = link.between(at).0.norm() - link.length;
             let slack = link.tension_only && stretch <= 0.0;
             if slack { 0.0 } else { 0.5 * link.stiffness * stretch * stretch * at.amplitude[link.amplitude] }
@@ -147,7 +147,7 @@ impl Effect for Links {
     }
 
     fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
-        let one = |link: &Instance| {
+        let one = |link: &Link| {
             let [a, b] = link.nodes.map(|node| field[node.u as usize]);
             let (d, change) = (link.between(at).0, b - a);
             let distance = d.norm();
@@ -158,5 +158,9 @@ impl Effect for Links {
         };
         let acting = self.links.iter().filter(|link| at.amplitude[link.amplitude] != 0.0);
         acting.map(one).fold(0.0, f64::max)
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }

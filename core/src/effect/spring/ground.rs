@@ -4,7 +4,7 @@
 //! it pulls with 4 pi times its stiffness, and it does not notice when the node changes its chart. With the unwrapped vector
 //! Pw = P + 2 pi k n, D = dPw/dP and stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
 
-use super::{Effect, Energy};
+use crate::effect::{Effect, Energy, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::{Complement, Rotation, log, nearest_turn, unwound};
 use crate::scalar::Real;
@@ -15,9 +15,9 @@ use std::f64::consts::PI;
 /// Rotation vectors shorter than this have come to a whole turn.
 const WHOLE_TURN: f64 = 1e-9;
 
-/// One spring.
+/// A spring with a damper from a node to ground.
 #[derive(Clone, Copy, Debug)]
-pub struct Instance {
+pub struct GroundSpring {
     /// The node it holds
     pub node: Node,
     /// Its stiffness against displacement, global components
@@ -32,14 +32,14 @@ pub struct Instance {
     pub amplitude: usize,
 }
 
-/// All springs.
+/// All springs to ground.
 #[derive(Clone, Debug, Default)]
-pub struct Spring {
+pub struct GroundSprings {
     /// The springs
-    pub springs: Vec<Instance>,
+    pub springs: Vec<GroundSpring>,
 }
 
-impl Effect for Spring {
+impl Effect for GroundSprings {
     fn name(&self) -> &'static str {
         "springs to ground"
     }
@@ -49,7 +49,7 @@ impl Effect for Spring {
     }
 
     fn damps(&self) -> bool {
-        self.springs.iter().any(Instance::is_damped)
+        self.springs.iter().any(GroundSpring::is_damped)
     }
 
     fn connectivity(&self) -> Connectivity {
@@ -58,13 +58,13 @@ impl Effect for Spring {
         connectivity
     }
 
-    fn is_symmetric(&self) -> bool {
-        !self.damps()
+    fn tangent(&self) -> TangentForm {
+        TangentForm::symmetric(!self.damps())
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for spring in &self.springs {
-            let Instance { translation, rotation, translation_damping, rotation_damping, .. } = *spring;
+            let GroundSpring { translation, rotation, translation_damping, rotation_damping, .. } = *spring;
             for tensor in [translation, rotation, translation_damping, rotation_damping] {
                 show(MirrorData::Tensor(tensor));
             }
@@ -98,7 +98,7 @@ impl Effect for Spring {
     }
 
     fn energy(&self, at: &State) -> Energy {
-        let one = |spring: &Instance| {
+        let one = |spring: &GroundSpring| {
             let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
             let unwrapped = unwound(p, at.unwrapped_at(spring.node.p));
             0.5 * at.amplitude[spring.amplitude]
@@ -112,16 +112,20 @@ impl Effect for Spring {
             let largest = stiffness.max_abs();
             if largest == 0.0 { 0.0 } else { (along.dot(stiffness * along) / largest).max(0.0).sqrt() }
         };
-        let one = |spring: &Instance| {
+        let one = |spring: &GroundSpring| {
             let (u, p) = (field[spring.node.u as usize], field[spring.node.p as usize]);
             held(spring.translation, u).max(held(spring.rotation, p) * length) / length
         };
         let acting = self.springs.iter().filter(|spring| at.amplitude[spring.amplitude] != 0.0);
         acting.map(one).fold(0.0, f64::max)
     }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
+    }
 }
 
-impl Instance {
+impl GroundSpring {
     fn is_damped(&self) -> bool {
         self.translation_damping != Mat3::ZERO || self.rotation_damping != Mat3::ZERO
     }
