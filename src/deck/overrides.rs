@@ -1,6 +1,7 @@
 //! `--set key=value`: changes a deck before it is read.
 
-use super::procedure::COEFFICIENTS;
+use super::scheme::{COEFFICIENTS, SchemeName};
+use super::words::Words;
 use toml_edit::{DocumentMut, Item, Key, Table, TableLike, Value};
 
 /// Applies `key=value` pairs to the text of a deck and gives the changed text.
@@ -46,12 +47,10 @@ fn drop_coefficients(document: &mut DocumentMut, number: &str, is_given: impl Fn
     };
     let Some(stage) = stage else { return };
     let Some(scheme) = stage.get("scheme").and_then(Item::as_str).map(str::to_string) else { return };
-    // A scheme that there is not is told when the deck is read.
-    let known = COEFFICIENTS.iter().any(|(_, owners)| owners.contains(&scheme.as_str()));
-    for (key, owners) in COEFFICIENTS {
-        if known && !owners.contains(&scheme.as_str()) && !is_given(key) {
-            stage.remove(key);
-        }
+    // An unknown scheme is reported when the deck is read.
+    let Some(scheme) = SchemeName::of(&scheme) else { return };
+    for key in COEFFICIENTS.into_iter().filter(|key| !scheme.coefficients().contains(key) && !is_given(key)) {
+        stage.remove(key);
     }
 }
 

@@ -1,6 +1,6 @@
 //! What is said of each key: the JSON Schema of the deck, which is the one source of words about keys.
 
-use super::diagnostic::nearest;
+use super::hints::nearest;
 use serde_json::Value;
 
 /// The JSON Schema (draft 7).

@@ -20,7 +20,7 @@ pub use names::Spot;
 pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{
-    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
+    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Words,
 };
 use crate::drive::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use crate::effect::beam_elasticity::StressField;
@@ -376,8 +376,8 @@ fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic
     for expect in &deck.expects {
         let source = expect.source.clone();
         match &expect.body {
-            ExpectBody::Fails(name) => {
-                found.push(Expectation { name: name.value.clone(), kind: ExpectationKind::Fails, source });
+            ExpectBody::Fails(failure) => {
+                found.push(Expectation { name: failure.word().into(), kind: ExpectationKind::Fails, source });
             }
             ExpectBody::Warns(kind) => {
                 found.push(Expectation { name: kind.name().into(), kind: ExpectationKind::Warns(*kind), source });

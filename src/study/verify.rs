@@ -1,6 +1,6 @@
 //! Expectations held against a run.
 
-use crate::deck::{Instant, Reduce};
+use crate::deck::{Instant, Reduce, Reduction, Words};
 use crate::drive::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
 use crate::probe::Probe;
 use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
@@ -219,7 +219,7 @@ fn describe(reduce: &Reduce) -> String {
         Reduce::At(Instant::End) => "at the end".into(),
         Reduce::At(Instant::Time(time)) => format!("at time {time}"),
         Reduce::At(Instant::Load(load)) => format!("at load {load}"),
-        how => how.word().into(),
+        Reduce::Over(reduction) => reduction.word().into(),
     }
 }
 
@@ -254,11 +254,11 @@ fn reduce(rows: &[Row], how: Reduce) -> Option<f64> {
         rows.iter().map(|row| of(row.value)).reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
     };
     match how {
-        Reduce::Max => fold(f64::max, &|v| v),
-        Reduce::Min => fold(f64::min, &|v| v),
-        Reduce::AbsMax => fold(f64::max, &f64::abs),
-        Reduce::Drift => fold(f64::max, &|v| (v - first).abs()),
-        Reduce::Mean => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
+        Reduce::Over(Reduction::Max) => fold(f64::max, &|v| v),
+        Reduce::Over(Reduction::Min) => fold(f64::min, &|v| v),
+        Reduce::Over(Reduction::AbsMax) => fold(f64::max, &f64::abs),
+        Reduce::Over(Reduction::Drift) => fold(f64::max, &|v| (v - first).abs()),
+        Reduce::Over(Reduction::Mean) => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
         Reduce::At(Instant::End) => rows.last().map(|row| row.value),
         Reduce::At(Instant::Time(time)) => at_time(rows, time),
         Reduce::At(Instant::Load(load)) => at_load(rows, load),
@@ -310,11 +310,11 @@ mod tests {
     #[test]
     fn rows_are_reduced_as_the_deck_says() {
         let value = |how| reduce(&rows(), how).unwrap();
-        assert_eq!(value(Reduce::Max), 4.0);
-        assert_eq!(value(Reduce::Min), -6.0);
-        assert_eq!(value(Reduce::AbsMax), 6.0);
-        assert_eq!(value(Reduce::Mean), 0.4);
-        assert_eq!(value(Reduce::Drift), 7.0);
+        assert_eq!(value(Reduce::Over(Reduction::Max)), 4.0);
+        assert_eq!(value(Reduce::Over(Reduction::Min)), -6.0);
+        assert_eq!(value(Reduce::Over(Reduction::AbsMax)), 6.0);
+        assert_eq!(value(Reduce::Over(Reduction::Mean)), 0.4);
+        assert_eq!(value(Reduce::Over(Reduction::Drift)), 7.0);
         assert_eq!(value(Reduce::At(Instant::End)), 0.0);
     }
 
