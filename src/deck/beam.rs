@@ -19,10 +19,10 @@ pub enum Path {
 words! {
     /// `interpolation = …`
     pub enum InterpolationWord {
-        /// Of total rotation vectors
-        Total = "total",
         /// Of rotations relative to the element
         Relative = "relative",
+        /// Of total rotation vectors
+        Total = "total",
     }
 }
 
