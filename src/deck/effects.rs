@@ -46,7 +46,7 @@ pub struct Effects {
 impl Effects {
     pub(super) fn read(top: &Table) -> Self {
         let Some(item) = top.get("effects") else { return Self::default() };
-        let keys: Vec<&str> = EffectWord::words().collect();
+        let keys: Vec<&'static str> = EffectWord::words().collect();
         let Some(table) = Table::new(top.context, item, "[effects]", &keys) else { return Self::default() };
         let forced = |word: EffectWord| {
             let value = table.flag(word.word())?;

@@ -1,7 +1,7 @@
 //! `[[expect]]`: numbers, failures and warnings that a run is compared with.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
-use super::hints::nearest;
+use super::hints::{self, nearest};
 use super::reader::{Context, Item, Table, kind_of};
 use super::words::{Words, words};
 use crate::warning::WarningKind;
@@ -27,8 +27,8 @@ pub enum ExpectBody {
         column: Spanned<String>,
         /// Over rows or at one
         reduce: Reduce,
-        /// value, atol, rtol
-        value: Option<(f64, f64, f64)>,
+        /// Value with its tolerances
+        value: Option<Target>,
         /// Upper bound
         below: Option<f64>,
         /// Lower bound
@@ -40,6 +40,17 @@ pub enum ExpectBody {
     Warns(WarningKind),
     /// No warning that puts an answer in doubt
     Quiet,
+}
+
+/// An expected value: a number may differ from it by atol + rtol |value|.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Expected number
+    pub value: f64,
+    /// Absolute tolerance
+    pub atol: f64,
+    /// Tolerance relative to the value
+    pub rtol: f64,
 }
 
 /// The rows that an expectation reads.
@@ -164,10 +175,9 @@ fn read_fails(table: &Table) -> Option<ExpectBody> {
     if let Some(failure) = FailureWord::of(&name.value) {
         return Some(ExpectBody::Fails(failure));
     }
-    let help = match nearest(&name.value, FailureWord::words()) {
-        Some(meant) => format!("did you mean `{meant}`?"),
-        None => format!("failures are {}", one_of(FailureWord::words())),
-    };
+    let known: Vec<&str> = FailureWord::words().collect();
+    let hint = hints::for_word("fails", &name.value, &known).help();
+    let help = hint.unwrap_or_else(|| format!("failures are {}", one_of(known)));
     table.context.report(Diagnostic::error(format!("there is no failure `{}`", name.value), name.span).help(help));
     None
 }
@@ -185,18 +195,18 @@ fn read_column(table: &Table) -> Option<ExpectBody> {
             return table.wrong("[[expect]] needs `value`, `below`, `above`, `fails` or `warns`");
         }
     }
-    let value = table.optional("value", |_, _| read_value(table));
+    let value = table.optional("value", |_, _| read_target(table));
     Some(ExpectBody::Column { column: column?, reduce: reduce?, value: value?, below, above })
 }
 
-fn read_value(table: &Table) -> Option<(f64, f64, f64)> {
+fn read_target(table: &Table) -> Option<Target> {
     let value = table.number("value");
     let atol = table.non_negative_or("atol", 0.0);
     let rtol = table.non_negative_or("rtol", 0.0);
     if !table.has("atol") && !table.has("rtol") {
         return table.wrong_key("value", "a `value` needs `rtol` or `atol`: how close is close enough?");
     }
-    Some((value?.value, atol?, rtol?))
+    Some(Target { value: value?.value, atol: atol?, rtol: rtol? })
 }
 
 fn read_reduce(table: &Table) -> Option<Reduce> {

@@ -21,10 +21,19 @@ pub struct Joint {
     pub stiffness: f64,
     /// About or along the axis
     pub damping: f64,
-    /// A prescribed angle or displacement, with its history
-    pub motor: Option<(f64, Option<HistoryUse>)>,
+    /// Motor on the free direction
+    pub motor: Option<JointMotor>,
     /// Place of the table
     pub span: Span,
+}
+
+/// A prescribed angle or displacement of a joint.
+#[derive(Clone, Debug)]
+pub struct JointMotor {
+    /// Radians of a revolute joint, length of a prismatic one
+    pub value: f64,
+    /// Factor over time or load factor
+    pub history: Option<HistoryUse>,
 }
 
 /// The parts that a joint connects; one part is joined to ground.
@@ -126,7 +135,7 @@ pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
     let damping = table.non_negative_or("damping", 0.0);
     let motor = match ["angle", "displacement"].into_iter().find(|key| table.has(key)) {
         None => None,
-        Some(key) => Some((table.number(key)?.value, read_history_use(&table, None))),
+        Some(key) => Some(JointMotor { value: table.number(key)?.value, history: read_history_use(&table, None) }),
     };
     if motor.is_none() {
         table.refuse("history", "`history` of a joint belongs to `angle` or `displacement`");

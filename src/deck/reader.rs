@@ -2,7 +2,7 @@
 
 use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
 use super::expression::Expression;
-use super::hints::nearest;
+use super::hints::{self, nearest};
 use super::parameters::Parameters;
 use super::words::Words;
 use std::cell::RefCell;
@@ -139,7 +139,8 @@ impl Context {
         }
         let message = format!("`{key}` is {}, not `{}`", one_of(W::words()), text.value);
         let mut diagnostic = Diagnostic::error(message, text.span);
-        diagnostic.help = nearest(&text.value, W::words()).map(|meant| format!("did you mean `{meant}`?"));
+        let known: Vec<&str> = W::words().collect();
+        diagnostic.help = hints::for_word(key, &text.value, &known).help();
         self.report(diagnostic);
         None
     }
@@ -193,7 +194,12 @@ pub struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// The table `item`; keys that are not in `keys` are errors.
-    pub fn new(context: &'a Context, item: &'a Item<'a>, what: impl Into<String>, keys: &[&str]) -> Option<Self> {
+    pub fn new(
+        context: &'a Context,
+        item: &'a Item<'a>,
+        what: impl Into<String>,
+        keys: &[&'static str],
+    ) -> Option<Self> {
         let mut table = Self::of_names(context, item, what)?;
         table.refuse_unknown(keys);
         Some(table)
@@ -209,25 +215,22 @@ impl<'a> Table<'a> {
     }
 
     /// The top level of a file.
-    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, what: &str, keys: &[&str]) -> Self {
+    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, what: &str, keys: &[&'static str]) -> Self {
         let mut table = Self { context, what: what.into(), span: 0..0, entries, misspelt: Vec::new() };
         table.refuse_unknown(keys);
         table
     }
 
-    fn refuse_unknown(&mut self, keys: &[&str]) {
+    fn refuse_unknown(&mut self, keys: &[&'static str]) {
         for key in self.entries.keys() {
             let name: &str = key.get_ref();
             if !keys.contains(&name) {
-                let mut diagnostic = Diagnostic::error(format!("unknown key `{name}` in {}", self.what), key.span());
-                diagnostic.help = Some(match nearest(name, keys.iter().copied()) {
-                    Some(meant) => {
-                        self.misspelt.push(meant.into());
-                        format!("did you mean `{meant}`?")
-                    }
-                    None => format!("{} knows {}", self.what, one_of(keys.iter().copied())),
-                });
-                self.context.report(diagnostic);
+                let hint = hints::for_key(&self.what, name, keys);
+                self.misspelt.extend(hint.meant().map(str::to_string));
+                let list = || format!("{} knows {}", self.what, one_of(keys.iter().copied()));
+                let message = format!("unknown key `{name}` in {}", self.what);
+                let help = hint.help().unwrap_or_else(list);
+                self.context.report(Diagnostic::error(message, key.span()).help(help));
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::diagnostic::Spanned;
 use super::reader::{Context, Item, Table, joined, kind_of};
-use super::words::words;
+use super::words::{Words, words};
 use toml::de::DeValue;
 
 /// `[section.NAME]`
@@ -173,7 +173,8 @@ pub(super) fn read_matrix<const N: usize>(table: &Table, key: &str, item: &Item)
     for i in 0..N {
         for j in 0..i {
             if (out[i][j] - out[j][i]).abs() > 1e-9 * largest {
-                let (row, column) = (i + 1, j + 1);
+                let row = i + 1;
+                let column = j + 1;
                 let message = format!(
                     "`{key}` must be symmetric; entry ({row}, {column}) is {}, its mirror {}",
                     out[i][j], out[j][i]
@@ -192,7 +193,7 @@ fn read_shaped(table: &Table) -> Option<SectionBody> {
     let material = context.text(material?)?;
     let kind: ShapeWord = context.word(shape?, "shape")?.value;
     for key in DIMENSIONS.into_iter().filter(|key| !kind.keys().contains(key)) {
-        table.refuse(key, format!("a {} has no `{key}`", super::Words::word(kind)));
+        table.refuse(key, format!("a {} has no `{key}`", kind.word()));
     }
     for key in kind.keys() {
         table.required(key);

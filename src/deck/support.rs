@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, read_axes};
 use super::diagnostic::{Diagnostic, Span, Spanned};
-use super::hints::nearest;
+use super::hints;
 use super::reader::{Context, Item, Table, kind_of};
 use super::stage::read_stages;
 use super::words::{Words, words};
@@ -84,7 +84,9 @@ fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
             if let Some(one) = DirectionWord::of(word) {
                 return Some(std::array::from_fn(|k| k == one as usize));
             }
-            context.report(unknown_direction(word, item.span()).help(FIX));
+            let known: Vec<&str> = DirectionsWord::words().chain(DirectionWord::words()).collect();
+            let help = hints::for_word("fix", word, &known).help();
+            context.report(unknown_direction(word, item.span()).help(help.unwrap_or(FIX.into())));
             None
         }
         DeValue::Array(_) => {
@@ -92,9 +94,10 @@ fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
             let mut fix = [false; 6];
             for word in &words {
                 let Some(direction) = DirectionWord::of(&word.value) else {
-                    let meant = nearest(&word.value, DirectionWord::words());
-                    let help = meant.map_or(FIX.into(), |meant| format!("did you mean `{meant}`?"));
-                    context.report(unknown_direction(&word.value, word.span.clone()).help(help));
+                    let known: Vec<&str> = DirectionWord::words().collect();
+                    let help = hints::for_word("fix", &word.value, &known).help();
+                    let unknown = unknown_direction(&word.value, word.span.clone());
+                    context.report(unknown.help(help.unwrap_or(FIX.into())));
                     return None;
                 };
                 let held = &mut fix[direction as usize];

@@ -60,7 +60,7 @@ const KEYS: [&str; 8] = ["deck", "vary", "set", "zip", "sample", "seed", "output
 const RANGE_KEYS: [&str; 4] = ["from", "to", "count", "log"];
 /// Most samples of a sweep, and most values of a key.
 const MOST_SAMPLES: usize = 10_000_000;
-/// Whole numbers of TOML and floats agree up to here.
+/// Largest seed: floats hold whole numbers exactly up to here.
 const LARGEST_SEED: usize = 1 << 53;
 
 impl SweepFile {

@@ -4,7 +4,7 @@ use super::compose::{DrivenTable, stage_set};
 use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
-use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
+use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, JointKind, MotionWhat, Span};
 use crate::drive::Driven;
 use crate::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
 use crate::system::{Direction, Node, Slot};
@@ -15,7 +15,8 @@ use std::sync::Arc;
 /// Three directions as columns; the deck gives the first two.
 pub fn axes(axes: Option<Axes>) -> Mat3 {
     let Some([a, b]) = axes else { return Mat3::IDENTITY };
-    let (a, b) = (Vec3(a), Vec3(b));
+    let a = Vec3(a);
+    let b = Vec3(b);
     Mat3::from_columns(a, b, a.cross(b))
 }
 
@@ -81,7 +82,8 @@ pub fn constraints(
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
-    let (mut motions, mut driven) = (Vec::new(), Vec::new());
+    let mut motions = Vec::new();
+    let mut driven = Vec::new();
     let table = |number: usize, what: &'static str, span: &Span, history: Option<&HistoryUse>| DrivenTable {
         drives: Driven::Motion(number),
         what,
@@ -96,9 +98,10 @@ pub fn constraints(
         match ground_motor(deck, histories, connection, node) {
             Ok(None) => {}
             Ok(Some(motor)) => {
-                let (span, history) = (&connection.joint.span, connection.joint.motor.as_ref());
+                let span = &connection.joint.span;
+                let history = connection.joint.motor.as_ref().and_then(|motor| motor.history.as_ref());
                 note(&mut held, &motor.directions(), &motor.stages, span, "motion");
-                driven.push(table(motions.len(), "motor", span, history.and_then(|(_, history)| history.as_ref())));
+                driven.push(table(motions.len(), "motor", span, history));
                 motions.push(motor);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -118,7 +121,7 @@ pub fn constraints(
     SceneConstraints { supports, motions, driven }
 }
 
-/// What acts on the state instead of the forces.
+/// Constraints of a scene: they act on the state, not by forces.
 pub struct SceneConstraints {
     /// Supports
     pub supports: Vec<Support>,
@@ -135,14 +138,16 @@ fn ground_motor(
     connection: &FoundJoint,
     node: Node,
 ) -> Result<Option<Motion>, Diagnostic> {
-    let Some((value, name)) = &connection.joint.motor else { return Ok(None) };
-    let history = find_history(deck, histories, name.as_ref())?;
+    let Some(motor) = &connection.joint.motor else { return Ok(None) };
+    let history = find_history(deck, histories, motor.history.as_ref())?;
     let axis = connection.axes.column(0);
     let (kind, slot) = match connection.joint.kind {
-        deck::JointKind::Prismatic => (MotionKind::Translation, node.u),
-        _ => (MotionKind::Rotation, node.p),
+        JointKind::Prismatic => (MotionKind::Translation, node.u),
+        JointKind::Revolute | JointKind::Spherical | JointKind::Universal | JointKind::Rigid => {
+            (MotionKind::Rotation, node.p)
+        }
     };
-    Ok(Some(Motion::new(kind, slot, axis, *value, history, StageSet::default())))
+    Ok(Some(Motion::new(kind, slot, axis, motor.value, history, StageSet::default())))
 }
 
 /// The history that a table names.
@@ -192,7 +197,7 @@ fn read_motion(
     })
 }
 
-/// Whether earlier tables hold all three directions of the slot, whenever this one holds its own.
+/// True if earlier tables hold all three directions of the slot whenever this one holds its own.
 fn spanned(earlier: &[Held], b: &Held) -> bool {
     let always = |a: &&Held| a.direction.slot == b.direction.slot && (a.stages.0.is_none() || a.stages == b.stages);
     let axes: Vec<Vec3> = earlier.iter().filter(always).map(|a| a.direction.axis).collect();

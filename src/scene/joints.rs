@@ -18,17 +18,17 @@ pub struct FoundJoint<'a> {
     pub arms: [Vec3; 2],
     /// e_1 (the axis), e_2, e_3 as columns
     pub axes: Mat3,
-    /// Where it sits
+    /// Place of the joint
     pub place: Vec3,
 }
 
 impl FoundJoint<'_> {
-    /// Whether a support and a motion of the one node do.
+    /// True if a support and a motion of its one node replace the joint.
     pub fn is_support(&self) -> bool {
         self.nodes[0].is_none() && self.arms[1] == Vec3::ZERO
     }
 
-    /// What it holds.
+    /// The components that multipliers hold.
     pub fn kind(&self) -> Kind {
         match self.joint.kind {
             JointKind::Spherical => Kind::SPHERICAL,
@@ -39,7 +39,7 @@ impl FoundJoint<'_> {
         }
     }
 
-    /// Which of the displacements along e_1, e_2, e_3 and the rotations about them a joint to ground holds by itself.
+    /// Displacements along e_1, e_2, e_3 and rotations about them that a joint to ground holds without multipliers.
     /// Two held components of a rotation vector make a hinge; a universal joint needs a multiplier.
     pub fn held(&self) -> [bool; 6] {
         match self.joint.kind {
@@ -66,7 +66,7 @@ pub fn find<'a>(deck: &'a Deck, mesh: &Mesh, diagnostics: &mut Vec<Diagnostic>) 
     found
 }
 
-/// Where the mesh could not part the beams it has said so.
+/// `None` where the mesh could not part the beams, which it has reported.
 fn between_beams<'a>(
     mesh: &Mesh,
     joint: &'a deck::Joint,
@@ -78,7 +78,7 @@ fn between_beams<'a>(
     let nodes = match beams {
         [first, second] => [Some(own(first)), Some(own(second))],
         [only] => [None, Some(own(only))],
-        _ => return None,
+        [] | [_, _, _, ..] => return None,
     };
     if nodes[0] == nodes[1] {
         return None;

@@ -72,9 +72,9 @@ impl Piece {
         }
     }
 
-    /// The unit tangent of one of so many equal elements and its length over that of xi, where its nodes, weighed, give `stretch`. On a
-    /// straight piece all elements are one: what round-off in the places of nodes makes of each would keep them from sharing what they have in
-    /// common.
+    /// The unit tangent of one of so many equal elements and its length over that of xi; `stretch`: derivative of the
+    /// interpolated line over xi. On a straight piece all elements have the same, without the round-off in the places of
+    /// their nodes, so that they can share data.
     pub fn slope(&self, stretch: Vec3, elements: usize) -> (Vec3, f64) {
         match &self.curve {
             Curve::Line => (self.tangent(0.0), 0.5 * self.length / elements as f64),
@@ -82,7 +82,8 @@ impl Piece {
         }
     }
 
-    /// How much longer than that an element with this chord is by the round-off in the places of its nodes.
+    /// The chord of one of so many equal elements relative to its part of a straight piece: 1 but for round-off in the
+    /// places of its nodes.
     pub fn rounding(&self, chord: Vec3, elements: usize) -> f64 {
         match &self.curve {
             Curve::Line => chord.norm() * elements as f64 / self.length,
@@ -126,7 +127,8 @@ impl CentreLine {
         if angle == 0.0 {
             return axes;
         }
-        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let sin = libm::sin(angle);
+        let cos = libm::cos(angle);
         let [e1, e2, e3] = [0, 1, 2].map(|k| axes.column(k));
         Mat3::from_columns(e1, e2 * cos + e3 * sin, e3 * cos - e2 * sin)
     }
@@ -150,7 +152,8 @@ impl CentreLine {
             let t = match &piece.curve {
                 Curve::Line => (place - piece.start).dot(piece.tangent(0.0)) / piece.length,
                 Curve::Arc { centre, e, f, angle, .. } => {
-                    let (x, y) = ((place - *centre).dot(*e), (place - *centre).dot(*f));
+                    let x = (place - *centre).dot(*e);
+                    let y = (place - *centre).dot(*f);
                     libm::atan2(y, x).rem_euclid(2.0 * PI) / angle
                 }
             };
@@ -217,7 +220,8 @@ fn arc(
     axis3: Option<&Spanned<Vec3>>,
     span: &Span,
 ) -> Result<Piece, Diagnostic> {
-    let (u, v) = (b - a, c - a);
+    let u = b - a;
+    let v = c - a;
     let cross = u.cross(v);
     let sizes = u.norm() * v.norm();
     if sizes.is_nan() || cross.norm() <= 1e-9 * sizes || (c - b).norm() <= 1e-12 * v.norm() || sizes == 0.0 {
@@ -226,7 +230,8 @@ fn arc(
     }
     let normal = cross * (1.0 / cross.norm());
     let to_centre = (cross.cross(u) * v.squared() + v.cross(cross) * u.squared()) * (0.5 / cross.squared());
-    let (centre, radius) = (a + to_centre, to_centre.norm());
+    let centre = a + to_centre;
+    let radius = to_centre.norm();
     let e = (a - centre) * (1.0 / radius);
     let f = normal.cross(e);
     let angle = libm::atan2((c - centre).dot(f), (c - centre).dot(e)).rem_euclid(2.0 * PI);
@@ -276,7 +281,8 @@ mod tests {
         let quarter = piece([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]]);
         let line = CentreLine::new(vec![quarter], [0.0, PI / 2.0]);
         let e1 = line.pieces[0].tangent(1.0);
-        let (plain, turned) = (line.pieces[0].untwisted_axes(e1), line.axes(0, e1, 1.0));
+        let plain = line.pieces[0].untwisted_axes(e1);
+        let turned = line.axes(0, e1, 1.0);
         assert!((plain.column(0).cross(plain.column(1)) - plain.column(2)).norm() < 1e-15);
         assert!((turned.column(1) - plain.column(2)).norm() < 1e-15);
     }

@@ -104,8 +104,12 @@ impl Composer<'_> {
             // Supports hold it; what is left is its drive, or the one direction of a universal joint.
             match joint.kind {
                 JointKind::Universal => kind.held = [true; 3],
-                _ if sprung => kind.normal = &[],
-                _ => return None,
+                JointKind::Spherical | JointKind::Revolute | JointKind::Prismatic | JointKind::Rigid => {
+                    if !sprung {
+                        return None;
+                    }
+                    kind.normal = &[];
+                }
             }
             if joint.motor.is_some() {
                 return None;
@@ -113,9 +117,9 @@ impl Composer<'_> {
         }
         let motor = match &joint.motor {
             None => None,
-            Some((value, history)) => {
-                let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
-                Some(joint::Motor { value: *value, amplitude })
+            Some(motor) => {
+                let amplitude = self.amplitude_of("motor", &joint.span, motor.history.as_ref(), None)?;
+                Some(joint::Motor { value: motor.value, amplitude })
             }
         };
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
@@ -149,13 +153,13 @@ impl Composer<'_> {
         if !kind.normal.is_empty() || (motor.is_some() && joint.kind == JointKind::Revolute) {
             instance.between = Some(self.multiplier(SlotKind::Moment, connection));
         }
-        if let Some((_, history)) = &joint.motor {
+        if let Some(motor) = &joint.motor {
             let slot = if joint.kind == JointKind::Prismatic { instance.along } else { instance.between };
             let table = |slot| DrivenTable {
                 drives: Driven::Motor(slot),
                 what: "motor",
                 span: joint.span.clone(),
-                history: history.clone(),
+                history: motor.history.clone(),
             };
             self.out.driven.extend(slot.map(table));
         }

@@ -11,10 +11,10 @@ use crate::system::Slot;
 use crate::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
 
-/// What is nearer to a straight line is one, relative to its length.
+/// Largest distance from a straight line, relative to its length.
 const STRAIGHT: f64 = 1e-9;
 
-/// Stiffnesses that differ by less are the same, relative to themselves.
+/// Largest relative difference of equal stiffnesses.
 const ALIKE: f64 = 1e-9;
 
 /// No beam, in lists by slot.
@@ -29,7 +29,8 @@ struct StraightPart<'m> {
 }
 
 impl StraightPart<'_> {
-    /// Whether it is straight without load, and bends and turns about all axes alike: a spin in a bend strains nothing, nor does it move mass.
+    /// True if the part is straight without load, and bends and turns about all axes alike: a spin of the bent part then
+    /// strains nothing and moves no mass.
     fn is_round(&self) -> bool {
         let at = |beam: &MeshBeam, fraction: f64| {
             let SectionMatrices { stiffness: k, mass } = beam.section.at(fraction);
@@ -116,12 +117,14 @@ impl Composer<'_> {
         let start = first_end.place;
         let second_end = farthest(start)?;
         let end = second_end.place;
-        let (axis, length) = ((end - start).normalized()?, (end - start).norm());
+        let axis = (end - start).normalized()?;
+        let length = (end - start).norm();
         let aside = |place: Vec3| (place - start - axis * axis.dot(place - start)).norm();
         if nodes.iter().any(|node| aside(node.place) > STRAIGHT * length) {
             return None;
         }
-        let (beam, middle) = (beams[0], beams[0].nodes.len() / 2);
+        let beam = beams[0];
+        let middle = beams[0].nodes.len() / 2;
         let torsion = beam.section.at(beam.fractions[middle]).stiffness[3][3];
         let hold = Instance {
             node: nodes[middle].node,
@@ -132,7 +135,7 @@ impl Composer<'_> {
         Some(StraightPart { beams, ends: [first_end.node.p, second_end.node.p], hold })
     }
 
-    /// Whether something of it is turned by gravity, or resists a spin by its inertia.
+    /// True if gravity turns the part about its axis, or its inertia resists a spin.
     fn has_spin_inertia(&self, part: &StraightPart) -> bool {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let of_beam = |beam: &&MeshBeam| {
@@ -144,8 +147,9 @@ impl Composer<'_> {
         part.beams.iter().any(of_beam) || of_body
     }
 
-    /// Whether loads may turn it about its axis: moments, loads that turn with it, weight beside its axis, in rotating frames all inertia; and
-    /// where it bends about one axis more easily than about another, or is curved by itself, whatever bends it.
+    /// True if loads may turn a part about its axis: moments, loads that turn with it, weight beside its axis, in rotating
+    /// frames all inertia; and any load that bends it where it bends about one axis more easily than about another, or is
+    /// curved by itself.
     fn feels_loads(&self, part: &StraightPart) -> bool {
         let acts_on = |load: &Load| match &load.target {
             LoadTarget::At(at) => self.is_on(part, at),
@@ -166,13 +170,13 @@ impl Composer<'_> {
         turns || (bends && !part.is_round()) || part.beams.iter().any(is_eccentric) || inert
     }
 
-    /// Whether a node of a part is one of its ends.
+    /// True if a named node is an end of a part.
     fn is_at_end(&self, part: &StraightPart, name: &Spanned<String>) -> bool {
         let found = self.mesh.find_node(self.deck, name).ok();
         found.is_some_and(|(number, _)| part.ends.contains(&self.mesh.nodes[number].node.p))
     }
 
-    /// Whether a node of a part has this name.
+    /// True if a named node lies on a part.
     fn is_on(&self, part: &StraightPart, name: &Spanned<String>) -> bool {
         let found = self.mesh.find_node(self.deck, name).ok();
         found.is_some_and(|(number, _)| part.hold.nodes.contains(&self.mesh.nodes[number].node))
@@ -206,6 +210,7 @@ fn root(part_of: &[usize], mut number: usize) -> usize {
 }
 
 fn join(part_of: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (root(part_of, a), root(part_of, b));
+    let a = root(part_of, a);
+    let b = root(part_of, b);
     part_of[a.max(b)] = a.min(b);
 }
