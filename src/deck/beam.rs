@@ -42,7 +42,8 @@ pub struct Beam {
     pub name: Spanned<String>,
     /// One section, two for a taper, or more
     pub sections: Vec<Spanned<String>>,
-    /// Places of the sections, from 0 to 1 as fractions of the length, or to the length; none: at start and end
+    /// Places of the sections, from 0 to 1 as fractions of the length, or to the length; none: at
+    /// start and end
     pub stations: Option<Spanned<Vec<f64>>>,
     /// Its centre line
     pub path: Path,

@@ -1,6 +1,7 @@
 //! Arithmetic in decks: parsed once, evaluated with exact first and second derivatives over `t`.
 //!
-//! Functions come from the pure-Rust `libm`, so that a deck means the same numbers on every machine.
+//! Functions come from the pure-Rust `libm`, so that a deck means the same numbers on every
+//! machine.
 
 use super::words::{Words, words};
 use std::f64::consts::PI;
@@ -387,7 +388,8 @@ fn call(function: Function, a: Jet, b: Jet) -> Jet {
             chain(a, libm::atan(x), slope, -2.0 * x * slope * slope)
         }
         Function::Atan2 => {
-            // The derivatives of atan(y/x), in a form that holds for every quadrant: (y'x - y x')/(x^2 + y^2).
+            // The derivatives of atan(y/x), in a form that holds for every quadrant:
+            // (y'x - y x')/(x^2 + y^2).
             let y = a;
             let x = b;
             let r2 = x[0] * x[0] + y[0] * y[0];
@@ -436,8 +438,8 @@ fn call(function: Function, a: Jet, b: Jet) -> Jet {
     }
 }
 
-/// True if a is less than b, or becomes so where they meet: `min`, `max` and `abs` then have the derivatives of the
-/// later branch, as tables have, in any order of arguments.
+/// True if a is less than b, or becomes so where they meet: `min`, `max` and `abs` then have the
+/// derivatives of the later branch, as tables have, in any order of arguments.
 fn falls_below(a: Jet, b: Jet) -> bool {
     (0..3).find(|&k| a[k] != b[k]).is_some_and(|k| a[k] < b[k])
 }
@@ -475,7 +477,8 @@ mod tests {
         assert!(Expression::parse(&"(".repeat(1000)).is_err());
     }
 
-    /// A ramp and what holds it would add up at their corner if each took its side by the order of its arguments.
+    /// A ramp and what holds it would add up at their corner if each took its side by the order of
+    /// its arguments.
     #[test]
     fn corners_have_the_derivatives_of_what_follows() {
         let at_corner = |text: &str| {

@@ -1,5 +1,5 @@
-//! Help for keys and words that the deck does not know: first from tables of what users of other programs write, then the
-//! nearest known word.
+//! Help for keys and words that the deck does not know: first from tables of what users of other
+//! programs write, then the nearest known word.
 
 use std::cmp::Reverse;
 
@@ -226,7 +226,8 @@ fn plain(word: &str) -> String {
     word.to_lowercase().replace(['-', ' '], "_")
 }
 
-/// Help for a key that a table does not know; `table` is its name in messages: `[[stage]]`, `[section.rod]`, `the deck`.
+/// Help for a key that a table does not know; `table` is its name in messages: `[[stage]]`,
+/// `[section.rod]`, `the deck`.
 pub fn for_key(table: &str, key: &str, known: &[&'static str]) -> Hint {
     let written = plain(key);
     let table = table.trim_start_matches("the ").trim_matches(['[', ']', '`']);
@@ -265,13 +266,14 @@ fn near(word: &str, known: &[&'static str]) -> Hint {
     nearest(word, known.iter().copied()).map_or(Hint::None, |meant| Hint::Near(meant.into()))
 }
 
-/// Fewest letters of words that are compared by their spelling: most shorter ones are near to each other.
+/// Fewest letters of words that are compared by their spelling: most shorter ones are near to each
+/// other.
 const FEWEST_LETTERS: usize = 4;
 /// Letters for each one that may differ.
 const LETTERS_PER_ERROR: usize = 3;
 
-/// The known word that is spelled nearly so: with at most a third of its letters wrong, or with its end left out, or equal
-/// but for capitals or doubled letters.
+/// The known word that is spelled nearly so: with at most a third of its letters wrong, or with its
+/// end left out, or equal but for capitals or doubled letters.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let written = plain(word);
     let rated = known.into_iter().filter_map(|candidate| Some((errors(&written, &plain(candidate))?, candidate)));

@@ -12,7 +12,8 @@ use toml::de::DeValue;
 pub struct HistoryUse {
     /// The name of the history
     pub name: Spanned<String>,
-    /// The stages that it belongs to, from 1: in others it stands still. Left out: it is read in all.
+    /// The stages that it belongs to, from 1: in others it stands still. Left out: it is read in
+    /// all.
     pub stages: Option<Vec<usize>>,
 }
 
@@ -53,8 +54,8 @@ pub(super) const KEYS: [&str; 6] = ["times", "values", "smooth", "expr", "csv", 
 /// Keys of `history = { … }`.
 pub(super) const USE_KEYS: [&str; 2] = ["name", "stages"];
 
-/// The history that a table names; `None` where it names none, or a wrong one, which is reported. `acting`: the stages in
-/// which the table itself acts, where it does not in all.
+/// The history that a table names; `None` where it names none, or a wrong one, which is reported.
+/// `acting`: the stages in which the table itself acts, where it does not in all.
 pub(super) fn read_history_use(table: &Table, acting: Option<&Vec<usize>>) -> Option<HistoryUse> {
     let context = table.context;
     let item = table.get("history")?;

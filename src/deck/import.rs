@@ -1,5 +1,5 @@
-//! Tables beside the deck: `{ csv = "spine.csv" }` is replaced by the rows of the file, so that all later steps have one
-//! whole text.
+//! Tables beside the deck: `{ csv = "spine.csv" }` is replaced by the rows of the file, so that all
+//! later steps have one whole text.
 
 use super::Diagnostic;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
@@ -10,7 +10,8 @@ const MOST_ROWS: usize = 1_000_000;
 /// Gives the text of a file that a deck names.
 pub type Open<'o> = &'o dyn Fn(&str) -> Result<String, String>;
 
-/// The text of a deck with everything that it imports. Lines keep their numbers; sections of a table follow at the end.
+/// The text of a deck with everything that it imports. Lines keep their numbers; sections of a
+/// table follow at the end.
 pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
     if !text.contains("csv") {
         return Ok(text.into());

@@ -1,6 +1,8 @@
-//! The language of the deck: from text to tables whose values have their places in the text. It knows no mechanics.
+//! The language of the deck: from text to tables whose values have their places in the text. It
+//! knows no mechanics.
 //!
-//! All errors are collected, each with file, line and column. One file a table, with its struct, its keys and its reader.
+//! All errors are collected, each with file, line and column. One file a table, with its struct,
+//! its keys and its reader.
 
 mod accuracy;
 mod axes;
@@ -136,8 +138,8 @@ const KEYS: [&str; 23] = [
     "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy", "damping", "expect",
 ];
 
-/// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own; `Err` where the text is
-/// not TOML.
+/// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
+/// `Err` where the text is not TOML.
 pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (document, syntax) = DeTable::parse_recoverable(text);
     if !syntax.is_empty() {
@@ -164,7 +166,8 @@ pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     Ok((deck, context.diagnostics.take()))
 }
 
-/// The first syntax error, and keys that stand twice; the parser's other errors are mostly consequences of the first.
+/// The first syntax error, and keys that stand twice; the parser's other errors are mostly
+/// consequences of the first.
 fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
     let describe = |error: &toml::de::Error| {
         let mut diagnostic = Diagnostic::whole(error.message().trim().replace('\n', "; "));

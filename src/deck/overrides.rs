@@ -6,8 +6,8 @@ use toml_edit::{DocumentMut, Item, Key, Table, TableLike, Value};
 
 /// Applies `key=value` pairs to the text of a deck and gives the changed text.
 ///
-/// Keys are paths as in TOML; arrays of tables are indexed by number (`stage.0.step`). A value is read as TOML, and as a
-/// text where that fails.
+/// Keys are paths as in TOML; arrays of tables are indexed by number (`stage.0.step`). A value is
+/// read as TOML, and as a text where that fails.
 pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
     if settings.is_empty() {
         return Ok(text.to_string());
@@ -35,7 +35,8 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
     Ok(document.to_string())
 }
 
-/// Takes the coefficients of the scheme that a stage had before out of it, unless they are given as well.
+/// Takes the coefficients of the scheme that a stage had before out of it, unless they are given as
+/// well.
 fn drop_coefficients(document: &mut DocumentMut, number: &str, is_given: impl Fn(&str) -> bool) {
     let Ok(number) = number.parse::<usize>() else { return };
     let stage: Option<&mut dyn TableLike> = match document.get_mut("stage") {

@@ -20,7 +20,8 @@ pub(super) fn read_points(top: &Table) -> Vec<(Spanned<String>, [f64; 3])> {
     table.entries().filter_map(read).collect()
 }
 
-/// Refuses names with the punctuation of node names and column names, in which names of points and beams stand.
+/// Refuses names with the punctuation of node names and column names, in which names of points and
+/// beams stand.
 pub(super) fn check_name(context: &Context, name: Spanned<String>) -> Option<Spanned<String>> {
     let bad = name.value.chars().find(|c| matches!(c, '@' | ':' | '.' | ',' | '"' | '/' | '\\') || c.is_control());
     if name.value.trim().is_empty() {

@@ -1,4 +1,5 @@
-//! Reads typed values out of TOML tables, each with its place, and collects everything that is wrong.
+//! Reads typed values out of TOML tables, each with its place, and collects everything that is
+//! wrong.
 
 use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
 use super::expression::Expression;
@@ -296,7 +297,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The value of a key that may be left out: `Some(None)` where it is, `None` where the value is wrong.
+    /// The value of a key that may be left out: `Some(None)` where it is, `None` where the value is
+    /// wrong.
     pub fn optional<T>(
         &self,
         key: &str,

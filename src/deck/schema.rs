@@ -29,8 +29,8 @@ pub struct Entry {
     pub required: bool,
 }
 
-/// Entries of a word: a key (`elements`, in all tables that have it), `beam.elements`, or a table (`[[beam]]`, `beam`).
-/// `Err` with the nearest known word.
+/// Entries of a word: a key (`elements`, in all tables that have it), `beam.elements`, or a table
+/// (`[[beam]]`, `beam`). `Err` with the nearest known word.
 pub fn explain(word: &str) -> Result<Vec<Entry>, Option<String>> {
     let path = word.trim().trim_matches(['[', ']']).replace(".NAME", "");
     let all = entries();
@@ -221,7 +221,8 @@ mod tests {
         list
     }
 
-    /// Visits every node of the schema that stands for a table or a key: its path, and the node of its entries.
+    /// Visits every node of the schema that stands for a table or a key: its path, and the node of
+    /// its entries.
     fn visit(node: &Value, path: &str, see: &mut dyn FnMut(&str, &Value)) {
         let (inner, _) = inside(node, path, path);
         see(path, inner);

@@ -256,7 +256,8 @@ fn read_step_tolerance(table: &Table) -> Option<Option<f64>> {
     if table.has("step_tolerance") {
         let message = "`step_tolerance` belongs to adaptive = true";
         let span = table.key_span("step_tolerance");
-        // With `adaptive = false` the tolerance is kept for later: studies change one key and leave the other.
+        // With `adaptive = false` the tolerance is kept for later: studies change one key and leave
+        // the other.
         table.context.report(if table.has("adaptive") {
             Diagnostic::warning(WarningKind::IdleStepTolerance, message, span)
         } else {

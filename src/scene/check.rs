@@ -164,8 +164,8 @@ pub fn histories_in(deck: &Deck, stage: usize) -> impl Iterator<Item = &Spanned<
     all.filter(move |history| history.goes_on_in(stage)).map(|history| &history.name)
 }
 
-/// Refuses total interpolation and single held rotation components under the rotation-aware scheme, which has no total
-/// rotation vectors.
+/// Refuses total interpolation and single held rotation components under the rotation-aware scheme,
+/// which has no total rotation vectors.
 fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let incremental = |stage: &deck::Stage| {
         matches!(stage.body, StageBody::Dynamic { scheme: deck::SchemeWord::LieGeneralizedAlpha(_), .. })
@@ -187,8 +187,8 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
     }
 }
 
-/// Warns of joints with multipliers under a scheme without dissipation: multipliers and accelerations oscillate from step
-/// to step.
+/// Warns of joints with multipliers under a scheme without dissipation: multipliers and
+/// accelerations oscillate from step to step.
 pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diagnostics: &mut Vec<Diagnostic>) {
     if composition.multipliers.is_empty() {
         return;
@@ -211,8 +211,8 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
     }
 }
 
-/// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
-/// constraint touches are held, so that the tangent stays regular.
+/// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither
+/// inertia nor a spring nor a constraint touches are held, so that the tangent stays regular.
 pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {
     let Composition { bodies, springs, jointed, .. } = composition;
     let on_beams: HashSet<usize> = mesh.beams.iter().flat_map(|beam| beam.nodes.iter().copied()).collect();
@@ -239,7 +239,8 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held
     supports
 }
 
-/// A moment about an axis that nothing holds, and that has no inertia either, has no answer; `loose`: see [`loose_rotations`].
+/// A moment about an axis that nothing holds, and that has no inertia either, has no answer;
+/// `loose`: see [`loose_rotations`].
 pub fn refuse_moments(deck: &Deck, mesh: &Mesh, loose: &[Support], diagnostics: &mut Vec<Diagnostic>) {
     let axes = |node: &str| {
         let slot = mesh.points.get(node).map(|&node| mesh.nodes[node].node.p);

@@ -1,6 +1,7 @@
 //! Joints: which nodes they connect, and whether a node's own unknowns hold it or multipliers do.
 //!
-//! A joint to ground that sits at its node needs no multipliers: it is a support, and its motor a prescribed motion.
+//! A joint to ground that sits at its node needs no multipliers: it is a support, and its motor a
+//! prescribed motion.
 
 use super::mesh::Mesh;
 use super::names;
@@ -39,8 +40,9 @@ impl FoundJoint<'_> {
         }
     }
 
-    /// Displacements along e_1, e_2, e_3 and rotations about them that a joint to ground holds without multipliers.
-    /// Two held components of a rotation vector make a hinge; a universal joint needs a multiplier.
+    /// Displacements along e_1, e_2, e_3 and rotations about them that a joint to ground holds
+    /// without multipliers. Two held components of a rotation vector make a hinge; a universal
+    /// joint needs a multiplier.
     pub fn held(&self) -> [bool; 6] {
         match self.joint.kind {
             JointKind::Spherical | JointKind::Universal => [true, true, true, false, false, false],

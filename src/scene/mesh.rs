@@ -44,7 +44,8 @@ pub enum Rule {
     Inner,
     /// For mass and line loads
     Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
+    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated
+    /// as vectors
     Nodal,
 }
 
@@ -139,7 +140,8 @@ pub struct MeshBeam {
     pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
     pub elements: Range<usize>,
-    /// First element of each piece of its centre line, counted from that of the beam, and at last their number
+    /// First element of each piece of its centre line, counted from that of the beam, and at last
+    /// their number
     piece_starts: Vec<usize>,
     /// Nodes of an element, less one
     pub order: usize,
@@ -160,7 +162,8 @@ impl MeshBeam {
         &self.nodes[first..=first + self.order]
     }
 
-    /// The piece of the centre line at a fraction of the length, and the part of its elements before that.
+    /// The piece of the centre line at a fraction of the length, and the part of its elements
+    /// before that.
     pub fn along(&self, fraction: f64) -> (usize, f64) {
         let (element, xi) = self.element_at(fraction);
         let Part { piece, number, count } = self.part_of_line(element);
@@ -204,7 +207,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to `diagnostics`.
+    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to
+    /// `diagnostics`.
     pub fn new(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let mut mesh = Self::default();
         mesh.part_joints(deck, diagnostics);
@@ -239,7 +243,8 @@ impl Mesh {
         self.names.of(self.nodes[node].node.p)
     }
 
-    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name is that of its first slot.
+    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name
+    /// is that of its first slot.
     fn add_node(&mut self, place: Vec3, shares: Option<usize>) -> usize {
         let mut slot = || {
             self.slots += 1;
@@ -465,7 +470,8 @@ pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
     }
 }
 
-/// Fractions of the length at which the pieces of a line are divided into equal parts, from start to end.
+/// Fractions of the length at which the pieces of a line are divided into equal parts, from start
+/// to end.
 fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
     let inner = (0..line.pieces.len()).flat_map(|piece| {
         let count = parts[piece.min(parts.len() - 1)];

@@ -165,7 +165,8 @@ words! {
 /// Most diagnostics that are reported.
 const MOST_DIAGNOSTICS: usize = 200;
 
-/// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
+/// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything
+/// that is wrong.
 pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (deck, found) = deck::read(text)?;
     from_deck(&deck, found)
@@ -176,7 +177,8 @@ pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene
     let mut found = Vec::new();
     let scene = build(deck, &mut found);
     if !diagnostics.iter().all(Diagnostic::is_warning) {
-        // Of a deck that could be read in part only what is said about names is no consequence of that.
+        // Where tables could not be read only errors about names are kept: all others may follow
+        // from the missing tables.
         found.retain(|d| d.unknown.as_ref().is_some_and(|name| !deck.broken.iter().any(|b| about(name, b))));
     }
     diagnostics.append(&mut found);
@@ -213,8 +215,8 @@ fn about(name: &str, table: &str) -> bool {
     name.split(['@', ':']).next() == Some(table)
 }
 
-/// Builds a scene from a deck that was read or made; errors and warnings go to `diagnostics`. `None` where errors leave no
-/// scene.
+/// Builds a scene from a deck that was read or made; errors and warnings go to `diagnostics`.
+/// `None` where errors leave no scene.
 pub fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
     switches::refuse_impossible(deck, diagnostics);
@@ -236,7 +238,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
-    // Where a beam could not be meshed, points may seem to be no nodes; names that are unknown are so all the same.
+    // Where a beam could not be meshed, points may seem to be no nodes: only errors about unknown
+    // names are kept.
     diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
     let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
     let expected =
@@ -356,7 +359,8 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
         });
         let work = match stage.body {
             StageBody::Static { steps, adaptive } => {
-                // Along a path the load factor goes back: only what is linear in it may be followed there.
+                // Along a path the load factor goes back: only what is linear in it may be followed
+                // there.
                 let linear = stage.frame.is_none() && check::histories_in(deck, stages.len() + 1).next().is_none();
                 let approach = match (adaptive, linear) {
                     (false, _) => Approach::Straight,

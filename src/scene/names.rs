@@ -186,7 +186,8 @@ impl Mesh {
         }
     }
 
-    /// The section axes at a name: of the beam it was named on, else of the first beam there, else the global ones.
+    /// The section axes at a name: of the beam it was named on, else of the first beam there, else
+    /// the global ones.
     fn frame(&self, found: &Found, on: Option<(usize, f64)>) -> Mat3 {
         let on = on.or_else(|| self.beams_at(found).into_iter().next());
         on.map_or(Mat3::IDENTITY, |(beam, fraction)| self.beams[beam].frame(fraction))

@@ -72,9 +72,9 @@ impl Piece {
         }
     }
 
-    /// The unit tangent of one of so many equal elements and its length over that of xi; `stretch`: derivative of the
-    /// interpolated line over xi. On a straight piece all elements have the same, without the round-off in the places of
-    /// their nodes, so that they can share data.
+    /// The unit tangent of one of so many equal elements and its length over that of xi; `stretch`:
+    /// derivative of the interpolated line over xi. On a straight piece all elements have the same,
+    /// without the round-off in the places of their nodes, so that they can share data.
     pub fn slope(&self, stretch: Vec3, elements: usize) -> (Vec3, f64) {
         match &self.curve {
             Curve::Line => (self.tangent(0.0), 0.5 * self.length / elements as f64),
@@ -82,8 +82,8 @@ impl Piece {
         }
     }
 
-    /// The chord of one of so many equal elements relative to its part of a straight piece: 1 but for round-off in the
-    /// places of its nodes.
+    /// The chord of one of so many equal elements relative to its part of a straight piece: 1 but
+    /// for round-off in the places of its nodes.
     pub fn rounding(&self, chord: Vec3, elements: usize) -> f64 {
         match &self.curve {
             Curve::Line => chord.norm() * elements as f64 / self.length,
@@ -91,7 +91,8 @@ impl Piece {
         }
     }
 
-    /// The way from the first node of one of so many equal elements to the next ones, where these stand at `places`.
+    /// The way from the first node of one of so many equal elements to the next ones, where these
+    /// stand at `places`.
     pub fn arms<const N: usize>(&self, places: [Vec3; N], elements: usize) -> [Vec3; N] {
         let straight = |i: usize| (self.end - self.start) * (i as f64 / ((N - 1) * elements) as f64);
         match &self.curve {
@@ -100,7 +101,8 @@ impl Piece {
         }
     }
 
-    /// The section axes for the unit tangent `e1`, before twist: E3 is the part of axis3 normal to it, E2 = E3 x E1.
+    /// The section axes for the unit tangent `e1`, before twist: E3 is the part of axis3 normal to
+    /// it, E2 = E3 x E1.
     pub fn untwisted_axes(&self, e1: Vec3) -> Mat3 {
         let normal = self.axis3 - e1 * self.axis3.dot(e1);
         let e3 = normal.normalized().unwrap_or(self.axis3);
@@ -120,7 +122,8 @@ impl CentreLine {
         Self { pieces, length, before, twist }
     }
 
-    /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the beam's length.
+    /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the
+    /// beam's length.
     pub fn axes(&self, piece: usize, e1: Vec3, s: f64) -> Mat3 {
         let axes = self.pieces[piece].untwisted_axes(e1);
         let angle = self.twist[0] + (self.twist[1] - self.twist[0]) * s;

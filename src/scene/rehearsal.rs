@@ -1,4 +1,5 @@
-//! Errors and warnings about stages that are found before anything is computed, with their places in the deck.
+//! Errors and warnings about stages that are found before anything is computed, with their places
+//! in the deck.
 
 use super::compose::DrivenTable;
 use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};

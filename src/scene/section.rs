@@ -54,8 +54,8 @@ pub enum SectionCourse {
     Rigid(Box<SectionCourse>, [bool; 6]),
 }
 
-/// Factor on the stiffness of strains that are switched off, of which a hundredth is left. A much larger one would need
-/// shorter time steps than all else.
+/// Factor on the stiffness of strains that are switched off, of which a hundredth is left. A much
+/// larger one would need shorter time steps than all else.
 const RIGID: f64 = 1e2;
 
 /// Relative difference of lengths in tables and of beams that is taken for rounding.
@@ -83,7 +83,8 @@ impl SectionCourse {
             }
             Self::Rigid(course, strains) => {
                 let section = course.at(s);
-                // D C D scales what the flexibility C^-1 has of these strains, and what it couples them with.
+                // D C D scales what the flexibility C^-1 has of these strains, and what it couples
+                // them with.
                 let scale = strains.map(|rigid| if rigid { RIGID.sqrt() } else { 1.0 });
                 let entry = |i: usize, j: usize| section.stiffness[i][j] * scale[i] * scale[j];
                 let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
@@ -92,7 +93,8 @@ impl SectionCourse {
         }
     }
 
-    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the length.
+    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the
+    /// length.
     pub fn along(self, length: f64) -> Result<Self, f64> {
         let Self::Stations { fractions, courses } = self else { return Ok(self) };
         let last = fractions.last().copied().unwrap_or(1.0);
@@ -319,8 +321,8 @@ fn geometry(shape: Shape, nu: f64) -> Geometry {
     }
 }
 
-/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art. 109):
-/// a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
+/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art.
+/// 109): a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
 fn rectangle_torsion(width: f64, height: f64) -> f64 {
     let a = width.max(height);
     let b = width.min(height);

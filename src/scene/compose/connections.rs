@@ -101,7 +101,8 @@ impl Composer<'_> {
         let support = connection.is_support();
         let mut kind = connection.kind();
         if support {
-            // Supports hold it; what is left is its drive, or the one direction of a universal joint.
+            // Supports hold it; what is left is its drive, or the one direction of a universal
+            // joint.
             match joint.kind {
                 JointKind::Universal => kind.held = [true; 3],
                 JointKind::Spherical | JointKind::Revolute | JointKind::Prismatic | JointKind::Rigid => {

@@ -25,7 +25,8 @@ impl Composer<'_> {
         self.push(effect, format!("{} begins where something may move", named.join(", ")));
     }
 
-    /// Static stages after a dynamic one, and after static ones that may have ended before all was taken away; from 0.
+    /// Static stages after a dynamic one, and after static ones that may have ended before all was
+    /// taken away; from 0.
     fn stages_after_motion(&self) -> Vec<usize> {
         let mut stages = Vec::new();
         let mut moves = false;

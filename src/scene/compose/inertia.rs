@@ -1,4 +1,5 @@
-//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional damping.
+//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional
+//! damping.
 
 use super::{Composer, SWITCHED_OFF, push_volume};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
@@ -18,7 +19,8 @@ use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
 impl Composer<'_> {
-    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
+    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section
+    /// has it.
     pub(super) fn beam_inertia(&mut self) {
         let names = ["beam mass", "rotary inertia", "eccentric section inertia", "section inertia at nodes"];
         if !self.dynamic || self.mesh.element_count == 0 {
@@ -153,9 +155,9 @@ impl Composer<'_> {
         self.reason("rotating frame", true, format!("{} stage(s) with a `frame`", framed.len()));
     }
 
-    /// Visits the elements with the mass properties of their volume points, about the centre line and in global axes, and
-    /// returns what sits at nodes instead: on beams whose rotations are relative all that turns with the section, because no
-    /// chart matters there.
+    /// Visits the elements with the mass properties of their volume points, about the centre line
+    /// and in global axes, and returns what sits at nodes instead: on beams whose rotations are
+    /// relative all that turns with the section, because no chart matters there.
     fn each_inertia(&self, mut visit: impl FnMut(&BeamElement, &[Station], &[Inertia])) -> Vec<Body> {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let mut nodal = NodalInertia::new(self.mesh);
@@ -181,7 +183,8 @@ impl Composer<'_> {
         nodal.bodies(self.mesh)
     }
 
-    /// All mass of beams: elements with a quantity of each of their points, and the bodies that sit at nodes instead.
+    /// All mass of beams: elements with a quantity of each of their points, and the bodies that sit
+    /// at nodes instead.
     fn inertia_elements<Q: Copy + PartialEq>(
         &self,
         quantity: impl Fn(&BeamElement, &Station, Inertia) -> Q,
@@ -256,7 +259,8 @@ impl Composer<'_> {
     }
 }
 
-/// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the node.
+/// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the
+/// node.
 struct NodalInertia {
     /// By node; none where no element of these beams ends
     nodes: Vec<(f64, Vec3, Mat3)>,
@@ -302,7 +306,8 @@ fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {
     beam.section.at(station.fraction).mass.unwrap_or(none)
 }
 
-/// True if a matrix can be the inertia of a body: no principal value negative, none larger than the sum of the others.
+/// True if a matrix can be the inertia of a body: no principal value negative, none larger than the
+/// sum of the others.
 fn is_inertia(matrix: [[f64; 3]; 3]) -> bool {
     let eigen = nalgebra::SymmetricEigen::new(nalgebra::Matrix3::from_fn(|i, j| matrix[i][j])).eigenvalues;
     let slack = 1e-9 * eigen.amax();

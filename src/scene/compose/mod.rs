@@ -81,7 +81,8 @@ pub struct Composition {
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
 
-/// Tables with the same key share an amplitude: the history with its stages, and the stages of the table.
+/// Tables with the same key share an amplitude: the history with its stages, and the stages of the
+/// table.
 type AmplitudeKey = (Option<(String, Option<Vec<usize>>)>, Option<Vec<usize>>);
 
 /// Collects effects while the tables of the deck are walked through.
@@ -291,7 +292,7 @@ impl Composer<'_> {
         self.part(EffectWord::FollowerTangent, "follower tangent", loaded, why);
     }
 
-    /// A part of what may be there: why it acts, was switched off, or has nothing that it belongs to.
+    /// The reason of a switchable part: it acts, was switched off, or has nothing to act on.
     fn part(&mut self, word: EffectWord, name: &'static str, there: bool, [acts, off, nowhere]: [&str; 3]) {
         match (there, self.deck.effects.allow(word)) {
             (false, _) => self.reason(name, false, nowhere),
@@ -312,7 +313,8 @@ impl Composer<'_> {
     }
 }
 
-/// Inertia is there for dynamic stages, where momenta are looked at, and where only small vibrations tell whether a static stage ends stable.
+/// True where effects of inertia are needed: by dynamic and modal stages, by outputs of momentum,
+/// and by static stages whose stability only small vibrations show.
 fn needs_mass(deck: &Deck) -> bool {
     let inertia =
         |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });

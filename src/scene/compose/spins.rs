@@ -29,8 +29,8 @@ struct StraightPart<'m> {
 }
 
 impl StraightPart<'_> {
-    /// True if the part is straight without load, and bends and turns about all axes alike: a spin of the bent part then
-    /// strains nothing and moves no mass.
+    /// True if the part is straight without load, and bends and turns about all axes alike: a spin
+    /// of the bent part then strains nothing and moves no mass.
     fn is_round(&self) -> bool {
         let at = |beam: &MeshBeam, fraction: f64| {
             let SectionMatrices { stiffness: k, mass } = beam.section.at(fraction);
@@ -147,9 +147,9 @@ impl Composer<'_> {
         part.beams.iter().any(of_beam) || of_body
     }
 
-    /// True if loads may turn a part about its axis: moments, loads that turn with it, weight beside its axis, in rotating
-    /// frames all inertia; and any load that bends it where it bends about one axis more easily than about another, or is
-    /// curved by itself.
+    /// True if loads may turn a part about its axis: moments, loads that turn with it, weight
+    /// beside its axis, in rotating frames all inertia; and any load that bends it where it bends
+    /// about one axis more easily than about another, or is curved by itself.
     fn feels_loads(&self, part: &StraightPart) -> bool {
         let acts_on = |load: &Load| match &load.target {
             LoadTarget::At(at) => self.is_on(part, at),
