@@ -257,7 +257,12 @@ pub fn hint(key: &str, word: &str, known: &[&'static str]) -> Option<String> {
     for_word(key, word, known).help()
 }
 
-fn synonym(table: &[Synonym], written: &str, known: &[&'static str]) -> Option<&'static str> {
+/// The key with the same meaning that is known, for a key of other programs.
+pub fn synonymous_key(key: &str, known: &[&str]) -> Option<&'static str> {
+    synonym(&SYNONYMS, &plain(key), known)
+}
+
+fn synonym(table: &[Synonym], written: &str, known: &[&str]) -> Option<&'static str> {
     let rows = table.iter().filter(|row| row.written.contains(&written));
     rows.flat_map(|row| row.meant).copied().find(|meant| known.contains(meant))
 }

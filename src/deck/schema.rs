@@ -1,6 +1,6 @@
 //! Descriptions of keys: the JSON Schema of the deck is their one source.
 
-use super::hints::nearest;
+use super::hints::{nearest, synonymous_key};
 use serde_json::Value;
 
 /// The JSON Schema (draft 7).
@@ -48,7 +48,7 @@ pub fn explain(word: &str) -> Result<Vec<Entry>, Option<String>> {
     }
     let keys = all.iter().filter_map(|entry| entry.path.rsplit('.').next());
     let known: Vec<&str> = all.iter().map(|entry| entry.path.as_str()).chain(keys).collect();
-    Err(nearest(&path, known).map(str::to_string))
+    Err(synonymous_key(&path, &known).or_else(|| nearest(&path, known)).map(str::to_string))
 }
 
 /// The deck itself, whose keys are its tables.
@@ -289,6 +289,7 @@ mod tests {
         assert!(one("[[stage]]").keys.contains(&"until".into()) && one("until.below").path == "stage.until.below");
         assert!(["moment", "history"].into_iter().all(|word| explain(word).is_ok_and(|all| !all.is_empty())));
         assert_eq!(explain("elemnts"), Err(Some("elements".into())));
+        assert_eq!(explain("dt"), Err(Some("step".into())));
         assert_eq!(explain("qqqqqqqqqqqqqq"), Err(None));
     }
 
