@@ -1,7 +1,7 @@
 //! From the path of a deck to a scene, with every message on the way.
 
 use super::{Status, say};
-use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity, SweepFile};
+use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity, SweepFile, Words};
 use crate::scene::{self, Scene};
 use std::fs::File;
 use std::io::Read;
@@ -123,7 +123,7 @@ pub fn text(path: &Path) -> Result<String, Refusal> {
 /// A deck may expect to be wrong.
 fn expected_failures(deck: &Deck) -> Vec<String> {
     let name = |expect: &deck::Expect| match &expect.body {
-        ExpectBody::Fails(name) => Some(name.value.clone()),
+        ExpectBody::Fails(failure) => Some(failure.word().into()),
         ExpectBody::Column { .. } | ExpectBody::Warns(_) | ExpectBody::Quiet => None,
     };
     deck.expects.iter().filter_map(name).collect()

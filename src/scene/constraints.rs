@@ -16,7 +16,8 @@ use std::sync::Arc;
 /// Three directions as columns; the deck gives the first two.
 pub fn axes(axes: Option<Axes>) -> Mat3 {
     let Some([a, b]) = axes else { return Mat3::IDENTITY };
-    let (a, b) = (Vec3(a), Vec3(b));
+    let a = Vec3(a);
+    let b = Vec3(b);
     Mat3::from_columns(a, b, a.cross(b))
 }
 
@@ -82,7 +83,8 @@ pub fn constraints(
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
-    let (mut motions, mut driven) = (Vec::new(), Vec::new());
+    let mut motions = Vec::new();
+    let mut driven = Vec::new();
     let table = |number: usize, what: &'static str, span: &Span, history: Option<&HistoryUse>| DrivenTable {
         drives: Driven::Motion(number),
         what,
@@ -97,9 +99,10 @@ pub fn constraints(
         match ground_motor(deck, histories, connection, node) {
             Ok(None) => {}
             Ok(Some(motor)) => {
-                let (span, history) = (&connection.joint.span, connection.joint.motor.as_ref());
+                let span = &connection.joint.span;
+                let history = connection.joint.motor.as_ref().and_then(|motor| motor.history.as_ref());
                 note(&mut held, &motor.directions(), &motor.stages, span, "motion");
-                driven.push(table(motions.len(), "motor", span, history.and_then(|(_, history)| history.as_ref())));
+                driven.push(table(motions.len(), "motor", span, history));
                 motions.push(motor);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -136,10 +139,11 @@ fn ground_motor(
     connection: &FoundJoint,
     node: Node,
 ) -> Result<Option<Motion>, Diagnostic> {
-    let Some((value, name)) = &connection.joint.motor else { return Ok(None) };
-    let history = find_history(deck, histories, name.as_ref())?;
+    let Some(motor) = &connection.joint.motor else { return Ok(None) };
+    let history = find_history(deck, histories, motor.history.as_ref())?;
     let axis = connection.axes.column(0);
-    let motion = |(kind, slot): (MotionKind, Slot)| Motion::new(kind, slot, axis, *value, history, StageSet::default());
+    let motion =
+        |(kind, slot): (MotionKind, Slot)| Motion::new(kind, slot, axis, motor.value, history, StageSet::default());
     let driven = connection.joint.kind.driven.map(|coordinate| match coordinate {
         FreeCoordinate::Angle => (MotionKind::Rotation, node.p),
         FreeCoordinate::Slide => (MotionKind::Translation, node.u),

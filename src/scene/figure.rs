@@ -26,14 +26,16 @@ pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[Link], elasticity: &[Arc<dy
 }
 
 fn point(mesh: &Mesh, beam: &MeshBeam, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {
-    let (node, fraction) = (&mesh.nodes[beam.nodes[k]], beam.fractions[k]);
+    let node = &mesh.nodes[beam.nodes[k]];
+    let fraction = beam.fractions[k];
     let frame = beam.frame(fraction);
     // Between two elements both have their say.
     let side = |element: usize, at: usize| {
         let number = beam.elements.start + element;
         beam.elements.contains(&number).then_some((number as u32, 2.0 * at as f64 / beam.order as f64 - 1.0))
     };
-    let (element, at) = (k / beam.order, k % beam.order);
+    let element = k / beam.order;
+    let at = k % beam.order;
     let before = (at == 0 && element > 0).then(|| side(element - 1, beam.order)).flatten();
     let sides = before.into_iter().chain(side(element, at)).collect();
     let stiffness = beam.section.at(fraction).stiffness;

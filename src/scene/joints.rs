@@ -1,6 +1,7 @@
 //! Joints: which nodes they connect, and whether a node's own unknowns hold it or multipliers do.
 //!
-//! A joint to ground that sits at its node needs no multipliers: it is a support, and its motor a prescribed motion.
+//! A joint to ground that sits at its node needs no multipliers: it is a support, and its motor a
+//! prescribed motion.
 
 use super::mesh::Mesh;
 use super::names;
@@ -43,7 +44,7 @@ pub fn find<'a>(deck: &'a Deck, mesh: &Mesh, diagnostics: &mut Vec<Diagnostic>) 
     found
 }
 
-/// Where the mesh could not part the beams it has said so.
+/// `None` where the mesh could not part the beams, which it has reported.
 fn between_beams<'a>(
     mesh: &Mesh,
     joint: &'a deck::Joint,
@@ -55,7 +56,7 @@ fn between_beams<'a>(
     let nodes = match beams {
         [first, second] => [Some(own(first)), Some(own(second))],
         [only] => [None, Some(own(only))],
-        _ => return None,
+        [] | [_, _, _, ..] => return None,
     };
     if nodes[0] == nodes[1] {
         return None;

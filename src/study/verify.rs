@@ -1,7 +1,7 @@
 //! Expectations held against a run.
 
-use crate::deck::{Instant, Reduce};
-use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
+use crate::deck::{Instant, Reduce, Reduction, Target, Words};
+use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, RunCounter, Scene};
 use beamsim_core::probe::Probe;
 use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
 
@@ -127,9 +127,9 @@ fn place(expectation: &Expectation, probes: &mut Vec<Probe>) -> Option<usize> {
 pub fn expected_values(expectations: &[Expectation]) -> Vec<(String, f64)> {
     let expected = expectations.iter().filter_map(|expectation| match &expectation.kind {
         ExpectationKind::Column { reduce: how, bounds, .. } => {
-            Some((format!("{} {}", expectation.name, describe(how)), bounds.value?.0))
+            Some((format!("{} {}", expectation.name, describe(how)), bounds.value?.value))
         }
-        ExpectationKind::Mode { bounds, .. } => Some((expectation.name.clone(), bounds.value?.0)),
+        ExpectationKind::Mode { bounds, .. } => Some((expectation.name.clone(), bounds.value?.value)),
         ExpectationKind::Counter { .. }
         | ExpectationKind::Fails
         | ExpectationKind::Warns(_)
@@ -163,8 +163,8 @@ pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Count
             ExpectationKind::Quiet => {
                 expected_warning(expectation, &warnings, !warnings.iter().any(|warning| warning.is_doubt()))
             }
-            ExpectationKind::Counter { name, bounds } => {
-                hold(expectation.name.clone(), bounds, Some(counter(counters, name) as f64))
+            ExpectationKind::Counter { counter: of, bounds } => {
+                hold(expectation.name.clone(), bounds, Some(counter(counters, *of) as f64))
             }
             ExpectationKind::Mode { quantity, number, bounds } => {
                 hold(expectation.name.clone(), bounds, recorder.mode(*quantity, *number))
@@ -204,13 +204,13 @@ fn expected_warning(expectation: &Expectation, given: &[&Warning], holds: bool) 
     }
 }
 
-fn counter(counters: &Counters, name: &str) -> u64 {
-    match name {
-        "steps" => counters.steps,
-        "iterations" => counters.work.iterations,
-        "cutbacks" => counters.cutbacks,
-        "chart_switches" => counters.work.chart_switches,
-        _ => counters.mixed_elements,
+fn counter(counters: &Counters, of: RunCounter) -> u64 {
+    match of {
+        RunCounter::Steps => counters.steps,
+        RunCounter::Iterations => counters.work.iterations,
+        RunCounter::Cutbacks => counters.cutbacks,
+        RunCounter::ChartSwitches => counters.work.chart_switches,
+        RunCounter::MixedElements => counters.mixed_elements,
     }
 }
 
@@ -219,7 +219,7 @@ fn describe(reduce: &Reduce) -> String {
         Reduce::At(Instant::End) => "at the end".into(),
         Reduce::At(Instant::Time(time)) => format!("at time {time}"),
         Reduce::At(Instant::Load(load)) => format!("at load {load}"),
-        how => how.word().into(),
+        Reduce::Over(reduction) => reduction.word().into(),
     }
 }
 
@@ -227,7 +227,7 @@ fn hold(what: String, bounds: &Bounds, came: Option<f64>) -> Judgement {
     let mut expected = Vec::new();
     let (mut holds, mut error, mut ratio) = (true, None, None);
     let value = came.unwrap_or(f64::NAN);
-    if let Some((wanted, atol, rtol)) = bounds.value {
+    if let Some(Target { value: wanted, atol, rtol }) = bounds.value {
         expected.push(format!("{wanted}"));
         let departure = (value - wanted).abs();
         let allowed = atol + rtol * wanted.abs();
@@ -254,11 +254,11 @@ fn reduce(rows: &[Row], how: Reduce) -> Option<f64> {
         rows.iter().map(|row| of(row.value)).reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
     };
     match how {
-        Reduce::Max => fold(f64::max, &|v| v),
-        Reduce::Min => fold(f64::min, &|v| v),
-        Reduce::AbsMax => fold(f64::max, &f64::abs),
-        Reduce::Drift => fold(f64::max, &|v| (v - first).abs()),
-        Reduce::Mean => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
+        Reduce::Over(Reduction::Max) => fold(f64::max, &|v| v),
+        Reduce::Over(Reduction::Min) => fold(f64::min, &|v| v),
+        Reduce::Over(Reduction::AbsMax) => fold(f64::max, &f64::abs),
+        Reduce::Over(Reduction::Drift) => fold(f64::max, &|v| (v - first).abs()),
+        Reduce::Over(Reduction::Mean) => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
         Reduce::At(Instant::End) => rows.last().map(|row| row.value),
         Reduce::At(Instant::Time(time)) => at_time(rows, time),
         Reduce::At(Instant::Load(load)) => at_load(rows, load),
@@ -310,11 +310,11 @@ mod tests {
     #[test]
     fn rows_are_reduced_as_the_deck_says() {
         let value = |how| reduce(&rows(), how).unwrap();
-        assert_eq!(value(Reduce::Max), 4.0);
-        assert_eq!(value(Reduce::Min), -6.0);
-        assert_eq!(value(Reduce::AbsMax), 6.0);
-        assert_eq!(value(Reduce::Mean), 0.4);
-        assert_eq!(value(Reduce::Drift), 7.0);
+        assert_eq!(value(Reduce::Over(Reduction::Max)), 4.0);
+        assert_eq!(value(Reduce::Over(Reduction::Min)), -6.0);
+        assert_eq!(value(Reduce::Over(Reduction::AbsMax)), 6.0);
+        assert_eq!(value(Reduce::Over(Reduction::Mean)), 0.4);
+        assert_eq!(value(Reduce::Over(Reduction::Drift)), 7.0);
         assert_eq!(value(Reduce::At(Instant::End)), 0.0);
     }
 
@@ -342,7 +342,7 @@ mod tests {
 
     #[test]
     fn nan_holds_nothing() {
-        let bounds = Bounds { value: Some((1.0, 10.0, 0.0)), below: None, above: None };
+        let bounds = Bounds { value: Some(Target { value: 1.0, atol: 10.0, rtol: 0.0 }), below: None, above: None };
         assert!(!hold("x".into(), &bounds, Some(f64::NAN)).holds);
         assert!(!hold("x".into(), &bounds, None).holds);
         assert!(hold("x".into(), &bounds, Some(2.0)).holds);

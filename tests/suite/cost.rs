@@ -1,6 +1,6 @@
 //! The study of what accuracy costs.
 
-use beamsim::deck::{self, Accuracy, Deck, Spanned};
+use beamsim::deck::{self, Accuracy, Deck, SchemeName, Spanned, Words};
 use beamsim::scene::{self, Scene};
 use beamsim::study::accuracy::{Found, reach};
 use beamsim::study::cost::{Against, Expected, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
@@ -255,8 +255,11 @@ fn meshes_keep_nodes_where_something_acts() {
 #[test]
 fn runs_that_fail_are_told_and_the_others_stay() {
     // One of the schemes has no total vectors to interpolate.
-    let schemes = ["newmark", "lie_generalized_alpha"];
-    let text = format!("{SWINGING}[cost]\norder = 1\ninterpolation = \"total\"\nscheme = {schemes:?}\n");
+    let schemes = [SchemeName::Newmark, SchemeName::LieGeneralizedAlpha];
+    let text = format!(
+        "{SWINGING}[cost]\norder = 1\ninterpolation = \"total\"\nscheme = {:?}\n",
+        schemes.map(SchemeName::word)
+    );
     let found = costs(&text, &Against::Finest, 2);
     let (failed, rest): (Vec<_>, Vec<_>) =
         found.runs.iter().partition(|run| run.point.family.scheme == Some(schemes[1]));

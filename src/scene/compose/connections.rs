@@ -135,7 +135,7 @@ impl Composer<'_> {
             drives: Driven::Motor(slot),
             what: "motor",
             span: joint.span.clone(),
-            history: joint.motor.as_ref().and_then(|(_, history)| history.clone()),
+            history: joint.motor.as_ref().and_then(|motor| motor.history.clone()),
         }));
         self.hold_idle_multipliers(&found);
         Some(found)
@@ -162,9 +162,9 @@ impl Composer<'_> {
 
     /// The drive of a joint on its free coordinate: a motor takes the place of spring and damper. The outer `None` is an unknown history.
     fn drive(&mut self, joint: &deck::Joint, coordinate: FreeCoordinate) -> Option<Option<Drive>> {
-        if let Some((value, history)) = &joint.motor {
-            let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
-            return Some(Some(Drive::Motor(coordinate, Motor { value: *value, amplitude })));
+        if let Some(motor) = &joint.motor {
+            let amplitude = self.amplitude_of("motor", &joint.span, motor.history.as_ref(), None)?;
+            return Some(Some(Drive::Motor(coordinate, Motor { value: motor.value, amplitude })));
         }
         let spring = SpringDamper { stiffness: joint.stiffness, damping: joint.damping };
         Some(is_sprung(joint).then_some(Drive::Spring(coordinate, spring)))

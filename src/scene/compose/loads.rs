@@ -65,9 +65,8 @@ impl Composer<'_> {
                 self.diagnostics.push(Diagnostic::error(message, at.span.clone()));
                 None
             }
-            _ => {
+            [(first, fraction), _, ..] => {
                 let message = format!("several beams meet at `{}`; whose section is meant?", at.value);
-                let (first, fraction) = beams[0];
                 let end = if fraction > 0.5 { "end" } else { "start" };
                 let help = format!("name the node on a beam, such as `{}@{end}`", self.mesh.beams[first].name);
                 self.diagnostics.push(Diagnostic::error(message, at.span.clone()).help(help));
@@ -78,7 +77,8 @@ impl Composer<'_> {
 
     /// Line loads; those that turn with a relative beam are returned as loads at its nodes.
     pub(super) fn line_loads(&mut self) -> NodeLoads {
-        let (mut spatial, mut material) = (ByOrder::default(), ByOrder::default());
+        let mut spatial = ByOrder::default();
+        let mut material = ByOrder::default();
         let mut nodal = NodeLoads::default();
         for load in &self.deck.loads {
             let LoadTarget::Along(along) = &load.target else { continue };

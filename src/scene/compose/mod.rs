@@ -32,20 +32,20 @@ use std::sync::Arc;
 pub struct Reason {
     /// The effect
     pub name: &'static str,
-    /// Whether it acts
+    /// True if it acts
     pub active: bool,
-    /// Why
+    /// The reason for that
     pub reason: String,
 }
 
 /// A table that a history drives, for messages.
 #[derive(Clone)]
 pub struct DrivenTable {
-    /// What it drives
+    /// The driven motion or motor
     pub drives: Driven,
-    /// What it is called
+    /// Its name in messages
     pub what: &'static str,
-    /// Where it stands
+    /// Its place in the deck
     pub span: Span,
     /// Its history, if it has one
     pub history: Option<HistoryUse>,
@@ -73,15 +73,16 @@ pub struct Composition {
     pub idle_multipliers: Vec<Support>,
     /// Nodes whose rotation a joint takes hold of
     pub jointed: Vec<usize>,
-    /// What histories drive, but for motions
+    /// Tables that histories drive, but for motions
     pub driven: Vec<DrivenTable>,
-    /// How many joints remember their angle
+    /// Number of joints that remember their angle
     pub angles: usize,
     /// The slots of the rotations on both sides of each of them
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
 
-/// What makes amplitudes one: the name of the history with its stages, and the stages of what it drives.
+/// Tables with the same key share an amplitude: the history with its stages, and the stages of the
+/// table.
 type AmplitudeKey = (Option<(String, Option<Vec<usize>>)>, Option<Vec<usize>>);
 
 /// Collects effects while the tables of the deck are walked through.
@@ -95,10 +96,11 @@ struct Composer<'a> {
     dynamic: bool,
 }
 
-/// Why what a scene has does not act
+/// The reason of effects that are switched off
 const SWITCHED_OFF: &str = "switched off in [effects]";
-/// The same of parts of the tangent, whose pivots tell whether a state is stable
+/// The reason of a switched-off geometric stiffness
 const UNSTRESSED: &str = "switched off in [effects]: what stress makes unstable is not told";
+/// The reason of a switched-off tangent of following loads
 const UNTURNED: &str = "switched off in [effects]: negative pivots are those of a tangent without it";
 
 /// Composes the effects of a deck.
@@ -192,10 +194,12 @@ impl Composer<'_> {
     /// Parts of the mechanics that [effects] may switch off.
     fn formulation(&mut self) {
         let beams = self.mesh.element_count > 0;
-        let (large, linear) = ("large rotations", "switched off in [effects]: static and dynamic stages are linear");
-        match self.deck.effects.allow(EffectWord::LargeRotations) {
-            true => self.reason(large, true, "forces and tangents of the present state"),
-            false => self.reason(large, false, linear),
+        let large = "large rotations";
+        let linear = "switched off in [effects]: static and dynamic stages are linear";
+        if self.deck.effects.allow(EffectWord::LargeRotations) {
+            self.reason(large, true, "forces and tangents of the present state");
+        } else {
+            self.reason(large, false, linear);
         }
         let parts = [
             (EffectWord::Shear, "shear", "sections have `GA`"),
@@ -246,12 +250,13 @@ impl Composer<'_> {
         self.reason(I::NAME, true, format!("{count} beam elements"));
         self.out.elasticity.push(effect.clone());
         self.out.effects.push(effect.clone());
-        match self.deck.damping {
-            Some([_, factor]) if factor != 0.0 && self.dynamic => {
-                self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
-            }
-            _ if !self.deck.effects.allow(EffectWord::Damping) => self.reason(I::DAMPING_NAME, false, SWITCHED_OFF),
-            _ => self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time"),
+        let [_, factor] = self.deck.damping.unwrap_or_default();
+        if factor != 0.0 && self.dynamic {
+            self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
+        } else if !self.deck.effects.allow(EffectWord::Damping) {
+            self.reason(I::DAMPING_NAME, false, SWITCHED_OFF);
+        } else {
+            self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time");
         }
     }
 
@@ -278,7 +283,8 @@ impl Composer<'_> {
         let acts = |of: &[&str]| self.out.reasons.iter().any(|reason| reason.active && of.contains(&reason.name));
         let inertia = ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "rigid body inertia"];
         let loads = ["following line loads", "following forces", "following moments", "dead moments"];
-        let (turns, loaded) = (acts(&inertia), acts(&loads));
+        let turns = acts(&inertia);
+        let loaded = acts(&loads);
         let spin = "inertia against rotation has forces of its spin alone";
         let why = [spin, SWITCHED_OFF, "nothing has inertia against rotation"];
         self.part(EffectWord::Gyroscopic, "gyroscopic forces", turns, why);
@@ -286,7 +292,7 @@ impl Composer<'_> {
         self.part(EffectWord::FollowerTangent, "follower tangent", loaded, why);
     }
 
-    /// A part of what may be there: why it acts, was switched off, or has nothing that it belongs to.
+    /// The reason of a switchable part: it acts, was switched off, or has nothing to act on.
     fn part(&mut self, word: EffectWord, name: &'static str, there: bool, [acts, off, nowhere]: [&str; 3]) {
         match (there, self.deck.effects.allow(word)) {
             (false, _) => self.reason(name, false, nowhere),
@@ -295,7 +301,7 @@ impl Composer<'_> {
         }
     }
 
-    /// What is known and never acts yet.
+    /// Reasons of effects that are known and never act yet.
     fn never(&mut self) {
         let seams = self.mesh.beams.iter().any(|beam| beam.interpolation == InterpolationWord::Total);
         let why = if seams {
@@ -307,7 +313,8 @@ impl Composer<'_> {
     }
 }
 
-/// Inertia is there for dynamic stages, where momenta are looked at, and where only small vibrations tell whether a static stage ends stable.
+/// True where effects of inertia are needed: by dynamic and modal stages, by outputs of momentum,
+/// and by static stages whose stability only small vibrations show.
 fn needs_mass(deck: &Deck) -> bool {
     let inertia =
         |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
@@ -321,7 +328,7 @@ fn needs_mass(deck: &Deck) -> bool {
     dynamic || written || expected || watched || may_flutter(deck)
 }
 
-/// Whether a static stage may end under loads that turn, whose tangents are not symmetric.
+/// True if a static stage may end under loads that turn, whose tangents are not symmetric.
 fn may_flutter(deck: &Deck) -> bool {
     let turns = |load: &deck::Load| match load.frame {
         deck::Frame::Space => load.moment.is_some(),
@@ -377,7 +384,8 @@ fn elastic<const N: usize, const G: usize>(
     free: Option<usize>,
     neighbour: Option<&ElasticElement<N, G>>,
 ) -> ElasticElement<N, G> {
-    let (beam, stations) = (element.beam, element.stations(Rule::Inner));
+    let beam = element.beam;
+    let stations = element.stations(Rule::Inner);
     let point = |k: usize| {
         let station = &stations[k];
         StiffnessPoint {
@@ -389,7 +397,8 @@ fn elastic<const N: usize, const G: usize>(
             free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
         }
     };
-    let (arms, points) = (element.arms(), std::array::from_fn(point));
+    let arms = element.arms();
+    let points = std::array::from_fn(point);
     ElasticElement::new(connect(element), element.rounding(), arms, points, free, neighbour)
 }
 

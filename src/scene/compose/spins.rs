@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, HashSet};
 /// Distance of a node from a straight line that still counts as on it, relative to the length of the line.
 const STRAIGHT: f64 = 1e-9;
 
-/// Stiffnesses that differ by less are the same, relative to themselves.
+/// Largest relative difference of equal stiffnesses.
 const ALIKE: f64 = 1e-9;
 
 /// No beam, in lists by slot.
@@ -116,12 +116,14 @@ impl Composer<'_> {
         let start = first_end.place;
         let second_end = farthest(start)?;
         let end = second_end.place;
-        let (axis, length) = ((end - start).normalized()?, (end - start).norm());
+        let axis = (end - start).normalized()?;
+        let length = (end - start).norm();
         let aside = |place: Vec3| (place - start - axis * axis.dot(place - start)).norm();
         if nodes.iter().any(|node| aside(node.place) > STRAIGHT * length) {
             return None;
         }
-        let (beam, middle) = (beams[0], beams[0].nodes.len() / 2);
+        let beam = beams[0];
+        let middle = beams[0].nodes.len() / 2;
         let torsion = beam.section.at(beam.fractions[middle]).stiffness[3][3];
         let hold = SpinningPart {
             node: nodes[middle].node,
@@ -206,6 +208,7 @@ fn root(part_of: &[usize], mut number: usize) -> usize {
 }
 
 fn join(part_of: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (root(part_of, a), root(part_of, b));
+    let a = root(part_of, a);
+    let b = root(part_of, b);
     part_of[a.max(b)] = a.min(b);
 }

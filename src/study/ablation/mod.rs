@@ -4,7 +4,7 @@ mod change;
 mod present;
 mod table;
 
-use crate::deck::{Deck, Diagnostic, EffectWord};
+use crate::deck::{Deck, Diagnostic, EffectWord, Words};
 use crate::scene::{self, Scene};
 use crate::study::outcome::{Outcome, columns};
 use beamsim_core::run::Failure;
@@ -93,7 +93,7 @@ pub fn ablate(
     tell: &mut dyn FnMut(&str),
 ) -> Result<Ablation, Failure> {
     let columns = columns(scene);
-    let (present, absent) = EffectWord::ALL.into_iter().partition::<Vec<_>, _>(|word| acts(*word, deck, scene));
+    let (present, absent) = EffectWord::values().partition::<Vec<_>, _>(|word| acts(*word, deck, scene));
     tell("the whole scene");
     let whole = timed(scene, u64::MAX, interrupted);
     if let Err(failure) = &whole.ended {

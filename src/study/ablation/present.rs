@@ -38,13 +38,14 @@ fn is_damped(deck: &Deck) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deck::Words;
 
     /// A name that no scene tells would call its effect absent for ever.
     #[test]
     fn scenes_tell_of_every_name() {
         let text = include_str!("../../../decks/robot_arm.toml");
         let (scene, _) = crate::scene::from_text(text).unwrap();
-        for name in EffectWord::ALL.into_iter().flat_map(names) {
+        for name in EffectWord::values().flat_map(names) {
             assert!(scene.reasons.iter().any(|reason| reason.name == *name), "{name}");
         }
     }

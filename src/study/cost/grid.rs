@@ -4,7 +4,7 @@
 use super::order::Expected;
 use super::sample::Sampler;
 use super::trial;
-use crate::deck::{Beam, Cost, Deck, InterpolationWord, SchemeWord, StageBody};
+use crate::deck::{Beam, Cost, Deck, InterpolationWord, SchemeName, SchemeWord, StageBody, Words};
 
 /// Orders, unless the deck names some.
 const ORDERS: [usize; 3] = [1, 2, 3];
@@ -30,7 +30,7 @@ pub struct Family {
     /// Interpolation of all beams
     pub interpolation: Option<InterpolationWord>,
     /// Scheme of all dynamic stages
-    pub scheme: Option<&'static str>,
+    pub scheme: Option<SchemeName>,
 }
 
 /// How time goes on.
@@ -77,7 +77,8 @@ impl Family {
     pub fn name(&self) -> String {
         let order = self.order.map(|order| format!("order {order}"));
         let interpolation = self.interpolation.map(|word| word.word().to_string());
-        let parts: Vec<String> = [order, interpolation, self.scheme.map(String::from)].into_iter().flatten().collect();
+        let scheme = self.scheme.map(|scheme| scheme.word().to_string());
+        let parts: Vec<String> = [order, interpolation, scheme].into_iter().flatten().collect();
         if parts.is_empty() { "the deck's".into() } else { parts.join(", ") }
     }
 }
@@ -318,8 +319,8 @@ impl Point {
     fn settings_of_stage(&self, k: usize, body: StageBody) -> Vec<String> {
         let StageBody::Dynamic { step, scheme, step_tolerance, .. } = body else { return Vec::new() };
         let mut settings = Vec::new();
-        if let Some(word) = self.family.scheme.filter(|word| *word != word_of(scheme)) {
-            settings.push(format!("stage.{k}.scheme={word:?}"));
+        if let Some(wanted) = self.family.scheme.filter(|wanted| *wanted != scheme.name()) {
+            settings.push(format!("stage.{k}.scheme={:?}", wanted.word()));
         }
         match self.pace {
             Pace::Timeless => {}
@@ -356,13 +357,4 @@ pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<Expected> {
     let mut orders = dynamic_stages(deck).map(of_stage);
     let first = orders.next()?;
     orders.all(|order| order == first).then_some(Expected { order: first, at_least: false })
-}
-
-fn word_of(scheme: SchemeWord) -> &'static str {
-    match scheme {
-        SchemeWord::Newmark(..) => "newmark",
-        SchemeWord::Hht(_) => "hht",
-        SchemeWord::GeneralizedAlpha(_) => "generalized_alpha",
-        SchemeWord::LieGeneralizedAlpha(_) => "lie_generalized_alpha",
-    }
 }

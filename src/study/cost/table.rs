@@ -2,6 +2,7 @@
 
 use super::grid::Pace;
 use super::{Run, Study};
+use crate::deck::Words;
 use csv::Writer;
 
 impl Study {
@@ -50,7 +51,7 @@ fn fields(run: &Run) -> Vec<String> {
     let own = [
         family.order.map_or(String::new(), |order| order.to_string()),
         family.interpolation.map_or(String::new(), |word| word.word().into()),
-        family.scheme.unwrap_or_default().into(),
+        family.scheme.map_or(String::new(), |scheme| scheme.word().into()),
         run.point.count().to_string(),
         step,
         tolerance,

@@ -1,4 +1,4 @@
-//! The deck as `[effects]` wants it: tables that are switched off are taken out before the scene is built.
+//! `[effects]`: tables that are switched off are taken out of the deck before the scene is built.
 
 use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, SpringBody, StageBody};
 use std::borrow::Cow;
@@ -30,7 +30,7 @@ fn take_dampers_out(deck: &mut Deck) {
     }
 }
 
-/// What cannot be switched off in the stages that a deck has.
+/// Refuses effects that cannot be switched off in the stages of the deck.
 pub fn refuse_impossible(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let linear = !deck.effects.allow(EffectWord::LargeRotations);
     let tangents = [EffectWord::GeometricStiffness, EffectWord::FollowerTangent];
@@ -42,15 +42,22 @@ pub fn refuse_impossible(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             let message = format!("{} = false leaves out part of the tangent, which this stage is about", word.key());
             diagnostics.push(Diagnostic::error(message, stage.span.clone()));
         }
+        if !linear {
+            continue;
+        }
         let why = match stage.body {
-            _ if !linear => continue,
             StageBody::Path { .. } => "control = \"arc_length\" follows what is not linear",
             StageBody::Dynamic { scheme: SchemeWord::LieGeneralizedAlpha(_), .. } => {
                 "lie_generalized_alpha has increments of large rotations for unknowns"
             }
-            _ if looks && moved => "this one looks at the full theory about the state reached",
-            _ => {
-                moved |= !looks;
+            StageBody::Modal { .. } | StageBody::Buckling { .. } => {
+                if !moved {
+                    continue;
+                }
+                "this one looks at the full theory about the state reached"
+            }
+            StageBody::Static { .. } | StageBody::Dynamic { .. } => {
+                moved = true;
                 continue;
             }
         };

@@ -1,6 +1,6 @@
-//! What is looked at in a run, from words on a command line.
+//! Observables of a run, from words on a command line.
 
-use super::{Instant, Reduce};
+use super::{Instant, Reduce, Reduction, Words};
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
 /// A number of a run: a column at an instant, or over all rows.
@@ -8,7 +8,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 pub struct Looked {
     /// The column
     pub column: String,
-    /// When, or over which rows
+    /// Instant, or rows
     pub reduce: Reduce,
 }
 
@@ -19,24 +19,24 @@ impl Looked {
         let Some((column, how)) = text.trim().rsplit_once(':') else { return at_end() };
         let load = how.strip_prefix("load=").and_then(|load| load.parse().ok()).map(Instant::Load);
         let instant = load.or_else(|| how.parse().ok().map(Instant::Time));
-        match Reduce::of(how).or(instant.map(Reduce::At)) {
+        match Reduction::of(how).map(Reduce::Over).or(instant.map(Reduce::At)) {
             Some(reduce) => Self { column: column.into(), reduce },
             // `arm:3.uz` is a column of the node number 3.
             None => at_end(),
         }
     }
 
-    /// As it is parsed.
+    /// The text that [`Looked::parse`] reads as this.
     pub fn name(&self) -> String {
         match self.reduce {
             Reduce::At(Instant::End) => self.column.clone(),
             Reduce::At(Instant::Time(time)) => format!("{}:{time}", self.column),
             Reduce::At(Instant::Load(load)) => format!("{}:load={load}", self.column),
-            how => format!("{}:{}", self.column, how.word()),
+            Reduce::Over(reduction) => format!("{}:{}", self.column, reduction.word()),
         }
     }
 
-    /// As an expectation of anything.
+    /// As an expectation that always holds.
     fn expectation(&self) -> Table {
         let mut table = Table::new();
         table.insert("column", toml_edit::value(self.column.as_str()));
@@ -47,7 +47,7 @@ impl Looked {
                 let at = InlineTable::from_iter([("load", Value::from(load))]);
                 table.insert("at", toml_edit::value(at));
             }
-            how => drop(table.insert("reduce", toml_edit::value(how.word()))),
+            Reduce::Over(reduction) => drop(table.insert("reduce", toml_edit::value(reduction.word()))),
         }
         table.insert("value", toml_edit::value(0.0));
         table.insert("atol", toml_edit::value(f64::MAX));
@@ -55,7 +55,7 @@ impl Looked {
     }
 }
 
-/// The text of a deck that expects just what is looked at, whatever its values.
+/// The text of a deck whose expectations are these observables, with bounds that always hold.
 pub fn looking_at(text: &str, all: &[Looked]) -> String {
     // A deck that is no TOML is reported when it is read.
     let Ok(mut document) = text.parse::<DocumentMut>() else { return text.into() };
@@ -74,7 +74,7 @@ mod tests {
         for (text, looked) in [
             ("tip.uz", of("tip.uz", Reduce::At(Instant::End))),
             ("arm:3.uz", of("arm:3.uz", Reduce::At(Instant::End))),
-            ("arm:3.uz:absmax", of("arm:3.uz", Reduce::AbsMax)),
+            ("arm:3.uz:absmax", of("arm:3.uz", Reduce::Over(Reduction::AbsMax))),
             ("tip.uz:0.5", of("tip.uz", Reduce::At(Instant::Time(0.5)))),
             ("tip.uz:load=0.5", of("tip.uz", Reduce::At(Instant::Load(0.5)))),
         ] {
