@@ -184,7 +184,7 @@ fn check_tells_what_would_be_simulated() {
         "mass 1,",
         "on  beam elasticity",
         "off gravity on beams",
-        "ms on this machine (it was run to its end)",
+        "ms on this machine (measured)",
     ] {
         assert!(text.contains(words), "{words:?} is missing in\n{text}");
     }
@@ -738,5 +738,5 @@ fn equal_warnings_are_said_once() {
     let output = folder.beamsim(&["run", "many.toml"]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(said.matches("warning[velocity_jump]: this motion begins with a velocity").count(), 1, "{said}");
-    assert!(said.contains("the same warning holds of lines "), "{said}");
+    assert!(said.contains("the same warning applies to lines "), "{said}");
 }

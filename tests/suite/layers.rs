@@ -11,7 +11,7 @@ const ORDER: [&str; 18] = [
 ];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 16] = [
     ("rayon", &["src/threads.rs"]),
     ("faer", &["src/solve/columns.rs", "src/solve/general.rs", "src/solve/krylov.rs", "src/solve/block/order.rs"]),
     ("toml", &["src/deck/"]),
@@ -26,7 +26,19 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("ctrlc", &["src/cli/"]),
     ("signal_hook", &["src/cli/"]),
     // The scene hands the resolved deck through to run.json.
-    ("serde_json", &["src/deck/", "src/scene/mod.rs", "src/output/", "src/study/sweep/store.rs", "src/cli/json.rs"]),
+    (
+        "serde_json",
+        &[
+            "src/deck/",
+            "src/scene/mod.rs",
+            "src/output/",
+            "src/study/sweep/store.rs",
+            "src/study/cost/journal.rs",
+            "src/cli/json.rs",
+        ],
+    ),
+    ("serde", &["src/output/", "src/study/", "src/cli/json.rs"]),
+    ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
 ];
 
 /// Whether a module may import another one; `Err` for a module that nobody has given a place.

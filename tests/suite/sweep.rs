@@ -103,10 +103,10 @@ fn a_point_that_fails_is_a_row_and_stops_no_other() {
     // The same command has nothing left to do, but to say so again.
     let bytes = fs::read(&path).unwrap();
     let again = folder.beamsim(&sweep);
-    assert!(String::from_utf8_lossy(&again.stderr).contains("goes on after 6 points that are done"));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("continues, 6 points are done"));
     assert_eq!((status(&again), fs::read(&path).unwrap()), (3, bytes));
     let redone = folder.beamsim(&[&sweep[..], &["--redo"]].concat());
-    assert!(String::from_utf8_lossy(&redone.stderr).contains("goes on after 2 points that are done"));
+    assert!(String::from_utf8_lossy(&redone.stderr).contains("continues, 2 points are done"));
 }
 
 #[test]
