@@ -21,16 +21,19 @@ use std::time::{Duration, Instant};
 /// Arguments of `beamsim run` besides the decks.
 #[derive(clap::Args)]
 pub struct RunArguments {
-    /// Choose elements and steps so that the estimated error of all outputs is below ERROR, relative to the largest value of each kind
+    /// Choose elements and steps so that the estimated error of all outputs is below ERROR,
+    /// relative to the largest value of each kind
     #[arg(long, value_name = "ERROR")]
     accuracy: Option<f64>,
     /// Time limit of this search: 90s, 5m, 1h
     #[arg(long, value_parser = console::duration, value_name = "TIME")]
     budget: Option<Duration>,
-    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two more runs with other elements and steps
+    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two more runs
+    /// with other elements and steps
     #[arg(long)]
     error_bars: bool,
-    /// Largest number of threads (default: one per core), for a search and for large scenes; results do not depend on it
+    /// Largest number of threads (default: one per core), for a search and for large scenes;
+    /// results do not depend on it
     #[arg(long, value_parser = console::threads, value_name = "N")]
     pub threads: Option<NonZero<usize>>,
     /// Also write report.html, a page that plays the run back
@@ -172,7 +175,7 @@ pub fn study_error(error: StudyError, path: &Path, loaded: &Loaded) -> CommandEr
 
 fn print_found(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {
     let (column, estimate) = found.worst(wanted);
-    console::line(&format!("{name}: estimated error {estimate:.1e}, of {column} ({} runs to find)", found.runs));
+    console::line(&format!("{name}: estimated error {estimate:.1e} of {column} ({} runs)", found.runs));
     console::line(&format!("  {}", describe(&found.variant)));
     paste_lines(deck, &found.settings()).iter().for_each(|line| console::line(&format!("    {line}")));
 }

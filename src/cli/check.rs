@@ -60,7 +60,8 @@ fn print_scene(scene: &Scene) -> Result<(), String> {
     size.map(|_| ())
 }
 
-/// The size of an effect, and the part of the equations that would vanish without it, where there is one.
+/// The size of an effect, and the part of the equations that would vanish without it, where there
+/// is one.
 fn describe_share(share: &Share) -> String {
     let Share { instances, unknowns, entries, .. } = share;
     let mut text = format!(" ({instances} in the first stage");
@@ -70,8 +71,8 @@ fn describe_share(share: &Share) -> String {
     text + ")"
 }
 
-/// Prints how long a run will take, in seconds; `Err` where it fails before it has computed anything. A run with a wanted accuracy
-/// begins with a search, whose time is not included.
+/// Prints how long a run will take, in seconds; `Err` where it fails before it has computed
+/// anything. A run with a wanted accuracy begins with a search, whose time is not included.
 fn print_time(loaded: &Loaded, reading: Duration) -> Result<f64, Failure> {
     let count = threads_of(&loaded.scene, None);
     let Forecast { seconds, watched, ended, computed, at } = threads::on(count, || forecast(&loaded.scene, TRIAL_TIME));
@@ -170,8 +171,9 @@ fn print_section(section: &crate::scene::SectionMatrices, place: &str) {
     }
 }
 
-/// Prints mass, centre, and inertia about the centre in the initial placement. Moments are summed about a node: for a scene far from the
-/// origin, moments about the origin would be differences of large numbers.
+/// Prints mass, centre, and inertia about the centre in the initial placement. Moments are summed
+/// about a node: for a scene far from the origin, moments about the origin would be differences of
+/// large numbers.
 fn print_mass(scene: &Scene) {
     let own = scene.mesh.nodes.first().map(|node| node.place);
     let about = own.or_else(|| scene.bodies.first().map(|body| body.place)).unwrap_or(Vec3::ZERO);
@@ -217,8 +219,9 @@ fn steiner(arm: Vec3, mass: f64) -> Mat3 {
     (Mat3::diagonal([arm.squared(); 3]) - arm.outer(arm)) * mass
 }
 
-/// Memory of a static scene beside its tangent, in vectors per slot (3 numbers each), measured on chains of a million elements: states,
-/// forces, mesh, elements and the positions of their blocks. Factors are stored within the tangent.
+/// Memory of a static scene beside its tangent, in vectors per slot (3 numbers each), measured on
+/// chains of a million elements: states, forces, mesh, elements and the positions of their blocks.
+/// Factors are stored within the tangent.
 const VECTORS: usize = 12;
 
 /// Memory of a dynamic scene beside its tangent, in vectors per slot.
@@ -227,7 +230,8 @@ const VECTORS_IN_DYNAMICS: usize = 27;
 /// Additional memory of a planar scene, which is also set up in space, in vectors per slot.
 const VECTORS_IN_SPACE: usize = 6;
 
-/// Prints unknowns, entries of the tangent and memory; gives the part of each effect. `Err` where the first stage cannot begin.
+/// Prints unknowns, entries of the tangent and memory; gives the part of each effect. `Err` where
+/// the first stage cannot begin.
 fn print_size(scene: &Scene) -> Result<Vec<Share>, String> {
     let mut model = scene.plan.model.clone();
     let state = model.rest();

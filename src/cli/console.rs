@@ -17,7 +17,8 @@ pub struct PrintOptions {
     /// Print a line of JSON for each result instead of text
     #[arg(long, global = true)]
     json: bool,
-    /// Treat warnings as failures: warnings about a deck stop it before it runs, warnings of a run give exit status 1 after it
+    /// Treat warnings as failures: warnings about a deck stop it before it runs, warnings of a run
+    /// give exit status 1 after it
     #[arg(long, global = true)]
     deny_warnings: bool,
 }

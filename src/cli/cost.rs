@@ -19,22 +19,26 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// A run of the frontier is printed where its error is below this part of the error of the printed run before; the table has all.
+/// A run of the frontier is printed where its error is below this part of the error of the printed
+/// run before; the table has all.
 const PRINTED_IMPROVEMENT: f64 = 0.9;
 
 /// Arguments of `beamsim cost` besides the decks.
 #[derive(clap::Args)]
 pub struct CostArguments {
-    /// Values to try, as in [cost]: order=1,2 elements=1,2,4 interpolation=relative scheme=newmark,hht step=1,0.5
+    /// Values to try, as in [cost]: order=1,2 elements=1,2,4 interpolation=relative
+    /// scheme=newmark,hht step=1,0.5
     #[arg(long, value_name = "KEY=V1,V2,…")]
     vary: Vec<String>,
     /// The accuracy for which lines of the deck are printed
     #[arg(long, default_value_t = 1e-3)]
     accuracy: f64,
-    /// Start no run after this time: 90s, 5m, 1h. Skipped runs are listed; run the command again to finish them
+    /// Start no run after this time: 90s, 5m, 1h. Skipped runs are listed; run the command again to
+    /// finish them
     #[arg(long, value_parser = console::duration, value_name = "TIME")]
     budget: Option<Duration>,
-    /// The reference for errors: a stored history (CSV), or `expect` for the values in [[expect]] (default: runs finer than all others)
+    /// The reference for errors: a stored history (CSV), or `expect` for the values in [[expect]]
+    /// (default: runs finer than all others)
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Number of simultaneous runs (default: one per core)
@@ -176,7 +180,7 @@ fn print_measure(found: &CostStudy) {
         count => format!("the worst of {count} outputs"),
     };
     let how = found.norm.described();
-    console::line(&format!("  error of {of}: {how}, over the largest value of its kind"));
+    console::line(&format!("  error of {of}: {how}, relative to the largest value of its kind"));
     if found.ends_only {
         console::line(
             "  compared only at the ends of stages, because steps adapt ([output] interval would give common instants)",
@@ -213,8 +217,8 @@ fn frontier(found: &CostStudy) -> Vec<&CostRun> {
 }
 
 fn print_run(run: &CostRun, found: &CostStudy) {
-    let told = found.reference.resolution();
-    let error = if run.error < told { format!("< {told:.1e}") } else { format!("{:.1e}", run.error) };
+    let resolution = found.reference.resolution();
+    let error = if run.error < resolution { format!("< {resolution:.1e}") } else { format!("{:.1e}", run.error) };
     let limit = run.limit.map_or("", |limit| limit.name());
     let spread = if run.timing.alone > 1 { format!("{:.0} %", 100.0 * run.timing.spread) } else { "–".into() };
     let cpu = console::time(run.timing.seconds.cpu);
@@ -267,8 +271,8 @@ fn print_lines(loaded: &Loaded, found: &CostStudy, accuracy: f64) {
     paste_lines(&loaded.deck, &run.settings()).iter().for_each(|line| console::line(&format!("    {line}")));
 }
 
-/// The plot of error over time: a line for each family through its best runs, points for its other runs, and the frontier of all runs
-/// in the background.
+/// The plot of error over time: a line for each family through its best runs, points for its other
+/// runs, and the frontier of all runs in the background.
 fn plot(title: &str, found: &CostStudy) -> String {
     let place = |run: &&CostRun| (run.timing.seconds.cpu, run.error);
     let all = NamedLine {

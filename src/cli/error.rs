@@ -33,7 +33,7 @@ pub enum CommandError {
     /// The search for an accuracy ended before it came to its end.
     #[error("the search was stopped: {missed}")]
     SearchStopped {
-        /// What stopped it
+        /// The failure that stopped it
         by: Failure,
         /// How far the best result is from the wanted accuracy
         missed: String,
@@ -59,7 +59,7 @@ pub struct DeckError {
     pub message: String,
     /// The errors with their lines of the deck; empty where there is nothing to show
     pub details: String,
-    /// Whether the deck only exceeds a supported limit
+    /// True if the deck only exceeds supported limits
     pub is_limit: bool,
     /// Failures that the deck itself expects
     pub expected: Vec<String>,
@@ -138,7 +138,8 @@ impl From<OutputError> for CommandError {
     }
 }
 
-/// An error of a study without the text of its deck: a diagnostic keeps its message and loses its line.
+/// An error of a study without the text of its deck: a diagnostic keeps its message and loses its
+/// line.
 impl From<StudyError> for CommandError {
     fn from(error: StudyError) -> Self {
         match error {

@@ -11,8 +11,8 @@ const WIDTH: usize = 96;
 pub fn explain(key: &str) -> Status {
     match deck::explain(key) {
         Ok(entries) => {
-            let told: Vec<String> = entries.iter().map(describe).collect();
-            console::answer(&told.join("\n\n"));
+            let texts: Vec<String> = entries.iter().map(describe).collect();
+            console::answer(&texts.join("\n\n"));
             Status::Fine
         }
         Err(meant) => {
@@ -28,7 +28,7 @@ pub fn explain(key: &str) -> Status {
 
 fn describe(entry: &Entry) -> String {
     let key = entry.path.rsplit('.').next().unwrap_or(&entry.path);
-    let needed = if entry.required { " (needed)" } else { "" };
+    let needed = if entry.required { " (required)" } else { "" };
     let mut lines = vec![format!("{key}, in {}{needed}", entry.table)];
     lines.extend(broken(&entry.description, "  "));
     let mut facts = vec![entry.kinds.clone()];

@@ -1,4 +1,5 @@
-//! Summaries for scripts: with `--json` a line on standard output for each deck, folder or table, instead of text.
+//! Summaries for scripts: with `--json` a line on standard output for each deck, folder or table,
+//! instead of text.
 
 use super::console;
 use crate::deck::EffectWord;
@@ -145,7 +146,8 @@ fn keys(words: &[EffectWord]) -> Vec<&'static str> {
     words.iter().map(|word| word.key()).collect()
 }
 
-/// Prints the change and the time of each reduced scene, and the effects that all outputs can do without.
+/// Prints the change and the time of each reduced scene, and the effects that all outputs can do
+/// without.
 pub fn effects(deck: &Path, file: &Path, found: &EffectStudy, tolerance: f64) {
     let summary = Effects {
         deck: text(deck),

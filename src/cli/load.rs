@@ -107,7 +107,8 @@ fn expected_failures(deck: &Deck) -> Vec<String> {
     deck.expects.iter().filter_map(name).collect()
 }
 
-/// Messages as the user sees them. Of warnings that differ only in names and numbers the first is shown, with the lines of the others.
+/// Messages as the user sees them. Of warnings that differ only in names and numbers the first is
+/// shown, with the lines of the others.
 pub fn render(path: &str, text: &str, diagnostics: &[Diagnostic]) -> String {
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|d| d.span.as_ref().map_or(0, |span| span.start));

@@ -138,7 +138,8 @@ enum Command {
     Effects {
         #[command(flatten)]
         input: DeckArguments,
-        /// Effects are left out as long as no output changes by more than this, relative to the largest value of its kind
+        /// Effects are left out as long as no output changes by more than this, relative to the
+        /// largest value of its kind
         #[arg(long, default_value_t = 1e-3)]
         tolerance: f64,
         /// Folder of the results (default: results/<deck name>)
@@ -227,7 +228,8 @@ fn with_warnings(status: Status) -> Status {
     error.status()
 }
 
-/// Prints help and version, which clap returns as errors too; everything else is a wrong command line.
+/// Prints help and version, which clap returns as errors too; everything else is a wrong command
+/// line.
 fn usage(error: &clap::Error) -> Status {
     let text = error.render();
     if error.exit_code() == 0 {

@@ -53,7 +53,7 @@ pub fn new(template: Template, out: Option<&Path>) -> Status {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             console::error(
                 "io",
-                &format!("{}: is there already, and is left as it is (--out names another)", path.display()),
+                &format!("{}: already exists and is not overwritten (use --out for another name)", path.display()),
             );
             Status::Io
         }

@@ -11,7 +11,8 @@ use crate::drive::Failure;
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
 
-/// Runs decks one after the other, each after a search for elements and steps where an accuracy is wanted.
+/// Runs decks one after the other, each after a search for elements and steps where an accuracy is
+/// wanted.
 pub fn run(decks: &[PathBuf], settings: &[String], wanted: &RunArguments, out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
     if let Err(error) = check_names(decks) {

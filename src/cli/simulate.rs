@@ -1,4 +1,5 @@
-//! A run from the command line: its history, fields, modes and record are written, its progress and warnings are shown.
+//! A run from the command line: its history, fields, modes and record are written, its progress and
+//! warnings are shown.
 
 use super::console;
 use super::progress::Progress;
@@ -47,7 +48,8 @@ pub struct Finished {
     pub threads: usize,
 }
 
-/// Runs a scene on a number of threads. With a folder its results are written there; a recorder follows the expectations of the deck.
+/// Runs a scene on a number of threads. With a folder its results are written there; a recorder
+/// follows the expectations of the deck.
 pub fn simulate(
     scene: &Scene,
     name: &str,
@@ -123,7 +125,8 @@ fn are_dynamic(scene: &Scene) -> Vec<bool> {
     scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect()
 }
 
-/// Gives all results their final names. The record is on disk before any other file gets its name, and gets its own name last.
+/// Gives all results their final names. The record is on disk before any other file gets its name,
+/// and gets its own name last.
 fn write_results(
     writers: Writers,
     modes: &ModesWriter,

@@ -54,7 +54,8 @@ impl Verdict {
         self.worst.as_ref().map_or(Status::Fine, CommandError::status)
     }
 
-    /// The exit status. With several decks the worst error is printed again, since other output may have followed it.
+    /// The exit status. With several decks the worst error is printed again, since other output may
+    /// have followed it.
     pub fn finish(self, decks: usize) -> Status {
         if let Some(error) = self.worst.as_ref().filter(|_| decks > 1) {
             error.print();

@@ -11,7 +11,8 @@ use crate::output::OutputError;
 use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
-/// Runs decks and prints for each expectation the expected value, the result and the error. A folder stands for the decks in it.
+/// Runs decks and prints for each expectation the expected value, the result and the error. A
+/// folder stands for the decks in it.
 pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
     let decks = match expand(paths) {

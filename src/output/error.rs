@@ -20,7 +20,7 @@ pub enum OutputError {
     Content {
         /// The file
         path: PathBuf,
-        /// What is wrong with it
+        /// The error in the content
         reason: String,
     },
     /// A path that ends in no file name, such as `..`.

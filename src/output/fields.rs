@@ -1,6 +1,8 @@
-//! fields.pvd and one .vtu file per row, for ParaView and other readers of VTK: the whole shape with its axes, strains and resultants.
+//! fields.pvd and one .vtu file per row, for ParaView and other readers of VTK: the whole shape
+//! with its axes, strains and resultants.
 //!
-//! Elements are cells of their own order, so that curved elements look curved. Numbers follow the XML as raw bytes ("appended").
+//! Elements are cells of their own order, so that curved elements look curved. Numbers follow the
+//! XML as raw bytes ("appended").
 
 use super::files::PartFile;
 use super::{OutputError, Row};
@@ -37,7 +39,8 @@ pub struct FieldsWriter {
 }
 
 impl FieldsWriter {
-    /// Creates the fields in a folder of results. `timed` is true if all stages advance time; otherwise rows are numbered for ParaView.
+    /// Creates the fields in a folder of results. `timed` is true if all stages advance time;
+    /// otherwise rows are numbered for ParaView.
     pub fn create(folder: &Path, figure: Figure, timed: bool) -> Result<Self, OutputError> {
         let part = folder.join(format!("fields.{}.part", std::process::id()));
         fs::create_dir_all(&part).map_err(|error| OutputError::file(&part, error))?;

@@ -47,7 +47,8 @@ impl PartFile {
         file.sync_all().map_err(|error| OutputError::file(&self.part, error)).and_then(|()| self.rename(name))
     }
 
-    /// Gives the file its final name at once: for content that can be made again if the machine loses it.
+    /// Gives the file its final name at once: for content that can be made again if the machine
+    /// loses it.
     pub fn rename(self, name: &str) -> Result<(), OutputError> {
         let done = self.folder.join(name);
         fs::rename(&self.part, &done).map_err(|error| OutputError::file(&done, error))

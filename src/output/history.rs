@@ -8,7 +8,8 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The rows that are written: every n-th, or those at multiples of a time interval, and always the last.
+/// The rows that are written: every n-th, or those at multiples of a time interval, and always the
+/// last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rows {
     /// Every n-th row
@@ -41,7 +42,8 @@ pub struct RowCounter {
 pub struct Row {
     /// Its number, from 0
     pub number: u64,
-    /// True for a row that is always written; any other is written only if it turns out to be the last
+    /// True for a row that is always written; any other is written only if it turns out to be the
+    /// last
     pub wanted: bool,
     /// True if its stage advances time
     pub dynamic: bool,
@@ -65,8 +67,9 @@ impl RowCounter {
 pub trait SideColumns: Send {
     /// The names of the additional columns, given the names of the others
     fn names(&self, columns: &[String]) -> Vec<String>;
-    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor. Returns true when the additional numbers
-    /// of all rows so far are known; rows are held back until then.
+    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor.
+    /// Returns true when the additional numbers of all rows so far are known; rows are held back
+    /// until then.
     fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool;
     /// The additional numbers of the rows that are held back, as far as they are known
     fn numbers(&self) -> Vec<f64>;
@@ -112,8 +115,8 @@ impl HistoryWriter {
         })
     }
 
-    /// Takes the numbers of a converged state, and writes them if its row is wanted. Returns the name of a column that is not finite, if
-    /// there is one.
+    /// Takes the numbers of a converged state, and writes them if its row is wanted. Returns the
+    /// name of a column that is not finite, if there is one.
     pub fn row(&mut self, at: Moment, values: &[f64], row: Row) -> Result<Option<String>, OutputError> {
         let clocks = [at.time, at.load];
         if let Some(k) = clocks.iter().chain(values).position(|value| !value.is_finite()) {
@@ -167,7 +170,8 @@ impl HistoryWriter {
     }
 }
 
-/// Adds numbers to a record. Debug formatting is the shortest text that reads back to the same float, with an exponent where shorter.
+/// Adds numbers to a record. Debug formatting is the shortest text that reads back to the same
+/// float, with an exponent where shorter.
 fn push(record: &mut csv::ByteRecord, text: &mut String, values: &[f64]) {
     for value in values {
         text.clear();
@@ -186,7 +190,8 @@ pub struct HistoryReader {
 }
 
 impl HistoryReader {
-    /// The path of the history in a folder of results: of a run that finished, or of one that failed.
+    /// The path of the history in a folder of results: of a run that finished, or of one that
+    /// failed.
     pub fn of_results(folder: &Path) -> Option<PathBuf> {
         let names = ["history.csv", "history.partial.csv"];
         names.map(|name| folder.join(name)).into_iter().find(|path| path.exists())

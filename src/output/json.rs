@@ -5,7 +5,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// A number that may be infinite or NaN. JSON has no such numbers: they are written as null, which is read as NaN.
+/// A number that may be infinite or NaN. JSON has no such numbers: they are written as null, which
+/// is read as NaN.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 #[serde(from = "Option<f64>", into = "f64")]
 pub(super) struct Number(pub(super) f64);
@@ -22,7 +23,8 @@ impl From<Number> for f64 {
     }
 }
 
-/// Numbers that are read back exactly, infinite ones and NaN too: each is written as the shortest text that reads back to it.
+/// Numbers that are read back exactly, infinite ones and NaN too: each is written as the shortest
+/// text that reads back to it.
 pub mod exact {
     use super::{Deserialize, Deserializer, Serializer};
     use serde::de::Error;

@@ -1,4 +1,5 @@
-//! The files of results. A file gets its name when it is complete: no name ever stands for half a result.
+//! The files of results. A file gets its name when it is complete: no name ever stands for half a
+//! result.
 
 mod curves;
 mod error;

@@ -125,7 +125,8 @@ struct TimeErrorRecord {
     moved: Number,
 }
 
-/// A warning in run.json and in the summaries for scripts. A warning about a deck has no stage, time and load.
+/// A warning in run.json and in the summaries for scripts. A warning about a deck has no stage,
+/// time and load.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct WarningRecord {
     name: String,

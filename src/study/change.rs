@@ -1,8 +1,9 @@
 //! Changes that studies make to a deck: elements, steps, schemes, tolerances.
 //!
-//! A change is applied to the deck that was read, so that variants need no text. Its `Display` is the setting that makes the same change on
-//! the command line (`--set beam.0.elements=8`). Settings of users (`--set`, `--vary` of sweeps) are applied to the text instead, since
-//! they may concern anything, such as parameters that expressions depend on.
+//! A change is applied to the deck that was read, so that variants need no text. Its `Display` is
+//! the setting that makes the same change on the command line (`--set beam.0.elements=8`). Settings
+//! of users (`--set`, `--vary` of sweeps) are applied to the text instead, since they may concern
+//! anything, such as parameters that expressions depend on.
 
 use super::StudyError;
 use crate::deck::{
@@ -154,7 +155,8 @@ fn counted(counts: &[usize]) -> Option<Vec<usize>> {
     counts.iter().all(|count| (1..=MOST_ELEMENTS).contains(count)).then(|| counts.to_vec())
 }
 
-/// The scheme of a word. It keeps the coefficients of the scheme before that it has too, and has the usual ones otherwise.
+/// The scheme of a word. It keeps the coefficients of the scheme before that it has too, and has
+/// the usual ones otherwise.
 fn scheme_with(before: SchemeWord, word: &str) -> Option<SchemeWord> {
     let rho_inf = match before {
         SchemeWord::GeneralizedAlpha(rho_inf) | SchemeWord::LieGeneralizedAlpha(rho_inf) => rho_inf,

@@ -29,8 +29,8 @@ pub struct ComparedHistories {
 
 /// Compares the columns that `stored` has; a column or row that `came` lacks is an error.
 ///
-/// A cell passes where |came - stored| <= atol + rtol |stored|. The error bars of both histories (`tip.ux.err`) are added to the right side;
-/// they are not compared themselves.
+/// A cell passes where |came - stored| <= atol + rtol |stored|. The error bars of both histories
+/// (`tip.ux.err`) are added to the right side; they are not compared themselves.
 pub fn compare(
     came: &HistoryReader,
     stored: &HistoryReader,

@@ -76,7 +76,7 @@ pub enum SweepError {
     Vary {
         /// The option
         text: String,
-        /// What is wrong with its values
+        /// The error of its values
         reason: Box<SweepError>,
     },
     /// A table `[[vary]]` whose range cannot be read.
@@ -84,17 +84,17 @@ pub enum SweepError {
     Key {
         /// The key that is varied
         key: String,
-        /// What is wrong with its values
+        /// The error of its values
         reason: Box<SweepError>,
     },
     /// A list with an empty entry.
     #[error("there is an empty value in `{0}`")]
     EmptyValue(String),
     /// A text that is no range.
-    #[error("`{0}` is no range: write FROM:TO, FROM:TO:COUNT, and `:log` behind it for equal factors")]
+    #[error("`{0}` is no range: write FROM:TO or FROM:TO:COUNT, with `:log` at the end for logarithmic spacing")]
     NoRange(String),
     /// A logarithmic range with a bound that is not positive.
-    #[error("equal factors lead from {from} to {to} only where both are positive")]
+    #[error("logarithmic spacing from {from} to {to} needs positive ends")]
     NotPositive {
         /// The first value
         from: f64,
@@ -102,7 +102,7 @@ pub enum SweepError {
         to: f64,
     },
     /// A range of which no value is taken.
-    #[error("a range of no numbers")]
+    #[error("a range needs at least one value")]
     NoNumbers,
     /// More points than are supported.
     #[error("more than the largest supported {0} points")]
@@ -114,10 +114,10 @@ pub enum SweepError {
     #[error("`{0}` is varied twice")]
     VariedTwice(String),
     /// A range without a count where no sample is drawn.
-    #[error("`{0}` has a range: say how many of it (FROM:TO:COUNT), or --sample")]
+    #[error("`{0}` has a range: give the number of values (FROM:TO:COUNT), or use --sample")]
     RangeWithoutCount(String),
     /// Lists of different lengths that are to be combined value by value.
-    #[error("--zip takes as many values of each key: `{first}` has {first_count}, `{other}` has {other_count}")]
+    #[error("--zip needs equal numbers of values: `{first}` has {first_count}, `{other}` has {other_count}")]
     UnequalLists {
         /// The first key
         first: String,

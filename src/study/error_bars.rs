@@ -1,7 +1,9 @@
-//! Error bars: the history of a run is compared with those of two others, one with half its elements and one with half its step.
+//! Error bars: the history of a run is compared with those of two others, one with half its
+//! elements and one with half its step.
 //!
-//! The bar of a row is the largest estimate so far, up to the next row that all histories have: an error does not vanish where two histories
-//! cross, and a growing error shows in them late. See [`super::accuracy`] for the estimate.
+//! The bar of a row is the largest estimate so far, up to the next row that all histories have: an
+//! error does not vanish where two histories cross, and a growing error shows in them late. See
+//! [`super::accuracy`] for the estimate.
 
 use super::StudyError;
 use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
@@ -18,13 +20,15 @@ use std::thread::{self, ScopedJoinHandle};
 /// The step tolerance of a companion with adaptive steps, over that of the run.
 const LOOSER: f64 = 10.0;
 
-/// Bars over estimates: factors of safety as in the grid convergence index (Roache, Annu. Rev. Fluid Mech. 29, 1997, DOI
-/// 10.1146/annurev.fluid.29.1.123, three grids), chosen on random motions with a twentieth of a period as their step, so that nearly all
-/// errors are inside. A finer run shows the error itself, a coarser one only what it would be for smooth solutions.
+/// Bars over estimates: factors of safety as in the grid convergence index (Roache, Annu. Rev.
+/// Fluid Mech. 29, 1997, DOI 10.1146/annurev.fluid.29.1.123, three grids), chosen on random motions
+/// with a twentieth of a period as their step, so that nearly all errors are inside. A finer run
+/// shows the error itself, a coarser one only what it would be for smooth solutions.
 const SAFETY_FINER: f64 = 1.5;
 const SAFETY_COARSER: f64 = 2.5;
 
-/// Straight pieces may stand for a curve if the angle between neighbours, in radians, is between these bounds.
+/// Straight pieces may stand for a curve if the angle between neighbours, in radians, is between
+/// these bounds.
 const SMALLEST_BEND: f64 = 1e-6;
 const LARGEST_BEND: f64 = 0.55;
 
@@ -56,7 +60,8 @@ struct Comparison {
     divisors: Vec<f64>,
 }
 
-/// Runs the companions of a deck, whose text is `text`, in parallel. `interrupted` gives the signal that was caught.
+/// Runs the companions of a deck, whose text is `text`, in parallel. `interrupted` gives the signal
+/// that was caught.
 pub fn error_bars(
     text: &str,
     deck: &Deck,
@@ -102,7 +107,7 @@ fn first_that_finishes(
             Err(error) => why = error.to_string(),
         }
     }
-    Err(Failure::Limit(format!("no error bars: a run with another mesh or step failed, {why}")))
+    Err(Failure::Limit(format!("no error bars: a comparison run with another mesh or step failed: {why}")))
 }
 
 /// Estimated errors of the expectations of a deck; `came` holds their values in the run.
@@ -128,7 +133,8 @@ pub fn of_expected(
     Ok(errors)
 }
 
-/// The variants from which errors are estimated, for mesh and steps: for each the most informative one, and others in case it fails.
+/// The variants from which errors are estimated, for mesh and steps: for each the most informative
+/// one, and others in case it fails.
 fn companions(original: Original, sampler: &Sampler) -> Vec<Vec<Comparison>> {
     let deck = original.deck;
     let mesher = Mesher { original, sampler, interpolation: None, keeps_places: true };
@@ -174,7 +180,8 @@ fn companions(original: Original, sampler: &Sampler) -> Vec<Vec<Comparison>> {
     found
 }
 
-/// Messages about beams whose straight pieces may stand for a curve: no error bar contains that error.
+/// Messages about beams whose straight pieces may stand for a curve: no error bar contains that
+/// error.
 pub fn polylines(deck: &Deck) -> Vec<String> {
     let mut messages = Vec::new();
     for beam in &deck.beams {
@@ -198,7 +205,8 @@ pub fn polylines(deck: &Deck) -> Vec<String> {
     messages
 }
 
-/// Refuses stages whose rows differ from run to run: paths, and adaptive steps without an output interval.
+/// Refuses stages whose rows differ from run to run: paths, and adaptive steps without an output
+/// interval.
 pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
     for stage in &deck.stages {
         let message = match stage.body {

@@ -5,7 +5,8 @@ use crate::scene::Scene;
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-/// Usual numbers of iterations of levels, steps, modes and critical loads, for stages that have not begun.
+/// Usual numbers of iterations of levels, steps, modes and critical loads, for stages that have not
+/// begun.
 const ITERATIONS_OF_A_LEVEL: f64 = 6.0;
 const ITERATIONS_OF_A_STEP: f64 = 3.0;
 const ITERATIONS_OF_A_MODE: f64 = 10.0;
@@ -25,8 +26,9 @@ pub struct Forecast {
     pub at: Moment,
 }
 
-/// Runs a scene for a limited time and predicts the duration of the whole run: the running stage continues at the pace of the later half of
-/// its attempts so far, and later stages take the usual numbers of iterations.
+/// Runs a scene for a limited time and predicts the duration of the whole run: the running stage
+/// continues at the pace of the later half of its attempts so far, and later stages take the usual
+/// numbers of iterations.
 pub fn forecast(scene: &Scene, limit: Duration) -> Forecast {
     let at = Moment { stage: 1, time: 0.0, load: 0.0 };
     let mut watch = Watch {

@@ -43,7 +43,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Runs a scene. It fails after more than `most_attempts` attempts at steps and levels. A recorder follows the expectations of the deck.
+    /// Runs a scene. It fails after more than `most_attempts` attempts at steps and levels. A
+    /// recorder follows the expectations of the deck.
     pub(in crate::study) fn of(
         scene: &Scene,
         recorder: Option<Recorder>,
@@ -172,7 +173,8 @@ fn are_dynamic(scene: &Scene) -> Vec<bool> {
     scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect()
 }
 
-/// The names of all outputs: the columns of the history, then modes and critical loads, stage by stage.
+/// The names of all outputs: the columns of the history, then modes and critical loads, stage by
+/// stage.
 pub(in crate::study) fn columns(scene: &Scene) -> Vec<String> {
     let mut columns: Vec<String> = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
     columns.extend(scene.plan.stages.iter().enumerate().flat_map(|(k, stage)| columns_of(k + 1, stage)));

@@ -6,9 +6,9 @@ use std::sync::Mutex;
 use std::sync::mpsc::{self, Sender};
 use std::thread;
 
-/// Runs the tasks `open`, the last first, on several threads until all have ended or `stopped`. `take` gets the result of each as it ends, on
-/// the calling thread. `work` returns `None` for a task that was stopped. A task that panics does not stop the others: its result is
-/// `broken`.
+/// Runs the tasks `open`, the last first, on several threads until all have ended or `stopped`.
+/// `take` gets the result of each as it ends, on the calling thread. `work` returns `None` for a
+/// task that was stopped. A task that panics does not stop the others: its result is `broken`.
 pub fn in_parallel<T: Send>(
     wanted: usize,
     open: Vec<usize>,

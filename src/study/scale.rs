@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-/// Forces below this part of the moments over the length of the scene are round-off, and moments, displacements and rotations likewise:
-/// residuals are up to 1e-8 of the largest force, and add up over elements.
+/// Forces below this part of the moments over the length of the scene are round-off, and moments,
+/// displacements and rotations likewise: residuals are up to 1e-8 of the largest force, and add up
+/// over elements.
 const ROUND_OFF: f64 = 1e-6;
 
 /// Numbers of consecutive columns.
@@ -15,8 +16,8 @@ pub(super) struct ScaleRow<'a> {
     pub values: &'a [f64],
 }
 
-/// For each column the largest value of its kind in the whole scene: of all displacements, rotations, forces, …. `length` is that of the
-/// scene.
+/// For each column the largest value of its kind in the whole scene: of all displacements,
+/// rotations, forces, …. `length` is that of the scene.
 pub(super) fn scales<'a>(columns: &[String], length: f64, rows: impl Iterator<Item = ScaleRow<'a>>) -> Vec<f64> {
     let kinds: Vec<&str> = columns.iter().map(|column| kind(column)).collect();
     let mut scales = HashMap::new();
@@ -26,7 +27,8 @@ pub(super) fn scales<'a>(columns: &[String], length: f64, rows: impl Iterator<It
             *scale = scale.max(value.abs());
         }
     }
-    // Round-off of forces must not count as a moment, nor that of displacements as a rotation, and vice versa.
+    // Round-off of forces must not count as a moment, nor that of displacements as a rotation, and
+    // vice versa.
     let before = scales.clone();
     let mut set_floor = |kind: &'static str, partner: &str, arm: f64| {
         let floor = before.get(partner).map_or(0.0, |scale| ROUND_OFF * arm * scale);
@@ -43,7 +45,8 @@ pub(super) fn scales<'a>(columns: &[String], length: f64, rows: impl Iterator<It
     kinds.iter().map(|kind| scales.get(kind).copied().unwrap_or(0.0)).collect()
 }
 
-/// The kind of a column: its name without node and direction. All energies are one kind, since they are compared with each other.
+/// The kind of a column: its name without node and direction. All energies are one kind, since they
+/// are compared with each other.
 pub(super) fn kind(column: &str) -> &str {
     // After a space the name tells the row of an expectation.
     let column = column.split(' ').next().unwrap_or(column);

@@ -114,7 +114,8 @@ impl Recorder {
     }
 }
 
-/// The number of an expectation's column among those of all probes. Its probe is added if it is missing.
+/// The number of an expectation's column among those of all probes. Its probe is added if it is
+/// missing.
 fn place(expectation: &Expectation, probes: &mut Vec<Probe>) -> Option<usize> {
     let ExpectationKind::Column { probe, component, .. } = &expectation.kind else { return None };
     let known = probes.iter().position(|known| known.names == probe.names);

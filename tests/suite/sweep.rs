@@ -178,8 +178,8 @@ fn wrong_words_for_a_sweep_are_told() {
     for (words, told) in [
         (&["--vary", "param.q=1,2"][..], "the deck has no parameter `q`"),
         (&["--vary", "sectoin.s.EA=1,2"], "the deck has no `sectoin`"),
-        (&["--vary", "param.L=1:2"], "say how many"),
-        (&["--vary", "param.L=1,2", "--vary", "param.F=1", "--zip"], "as many values"),
+        (&["--vary", "param.L=1:2"], "give the number of values"),
+        (&["--vary", "param.L=1,2", "--vary", "param.F=1", "--zip"], "equal numbers of values"),
         (&["--vary", "param.L=1,2", "--output", "tip.uq"], "there is no column `tip.uq`"),
         (&["--vary", "param.L=1,2", "--only", "3"], "points are numbers from 1 to 2"),
         (&["--vary", "param.L"], "expected KEY=V1,V2"),

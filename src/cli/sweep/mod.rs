@@ -24,10 +24,12 @@ pub struct SweepArguments {
     /// Change a value of the deck for all points
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Vary a key: section.arm.EI=1e3,1e4 param.L=5:20:4 (four numbers from 5 to 20) param.k=1e3:1e6:4:log
+    /// Vary a key: section.arm.EI=1e3,1e4 param.L=5:20:4 (four numbers from 5 to 20)
+    /// param.k=1e3:1e6:4:log
     #[arg(long, value_name = "KEY=V1,V2,…")]
     vary: Vec<String>,
-    /// Combine the first values of all keys, then the second ones, and so on, instead of every value with every other
+    /// Combine the first values of all keys, then the second ones, and so on, instead of every
+    /// value with every other
     #[arg(long, conflicts_with = "sample")]
     zip: bool,
     /// Draw COUNT random points from ranges (--vary param.L=5:20), spread evenly (Latin hypercube)
@@ -36,8 +38,8 @@ pub struct SweepArguments {
     /// Random seed of --sample (default: 1)
     #[arg(long)]
     seed: Option<u64>,
-    /// Output to record: tip.uz (at the end) tip.uz:absmax (or max, min, mean, drift) tip.uz:0.5 (at a time) tip.uz:load=0.5 (default:
-    /// all columns at the end, and modes)
+    /// Output to record: tip.uz (at the end) tip.uz:absmax (or max, min, mean, drift) tip.uz:0.5
+    /// (at a time) tip.uz:load=0.5 (default: all columns at the end, and modes)
     #[arg(long = "output", value_name = "COLUMN[:WHEN]")]
     outputs: Vec<String>,
     /// Estimate the errors of the outputs, from two more runs of each point

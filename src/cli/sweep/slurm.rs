@@ -1,8 +1,9 @@
 //! Points as tasks of a Slurm job array.
 //!
-//! A point has ended when its file of results exists, whatever Slurm says. The array is named after the sweep and its folder, so that
-//! the command, when it is run again, follows a running array instead of submitting it twice. The queue is asked for by this name, since
-//! Slurm forgets jobs, and without accounting, which many clusters lack.
+//! A point has ended when its file of results exists, whatever Slurm says. The array is named after
+//! the sweep and its folder, so that the command, when it is run again, follows a running array
+//! instead of submitting it twice. The queue is asked for by this name, since Slurm forgets jobs,
+//! and without accounting, which many clusters lack.
 
 use super::SweepArguments;
 use super::plan::Plan;
@@ -21,7 +22,8 @@ use std::time::{Duration, Instant};
 /// Largest number of tasks of an array where Slurm does not tell its limit.
 const DEFAULT_MAX_TASKS: usize = 1000;
 
-/// Queue checks after which a point without a file is given up: a shared file system shows files of other machines late.
+/// Queue checks after which a point without a file is given up: a shared file system shows files of
+/// other machines late.
 const MAX_CHECKS_WITHOUT_FILE: usize = 3;
 
 /// Time between checks for a signal.
@@ -41,7 +43,8 @@ const ENDED: [&str; 10] = [
     "REVOKED",
 ];
 
-/// Submits points (numbers from 0), or follows the array that was submitted before, until all points have ended.
+/// Submits points (numbers from 0), or follows the array that was submitted before, until all
+/// points have ended.
 pub fn run(plan: &Plan, points: &[usize], wanted: &SweepArguments) -> Result<(), CommandError> {
     let array =
         Array { plan, name: format!("beamsim-{}", plan.fingerprint()), folder: absolute(&plan.folder)?.join("slurm") };
@@ -214,8 +217,8 @@ fn wait(time: Duration) -> bool {
 
 /// The largest number of tasks of an array: Slurm numbers them from 0 to MaxArraySize - 1.
 fn largest_array() -> usize {
-    let told = output(Command::new("scontrol").args(["show", "config"])).unwrap_or_default();
-    let line = told.lines().find(|line| line.trim_start().starts_with("MaxArraySize"));
+    let config = output(Command::new("scontrol").args(["show", "config"])).unwrap_or_default();
+    let line = config.lines().find(|line| line.trim_start().starts_with("MaxArraySize"));
     let number = line.and_then(|line| line.split('=').nth(1)?.trim().parse::<usize>().ok());
     number.filter(|&number| number > 1).map_or(DEFAULT_MAX_TASKS, |number| number - 1)
 }

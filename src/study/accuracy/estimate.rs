@@ -45,8 +45,8 @@ impl Falls {
 /// The lowest order that estimates use.
 const LEAST_ORDER: f64 = 0.5;
 
-/// The usual error of Newton's method over its tolerance: the last iteration reaches less than the tolerance, but with a kept tangent not
-/// much less.
+/// The usual error of Newton's method over its tolerance: the last iteration reaches less than the
+/// tolerance, but with a kept tangent not much less.
 const LEFT_BY_NEWTON: f64 = 0.2;
 
 /// The error of Newton's method in all outputs, relative to the largest value of their kind.
@@ -59,8 +59,9 @@ pub fn largest_tolerance(deck: &Deck) -> f64 {
     deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max)
 }
 
-/// For each column: the difference to a run with other elements over this is the error. `ratio` is the width of the other elements over that
-/// of the own ones. Columns that lie `between` nodes may be at or near nodes of the other mesh.
+/// For each column: the difference to a run with other elements over this is the error. `ratio` is
+/// the width of the other elements over that of the own ones. Columns that lie `between` nodes may
+/// be at or near nodes of the other mesh.
 pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String], between: &[bool]) -> Vec<f64> {
     let divisor = |(column, &between): (&String, &bool)| {
         if between { ratio.min(1.0) } else { (ratio.powf(Falls::of(column).in_space(order).assumed) - 1.0).abs() }
@@ -95,7 +96,8 @@ impl Source {
 /// The part of the error of a run that comes from its mesh, or its steps.
 #[derive(Clone)]
 pub struct ErrorShare {
-    /// The largest ratio of the error of an output to the wanted error; infinite where it is unknown
+    /// The largest ratio of the error of an output to the wanted error; infinite where it is
+    /// unknown
     pub largest: f64,
     /// The error of each output
     pub columns: Vec<f64>,
@@ -167,7 +169,8 @@ impl Fall {
         self.traces[self.leading].low
     }
 
-    /// The orders of the largest error for elements of an order, to plan the next mesh; the assumed order is half way to that of smooth scenes.
+    /// The orders of the largest error for elements of an order, to plan the next mesh; the assumed
+    /// order is half way to that of smooth scenes.
     pub fn planned_orders(&self, order: usize) -> Orders {
         let Orders { assumed, smooth } = Falls::ALL[self.leading].in_space(order);
         Orders { assumed: 0.5 * (assumed + smooth), smooth }
@@ -182,7 +185,8 @@ impl Fall {
         let falls: Vec<Falls> = sampler.columns.iter().map(|column| Falls::of(column)).collect();
         let mut largest = [f64::NAN; 2];
         let mut coarser = f64::NAN;
-        // The difference of an interpolated value to a node of the other mesh may be its whole error.
+        // The difference of an interpolated value to a node of the other mesh may be its whole
+        // error.
         let interpolated = outputs.largest_of(&differences, |k| between[k]);
         for k in (0..falls.len()).filter(|&k| between[k]) {
             of_coarser[k] = 2.0 * differences[k];
@@ -214,8 +218,8 @@ impl Fall {
 }
 
 impl Trace {
-    /// The order that the estimate uses: the observed one where it is lower than the assumed one, as for waves with fronts; half way to it
-    /// where it is higher.
+    /// The order that the estimate uses: the observed one where it is lower than the assumed one,
+    /// as for waves with fronts; half way to it where it is higher.
     fn order(&mut self, Orders { assumed, smooth }: Orders, now: Difference) -> f64 {
         match self.before {
             // The same width shows nothing new.
@@ -230,8 +234,8 @@ impl Trace {
     }
 }
 
-/// The order that explains the differences of a coarse and a fine run, at most that of smooth solutions. The two differences may have
-/// different ratios, so it is found by bisection.
+/// The order that explains the differences of a coarse and a fine run, at most that of smooth
+/// solutions. The two differences may have different ratios, so it is found by bisection.
 fn seen_order(smooth: f64, coarse: Difference, fine: Difference) -> f64 {
     let too_high = |order| coarse.of_order(order) * fine.size > fine.of_order(order) * coarse.size;
     if !too_high(smooth) {
@@ -274,8 +278,8 @@ pub struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// The largest ratio of a difference to the wanted error among some columns; NaN where nothing can be compared, as for columns that are
-    /// always zero.
+    /// The largest ratio of a difference to the wanted error among some columns; NaN where nothing
+    /// can be compared, as for columns that are always zero.
     fn largest_of(&self, differences: &[f64], of: impl Fn(usize) -> bool) -> f64 {
         let over = |&k: &usize| differences[k] / self.wanted.of(&self.sampler.columns[k]);
         self.sampler.outputs.iter().filter(|&&k| of(k)).map(over).fold(f64::NAN, f64::max)

@@ -1,17 +1,19 @@
-//! Elements and steps for a wanted accuracy: the deck is run on finer meshes and with smaller steps until the estimated error of all outputs is
-//! below the wanted one.
+//! Elements and steps for a wanted accuracy: the deck is run on finer meshes and with smaller steps
+//! until the estimated error of all outputs is below the wanted one.
 //!
-//! Each round runs up to three variants: the latest one of the search, one with twice its step, and one with half its elements, which after
-//! the first round has the longer step too. The differences give the errors of mesh and step. With a ratio r of widths and an order q,
+//! Each round runs up to three variants: the latest one of the search, one with twice its step, and
+//! one with half its elements, which after the first round has the longer step too. The differences
+//! give the errors of mesh and step. With a ratio r of widths and an order q,
 //!
 //! ```text
 //! e = |U - U_coarse| / (r^q - 1)
 //! ```
 //!
-//! For smooth solutions the order is at least 2 for steps, the order of the elements for resultants, and one more for other columns. The
-//! estimate uses q half an order below that, or half way from there to the order that is observed from round to round, so that estimates are
-//! above errors. The error of the coarser run is r^q times that of the finer one, so that the search can return the cheapest variant that is
-//! accurate enough.
+//! For smooth solutions the order is at least 2 for steps, the order of the elements for
+//! resultants, and one more for other columns. The estimate uses q half an order below that, or
+//! half way from there to the order that is observed from round to round, so that estimates are
+//! above errors. The error of the coarser run is r^q times that of the finer one, so that the
+//! search can return the cheapest variant that is accurate enough.
 
 mod candidates;
 mod estimate;
@@ -51,7 +53,8 @@ pub struct Found {
     pub reached: bool,
     /// The names of all outputs
     pub columns: Vec<String>,
-    /// The estimated error of each, over the largest value of its kind; NaN where there is nothing to compare
+    /// The estimated error of each, over the largest value of its kind; NaN where there is nothing
+    /// to compare
     pub estimates: Vec<f64>,
     /// The largest ratio of an estimate to the wanted error
     pub ratio: f64,
@@ -77,8 +80,8 @@ impl Found {
     }
 }
 
-/// Finds a variant of the deck `text` whose estimated errors are at most the wanted ones; the best variant so far if the budget ends before,
-/// or the mesh would have too many nodes.
+/// Finds a variant of the deck `text` whose estimated errors are at most the wanted ones; the best
+/// variant so far if the budget ends before, or the mesh would have too many nodes.
 pub fn reach(
     text: &str,
     deck: &Deck,
@@ -110,7 +113,8 @@ pub fn reach(
     Search::new(wanted, mesher, family, pace, newton).run(pool)
 }
 
-/// True if the steps are longer than those of the deck. Such a variant may fail without harm: the search goes on with shorter steps.
+/// True if the steps are longer than those of the deck. Such a variant may fail without harm: the
+/// search goes on with shorter steps.
 fn has_long_steps(variant: &Variant) -> bool {
     matches!(variant.pace, Pace::Steps(factor) if factor > 1.0)
 }

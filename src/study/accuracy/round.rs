@@ -10,7 +10,8 @@ pub struct Round {
     pub own: Variant,
     /// The variant with a longer step
     pub longer: Option<Compared>,
-    /// A variant on another mesh. It may have the longer steps, which cost less: the mesh error hardly depends on the step.
+    /// A variant on another mesh. It may have the longer steps, which cost less: the mesh error
+    /// hardly depends on the step.
     pub remeshed: Option<Compared>,
 }
 

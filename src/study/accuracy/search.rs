@@ -11,7 +11,8 @@ use crate::study::cost::{Companion, Family, Mesher, Pace, Pool, Trial, Variant};
 
 /// The nodes of the first mesh over those of the deck.
 const FIRST_MESH: f64 = 0.5;
-/// The nodes of the first mesh over those of the deck, without dynamic stages and for a loose accuracy.
+/// The nodes of the first mesh over those of the deck, without dynamic stages and for a loose
+/// accuracy.
 const COARSE_MESH: f64 = 0.35;
 
 /// The smallest and the largest factor of the nodes from round to round.
@@ -22,7 +23,8 @@ const MESH_SHRINKS: [f64; 2] = [0.8, 0.25];
 /// The largest number of halvings of a step from round to round.
 const MOST_HALVINGS: f64 = 3.0;
 
-/// The order with which steps are planned. A step that is too long costs little, since the next round compares with it.
+/// The order with which steps are planned. A step that is too long costs little, since the next
+/// round compares with it.
 const PLANNED_ORDER: f64 = 2.0;
 
 /// The planned error over the allowed one.
@@ -31,16 +33,19 @@ const AIM: f64 = 0.9;
 /// The smaller share of the error is not reduced below this part of the wanted error.
 const MOST_OF_THE_LESSER: f64 = 0.7;
 
-/// A share of the error below this part of the wanted error is not estimated again when only the other source changes.
+/// A share of the error below this part of the wanted error is not estimated again when only the
+/// other source changes.
 const SMALL: f64 = 0.7;
 /// The largest change of the other source for that, in halvings.
 const NEAR: f64 = 2.0;
 
-/// A mesh whose share is below this part of the wanted error becomes coarser where the steps change anyway; a larger share would leave too
-/// little to the steps, which cost more. A share below this is kept however the other source changes.
+/// A mesh whose share is below this part of the wanted error becomes coarser where the steps change
+/// anyway; a larger share would leave too little to the steps, which cost more. A share below this
+/// is kept however the other source changes.
 const FINE_ENOUGH: f64 = 0.1;
 
-/// On the coarsest mesh, a share below this part of the allowed one leads to elements of a lower order.
+/// On the coarsest mesh, a share below this part of the allowed one leads to elements of a lower
+/// order.
 const LOWER_ORDER: f64 = 0.1;
 
 /// The largest number of rounds.
@@ -50,7 +55,8 @@ const MOST_NODES: usize = 200_000;
 /// The largest number of steps to the end of the run.
 const MOST_STEPS: f64 = 2e6;
 
-/// The allowed share of one source of errors beside the share of the other, both over the wanted error.
+/// The allowed share of one source of errors beside the share of the other, both over the wanted
+/// error.
 fn allowed(share: f64, other: f64) -> f64 {
     if share < other && share < MOST_OF_THE_LESSER {
         // The larger share is reduced instead.
@@ -97,7 +103,8 @@ impl<T: PartialEq> KnownShares<T> {
         Self { fall: Fall::default(), last: Vec::new(), beside: 1.0 }
     }
 
-    /// The share of a mesh, or pace, where it is known well enough for the present width of the other source.
+    /// The share of a mesh, or pace, where it is known well enough for the present width of the
+    /// other source.
     fn known(&self, of: &T, beside: f64) -> Option<ErrorShare> {
         let near = (beside / self.beside).log2().abs() <= NEAR;
         let largest = if near { SMALL } else { FINE_ENOUGH };
@@ -177,7 +184,7 @@ impl<'a> Search<'a> {
             self.refine(&estimates.own);
         }
         best.map(|best| Found { runs, ..best }).ok_or_else(|| {
-            let message = format!("no run came to its end whose error could be estimated{ended}");
+            let message = format!("no run finished whose error could be estimated{ended}");
             StudyError::Failure(Failure::Limit(message))
         })
     }
@@ -206,7 +213,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The first candidate that finishes. A candidate that the round has not run is run now, if the budget allows it.
+    /// The first candidate that finishes. A candidate that the round has not run is run now, if the
+    /// budget allows it.
     fn choose(
         &self,
         candidates: Vec<Candidate>,
@@ -343,8 +351,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Refines the mesh or the steps, whichever causes the error, by as much as the order requires, and coarsens the one that is finer than
-    /// necessary.
+    /// Refines the mesh or the steps, whichever causes the error, by as much as the order requires,
+    /// and coarsens the one that is finer than necessary.
     fn refine(&mut self, estimate: &Estimate) {
         let mesh = estimate.mesh.largest;
         let step = estimate.step.largest;

@@ -6,15 +6,18 @@ use super::sample::Samples;
 use super::variant::{Pace, Variant};
 use crate::study::StudyError;
 
-/// The factor of Newton's tolerance with which the part of the error that comes from it is measured.
+/// The factor of Newton's tolerance with which the part of the error that comes from it is
+/// measured.
 const TIGHTER: f64 = 1e-2;
 
-/// The error of a run, at least the resolution of the reference; infinite where the run cannot be compared.
+/// The error of a run, at least the resolution of the reference; infinite where the run cannot be
+/// compared.
 fn error_of(run: &CostRun, resolution: f64) -> f64 {
     if run.error.is_nan() { f64::INFINITY } else { run.error.max(resolution) }
 }
 
-/// The numbers of runs that are at most `near` times as slow as the fastest one of at least their accuracy.
+/// The numbers of runs that are at most `near` times as slow as the fastest one of at least their
+/// accuracy.
 pub(super) fn near(runs: &[CostRun], resolution: f64, near: f64) -> Vec<usize> {
     let known = |k: &usize| error_of(&runs[*k], resolution).is_finite();
     let time = |k: usize| runs[k].timing.seconds.cpu;
@@ -43,8 +46,8 @@ pub(super) fn mark(runs: &mut [CostRun], resolution: f64) {
     }
 }
 
-/// Finds the main source of error of each run of the frontier: mesh and step from differences to neighbours on the grid, Newton's method
-/// from another run with a smaller tolerance.
+/// Finds the main source of error of each run of the frontier: mesh and step from differences to
+/// neighbours on the grid, Newton's method from another run with a smaller tolerance.
 pub(super) fn find_limits(
     runs: &mut [CostRun],
     pool: &mut Pool,
@@ -98,8 +101,8 @@ const STEP: Direction = Direction {
     },
 };
 
-/// An estimate of the part of an error that comes from one source: the difference to the next finer run, or, where there is none, the
-/// difference to the next coarser one, reduced by the order.
+/// An estimate of the part of an error that comes from one source: the difference to the next finer
+/// run, or, where there is none, the difference to the next coarser one, reduced by the order.
 fn share(
     runs: &[CostRun],
     k: usize,

@@ -1,4 +1,5 @@
-//! The variants that a study of cost runs: families of elements, interpolations and schemes, each on several meshes and with several steps.
+//! The variants that a study of cost runs: families of elements, interpolations and schemes, each
+//! on several meshes and with several steps.
 
 use super::mesher::Mesher;
 use super::variant::{Family, Pace, Variant, dynamic_stages};
@@ -51,7 +52,8 @@ impl Grid {
         Self { families, meshes, paces: paces(deck, step, step_tolerance) }
     }
 
-    /// Every variant once, by family, mesh and pace; two coarse meshes may be the same after rounding.
+    /// Every variant once, by family, mesh and pace; two coarse meshes may be the same after
+    /// rounding.
     pub fn variants(&self, mesher: &Mesher) -> Vec<Variant> {
         let mut variants: Vec<Variant> = Vec::new();
         for family in &self.families {

@@ -1,4 +1,5 @@
-//! Runs that have ended, saved on disk while a study is running, so that a stopped study can continue.
+//! Runs that have ended, saved on disk while a study is running, so that a stopped study can
+//! continue.
 
 use super::trial::Trial;
 use crate::output::{OutputError, PartFile};
@@ -40,7 +41,8 @@ struct Entry<'a> {
 }
 
 impl Journal {
-    /// Opens the journal in a folder. Runs of the study `identity` are read, those of other studies are forgotten.
+    /// Opens the journal in a folder. Runs of the study `identity` are read, those of other studies
+    /// are forgotten.
     pub fn open(folder: &Path, identity: &str) -> Result<Self, OutputError> {
         let path = folder.join(NAME);
         let known = fs::read_to_string(&path).ok().and_then(|text| read(&text, identity)).unwrap_or_default();
@@ -69,7 +71,8 @@ impl Journal {
         self.known.get(key).cloned()
     }
 
-    /// Saves a run. If it cannot be written, it is only known in memory, and [`Journal::write_error`] gives the reason.
+    /// Saves a run. If it cannot be written, it is only known in memory, and
+    /// [`Journal::write_error`] gives the reason.
     pub fn keep(&mut self, key: &str, trial: &Trial) {
         self.known.insert(key.into(), trial.clone());
         let entry = line(&Entry { settings: key.into(), run: Cow::Borrowed(trial) });

@@ -6,7 +6,8 @@ use super::trial;
 use super::variant::{Family, Original, Pace, Variant};
 use crate::deck::{Beam, InterpolationWord};
 
-/// The largest divisor of the deck's numbers of elements that is tried for a coarser mesh, and the number of multiples for a finer one.
+/// The largest divisor of the deck's numbers of elements that is tried for a coarser mesh, and the
+/// number of multiples for a finer one.
 const MOST_PARTS: usize = 8;
 
 /// A mesh that another one is compared with.
@@ -30,8 +31,9 @@ pub struct Mesher<'a> {
 }
 
 impl Mesher<'_> {
-    /// Elements of each piece of each beam for a factor times the nodes of the deck. Where a load, support or output would lose its node, a
-    /// divisor or a multiple of the deck's elements is taken instead.
+    /// Elements of each piece of each beam for a factor times the nodes of the deck. Where a load,
+    /// support or output would lose its node, a divisor or a multiple of the deck's elements is
+    /// taken instead.
     pub fn elements(&self, order: Option<usize>, factor: f64) -> Vec<Vec<usize>> {
         let ratio = |beam: &Beam| (beam.order as f64 / order.unwrap_or(beam.order) as f64) * factor;
         let each = |count: &dyn Fn(&Beam, usize) -> usize| -> Vec<Vec<usize>> {
@@ -52,7 +54,8 @@ impl Mesher<'_> {
         parts.chain(multiples).find(|elements| self.makes_sense(order, elements)).unwrap_or(rounded)
     }
 
-    /// A mesh to compare another with: it has half the elements of each piece, or twice as many where some piece has only one.
+    /// A mesh to compare another with: it has half the elements of each piece, or twice as many
+    /// where some piece has only one.
     pub fn companion(&self, order: Option<usize>, elements: &[Vec<usize>]) -> Companion {
         let each = |change: &dyn Fn(usize) -> usize| -> Vec<Vec<usize>> {
             elements.iter().map(|beam| beam.iter().map(|&count| change(count)).collect()).collect()
@@ -69,7 +72,8 @@ impl Mesher<'_> {
         Companion { elements: each(&|count| count.saturating_mul(2)), ratio: 0.5 }
     }
 
-    /// Changes the numbers of elements; `change` takes a number and the unit that the new one must be a multiple of.
+    /// Changes the numbers of elements; `change` takes a number and the unit that the new one must
+    /// be a multiple of.
     fn by_units(
         &self,
         order: Option<usize>,

@@ -1,5 +1,6 @@
-//! The cost of accuracy: a scene is run on several meshes, with several orders and steps. Errors are measured against a reference that the
-//! study computes itself, and the cheapest run for each accuracy is found.
+//! The cost of accuracy: a scene is run on several meshes, with several orders and steps. Errors
+//! are measured against a reference that the study computes itself, and the cheapest run for each
+//! accuracy is found.
 
 mod frontier;
 mod grid;
@@ -67,7 +68,8 @@ pub struct CostStudy {
     pub outputs: Vec<usize>,
     /// How errors are measured
     pub norm: NormWord,
-    /// True if only the ends of stages have been compared, because runs have no other instants in common
+    /// True if only the ends of stages have been compared, because runs have no other instants in
+    /// common
     pub ends_only: bool,
     /// The reference of the errors
     pub reference: Reference,
@@ -145,10 +147,8 @@ fn finest(mesher: &Mesher, grid: &Grid, sampler: &Sampler, pool: &mut Pool) -> R
 
 fn no_reference(status: &str) -> String {
     match status {
-        "interrupted" => "the budget is too small for the run that errors are measured against".into(),
-        status => format!(
-            "the run that errors are measured against ended with `{status}`: nothing finer can be compared with"
-        ),
+        "interrupted" => "the budget is too small for the reference run".into(),
+        status => format!("the reference run, which is finer than all others, ended with `{status}`"),
     }
 }
 

@@ -9,9 +9,11 @@ const ORDERS: [f64; 2] = [0.05, 20.0];
 /// An observed and an expected order of convergence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Order {
-    /// The order of the finest three runs whose differences are above the noise; `None` where there are none
+    /// The order of the finest three runs whose differences are above the noise; `None` where there
+    /// are none
     pub observed: Option<f64>,
-    /// The order for smooth solutions on fine meshes; `None` where the outputs have different orders
+    /// The order for smooth solutions on fine meshes; `None` where the outputs have different
+    /// orders
     pub expected: Option<Expected>,
 }
 
@@ -27,7 +29,8 @@ pub struct Expected {
 impl Order {
     /// The meaning of an observed order that differs from the expected one.
     pub fn remark(&self) -> Option<&'static str> {
-        let (observed, expected) = (self.observed?, self.expected?);
+        let observed = self.observed?;
+        let expected = self.expected?;
         let ratio = observed / expected.order;
         if ratio < 0.8 {
             Some("lower than expected: the meshes or steps are too coarse, or the solution is not smooth")
@@ -39,8 +42,8 @@ impl Order {
     }
 }
 
-/// The order of the error as a power of the width, from falling widths and the distances between neighbouring runs: that of the finest
-/// three runs from which it can be computed.
+/// The order of the error as a power of the width, from falling widths and the distances between
+/// neighbouring runs: that of the finest three runs from which it can be computed.
 pub fn observed(widths: &[f64], distances: &[f64]) -> Option<f64> {
     let triples = widths.windows(3).zip(distances.windows(2));
     triples

@@ -1,4 +1,5 @@
-//! Positions of outputs on beams: at nodes of a mesh, or between them, where values are interpolated.
+//! Positions of outputs on beams: at nodes of a mesh, or between them, where values are
+//! interpolated.
 
 use crate::deck::Deck;
 use crate::scene::{Scene, Spot};
@@ -29,8 +30,9 @@ impl Places {
         Self(columns.iter().map(spot).collect())
     }
 
-    /// The smallest number of elements of an order that gives a piece of a beam nodes at all outputs that are nodes of the deck's mesh; its
-    /// multiples do too. 1 where it would be more than `most`.
+    /// The smallest number of elements of an order that gives a piece of a beam nodes at all
+    /// outputs that are nodes of the deck's mesh; its multiples do too. 1 where it would be more
+    /// than `most`.
     pub fn unit(&self, piece: Piece, order: usize, outputs: &[usize], most: usize) -> usize {
         let counts = |k: &usize| outputs.is_empty() || outputs.contains(k);
         let here = |spot: &&Spot| spot.is_node && spot.beam == piece.beam && spot.piece == piece.number;

@@ -17,9 +17,11 @@ use std::time::{Duration, Instant};
 const TIMED_SECONDS: f64 = 0.3;
 /// The smallest and the largest number of repetitions.
 const REPEATS: [usize; 2] = [3, 25];
-/// Rounds of choosing runs that may be on the frontier. Times measured alone change little after the first round.
+/// Rounds of choosing runs that may be on the frontier. Times measured alone change little after
+/// the first round.
 const ROUNDS: usize = 4;
-/// Runs may be on the frontier if they took less than this times the time of the fastest run of their accuracy.
+/// Runs may be on the frontier if they took less than this times the time of the fastest run of
+/// their accuracy.
 const NEAR: f64 = 1.5;
 
 /// The largest outcome that is kept in memory, in numbers: 64 MB.
@@ -147,8 +149,8 @@ impl<'a, 'o> Pool<'a, 'o> {
         }
     }
 
-    /// The failure of the deck itself, for a variant that ended as `singular`: a mechanism is one on every mesh, and the message should
-    /// name a node of the deck.
+    /// The failure of the deck itself, for a variant that ended as `singular`: a mechanism is one
+    /// on every mesh, and the message should name a node of the deck.
     pub fn own_failure(&self) -> Option<Failure> {
         let deck = self.original.deck;
         let outcome = trial::simulate(deck, &[], self.sampler, Patience::LONG, &self.options.interrupted);

@@ -10,11 +10,12 @@ use crate::deck::InterpolationWord;
 /// The finest mesh of the reference over that of the study, in nodes.
 const FINER: f64 = 2.0;
 
-/// The difference between two runs, one with twice the width or step, over the error of the finer one: that of second order, which is
-/// the least that is assumed.
+/// The difference between two runs, one with twice the width or step, over the error of the finer
+/// one: that of second order, which is the least that is assumed.
 const SECOND_ORDER: f64 = 3.0;
 
-/// Halved steps reduce differences to a quarter. Within these bounds of the ratio, the result is extrapolated.
+/// Halved steps reduce differences to a quarter. Within these bounds of the ratio, the result is
+/// extrapolated.
 const EXTRAPOLATED_RATIOS: [f64; 2] = [3.3, 4.8];
 
 /// The reference of errors.
@@ -37,7 +38,8 @@ impl Reference {
     }
 }
 
-/// The variants that a reference is made of: on the finest mesh with every pace, the coarsest first, then on a coarser mesh.
+/// The variants that a reference is made of: on the finest mesh with every pace, the coarsest
+/// first, then on a coarser mesh.
 pub fn variants(mesher: &Mesher, grid: &Grid) -> Vec<Variant> {
     let bent = !mesher.original.deck.beams.is_empty();
     let family = Family {
@@ -105,7 +107,8 @@ impl TimeLimit {
     }
 }
 
-/// The limit from three runs with halved steps: extrapolated where their differences show a second order.
+/// The limit from three runs with halved steps: extrapolated where their differences show a second
+/// order.
 fn halved_steps(sampler: &Sampler, runs: [&Samples; 3], scales: &[f64]) -> TimeLimit {
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, scales);
     let first = distance(runs[0], runs[1]);

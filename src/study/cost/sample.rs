@@ -76,18 +76,21 @@ impl Differences {
     }
 }
 
-/// The numbers of a run that are compared: instant by instant all columns of the history, then modes.
+/// The numbers of a run that are compared: instant by instant all columns of the history, then
+/// modes.
 pub type Samples = Vec<f64>;
 
 impl Sampler {
-    /// Compares the columns of a scene with those of a run of the same deck at the coarsest pace of the study.
+    /// Compares the columns of a scene with those of a run of the same deck at the coarsest pace of
+    /// the study.
     pub fn of_rows(deck: &Deck, scene: &Scene, outputs: Vec<usize>, pace: Pace) -> Self {
         let rows = ComparedRows::At(instants(deck, pace, 0));
         Self { outputs, rows, ..Self::new(deck, scene, columns(scene), columns_of_history(scene)) }
     }
 
-    /// Compares whole histories of the columns of a scene, whatever norm [cost] of the deck names. The first instants include some that only
-    /// shorter steps have, since the error after a jump depends on the length of the first step.
+    /// Compares whole histories of the columns of a scene, whatever norm [cost] of the deck names.
+    /// The first instants include some that only shorter steps have, since the error after a jump
+    /// depends on the length of the first step.
     pub fn of_histories(deck: &Deck, scene: &Scene, outputs: Vec<usize>, pace: Pace) -> Self {
         let rows = ComparedRows::At(instants(deck, pace, HALVINGS));
         Self { norm: NormWord::History, rows, ..Self::of_rows(deck, scene, outputs, pace) }
@@ -249,8 +252,10 @@ impl Sampler {
         all
     }
 
-    /// The order of the error over the width of elements, for smooth scenes: at nodes twice the order of the elements, or less on curved lines
-    /// and with lumped masses or loads; between nodes one more than the order of the elements. `None` where outputs that are not motions count.
+    /// The order of the error over the width of elements, for smooth scenes: at nodes twice the
+    /// order of the elements, or less on curved lines and with lumped masses or loads; between
+    /// nodes one more than the order of the elements. `None` where outputs that are not motions
+    /// count.
     pub fn order_in_space(&self, order: usize, relative: bool) -> Option<Expected> {
         let motion = |&k: &usize| MOTIONS.contains(&kind(&self.columns[k]));
         let between = |&k: &usize| {
@@ -258,7 +263,8 @@ impl Sampler {
             let place = node.split_once('@').map_or("", |(_, place)| place);
             node.contains(':') || !["", "start", "end"].contains(&place)
         };
-        // The order of the approximation of a curved line: for even orders, errors cancel from end to end of an element.
+        // The order of the approximation of a curved line: for even orders, errors cancel from end
+        // to end of an element.
         let line = 2 * ((order + 2) / 2);
         let expected = if self.outputs.iter().any(between) {
             Expected { order: (1 + order) as f64, at_least: true }
@@ -270,7 +276,8 @@ impl Sampler {
         self.outputs.iter().all(motion).then_some(expected)
     }
 
-    /// Replaces rotation vectors by the equivalent ones that are nearer to those of another row: each rotation has two of up to 2 pi.
+    /// Replaces rotation vectors by the equivalent ones that are nearer to those of another row:
+    /// each rotation has two of up to 2 pi.
     pub fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
         let own = first..first + row.len();
         for k in self.rotations.iter().filter(|&k| own.contains(k)).map(|k| k - first) {
@@ -302,8 +309,9 @@ fn rotations(scene: &Scene) -> Vec<usize> {
     found
 }
 
-/// The instants that all runs of a deck have: levels of static stages, and multiples of the coarsest step of dynamic ones, preceded by
-/// halvings of that step. Paths have only their ends in common.
+/// The instants that all runs of a deck have: levels of static stages, and multiples of the
+/// coarsest step of dynamic ones, preceded by halvings of that step. Paths have only their ends in
+/// common.
 fn instants(deck: &Deck, coarsest: Pace, halvings: i32) -> Vec<StageClock> {
     let mut all = Vec::new();
     let mut start = 0.0;
@@ -334,7 +342,8 @@ fn instants(deck: &Deck, coarsest: Pace, halvings: i32) -> Vec<StageClock> {
     all
 }
 
-/// Evenly spaced numbers from 1 to `count`, not too many, and some more of the first, since motions may begin with a jump.
+/// Evenly spaced numbers from 1 to `count`, not too many, and some more of the first, since motions
+/// may begin with a jump.
 fn thinned(count: usize) -> impl Iterator<Item = usize> {
     let stride = count.div_ceil(MOST_INSTANTS).max(1);
     let first = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(move |&n| n < stride);

@@ -23,7 +23,8 @@ pub struct Patience {
 impl Patience {
     /// A run with more attempts would take longer than any user waits.
     pub const LONG: Self = Self { per_step: 50.0, per_level: 50.0, more: 1000.0 };
-    /// For runs that are worth little if many of their steps fail: one in forty, halved once each, uses this up.
+    /// For runs that are worth little if many of their steps fail: one in forty, halved once each,
+    /// uses this up.
     pub const SHORT: Self = Self { per_step: 1.05, per_level: 50.0, more: 10.0 };
 }
 
@@ -70,7 +71,8 @@ impl Trial {
     }
 }
 
-/// Runs a deck with changes. Gives the trial, and all outputs where there is such a scene. `interrupted` gives the signal that was caught.
+/// Runs a deck with changes. Gives the trial, and all outputs where there is such a scene.
+/// `interrupted` gives the signal that was caught.
 pub fn run(
     deck: &Deck,
     changes: &[Change],

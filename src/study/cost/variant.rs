@@ -20,7 +20,8 @@ impl Original<'_> {
     }
 }
 
-/// The part of a variant that all points of one line of the plot share. `None` stands for the deck's own value.
+/// The part of a variant that all points of one line of the plot share. `None` stands for the
+/// deck's own value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Family {
     /// Polynomial order of all elements
@@ -55,7 +56,8 @@ pub struct Variant {
     pub newton: f64,
 }
 
-/// The fixed step that is taken: with rows at multiples of an interval, the largest whole part of the interval up to `step`.
+/// The fixed step that is taken: with rows at multiples of an interval, the largest whole part of
+/// the interval up to `step`.
 pub fn equal_part(deck: &Deck, step: f64) -> f64 {
     deck.output.interval.map_or(step, |interval| interval / (interval / step - 1e-9).ceil().max(1.0))
 }
@@ -92,7 +94,8 @@ impl Variant {
         1.0 / self.count().max(1) as f64
     }
 
-    /// The step of the first dynamic stage as it is taken (see [`equal_part`]), where steps are fixed.
+    /// The step of the first dynamic stage as it is taken (see [`equal_part`]), where steps are
+    /// fixed.
     pub fn step(&self, deck: &Deck) -> Option<f64> {
         let Pace::Steps(factor) = self.pace else { return None };
         let StageBody::Dynamic { step, .. } = dynamic_stages(deck).next()?.1 else { return None };
@@ -186,7 +189,11 @@ pub(super) fn order_in_time(deck: &Deck, family: &Family) -> Option<Expected> {
         StageBody::Dynamic { scheme: SchemeWord::Newmark(_, gamma), .. } if family.scheme.is_none() && gamma != 0.5 => {
             1.0
         }
-        _ => 2.0,
+        StageBody::Dynamic { .. }
+        | StageBody::Static { .. }
+        | StageBody::Path { .. }
+        | StageBody::Modal { .. }
+        | StageBody::Buckling { .. } => 2.0,
     };
     let mut orders = dynamic_stages(deck).map(of_stage);
     let first = orders.next()?;

@@ -3,8 +3,8 @@
 use crate::study::outcome::{Outcome, StageClock};
 use crate::study::scale::{ScaleRow, scales};
 
-/// The largest change of each column over all rows, relative to the largest value of its kind in the whole scene: of all displacements,
-/// rotations, forces, ….
+/// The largest change of each column over all rows, relative to the largest value of its kind in
+/// the whole scene: of all displacements, rotations, forces, ….
 pub(super) fn changes(columns: &[String], length: f64, whole: &Outcome, other: &Outcome) -> Vec<f64> {
     let of_history = columns.len() - whole.modes.len();
     let history = whole.rows.iter().map(|row| ScaleRow { first: 0, values: row });
@@ -39,8 +39,9 @@ pub(super) fn changes(columns: &[String], length: f64, whole: &Outcome, other: &
 }
 
 impl Outcome {
-    /// The numbers that belong to row `k` of another run: those of a row at its clock, or interpolated ones. The last rows belong together.
-    /// `None` for stages whose clock goes back, and after the end of the run.
+    /// The numbers that belong to row `k` of another run: those of a row at its clock, or
+    /// interpolated ones. The last rows belong together. `None` for stages whose clock goes back,
+    /// and after the end of the run.
     fn at(&self, other: &Self, k: usize) -> Option<Vec<f64>> {
         let StageClock { stage, clock } = other.clock(k);
         if k < self.rows.len() && self.clock(k) == other.clock(k) {

@@ -1,4 +1,5 @@
-//! The importance of effects: each is switched off in turn, and the scene is run again for the change of its outputs and its time.
+//! The importance of effects: each is switched off in turn, and the scene is run again for the
+//! change of its outputs and its time.
 
 mod change;
 mod present;
@@ -13,7 +14,8 @@ use crate::study::outcome::{Outcome, columns};
 use change::changes;
 use present::acts;
 
-/// A reduced scene is given up after this factor of the attempts of the whole scene, and some more: it would take longer than any user waits.
+/// A reduced scene is given up after this factor of the attempts of the whole scene, and some more:
+/// it would take longer than any user waits.
 const MOST_ATTEMPTS: u64 = 20;
 const MORE_ATTEMPTS: u64 = 200;
 
@@ -23,7 +25,8 @@ const TIMED_SECONDS: f64 = 0.2;
 /// The largest number of repetitions.
 const MOST_REPEATS: usize = 99;
 
-/// Times that differ relatively by less than this are equal: medians of several runs vary by about as much.
+/// Times that differ relatively by less than this are equal: medians of several runs vary by about
+/// as much.
 const SAME_TIME: f64 = 0.02;
 
 /// A scene without some of its effects.
@@ -33,8 +36,8 @@ pub struct ReducedScene {
     pub without: Vec<EffectWord>,
     /// The run; `Err` where there is no such scene
     pub outcome: Result<Outcome, String>,
-    /// The change of each column, relative to the largest value of its kind in the whole scene; NaN where there is nothing to compare,
-    /// empty where the run failed
+    /// The change of each column, relative to the largest value of its kind in the whole scene; NaN
+    /// where there is nothing to compare, empty where the run failed
     pub changes: Vec<f64>,
 }
 
@@ -84,8 +87,9 @@ impl ReducedScene {
     }
 }
 
-/// Switches each effect of a deck off in turn, then together those that change no output by more than `tolerance`. `interrupted` gives the
-/// signal that was caught; `progress` takes a description of each run.
+/// Switches each effect of a deck off in turn, then together those that change no output by more
+/// than `tolerance`. `interrupted` gives the signal that was caught; `progress` takes a description
+/// of each run.
 pub fn study_effects(
     deck: &Deck,
     scene: &Scene,
@@ -148,8 +152,8 @@ impl Baseline<'_> {
         Ok(ReducedScene { without: words.to_vec(), outcome, changes })
     }
 
-    /// Leaves effects out together, those with the smallest change first, as long as no output changes by more than `tolerance`. Effects whose
-    /// removal saves no time stay.
+    /// Leaves effects out together, those with the smallest change first, as long as no output
+    /// changes by more than `tolerance`. Effects whose removal saves no time stay.
     fn cheapest(&self, reduced: &[ReducedScene], tolerance: f64) -> Result<ReducedScene, StudyError> {
         let mut best = ReducedScene {
             without: Vec::new(),

@@ -3,7 +3,8 @@
 use crate::deck::{self, Deck, EffectWord, SpringBody};
 use crate::scene::Scene;
 
-/// The names of an effect in the reasons of a scene. Dampers have none: they are found in the tables of the deck.
+/// The names of an effect in the reasons of a scene. Dampers have none: they are found in the
+/// tables of the deck.
 pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
     match word {
         EffectWord::Planar => &["planar"],

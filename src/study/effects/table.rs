@@ -4,7 +4,8 @@ use super::EffectStudy;
 use csv::Writer;
 
 impl EffectStudy {
-    /// The content of the file: comma-separated values, a line for each output of each reduced scene, the cheapest scene last.
+    /// The content of the file: comma-separated values, a line for each output of each reduced
+    /// scene, the cheapest scene last.
     pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
         let mut table = Writer::from_writer(Vec::new());
         table.write_record(["without", "status", "iterations", "seconds", "output", "change"])?;

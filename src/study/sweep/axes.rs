@@ -43,7 +43,8 @@ pub enum Combination {
     Grid,
     /// The first values of all axes, then the second ones, and so on
     Zip,
-    /// Random points, spread evenly over all ranges (Latin hypercube; McKay, Beckman and Conover 1979, doi:10.1080/00401706.1979.10489755)
+    /// Random points, spread evenly over all ranges (Latin hypercube; McKay, Beckman and Conover
+    /// 1979, doi:10.1080/00401706.1979.10489755)
     Sample {
         /// The number of points
         count: usize,
@@ -74,7 +75,8 @@ impl Range {
 }
 
 impl Values {
-    /// Reads a list `1,2,3`; `5:20:4`, four numbers from 5 to 20; `1e3:1e6:4:log`, with equal factors; ranges `5:20` and `1e3:1e6:log`.
+    /// Reads a list `1,2,3`; `5:20:4`, four numbers from 5 to 20; `1e3:1e6:4:log`, with equal
+    /// factors; ranges `5:20` and `1e3:1e6:log`.
     pub fn parse(text: &str) -> Result<Self, SweepError> {
         let words = split(text, ',');
         match &words[..] {

@@ -1,4 +1,5 @@
-//! Latin hypercube: each axis is cut into as many equal parts as there are points, and each part holds one point.
+//! Latin hypercube: each axis is cut into as many equal parts as there are points, and each part
+//! holds one point.
 
 /// `count` points in the unit cube, the same for the same seed on every machine.
 pub fn latin_hypercube(count: usize, axes: usize, seed: u64) -> Vec<Vec<f64>> {

@@ -1,4 +1,5 @@
-//! Many runs of one deck with varied keys: each point is a run, and one table holds the results of all.
+//! Many runs of one deck with varied keys: each point is a run, and one table holds the results of
+//! all.
 
 mod axes;
 mod latin;
@@ -60,7 +61,8 @@ impl Sweep {
         Ok(Self { text, common, outputs, error_bars, keys, points })
     }
 
-    /// Checks that the deck has the keys, parameters and outputs. The values of each point are checked when it is run.
+    /// Checks that the deck has the keys, parameters and outputs. The values of each point are
+    /// checked when it is run.
     pub fn check(&self, deck: &Deck) -> Result<(), StudyError> {
         self.check_keys(deck)?;
         BuiltDeck::read(&self.text).map(|_| ())

@@ -43,8 +43,8 @@ impl PointResult {
     }
 }
 
-/// Runs the deck `text`, which has an expectation for each output, with settings. These are applied to the text, since users may vary
-/// anything, such as parameters that expressions depend on.
+/// Runs the deck `text`, which has an expectation for each output, with settings. These are applied
+/// to the text, since users may vary anything, such as parameters that expressions depend on.
 pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> PointResult {
     let text = match deck::apply(text, settings) {
         Ok(text) => text,

@@ -1,4 +1,5 @@
-//! The results of points, a small file each: processes on several machines write at the same time, and a killed one leaves no half result.
+//! The results of points, a small file each: processes on several machines write at the same time,
+//! and a killed one leaves no half result.
 
 use super::point::PointResult;
 use crate::output::{OutputError, PartFile, remove_if_there};
@@ -31,7 +32,8 @@ impl Store {
         Self { folder: folder.join("points") }
     }
 
-    /// The path of a point. It depends on the identity and not on the number, so that a larger sweep finds the results of a smaller one.
+    /// The path of a point. It depends on the identity and not on the number, so that a larger
+    /// sweep finds the results of a smaller one.
     fn place(&self, identity: &str) -> Place {
         let mark = identity.rsplit(' ').next().unwrap_or(identity);
         Place { folder: self.folder.join(&mark[..mark.len().min(2)]), name: format!("{mark}.json") }

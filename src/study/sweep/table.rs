@@ -6,7 +6,8 @@ use super::{PointResult, Sweep};
 const MISSING: &str = "missing";
 
 impl Sweep {
-    /// The content of the file. It holds no times, so that all ways of running the points give the same bytes.
+    /// The content of the file. It holds no times, so that all ways of running the points give the
+    /// same bytes.
     pub fn to_csv(&self, results: &[Option<PointResult>]) -> Result<Vec<u8>, csv::Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.header())?;
