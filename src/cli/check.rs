@@ -2,8 +2,9 @@
 
 use super::error::CommandError;
 use super::load::Loaded;
-use super::status::{Status, Verdict};
+use super::status::Status;
 use super::thread_count::{on_threads, threads_of};
+use super::verdict::Verdict;
 use super::{console, json, load};
 use crate::drive::{Failure, Moment, refusal};
 use crate::model::{Assembly, Share};

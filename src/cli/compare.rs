@@ -1,7 +1,8 @@
 //! `beamsim compare`
 
 use super::error::CommandError;
-use super::status::{Status, Verdict};
+use super::status::Status;
+use super::verdict::Verdict;
 use super::{console, json};
 use crate::output::HistoryReader;
 use crate::study::{self, ComparedHistories};

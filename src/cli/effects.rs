@@ -3,7 +3,8 @@
 use super::error::CommandError;
 use super::folders::{check_names, folder};
 use super::load::{self, Loaded};
-use super::status::{Status, Verdict};
+use super::status::Status;
+use super::verdict::Verdict;
 use super::{console, json, signals};
 use crate::deck::EffectWord;
 use crate::output::{OutputError, PartFile};

@@ -25,6 +25,7 @@ mod status;
 mod sweep;
 mod thread_count;
 mod variant;
+mod verdict;
 mod verify;
 
 use clap::{CommandFactory, Parser, Subcommand};

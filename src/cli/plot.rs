@@ -1,7 +1,8 @@
 //! `beamsim plot`
 
 use super::error::CommandError;
-use super::status::{Status, Verdict};
+use super::status::Status;
+use super::verdict::Verdict;
 use super::{console, json, load};
 use crate::deck::nearest;
 use crate::output::{Curve, Curves, HistoryReader, PartFile};

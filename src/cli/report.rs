@@ -2,8 +2,9 @@
 
 use super::error::CommandError;
 use super::simulate::{RunExtras, simulate};
-use super::status::{Status, Verdict};
+use super::status::Status;
 use super::thread_count::threads_of;
+use super::verdict::Verdict;
 use super::{console, json, load, signals};
 use crate::output::{Film, OutputError, Record, Report};
 use crate::scene::{self, Scene};

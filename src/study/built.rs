@@ -1,7 +1,7 @@
 //! A changed deck and its scene.
 
-use super::StudyError;
 use super::change::{self, Change};
+use super::error::StudyError;
 use crate::deck::{self, Deck, Diagnostic};
 use crate::scene::{self, Scene};
 

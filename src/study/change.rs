@@ -5,7 +5,7 @@
 //! of users (`--set`, `--vary` of sweeps) are applied to the text instead, since they may concern
 //! anything, such as parameters that expressions depend on.
 
-use super::StudyError;
+use super::error::StudyError;
 use crate::deck::{
     Beam, Deck, InterpolationWord, MOST_ELEMENTS, MOST_STEPS, SchemeWord, Span, Spanned, Stage, StageBody,
 };

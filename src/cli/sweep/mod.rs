@@ -5,7 +5,8 @@ mod plan;
 mod slurm;
 
 use super::error::CommandError;
-use super::status::{Status, Verdict};
+use super::status::Status;
+use super::verdict::Verdict;
 use super::{console, json, signals};
 use crate::output::{OutputError, PartFile};
 use crate::study::sweep::PointResult;

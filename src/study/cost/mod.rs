@@ -5,6 +5,7 @@
 mod frontier;
 mod grid;
 mod journal;
+mod limits;
 mod mesher;
 mod order;
 mod places;
@@ -111,7 +112,7 @@ pub fn study(
     pool.time_alone(&mut runs, reference.resolution())?;
     frontier::mark(&mut runs, reference.resolution());
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, &scales);
-    frontier::find_limits(&mut runs, &mut pool, &distance)?;
+    limits::find(&mut runs, &mut pool, &distance)?;
     let orders = orders(deck, &grid, &sampler, &runs, &distance);
     Ok(CostStudy {
         ends_only: sampler.compares_ends_only(deck, grid.paces[0]),
