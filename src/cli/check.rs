@@ -36,7 +36,7 @@ fn one(path: &Path, settings: &[String]) -> Result<(), CommandError> {
     let reading = begun.elapsed();
     let title = loaded.scene.title.as_deref().unwrap_or("(no title)");
     console::line(&format!("{}: {title}", path.display()));
-    print_scene(&loaded.scene).map_err(|why| CommandError::Run(Failure::Deck(why)))?;
+    print_scene(&loaded.scene).map_err(CommandError::Run)?;
     let seconds = print_time(&loaded, reading).map_err(|failure| {
         print_hint(&failure, &loaded.scene);
         CommandError::Run(failure)
@@ -45,7 +45,7 @@ fn one(path: &Path, settings: &[String]) -> Result<(), CommandError> {
     Ok(())
 }
 
-fn print_scene(scene: &Scene) -> Result<(), String> {
+fn print_scene(scene: &Scene) -> Result<(), Failure> {
     print_beams(&scene.mesh);
     print_mass(scene);
     let size = print_size(scene);
@@ -233,12 +233,12 @@ const VECTORS_IN_SPACE: usize = 6;
 
 /// Prints unknowns, entries of the tangent and memory; gives the part of each effect. `Err` where
 /// the first stage cannot begin.
-fn print_size(scene: &Scene) -> Result<Vec<Share>, String> {
+fn print_size(scene: &Scene) -> Result<Vec<Share>, Failure> {
     let mut model = scene.plan.model.clone();
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
     let begun = model.begin_stage(0, kind, &state);
-    let equations = begun.map_err(|error| format!("stage 1: {}", refusal(&error, &model)))?;
+    let equations = begun.map_err(|error| Failure::Deck(format!("stage 1: {}", refusal(&error, &model))))?;
     let free = equations.count();
     let slots = model.slots();
     let context = scene.plan.stages[0].context(0);
