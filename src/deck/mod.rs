@@ -65,7 +65,7 @@ pub use schema::{Entry, SCHEMA, entries, explain};
 pub use scheme::{SchemeName, SchemeWord};
 pub use section::{Section, SectionBody, Shape};
 pub use spring::{Spring, SpringBody};
-pub use stage::{MOST_STEPS, RotatingFrame, Stage, StageBody, Until};
+pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
 pub use support::Support;
 pub use sweep::{SweepFile, VaryBody, VaryTable};
 pub use words::Words;

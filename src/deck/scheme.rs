@@ -40,6 +40,21 @@ impl SchemeWord {
             Self::LieGeneralizedAlpha(_) => SchemeName::LieGeneralizedAlpha,
         }
     }
+
+    /// The scheme of another name. It keeps the coefficients that it shares with this one, and has the default ones otherwise.
+    pub fn renamed(self, name: SchemeName) -> Self {
+        let rho_inf = match self {
+            Self::GeneralizedAlpha(rho_inf) | Self::LieGeneralizedAlpha(rho_inf) => rho_inf,
+            Self::Newmark(..) | Self::Hht(_) => RHO_INF,
+        };
+        match name {
+            name if name == self.name() => self,
+            SchemeName::Newmark => Self::Newmark(BETA, GAMMA),
+            SchemeName::Hht => Self::Hht(ALPHA),
+            SchemeName::GeneralizedAlpha => Self::GeneralizedAlpha(rho_inf),
+            SchemeName::LieGeneralizedAlpha => Self::LieGeneralizedAlpha(rho_inf),
+        }
+    }
 }
 
 /// Keys of coefficients, of all schemes.
@@ -56,6 +71,10 @@ impl SchemeName {
     }
 }
 
+/// Default of `beta`.
+const BETA: f64 = 0.25;
+/// Default of `gamma`.
+const GAMMA: f64 = 0.5;
 /// Default of `alpha`.
 const ALPHA: f64 = 0.05;
 /// Default of `rho_inf`.
@@ -70,8 +89,8 @@ pub(super) fn read_scheme(table: &Table) -> Option<SchemeWord> {
     }
     match name {
         SchemeName::Newmark => {
-            let beta = table.positive_or("beta", 0.25);
-            let gamma = table.positive_or("gamma", 0.5);
+            let beta = table.positive_or("beta", BETA);
+            let gamma = table.positive_or("gamma", GAMMA);
             Some(SchemeWord::Newmark(beta?, gamma?))
         }
         SchemeName::Hht => read_within(table, "alpha", ALPHA, 1.0 / 3.0).map(SchemeWord::Hht),

@@ -120,7 +120,7 @@ const MOST_ITERATIONS: usize = 10_000;
 /// Default of `energy_limit`.
 const ENERGY_LIMIT: f64 = 0.2;
 /// Default of `step_tolerance`.
-const STEP_TOLERANCE: f64 = 1e-4;
+pub const STEP_TOLERANCE: f64 = 1e-4;
 /// Default of `tolerance`.
 const TOLERANCE: f64 = 1e-9;
 /// Default of `max_iterations`.

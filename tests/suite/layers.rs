@@ -16,7 +16,7 @@ const ORDER: [&str; 18] = [
 const DECK_ROWS: [&str; 1] = ["beamsim_core::effect::joint::JointKind"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 16] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
@@ -39,7 +39,19 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("ctrlc", &["src/cli/"]),
     ("signal_hook", &["src/cli/"]),
     // The scene hands the resolved deck through to run.json.
-    ("serde_json", &["src/deck/", "src/scene/mod.rs", "src/output/", "src/study/sweep/store.rs", "src/cli/json.rs"]),
+    (
+        "serde_json",
+        &[
+            "src/deck/",
+            "src/scene/mod.rs",
+            "src/output/",
+            "src/study/sweep/store.rs",
+            "src/study/cost/journal.rs",
+            "src/cli/json.rs",
+        ],
+    ),
+    ("serde", &["src/output/", "src/study/", "src/cli/json.rs"]),
+    ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
 ];
 
 /// Whether a module may import another one; `Err` for a module that nobody has given a place.

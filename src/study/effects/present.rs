@@ -1,9 +1,10 @@
-//! Which effects a scene has.
+//! The effects that a scene has.
 
 use crate::deck::{self, Deck, EffectWord, SpringBody};
 use crate::scene::Scene;
 
-/// The names under which a scene tells whether it has an effect; dampers stand in tables of their own.
+/// The names of an effect in the reasons of a scene. Dampers have none: they are found in the
+/// tables of the deck.
 pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
     match word {
         EffectWord::Planar => &["planar"],
@@ -19,7 +20,7 @@ pub(super) fn names(word: EffectWord) -> &'static [&'static str] {
     }
 }
 
-/// Whether there is something of an effect in a scene.
+/// True if an effect acts in a scene.
 pub(super) fn acts(word: EffectWord, deck: &Deck, scene: &Scene) -> bool {
     let named = scene.reasons.iter().any(|reason| reason.active && names(word).contains(&reason.name));
     named || (word == EffectWord::Damping && is_damped(deck))
@@ -40,9 +41,9 @@ mod tests {
     use super::*;
     use crate::deck::Words;
 
-    /// A name that no scene tells would call its effect absent for ever.
+    /// An effect whose name no scene has would always be absent.
     #[test]
-    fn scenes_tell_of_every_name() {
+    fn scenes_have_every_name() {
         let text = include_str!("../../../decks/robot_arm.toml");
         let (scene, _) = crate::scene::from_text(text).unwrap();
         for name in EffectWord::values().flat_map(names) {

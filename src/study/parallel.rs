@@ -1,4 +1,4 @@
-//! Work that is done side by side, each piece once, in an order of the caller's.
+//! A queue of tasks that several threads work through.
 
 use beamsim_core::threads;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -6,10 +6,10 @@ use std::sync::Mutex;
 use std::sync::mpsc::{self, Sender};
 use std::thread;
 
-/// Does the pieces `open`, the last first, on some threads until all are done or `stopped`; `take` sees what came of each as it ends, on
-/// this thread. `None` of `work` is a piece that was not brought to its end. A fault of the program in one piece is none of the others':
-/// `broken` stands for what would have come of it.
-pub fn side_by_side<T: Send>(
+/// Runs the tasks `open`, the last first, on several threads until all have ended or `stopped`.
+/// `take` gets the result of each as it ends, on the calling thread. `work` returns `None` for a
+/// task that was stopped. A task that panics does not stop the others: its result is `broken`.
+pub fn in_parallel<T: Send>(
     wanted: usize,
     open: Vec<usize>,
     stopped: &(dyn Fn() -> bool + Sync),
@@ -35,7 +35,7 @@ pub fn side_by_side<T: Send>(
             threads::beside(scope, || go_on(sender)).ok()
         };
         let started = (0..wanted).map_while(start).count();
-        // Where the system gives no thread.
+        // The system may refuse new threads.
         if started == 0 {
             go_on(sender.clone());
         }

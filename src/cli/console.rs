@@ -1,4 +1,4 @@
-//! Words to the user. A closed pipe is a quiet end.
+//! Printing. Errors of a closed pipe are ignored.
 
 use std::collections::BTreeSet;
 use std::io::{self, IsTerminal, Write};
@@ -8,113 +8,116 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// How the user wants to be spoken to.
+/// Global options of the output.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
-pub struct Manner {
-    /// Say nothing but warnings and errors
+pub struct PrintOptions {
+    /// Print only warnings and errors
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Print a line of JSON for each result instead of words
+    /// Print a line of JSON for each result instead of text
     #[arg(long, global = true)]
     json: bool,
-    /// End with a failure where there are warnings: those about a deck before it runs, those of a run after it (exit status 1)
+    /// Treat warnings as failures: warnings about a deck stop it before it runs, warnings of a run
+    /// give exit status 1 after it
     #[arg(long, global = true)]
     deny_warnings: bool,
 }
 
-static MANNER: OnceLock<Manner> = OnceLock::new();
+static OPTIONS: OnceLock<PrintOptions> = OnceLock::new();
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
-/// From here on.
-pub fn in_manner(manner: Manner) {
-    let _ = MANNER.set(manner);
+/// Sets the options, once.
+pub fn configure(options: PrintOptions) {
+    let _ = OPTIONS.set(options);
 }
 
-fn manner() -> Manner {
-    MANNER.get().copied().unwrap_or_default()
+fn options() -> PrintOptions {
+    OPTIONS.get().copied().unwrap_or_default()
 }
 
-/// Whether scripts are spoken to.
-pub fn speaks_json() -> bool {
-    manner().json
+/// True with `--json`.
+pub fn prints_json() -> bool {
+    options().json
 }
 
-/// Whether only warnings and errors are wanted.
+/// True with `--quiet`.
 pub fn is_quiet() -> bool {
-    manner().quiet
+    options().quiet
 }
 
-/// Whether warnings are failures.
+/// True with `--deny-warnings`.
 pub fn denies_warnings() -> bool {
-    manner().deny_warnings
+    options().deny_warnings
 }
 
-/// Takes note of warnings that were said.
+/// Counts warnings that were printed.
 pub fn count_warnings(count: usize) {
     WARNINGS.fetch_add(count, Ordering::Relaxed);
 }
 
-/// Whether a message about a file is said for the first time.
+/// True for the first message of this text about a file.
 pub fn is_new(file: &Path, message: &str) -> bool {
-    static SAID: Mutex<BTreeSet<(PathBuf, String)>> = Mutex::new(BTreeSet::new());
-    let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
-    said.insert((file.into(), message.into()))
+    static PRINTED: Mutex<BTreeSet<(PathBuf, String)>> = Mutex::new(BTreeSet::new());
+    let mut printed = PRINTED.lock().unwrap_or_else(PoisonError::into_inner);
+    printed.insert((file.into(), message.into()))
 }
 
-/// How many there were.
+/// The number of warnings so far.
 pub fn warnings() -> usize {
     WARNINGS.load(Ordering::Relaxed)
 }
 
-/// A line on standard output, for people.
+/// Prints a line for people on standard output.
 pub fn line(text: &str) {
-    if !manner().quiet && !manner().json {
+    if !options().quiet && !options().json {
         answer(text);
     }
 }
 
-/// A line on standard output, for scripts.
+/// Prints a line for scripts on standard output.
 pub fn data(text: &str) {
-    if manner().json {
+    if options().json {
         answer(text);
     }
 }
 
-/// What was asked for, whatever the manner.
+/// Prints the answer of a command on standard output, whatever the options.
 pub fn answer(text: &str) {
     write_to(&mut io::stdout().lock(), text);
 }
 
-/// A remark on standard error that is no warning.
+/// Prints a remark on standard error, unless `--quiet` is given.
 pub fn remark(text: &str) {
-    if !manner().quiet {
+    if !options().quiet {
         note(text);
     }
 }
 
-/// A line on standard error.
+/// Prints a line on standard error.
 pub fn note(text: &str) {
     write_to(&mut io::stderr().lock(), text);
 }
 
-/// The last line on standard error: it names the failure.
+/// Prints the last line on standard error, with the name of the failure.
 pub fn error(name: &str, message: &str) {
     note(&format!("error[{name}]: {message}"));
 }
 
-/// Whether messages may be coloured.
+/// True where messages may be coloured.
 pub fn styled() -> bool {
     io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
 }
 
-/// Nobody reads any more: nothing is lost by not writing.
+/// Writes a line. Errors are ignored: nobody reads a closed pipe.
 fn write_to(out: &mut dyn Write, text: &str) {
     let _ = writeln!(out, "{text}").and_then(|()| out.flush());
 }
 
-/// 1.3 ms, 2.5 s.
+/// A measured time with three digits: 1.30 ms, 2.50 s.
 pub fn time(seconds: f64) -> String {
-    let (number, unit) = if seconds < 1.0 { (1e3 * seconds, "ms") } else { (seconds, "s") };
+    let in_ms = seconds < 1.0;
+    let number = if in_ms { 1e3 * seconds } else { seconds };
+    let unit = if in_ms { "ms" } else { "s" };
     let digits = if number < 10.0 {
         2
     } else if number < 100.0 {
@@ -125,12 +128,12 @@ pub fn time(seconds: f64) -> String {
     format!("{number:.digits$} {unit}")
 }
 
-/// A count of threads as it stands on a command line.
+/// Reads a number of threads of the command line.
 pub fn threads(text: &str) -> Result<NonZero<usize>, String> {
-    text.parse().map_err(|_| "threads are counted from 1".into())
+    text.parse().map_err(|_| "expected a number of threads, at least 1".into())
 }
 
-/// A time as it stands on a command line: 90, 90s, 1.5m, 2h.
+/// Reads a time of the command line: 90, 90s, 1.5m, 2h.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || "a time is a number with s, m or h: 90s, 5m, 1h";
     let number = text.trim_end_matches(['s', 'm', 'h']);
@@ -141,7 +144,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
         _ => return Err(wrong().into()),
     };
     let seconds = number.trim().parse::<f64>().map_err(|_| wrong())? * unit;
-    // Later than that nobody waits, and clocks can add it.
+    // Clocks can add this many seconds.
     const LONGEST: f64 = 100.0 * 365.0 * 86_400.0;
     if !(0.0..=LONGEST).contains(&seconds) {
         return Err("a time is between 0 and a hundred years".into());
