@@ -4,7 +4,6 @@ use super::block::BlockSolver;
 use super::constraints::Constraints;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
-use super::softest::NullVector;
 use super::tangent::Tangent;
 use crate::system::{Leftover, Slot, System};
 use crate::tensor::Vec3;
@@ -53,9 +52,6 @@ const BACKWARD_ERROR: f64 = 1e-11;
 
 /// What refinement does not bring below this is no solution.
 const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
-
-/// Blocks need more of them.
-const FEW_DIGITS: f64 = 4.0;
 
 /// So many corrections
 const REFINEMENTS: usize = 3;
@@ -307,27 +303,24 @@ impl LinearSolver {
         error <= LARGEST_BACKWARD_ERROR
     }
 
-    /// After corrections that led nowhere: in general where few digits of the softest stiffness are left, of which pivots save more; and
-    /// in turns with blocks where that did not help either.
-    pub fn doubt(&mut self, tangent: &mut Tangent) {
+    /// Whether blocks do the work at present.
+    pub(super) fn is_in_blocks(&self) -> bool {
+        self.trust.in_blocks
+    }
+
+    /// After corrections that led nowhere pivoting gives way to blocks, which then stay for the next attempt whatever they lose; `false`
+    /// where blocks did the work, and may be left.
+    pub(super) fn gives_way_to_blocks(&mut self) -> bool {
         if !self.trust.in_blocks {
             self.return_to_blocks();
             self.trust.in_vain = true;
-            return;
+            return true;
         }
-        if std::mem::take(&mut self.trust.in_vain) {
-            return;
-        }
-        // The factorisation may be that of the iterate before; either may leave blocks itself.
-        let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
-        let is_doubtful = softest.is_some_and(|vector: NullVector| vector.digits(tangent.look()) < FEW_DIGITS);
-        if is_doubtful && self.trust.in_blocks {
-            self.factored = self.leave_blocks(tangent.look());
-        }
+        std::mem::take(&mut self.trust.in_vain)
     }
 
     /// From here on in general, until blocks have another chance.
-    fn leave_blocks(&mut self, system: &System) -> bool {
+    pub(super) fn leave_blocks(&mut self, system: &System) -> bool {
         if self.general.is_none() {
             self.general = GeneralSolver::new(system).map(Box::new);
         }

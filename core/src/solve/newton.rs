@@ -2,9 +2,9 @@
 
 use super::convergence::{Convergence, Residual, Verdict, size};
 use super::linear::LinearSolver;
-use super::pivots::Signature;
 use super::refinement::Refinement;
 use super::reuse::Reuse;
+use super::signature::Signature;
 use super::soft_mode::mechanism;
 use super::softest::NullVector;
 use super::stress_predictor::StressPredictor;

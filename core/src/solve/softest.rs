@@ -44,6 +44,9 @@ impl NullVector {
 /// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
 const NO_STIFFNESS: f64 = 8.0;
 
+/// Decimal digits of the softest stiffness that factorisation in blocks must leave.
+const FEW_DIGITS: f64 = 4.0;
+
 /// Forces of multipliers that cancel to this part of themselves cancel.
 const SAID_TWICE: f64 = 1e-10;
 
@@ -90,6 +93,20 @@ impl LinearSolver {
         Some(NullVector { entries: x, motion, held, broke_down: false })
     }
 
+    /// After corrections that led nowhere: in general where few digits of the softest stiffness are left, of which pivots save more; and
+    /// in turns with blocks where that did not help either.
+    pub fn doubt(&mut self, tangent: &mut Tangent) {
+        if self.gives_way_to_blocks() {
+            return;
+        }
+        // The factorisation may be that of the iterate before; either may leave blocks itself.
+        let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
+        let is_doubtful = softest.is_some_and(|vector| vector.digits(tangent.look()) < FEW_DIGITS);
+        if is_doubtful && self.is_in_blocks() {
+            self.factored = self.leave_blocks(tangent.look());
+        }
+    }
+
     /// Whether what moves most, by entries that compare, are multipliers whose forces cancel: conditions that hold what is held already. Their
     /// unknowns are round-off, of which the stiffness tells nothing.
     fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
@@ -109,7 +126,7 @@ impl LinearSolver {
         left.iter().zip(&all).all(|(left, all)| left.abs() <= SAID_TWICE * all)
     }
 
-    /// The same where the factorisation broke down: the diagonal is raised by a little first.
+    /// The direction of least stiffness where the factorisation broke down: the diagonal is raised by a little first.
     fn null_vector_of_shifted(&mut self, system: &System, broke_down: bool) -> Option<NullVector> {
         let mut shifted = system.clone();
         // Multipliers have no diagonal: they get a little compliance.

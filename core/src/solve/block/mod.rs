@@ -8,6 +8,7 @@
 
 mod diagonal;
 mod elimination;
+mod factor;
 mod ldl;
 mod lu;
 mod order;
@@ -19,6 +20,7 @@ use crate::system::{Matrix, Pattern, Symmetry, System, WIDTH};
 use crate::tensor::Vec3;
 use crate::threads;
 use elimination::{Elimination, Fill};
+use factor::Factor;
 use ldl::Ldl;
 use lu::Lu;
 use pieces::Pieces;
@@ -30,36 +32,6 @@ pub struct BlockSolver {
     factor: Box<dyn Factor>,
     /// What is solved for, by row
     parts: Vec<f64>,
-}
-
-/// The numbers of a factorisation.
-trait Factor: Send {
-    /// What it does, in a word.
-    fn name(&self) -> &'static str;
-
-    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
-    fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool;
-
-    /// See [`BlockSolver::can_stay_within`].
-    fn can_stay_within(&self, elimination: &Elimination, system: &System) -> bool;
-
-    /// See [`BlockSolver::factorise_within`].
-    fn factorise_within(&mut self, elimination: &Elimination, system: &mut System) -> bool;
-
-    /// See [`BlockSolver::negative`].
-    fn negative(&self) -> Option<usize>;
-
-    /// See [`BlockSolver::has_negative_determinant`].
-    fn has_negative_determinant(&self) -> Option<bool>;
-
-    /// See [`BlockSolver::is_sure`].
-    fn is_sure(&self) -> bool;
-
-    /// See [`BlockSolver::is_symmetric`].
-    fn is_symmetric(&self) -> bool;
-
-    /// Solves with the last factorisation, which is that of `matrix`, row by row.
-    fn solve(&self, elimination: &Elimination, matrix: Matrix, x: &mut [f64]);
 }
 
 impl BlockSolver {

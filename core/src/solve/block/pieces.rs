@@ -1,8 +1,8 @@
 //! A factorisation in pieces: branches of the elimination tree, which are eliminated at once, and the trunk, where they meet.
 
-use super::Factor;
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
+use super::factor::Factor;
 use super::tile::{Own, Part, Tile};
 use crate::scalar::Instructions;
 use crate::system::{Matrix, Symmetry, System};
