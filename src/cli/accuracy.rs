@@ -2,7 +2,7 @@
 
 use super::load::{Loaded, Refusal};
 use super::progress::Progress;
-use super::{Status, cores, load, run, say, signals};
+use super::{Status, cores, load, say, signals};
 use crate::deck::{Accuracy, Deck};
 use crate::output::{Film, Reached};
 use crate::scene::Scene;
@@ -10,6 +10,7 @@ use crate::study::Outcome;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{self, Journal, Options, Pace, Point};
 use crate::study::error_bars::{ErrorBars, error_bars, polylines, refuse_paths};
+use beamsim_core::failure::FailureKind;
 use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -56,7 +57,7 @@ impl Target {
     /// Reads a deck, and searches for the wanted accuracy where there is one.
     pub fn aim(&self, name: &str, path: &Path, settings: &[String]) -> Result<Aimed, Refusal> {
         let loaded = load::deck(path, settings)?;
-        let usage = |why: String| Refusal::of(Status::Wrong, "usage", why);
+        let usage = |why: String| Refusal::usage(why);
         self.accuracy.map(Accuracy::check).transpose().map_err(|why| usage(format!("--accuracy: {why}")))?;
         let Some(wanted) = self.accuracy.map(Accuracy::All).or(loaded.deck.accuracy.clone()) else {
             if self.budget.is_some() {
@@ -125,7 +126,7 @@ impl Target {
             Some(stopped) => {
                 lines(&loaded.deck, &found.settings).iter().for_each(|line| say::note(line));
                 let message = format!("the search was stopped: {}", missed(&found, wanted));
-                Err(Refusal::of(run::status_of(stopped), stopped.name(), message))
+                Err(Refusal::with_status(Status::of_failure(stopped), stopped.name(), message))
             }
         }
     }
@@ -149,10 +150,12 @@ fn tell_polylines(deck: &Deck) {
 /// A study that could not be made, as it is told for a deck.
 pub fn refused(refusal: cost::Refusal, path: &Path, loaded: &Loaded) -> Refusal {
     match refusal {
-        cost::Refusal::Failure(failure) => Refusal::of(run::status_of(&failure), failure.name(), failure.to_string()),
+        cost::Refusal::Failure(failure) => {
+            Refusal::with_status(Status::of_failure(&failure), failure.name(), failure.to_string())
+        }
         cost::Refusal::Deck(diagnostic) => Refusal {
             details: diagnostic.render(&path.display().to_string(), &loaded.text, say::styled()),
-            ..Refusal::of(Status::Wrong, "deck", format!("1 error in {}", path.display()))
+            ..Refusal::of(FailureKind::Deck, format!("1 error in {}", path.display()))
         },
     }
 }

@@ -1,7 +1,6 @@
 //! `beamsim check`
 
 use super::load::Loaded;
-use super::run::status_of;
 use super::{Status, Verdict, json, load, on_threads, say, threads_of};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
@@ -30,7 +29,7 @@ pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
                     Ok(seconds) => json::check(path, &loaded.scene, Some(seconds)),
                     Err(failure) => {
                         hint(&failure, &loaded.scene);
-                        verdict.fail(status_of(&failure), failure.name(), failure.to_string());
+                        verdict.fail(Status::of_failure(&failure), failure.name(), failure.to_string());
                     }
                 }
             }

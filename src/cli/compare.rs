@@ -3,6 +3,7 @@
 use super::{Status, json, say};
 use crate::output::HistoryReader;
 use crate::study;
+use beamsim_core::failure::FailureKind;
 use std::path::Path;
 
 /// Prints the worst cell of each column.
@@ -15,7 +16,7 @@ pub fn compare(a: &Path, b: &Path, rtol: f64, atol: f64) -> Status {
     let (came, stored) = match (HistoryReader::read(a), HistoryReader::read(b)) {
         (Ok(came), Ok(stored)) => (came, stored),
         (Err(error), _) | (_, Err(error)) => {
-            say::error("io", &error.to_string());
+            say::error(FailureKind::Io.name(), &error.to_string());
             return Status::Io;
         }
     };

@@ -8,6 +8,7 @@ use super::{Status, Verdict, cores, json, load, say, signals};
 use crate::deck::Accuracy;
 use crate::output::{HistoryReader, LinePlots, NamedLine, PartFile};
 use crate::study::cost::{Against, Expected, Family, Journal, Knob, Options, Order, Orders, Run, Study, study};
+use beamsim_core::failure::FailureKind;
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -84,7 +85,7 @@ fn setting(vary: &str) -> String {
 }
 
 fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &Wanted, folder: &Path) -> Result<(), Refusal> {
-    let io = |error: std::io::Error| Refusal::of(Status::Io, "io", format!("{}: {error}", folder.display()));
+    let io = |error: std::io::Error| Refusal::of(FailureKind::Io, format!("{}: {error}", folder.display()));
     let (against, given) = match &wanted.reference {
         None => (Against::Finest, String::new()),
         Some(word) if word.as_os_str() == "expect" => (Against::Expectations, "expect".into()),

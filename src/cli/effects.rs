@@ -1,10 +1,11 @@
 //! `beamsim effects`
 
-use super::run::{folder, refuse_twins, status_of};
+use super::run::{folder, refuse_twins};
 use super::{Status, Verdict, json, load, say, signals};
 use crate::deck::EffectWord;
 use crate::output::PartFile;
 use crate::study::ablation::{Ablation, Variant, ablate};
+use beamsim_core::failure::FailureKind;
 use std::path::{Path, PathBuf};
 
 /// Studies decks one after the other.
@@ -47,11 +48,12 @@ fn study(
     let name = load::name(path);
     let mut progress = |what: &str| say::note(&format!("{name}: {what}"));
     let found = ablate(&deck, &scene, tolerance, &signals::caught, &mut progress)
-        .map_err(|failure| (status_of(&failure), failure.name(), failure.to_string()))?;
+        .map_err(|failure| (Status::of_failure(&failure), failure.name(), failure.to_string()))?;
     tell(&name, scene.title.as_deref(), &found, tolerance);
     let folder = folder(out, &name, several);
-    let table = found.to_csv().map_err(|error| (Status::Io, "io", error.to_string()))?;
-    PartFile::write(&folder, "effects.csv", &table).map_err(|error| (Status::Io, "io", error.to_string()))?;
+    let table = found.to_csv().map_err(|error| (Status::Io, FailureKind::Io.name(), error.to_string()))?;
+    PartFile::write(&folder, "effects.csv", &table)
+        .map_err(|error| (Status::Io, FailureKind::Io.name(), error.to_string()))?;
     say::line(&format!("  {}", folder.join("effects.csv").display()));
     json::effects(path, &folder.join("effects.csv"), &found, tolerance);
     Ok(())

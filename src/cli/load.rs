@@ -3,6 +3,7 @@
 use super::{Status, say};
 use crate::deck::{self, Deck, Diagnostic, ExpectBody, Severity, SweepFile};
 use crate::scene::{self, Scene};
+use beamsim_core::failure::FailureKind;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -27,11 +28,21 @@ pub struct Refusal {
 impl Refusal {
     /// A file that could not be read or written.
     pub fn io(error: std::io::Error) -> Self {
-        Self::of(Status::Io, "io", error.to_string())
+        Self::of(FailureKind::Io, error.to_string())
     }
 
-    /// With its last line.
-    pub fn of(status: Status, name: &'static str, message: String) -> Self {
+    /// A wrong command line.
+    pub fn usage(message: String) -> Self {
+        Self::with_status(Status::Wrong, "usage", message)
+    }
+
+    /// A failure of a kind that runs have, too, with its last line.
+    pub fn of(kind: FailureKind, message: String) -> Self {
+        Self::with_status(Status::of(kind), kind.name(), message)
+    }
+
+    /// A failure with its exit status and its last line.
+    pub fn with_status(status: Status, name: &'static str, message: String) -> Self {
         Self { status, name, message, details: String::new(), expected: Vec::new() }
     }
 }
@@ -53,7 +64,7 @@ pub fn deck(path: &Path, settings: &[String]) -> Result<Loaded, Refusal> {
 
 /// The same for a text that was read from there before.
 pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Refusal> {
-    let text = deck::apply(own, settings).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
+    let text = deck::apply(own, settings).map_err(|why| Refusal::of(FailureKind::Deck, why))?;
     // Settings may have moved lines.
     let changed = if settings.is_empty() { "" } else { " (as changed by --set)" };
     let label = format!("{}{changed}", path.display());
@@ -62,12 +73,13 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Refu
             return a_sweep(path);
         }
         let errors: Vec<_> = found.iter().filter(|d| !d.is_warning()).collect();
-        let name = if errors.iter().all(|d| d.severity == Severity::Limit) { "limit" } else { "deck" };
+        let is_limit = errors.iter().all(|d| d.severity == Severity::Limit);
+        let kind = if is_limit { FailureKind::Limit } else { FailureKind::Deck };
         let count = if errors.len() == 1 { "1 error".to_string() } else { format!("{} errors", errors.len()) };
         Refusal {
             details: render(&label, text, found),
             expected,
-            ..Refusal::of(Status::Wrong, name, format!("{count} in {}", path.display()))
+            ..Refusal::of(kind, format!("{count} in {}", path.display()))
         }
     };
     let text = deck::import(&text, &|name| beside(path, name)).map_err(|found| refuse(&text, &found, Vec::new()))?;
@@ -79,8 +91,7 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Refu
         return Err(Refusal {
             details: render(&label, &text, &warnings),
             ..Refusal::of(
-                Status::Wrong,
-                "deck",
+                FailureKind::Deck,
                 format!("{count} warning(s) in {}, which --deny-warnings takes for errors", path.display()),
             )
         });
@@ -95,7 +106,7 @@ pub fn again(path: &Path, own: &str, settings: &[String]) -> Result<Loaded, Refu
 /// What a sweep is told where a deck belongs.
 fn a_sweep(path: &Path) -> Refusal {
     let name = path.display();
-    Refusal::of(Status::Wrong, "deck", format!("{name} is a sweep and no deck: try `beamsim sweep {name}`"))
+    Refusal::of(FailureKind::Deck, format!("{name} is a sweep and no deck: try `beamsim sweep {name}`"))
 }
 
 /// The text of a table that a deck names, seen from the deck's folder.
@@ -106,17 +117,17 @@ fn beside(deck: &Path, name: &str) -> Result<String, String> {
 
 /// The text of a file.
 pub fn text(path: &Path) -> Result<String, Refusal> {
-    let refuse = |why: String| Refusal::of(Status::Io, "io", format!("{}: {why}", path.display()));
+    let refuse = |why: String| Refusal::of(FailureKind::Io, format!("{}: {why}", path.display()));
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|e| refuse(e.to_string()))?;
     file.take(LARGEST_DECK + 1).read_to_end(&mut bytes).map_err(|e| refuse(e.to_string()))?;
     if bytes.len() as u64 > LARGEST_DECK {
         let message = format!("{}: more than the largest supported {LARGEST_DECK} bytes", path.display());
-        return Err(Refusal::of(Status::Wrong, "limit", message));
+        return Err(Refusal::of(FailureKind::Limit, message));
     }
     String::from_utf8(bytes).map_err(|e| {
         let message = format!("{}: not UTF-8 text at byte {}", path.display(), e.utf8_error().valid_up_to());
-        Refusal::of(Status::Wrong, "deck", message)
+        Refusal::of(FailureKind::Deck, message)
     })
 }
 

@@ -18,6 +18,8 @@ mod verify;
 mod words;
 
 use crate::scene::Scene;
+use beamsim_core::failure::{Cause, FailureKind};
+use beamsim_core::run::Failure;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -201,7 +203,25 @@ pub enum Status {
 }
 
 impl Status {
-    /// That of a process that a signal ended.
+    /// The exit status that belongs to a kind of failures.
+    pub fn of(kind: FailureKind) -> Self {
+        match kind.cause() {
+            Cause::Deck => Self::Wrong,
+            Cause::Numerics => Self::GaveUp,
+            Cause::File => Self::Io,
+            Cause::Signal => Self::Interrupted,
+        }
+    }
+
+    /// The exit status that belongs to a failure of a run.
+    pub fn of_failure(failure: &Failure) -> Self {
+        match failure {
+            Failure::Interrupted { signal, .. } => Self::after(*signal),
+            other => Self::of(other.kind()),
+        }
+    }
+
+    /// The exit status of a process that a signal ended.
     pub fn after(signal: i32) -> Self {
         if signal == 15 { Self::Terminated } else { Self::Interrupted }
     }

@@ -89,21 +89,21 @@ fn picture(curves: &Curves, path: &Path) -> Result<Vec<u8>, Refusal> {
         Some("png") => png(curves),
         Some(other) => {
             let message = format!("`.{other}`: pictures are written as .svg or .png");
-            Err(Refusal::of(Status::Wrong, "usage", message))
+            Err(Refusal::usage(message))
         }
     }
 }
 
 #[cfg(feature = "png")]
 fn png(curves: &Curves) -> Result<Vec<u8>, Refusal> {
-    curves.to_png().map_err(|why| Refusal::of(Status::Wrong, "usage", format!("the picture cannot be drawn: {why}")))
+    curves.to_png().map_err(|why| Refusal::usage(format!("the picture cannot be drawn: {why}")))
 }
 
 #[cfg(not(feature = "png"))]
 fn png(_curves: &Curves) -> Result<Vec<u8>, Refusal> {
     let message =
         "this build draws .svg only: `cargo install --path . --locked --features png` makes one that draws .png";
-    Err(Refusal::of(Status::Wrong, "usage", message.into()))
+    Err(Refusal::usage(message.into()))
 }
 
 /// The history in a folder, or the file itself.
@@ -127,7 +127,7 @@ fn find(history: &HistoryReader, name: &str) -> Result<usize, Refusal> {
             Some(meant) => format!("did you mean `{meant}`?"),
             None => format!("there are {}", history.names.join(", ")),
         };
-        Refusal::of(Status::Wrong, "usage", format!("the history has no column `{name}`: {help}"))
+        Refusal::usage(format!("the history has no column `{name}`: {help}"))
     })
 }
 
@@ -144,7 +144,7 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
     let some: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
     let usual = if some.is_empty() { all } else { some };
     if usual.is_empty() {
-        return Err(Refusal::of(Status::Wrong, "usage", "the history has no columns to draw".into()));
+        return Err(Refusal::usage("the history has no columns to draw".into()));
     }
     Ok(usual.into_iter().take(USUAL).collect())
 }
@@ -167,7 +167,7 @@ fn curve(run: &Named, x: &str, column: &str, empty: Curve) -> Result<Curve, Refu
     let points: Vec<(f64, f64)> = run.history.rows.iter().map(|row| (row[x], row[y])).collect();
     if let Some(row) = points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
         let message = format!("{}: row {} of `{column}` is not finite", run.name, row + 1);
-        return Err(Refusal::of(Status::Wrong, "usage", message));
+        return Err(Refusal::usage(message));
     }
     let bars = run.history.names.iter().position(|name| *name == format!("{column}.err"));
     let bars = bars.map(|k| run.history.rows.iter().map(|row| row[k]).collect::<Vec<f64>>());

@@ -5,6 +5,7 @@ use super::run::{Beyond, simulate};
 use super::{Status, Verdict, json, load, say, signals, threads_of};
 use crate::output::{Film, Record, Report};
 use crate::scene::{self, Scene};
+use beamsim_core::failure::FailureKind;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -30,11 +31,11 @@ fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
     let record = Record::read(folder).map_err(Refusal::io)?;
     let Some(text) = record.text() else {
         let message = format!("{}: run.json holds no deck: run it again", folder.display());
-        return Err(Refusal::of(Status::Io, "io", message));
+        return Err(Refusal::of(FailureKind::Io, message));
     };
     let scene = scene::from_text(text).map(|(scene, _)| scene).map_err(|_| {
         let message = format!("{}: this version of beamsim does not read the deck: run it again", folder.display());
-        Refusal::of(Status::Wrong, "deck", message)
+        Refusal::of(FailureKind::Deck, message)
     })?;
     let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::name(&path));
     // A history holds the nodes that were asked for; the shape is that of the same run once more.
@@ -48,9 +49,13 @@ fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
     let finished = simulate(scene, name, None, None, beyond, threads_of(scene, None));
     if signals::caught().is_some() {
         let status = finished.status();
-        return Err(Refusal::of(status, "interrupted", "stopped before the report was written".into()));
+        return Err(Refusal::with_status(
+            status,
+            FailureKind::Interrupted.name(),
+            "stopped before the report was written".into(),
+        ));
     }
-    finished.film.ok_or_else(|| Refusal::of(Status::Io, "io", "nothing was filmed".into()))
+    finished.film.ok_or_else(|| Refusal::of(FailureKind::Io, "nothing was filmed".into()))
 }
 
 /// Writes the page, and says where.

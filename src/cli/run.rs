@@ -10,6 +10,7 @@ use crate::output::{
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
 use crate::study::{self, Recorder};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
 use beamsim_core::threads;
 use std::path::{Path, PathBuf};
@@ -46,7 +47,11 @@ pub fn run(decks: &[PathBuf], settings: &[String], target: &Target, out: Option<
         }
         if let Some(signal) = signals::caught() {
             if number + 1 < decks.len() {
-                verdict.fail(Status::after(signal), "interrupted", format!("stopped by signal {signal}"));
+                verdict.fail(
+                    Status::after(signal),
+                    FailureKind::Interrupted.name(),
+                    format!("stopped by signal {signal}"),
+                );
             }
             break;
         }
@@ -96,17 +101,7 @@ pub struct Finished {
 impl Finished {
     /// The exit status that belongs to it.
     pub fn status(&self) -> Status {
-        self.result.as_ref().map_or_else(status_of, |()| Status::Fine)
-    }
-}
-
-/// The exit status that belongs to a failure.
-pub fn status_of(failure: &Failure) -> Status {
-    match failure {
-        Failure::Deck(_) | Failure::Limit(_) => Status::Wrong,
-        Failure::Io(_) => Status::Io,
-        Failure::Interrupted { signal, .. } => Status::after(*signal),
-        _ => Status::GaveUp,
+        self.result.as_ref().map_or_else(Status::of_failure, |()| Status::Fine)
     }
 }
 

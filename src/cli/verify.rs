@@ -3,6 +3,7 @@
 use super::run::{Beyond, folder, simulate};
 use super::{Status, Verdict, json, load, say, signals, threads_of};
 use crate::study::{Judgement, Recorder, expected_failure, judge};
+use beamsim_core::failure::FailureKind;
 use std::path::{Path, PathBuf};
 
 /// Runs decks and prints what was expected, what came, the error, the time. A folder stands for the decks in it.
@@ -10,7 +11,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
     let decks = match expand(paths) {
         Ok(decks) => decks,
         Err(message) => {
-            say::error("io", &message);
+            say::error(FailureKind::Io.name(), &message);
             return Status::Io;
         }
     };
@@ -35,7 +36,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
                     threads_of(&scene, None),
                 );
                 if let Some(signal) = signals::caught() {
-                    say::error("interrupted", &format!("stopped by signal {signal}"));
+                    say::error(FailureKind::Interrupted.name(), &format!("stopped by signal {signal}"));
                     return Status::after(signal);
                 }
                 let judgements = judge(&recorder, &finished.result, &finished.counters);

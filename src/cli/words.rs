@@ -2,6 +2,7 @@
 
 use super::{Status, say};
 use crate::deck::{Entry, SCHEMA, explain as explained};
+use beamsim_core::failure::FailureKind;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -111,13 +112,13 @@ pub fn new(template: Template, out: Option<&Path>) -> Status {
         }
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             say::error(
-                "io",
+                FailureKind::Io.name(),
                 &format!("{}: is there already, and is left as it is (--out names another)", path.display()),
             );
             Status::Io
         }
         Err(error) => {
-            say::error("io", &format!("{}: {error}", path.display()));
+            say::error(FailureKind::Io.name(), &format!("{}: {error}", path.display()));
             Status::Io
         }
     }
@@ -150,7 +151,7 @@ pub fn manual(command: clap::Command, folder: Option<&Path>) -> Status {
     match done {
         Ok(()) => Status::Fine,
         Err(error) => {
-            say::error("io", &error.to_string());
+            say::error(FailureKind::Io.name(), &error.to_string());
             Status::Io
         }
     }

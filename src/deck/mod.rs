@@ -36,8 +36,7 @@ pub use looked_at::{Looked, looking_at};
 pub use overrides::apply;
 pub use parameters::Parameters;
 pub use procedure::{
-    Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage, StageBody,
-    Until,
+    Expect, ExpectBody, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage, StageBody, Until,
 };
 
 pub use schema::{Entry, SCHEMA, entries, explain};

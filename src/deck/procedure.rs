@@ -4,6 +4,7 @@ use super::cost::SCHEMES;
 use super::diagnostic::{Diagnostic, Span, Spanned, nearest};
 use super::geometry::{PointRef, read_point};
 use super::reader::{Context, Item, Table, kind_of};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
@@ -197,19 +198,6 @@ pub enum Instant {
     /// The first crossing of a load factor
     Load(f64),
 }
-
-/// Names of failures that a run can end with.
-pub const FAILURES: [&str; 9] = [
-    "deck",
-    "mesh_too_coarse",
-    "not_converged",
-    "singular",
-    "non_finite",
-    "energy_growth",
-    "limit",
-    "io",
-    "interrupted",
-];
 
 /// Most load levels or time steps of a stage.
 pub const MOST_STEPS: usize = 1_000_000_000;
@@ -508,13 +496,14 @@ fn read_fails(table: &Table) -> Option<ExpectBody> {
     let context = table.context;
     refuse_keys_beside(table, "fails", "an expected failure")?;
     let name = table.text("fails")?;
-    if FAILURES.contains(&name.value.as_str()) {
+    if FailureKind::of(&name.value).is_some() {
         return Some(ExpectBody::Fails(name));
     }
     let mut diagnostic = Diagnostic::error(format!("there is no failure `{}`", name.value), name.span);
-    diagnostic.help = Some(match nearest(&name.value, FAILURES) {
+    let names = || FailureKind::ALL.iter().map(|kind| kind.name());
+    diagnostic.help = Some(match nearest(&name.value, names()) {
         Some(meant) => format!("did you mean `{meant}`?"),
-        None => format!("failures are {}", super::one_of(FAILURES)),
+        None => format!("failures are {}", super::one_of(names())),
     });
     context.report(diagnostic);
     None

@@ -1,6 +1,7 @@
 //! run.json: what was simulated, what it took, how it ended.
 
 use crate::scene::Scene;
+use beamsim_core::failure::FailureKind;
 use beamsim_core::integrate::Largest;
 use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
 use serde_json::{Map, Value, json};
@@ -63,7 +64,7 @@ impl Record {
 
     /// Whether a signal ended the run.
     pub fn is_interrupted(&self) -> bool {
-        self.0["status"] == "interrupted"
+        self.0["status"] == FailureKind::Interrupted.name()
     }
 
     /// Without the deck.

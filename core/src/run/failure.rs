@@ -1,5 +1,6 @@
 //! What a run can end with, by name and with its numbers.
 
+use crate::failure::{Cause, FailureKind};
 use crate::model::{Jump, Model, MotionKind, MotorJump, Reading, SlotKind, StageError, StageKind};
 use crate::tensor::Vec3;
 use std::fmt;
@@ -35,7 +36,7 @@ pub struct Tried {
     pub soft: bool,
 }
 
-/// A failure of a run. The names are part of the contract with users.
+/// A failure of a run, with its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Failure {
     /// Something in the deck that only shows when a stage begins
@@ -141,38 +142,34 @@ impl Place {
 }
 
 impl Failure {
-    /// The name of the failure.
-    pub fn name(&self) -> &'static str {
+    /// Its kind, which has a name.
+    pub fn kind(&self) -> FailureKind {
         match self {
-            Self::Deck(_) => "deck",
+            Self::Deck(_) => FailureKind::Deck,
             Self::NotConverged { .. }
             | Self::TurnsTooFar { .. }
             | Self::LimitPoint { .. }
-            | Self::StepTooSmall { .. } => "not_converged",
-            Self::Singular { .. } => "singular",
-            Self::NonFinite { .. } => "non_finite",
-            Self::MeshTooCoarse { .. } => "mesh_too_coarse",
-            Self::EnergyGrowth { .. } => "energy_growth",
-            Self::Limit(_) => "limit",
-            Self::Io(_) => "io",
-            Self::Interrupted { .. } => "interrupted",
+            | Self::StepTooSmall { .. } => FailureKind::NotConverged,
+            Self::Singular { .. } => FailureKind::Singular,
+            Self::NonFinite { .. } => FailureKind::NonFinite,
+            Self::MeshTooCoarse { .. } => FailureKind::MeshTooCoarse,
+            Self::EnergyGrowth { .. } => FailureKind::EnergyGrowth,
+            Self::Limit(_) => FailureKind::Limit,
+            Self::Io(_) => FailureKind::Io,
+            Self::Interrupted { .. } => FailureKind::Interrupted,
         }
+    }
+
+    /// The name of its kind.
+    pub fn name(&self) -> &'static str {
+        self.kind().name()
     }
 
     /// Whether the deck itself asks for what cannot be: in a stage that cannot begin, or with a mechanism before anything is loaded.
     pub fn is_of_start(&self) -> bool {
         match self {
-            Self::Deck(_) | Self::Limit(_) => true,
             Self::Singular { at, .. } => at.stage == 1 && at.time == 0.0 && at.load == 0.0,
-            Self::NotConverged { .. }
-            | Self::TurnsTooFar { .. }
-            | Self::LimitPoint { .. }
-            | Self::StepTooSmall { .. }
-            | Self::NonFinite { .. }
-            | Self::MeshTooCoarse { .. }
-            | Self::EnergyGrowth { .. }
-            | Self::Io(_)
-            | Self::Interrupted { .. } => false,
+            other => other.kind().cause() == Cause::Deck,
         }
     }
 

@@ -8,6 +8,7 @@ use super::load::Refusal;
 use super::{Status, Verdict, json, say, signals};
 use crate::output::PartFile;
 use crate::study::sweep::Outcome;
+use beamsim_core::failure::FailureKind;
 use plan::Plan;
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -124,7 +125,7 @@ fn one(wanted: &Wanted, verdict: &mut Verdict) -> Result<(), Refusal> {
 /// After points of which each has been named.
 fn tell_failures(failed: usize, of: usize, verdict: &mut Verdict) {
     match stopped() {
-        Some(status) => verdict.fail(status, "interrupted", "what had ended is kept".into()),
+        Some(status) => verdict.fail(status, FailureKind::Interrupted.name(), "what had ended is kept".into()),
         None if failed > 0 => verdict.fail(Status::GaveUp, "sweep", format!("{failed} of {of} points failed")),
         None => {}
     }
@@ -147,7 +148,7 @@ fn list(plan: &Plan) {
 
 /// `3`, `1-5,8`: points from 1, as numbers from 0.
 fn chosen(words: &str, count: usize) -> Result<Vec<usize>, Refusal> {
-    let wrong = || Refusal::of(Status::Wrong, "usage", format!("--only {words}: points are numbers from 1 to {count}"));
+    let wrong = || Refusal::usage(format!("--only {words}: points are numbers from 1 to {count}"));
     let mut points = Vec::new();
     for word in words.split(',') {
         let (from, to) = word.split_once('-').unwrap_or((word, word));
@@ -204,7 +205,7 @@ fn tell(plan: &Plan, outcomes: &[Option<Outcome>], verdict: &mut Verdict) {
     match stopped() {
         Some(status) => {
             say::note(&format!("{}: {} points are kept; the same command goes on after them", plan.name, known.len()));
-            verdict.fail(status, "interrupted", message);
+            verdict.fail(status, FailureKind::Interrupted.name(), message);
         }
         None => verdict.fail(Status::GaveUp, "sweep", message),
     }

@@ -2,12 +2,12 @@
 
 use super::Wanted;
 use super::slurm::absolute;
-use crate::cli::Status;
 use crate::cli::load::{self, Refusal};
 use crate::cli::run::folder;
 use crate::cli::say;
 use crate::deck::{Diagnostic, Looked, SweepFile, VaryBody, VaryTable};
 use crate::study::sweep::{Axis, Combination, Outcome, Range, Store, Sweep, Values, usual_outputs};
+use beamsim_core::failure::FailureKind;
 use std::path::{Path, PathBuf};
 
 /// A sweep with its place.
@@ -28,7 +28,7 @@ impl Plan {
         let text = load::text(&wanted.file)?;
         let given = if SweepFile::is_one(&text) { Some(read(&wanted.file, &text)?) } else { None };
         let file = given.clone().unwrap_or_default();
-        let usage = |why: String| Refusal::of(Status::Wrong, "usage", why);
+        let usage = |why: String| Refusal::usage(why);
 
         let mut axes = file.vary.iter().map(axis).collect::<Result<Vec<_>, _>>().map_err(usage)?;
         for text in &wanted.vary {
@@ -60,7 +60,7 @@ impl Plan {
         };
         let sweep =
             Sweep::new(&loaded.text, &axes, how, outputs, wanted.error_bars || file.error_bars).map_err(usage)?;
-        sweep.check(&loaded.deck).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
+        sweep.check(&loaded.deck).map_err(|why| Refusal::of(FailureKind::Deck, why))?;
         let name = load::name(&wanted.file);
         let folder = folder(wanted.out.as_deref(), &name, false);
         Ok(Self { sweep, store: Store::of(&folder), folder, name })
@@ -116,7 +116,7 @@ fn read(path: &Path, text: &str) -> Result<SweepFile, Refusal> {
         let count = if found.len() == 1 { "1 error".to_string() } else { format!("{} errors", found.len()) };
         Refusal {
             details: load::render(&path.display().to_string(), text, &found),
-            ..Refusal::of(Status::Wrong, "deck", format!("{count} in {}", path.display()))
+            ..Refusal::of(FailureKind::Deck, format!("{count} in {}", path.display()))
         }
     })
 }

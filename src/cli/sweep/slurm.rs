@@ -8,9 +8,10 @@ use super::plan::Plan;
 use super::{Wanted, stopped};
 use crate::cli::load::Refusal;
 use crate::cli::progress::Progress;
-use crate::cli::{Status, say};
+use crate::cli::say;
 use crate::output::PartFile;
 use crate::study::sweep::Outcome;
+use beamsim_core::failure::FailureKind;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -222,7 +223,7 @@ fn largest_array() -> usize {
 
 fn output(command: &mut Command) -> Result<String, Refusal> {
     let name = command.get_program().to_string_lossy().into_owned();
-    let refuse = |why: String| Refusal::of(Status::Io, "io", format!("{name}: {why}"));
+    let refuse = |why: String| Refusal::of(FailureKind::Io, format!("{name}: {why}"));
     let done = command.output().map_err(|error| refuse(format!("{error}; is Slurm installed here?")))?;
     if done.status.success() {
         return Ok(String::from_utf8_lossy(&done.stdout).into_owned());
@@ -240,7 +241,7 @@ pub fn absolute(path: &Path) -> Result<PathBuf, Refusal> {
 }
 
 fn io(path: &Path, error: &std::io::Error) -> Refusal {
-    Refusal::of(Status::Io, "io", format!("{}: {error}", path.display()))
+    Refusal::of(FailureKind::Io, format!("{}: {error}", path.display()))
 }
 
 #[cfg(test)]
