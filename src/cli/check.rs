@@ -6,7 +6,6 @@ use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
 use beamsim_core::model::{Assembly, EffectSize};
 use beamsim_core::run::{Failure, Moment, refusal};
-use beamsim_core::system::StageKind;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::threads;
 use std::path::PathBuf;
@@ -226,7 +225,7 @@ fn tell_size(scene: &Scene) -> Result<Vec<EffectSize>, String> {
     let in_space = in_space.map(|equations| Assembly::new(&context, equations, &model).system.pattern.values());
     let assembly = Assembly::new(&context, equations, &model);
     let entries = assembly.system.pattern.nonzeros();
-    let vectors = if kind == StageKind::Dynamic { VECTORS_IN_DYNAMICS } else { VECTORS };
+    let vectors = if kind.advances_time() { VECTORS_IN_DYNAMICS } else { VECTORS };
     let vectors = vectors + in_space.map_or(0, |_| VECTORS_IN_SPACE);
     let bytes = 8 * (assembly.system.pattern.values() + in_space.unwrap_or(0)) + 24 * vectors * slots;
     say::line(&format!(

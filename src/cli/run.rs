@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
 use crate::study::{self, Recorder};
 use beamsim_core::failure::FailureKind;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::threads;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -156,15 +156,9 @@ impl Observer for Watcher<'_> {
         self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
     }
 
-    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
-        self.modes.push_modes(stage, modes);
-        Ok(())
-    }
-
-    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
-        self.modes.push_loads(stage, loads);
+    fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
+        self.modes.push(stage, result);
         Ok(())
     }
 
@@ -217,8 +211,7 @@ pub fn simulate(
     let beside = bars.map(|bars| Box::new(bars) as Box<dyn Beside>);
     let names = || scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
     let history = folder.map(|folder| HistoryWriter::create(folder, names(), beside)).transpose();
-    let dynamic: Vec<bool> =
-        scene.plan.stages.iter().map(|s| s.work.kind() == beamsim_core::model::StageKind::Dynamic).collect();
+    let dynamic: Vec<bool> = scene.plan.stages.iter().map(|s| s.work.kind().advances_time()).collect();
     let timed = dynamic.iter().all(|dynamic| *dynamic);
     let fields = folder.filter(|_| scene.vtk).map(|folder| FieldsWriter::create(folder, scene.figure(), timed));
     let (history, fields, opened) = match (history, fields.transpose()) {

@@ -1,7 +1,7 @@
 //! modes.csv and buckling.csv: what modal and buckling stages find.
 
 use super::files::{PartFile, remove_if_there};
-use beamsim_core::run::{CriticalLoad, Mode};
+use beamsim_core::run::{CriticalLoad, Mode, StageResult};
 use std::io;
 use std::path::Path;
 
@@ -13,14 +13,16 @@ pub struct ModesWriter {
 }
 
 impl ModesWriter {
-    /// The modes of a stage (from 1).
-    pub fn push_modes(&mut self, stage: usize, modes: &[Mode]) {
-        self.modes.extend(modes.iter().enumerate().map(|(k, &mode)| (stage, k + 1, mode)));
-    }
-
-    /// The critical loads of a stage (from 1).
-    pub fn push_loads(&mut self, stage: usize, loads: &[CriticalLoad]) {
-        self.loads.extend(loads.iter().enumerate().map(|(k, &load)| (stage, k + 1, load)));
+    /// Takes the result of stage number `stage`, from 1.
+    pub fn push(&mut self, stage: usize, result: &StageResult) {
+        match result {
+            StageResult::Modes(modes) => {
+                self.modes.extend(modes.iter().enumerate().map(|(k, &mode)| (stage, k + 1, mode)));
+            }
+            StageResult::CriticalLoads(loads) => {
+                self.loads.extend(loads.iter().enumerate().map(|(k, &load)| (stage, k + 1, load)));
+            }
+        }
     }
 
     /// Writes the files that have rows, and removes those that an earlier run has left.

@@ -4,8 +4,7 @@ use crate::deck::{Diagnostic, Spanned, is_named, nearest};
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
 use crate::study::Recorder;
-use beamsim_core::model::StageKind;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, Stage, StageResult};
 use std::time::Instant;
 
 /// The outputs of a run, and what it took.
@@ -159,7 +158,7 @@ impl Outcome {
 
 /// For each stage whether its clock is the time.
 fn are_dynamic(scene: &Scene) -> Vec<bool> {
-    scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect()
+    scene.plan.stages.iter().map(|stage| stage.work.kind().advances_time()).collect()
 }
 
 /// The names of all outputs: the columns of the history, then modes and critical loads, stage by stage.
@@ -187,12 +186,7 @@ pub(in crate::study) fn columns_of_history(scene: &Scene) -> usize {
 
 /// Those of a stage, which has this number.
 fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
-    let mode = |mode: usize| ["omega", "growth"].map(|quantity| format!("stage{number}.mode{mode}.{quantity}"));
-    match stage.work {
-        StageWork::Modal { modes } => (1..=modes).flat_map(mode).collect(),
-        StageWork::Buckling { modes } => (1..=modes).map(|mode| format!("stage{number}.buckling{mode}.load")).collect(),
-        _ => Vec::new(),
-    }
+    stage.work.results().into_iter().map(|result| format!("stage{number}.{result}")).collect()
 }
 
 /// Collects the columns of every row.
@@ -226,18 +220,10 @@ impl Observer for Columns<'_> {
         Ok(())
     }
 
-    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
-        self.found.push_modes(stage, modes);
-        let found = modes.iter().flat_map(|mode| [mode.omega, mode.growth]);
-        self.take_modes(stage, found.collect());
-        Ok(())
-    }
-
-    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
-        self.found.push_loads(stage, loads);
-        self.take_modes(stage, loads.iter().map(|critical| critical.load).collect());
+    fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
+        self.found.push(stage, result);
+        self.take_modes(stage, result.values());
         Ok(())
     }
 

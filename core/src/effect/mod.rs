@@ -31,9 +31,7 @@ use crate::kernel::inertia::Inertia;
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
 use crate::scalar::{LANES, Lanes, Pack, Real, each_lane};
-use crate::system::{
-    Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, StageKind, State,
-};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, State};
 use crate::tensor::{Mat3, Vec3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -132,7 +130,7 @@ pub trait Effect: Send + Sync {
 
     /// Whether it acts in a stage: inertia and damping do where something moves, inertia not where a rotating frame holds it.
     fn acts(&self, stage: &StageContext) -> bool {
-        let moves = matches!(stage.kind, StageKind::Dynamic | StageKind::Modal);
+        let moves = stage.kind.needs_inertia();
         match self.category() {
             Category::Inertia => moves && !stage.rotating,
             Category::Damping => moves,

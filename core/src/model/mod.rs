@@ -212,9 +212,7 @@ impl Model {
         if let Some(jump) = self.settle(stage, kind, state).into_iter().next() {
             return Err(StageError::Jump(jump));
         }
-        let plane = self
-            .plane
-            .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
+        let plane = self.plane.filter(|plane| kind.advances_state() && self.keeps(state, plane));
         self.refuse_turned_hinges(stage, state)?;
         self.number(stage, plane)
     }
@@ -268,7 +266,7 @@ impl Model {
 
     /// Whether stages of a kind are linear in the displacements.
     pub fn is_linear(&self, kind: StageKind) -> bool {
-        self.linear && matches!(kind, StageKind::Static | StageKind::Dynamic)
+        self.linear && kind.advances_state()
     }
 
     /// The unknowns that are free in a stage that has begun, in a plane or in space.

@@ -4,6 +4,25 @@ use super::failure::Moment;
 use crate::warning::WarningKind;
 use std::fmt;
 
+/// What a stage finds beside its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StageResult {
+    /// Small motions, by frequency
+    Modes(Vec<Mode>),
+    /// Critical loads, nearest above the load that was reached first
+    CriticalLoads(Vec<CriticalLoad>),
+}
+
+impl StageResult {
+    /// Its numbers, in the order of [`StageWork::results`](super::StageWork::results).
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            Self::Modes(modes) => modes.iter().flat_map(|mode| [mode.omega, mode.growth]).collect(),
+            Self::CriticalLoads(loads) => loads.iter().map(|critical| critical.load).collect(),
+        }
+    }
+}
+
 /// A small motion exp(s t), s = growth + i omega.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {

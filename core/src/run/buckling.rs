@@ -4,7 +4,7 @@
 //! eigenvalues m of K x = -m K' x tell how far away the critical loads are. Each is then followed: the path is continued to
 //! the load found, and looked at again from there, until it is reached.
 
-use super::analysis_results::{CriticalKind, CriticalLoad};
+use super::analysis_results::{CriticalKind, CriticalLoad, StageResult};
 use super::direction::Direction;
 use super::failure::Failure;
 use super::levels::{LARGEST_CONTRACTION, NO_MOTION, distance};
@@ -100,7 +100,7 @@ impl Run<'_> {
         self.counters.work.uncertainty = uncertainty;
         found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.count_steps();
-        self.observer.buckling(self.stage + 1, &found)
+        self.observer.found(self.stage + 1, &StageResult::CriticalLoads(found))
     }
 
     /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the

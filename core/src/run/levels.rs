@@ -1,6 +1,7 @@
 //! How the levels of a static stage are approached, and how a step to another branch is noticed.
 
 use super::failure::Failure;
+use super::plan::Approach;
 use super::stage_run::{Run, StageRun};
 use crate::kernel::Weights;
 use crate::model::{Model, SlotKind};
@@ -38,17 +39,6 @@ const BACK: f64 = -0.5;
 
 /// What moves less is round-off: relative to the length of the scene, and in radians.
 pub(super) const NO_MOTION: f64 = 1e-9;
-
-/// What a stage may do where Newton does not reach a level at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Approach {
-    /// Nothing
-    Straight,
-    /// Smaller steps
-    Parts,
-    /// Smaller steps, then arc length along the path; only where everything is linear in the load factor
-    Path,
-}
 
 /// How a stage has come to its last good state. Where levels lead on, one that is not reached is a limit of the path: the state of rest
 /// behind it is not looked for.

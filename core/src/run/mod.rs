@@ -27,12 +27,11 @@ mod statics;
 mod vibrations;
 mod warnings;
 
-pub use analysis_results::{CriticalKind, CriticalLoad, Event, EventKind, Mode};
+pub use analysis_results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
 pub use failure::{Failure, Moment, Place, refusal, refusal_help};
 pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
 pub use ledger::Ledger;
-pub use levels::Approach;
 pub use observer::{Counters, Observer, Snapshot};
-pub use plan::{InitialMotion, Plan, Stage, StageWork, Until};
+pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use stage_run::Run;

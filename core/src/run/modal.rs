@@ -1,6 +1,6 @@
 //! Small motions about the state that was reached: (s^2 M + s C + K) x = 0.
 
-use super::analysis_results::Mode;
+use super::analysis_results::{Mode, StageResult};
 use super::failure::Failure;
 use super::rigid::{free_spins, rigid_motions};
 use super::stage_run::{Run, StageRun};
@@ -87,8 +87,8 @@ impl Run<'_> {
         self.count_steps();
         // What moved moves on.
         self.state.copy_rates(&moving);
-        let listed: Vec<Mode> = listed.iter().map(mode).collect();
-        self.observer.modes(self.stage + 1, &listed)
+        let listed = listed.iter().map(mode).collect();
+        self.observer.found(self.stage + 1, &StageResult::Modes(listed))
     }
 
     /// No velocities: modes and paths are looked at from rest.

@@ -1,6 +1,6 @@
 //! What watches a run: rows of converged states, results of analyses, warnings, progress.
 
-use super::analysis_results::{CriticalLoad, Mode};
+use super::analysis_results::StageResult;
 use super::failure::{Failure, Moment};
 use super::findings::{Findings, Warning};
 use super::ledger::Ledger;
@@ -36,13 +36,8 @@ pub trait Observer {
     /// A converged state: the start, a load level, a time step.
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure>;
 
-    /// The modes of a stage (from 1).
-    fn modes(&mut self, _stage: usize, _modes: &[Mode]) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// The critical loads of a stage (from 1).
-    fn buckling(&mut self, _stage: usize, _loads: &[CriticalLoad]) -> Result<(), Failure> {
+    /// The result of an analysis in stage number `stage` (from 1), beside its rows.
+    fn found(&mut self, _stage: usize, _result: &StageResult) -> Result<(), Failure> {
         Ok(())
     }
 

@@ -1,6 +1,5 @@
 //! The plan of a run: the scene, and the stages in their order.
 
-use super::levels::Approach;
 use super::observer::Snapshot;
 use crate::integrate::Scheme;
 use crate::model::{Model, StageContext, StageKind};
@@ -104,8 +103,14 @@ pub enum StageWork {
     },
 }
 
+/// Newton iterations that a load level, a time step, a mode and a critical load usually take.
+const ITERATIONS_OF_A_LEVEL: f64 = 6.0;
+const ITERATIONS_OF_A_STEP: f64 = 3.0;
+const ITERATIONS_OF_A_MODE: f64 = 10.0;
+const ITERATIONS_OF_A_CRITICAL_LOAD: f64 = 60.0;
+
 impl StageWork {
-    /// Its kind.
+    /// Its kind, as loads, motions and effects see it.
     pub fn kind(&self) -> StageKind {
         match self {
             Self::Static { .. } | Self::Path { .. } => StageKind::Static,
@@ -114,6 +119,86 @@ impl StageWork {
             Self::Dynamic { .. } => StageKind::Dynamic,
         }
     }
+
+    /// The load levels that it is divided into, or whose length its first increment has.
+    pub fn load_levels(&self) -> Option<usize> {
+        match *self {
+            Self::Static { steps, .. } | Self::Path { steps, .. } => Some(steps),
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+        }
+    }
+
+    /// How it approaches load levels.
+    pub fn approach(&self) -> Option<Approach> {
+        match *self {
+            Self::Static { approach, .. } => Some(approach),
+            Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+        }
+    }
+
+    /// Its time scheme.
+    pub fn scheme(&self) -> Option<Scheme> {
+        match *self {
+            Self::Dynamic { scheme, .. } => Some(scheme),
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => None,
+        }
+    }
+
+    /// The time on the run's clock at which it ends.
+    pub fn end(&self) -> Option<f64> {
+        match *self {
+            Self::Dynamic { end, .. } => Some(end),
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => None,
+        }
+    }
+
+    /// Follows an equilibrium path in the load factor, so that a load or a motion must grow with it.
+    pub fn follows_path(&self) -> bool {
+        match self {
+            Self::Path { .. } | Self::Buckling { .. } => true,
+            Self::Static { .. } | Self::Modal { .. } | Self::Dynamic { .. } => false,
+        }
+    }
+
+    /// Its progress is slow at first and fast at the end: a search that closes in.
+    pub fn speeds_up(&self) -> bool {
+        match self {
+            Self::Buckling { .. } => true,
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Dynamic { .. } => false,
+        }
+    }
+
+    /// Newton iterations that it usually takes, where the clock stands at `start` before it.
+    pub fn usual_iterations(&self, start: f64) -> f64 {
+        match *self {
+            Self::Static { steps, .. } => steps as f64 * ITERATIONS_OF_A_LEVEL,
+            Self::Path { max_steps, .. } => max_steps as f64 * ITERATIONS_OF_A_LEVEL,
+            Self::Dynamic { end, step, .. } => (end - start) / step * ITERATIONS_OF_A_STEP,
+            Self::Modal { modes } => modes as f64 * ITERATIONS_OF_A_MODE,
+            Self::Buckling { modes } => modes as f64 * ITERATIONS_OF_A_CRITICAL_LOAD,
+        }
+    }
+
+    /// The names of the numbers that it finds beside its rows, such as `mode1.omega`.
+    pub fn results(&self) -> Vec<String> {
+        let mode = |mode: usize| ["omega", "growth"].map(|quantity| format!("mode{mode}.{quantity}"));
+        match *self {
+            Self::Modal { modes } => (1..=modes).flat_map(mode).collect(),
+            Self::Buckling { modes } => (1..=modes).map(|mode| format!("buckling{mode}.load")).collect(),
+            Self::Static { .. } | Self::Path { .. } | Self::Dynamic { .. } => Vec::new(),
+        }
+    }
+}
+
+/// What a stage may do where Newton does not reach a level at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// Nothing
+    Straight,
+    /// Smaller steps
+    Parts,
+    /// Smaller steps, then arc length along the path; only where everything is linear in the load factor
+    Path,
 }
 
 /// A condition that ends a stage at the first row beyond it.

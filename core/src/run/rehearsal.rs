@@ -2,7 +2,7 @@
 //!
 //! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
 
-use super::plan::{InitialMotion, Plan, Stage, StageWork};
+use super::plan::{InitialMotion, Plan, Stage};
 use super::start::set_in_motion;
 use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
 use crate::system::{DofMap, Slot, State};
@@ -95,12 +95,10 @@ pub(super) fn lacking(
     dof_map: impl FnOnce() -> Option<DofMap>,
 ) -> Option<StageError> {
     let kind = stage.work.kind();
-    let grows = matches!(stage.work, StageWork::Path { .. } | StageWork::Buckling { .. });
-    if grows && !fading && !stage.rotating && model.is_idle() {
+    if stage.work.follows_path() && !fading && !stage.rotating && model.is_idle() {
         return Some(StageError::NothingGrows(kind));
     }
-    let is_modal = kind == StageKind::Modal;
-    let lacks_mass = is_modal && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
+    let lacks_mass = kind.needs_mass() && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
     lacks_mass.then_some(StageError::NoMass)
 }
 
@@ -162,17 +160,12 @@ impl<'p> Rehearser<'p> {
             self.look_at_amplitudes(number, kind);
             self.look_at_static_motions(number, kind);
         }
-        let fading = self.has_moved && kind == StageKind::Static;
+        let fading = self.has_moved && kind.ramps_load();
         let lacks = lacking(&self.model, stage, number, fading, || self.model.number(number, None).ok());
         self.found.refusals.extend(lacks.map(|error| (number, error)));
         let amplitude = self.state.amplitude.clone();
-        self.state.load = match kind {
-            StageKind::Static => 0.0,
-            StageKind::Dynamic => 1.0,
-            StageKind::Buckling if fresh => 0.0,
-            StageKind::Modal | StageKind::Buckling => self.state.load,
-        };
-        if kind != StageKind::Dynamic {
+        self.state.load = kind.first_load(self.state.load, fresh);
+        if !kind.advances_time() {
             let load = self.state.load;
             self.model.set_clock(&mut self.state, clock, load);
             return;
@@ -192,7 +185,7 @@ impl<'p> Rehearser<'p> {
         let given = begins.then_some(&given[..]);
         self.look_at_velocities(number, given);
         self.look_at_motors(number, begins);
-        if let StageWork::Dynamic { end, .. } = stage.work {
+        if let Some(end) = stage.work.end() {
             self.look_at_kinks(number, end);
         }
     }
@@ -208,7 +201,7 @@ impl<'p> Rehearser<'p> {
     /// Loads, free strains and motors whose history goes on in this stage, and that have acted in the one before.
     fn look_at_amplitudes(&mut self, number: usize, kind: StageKind) {
         let Some(before) = &self.before else { return };
-        let load = if kind == StageKind::Static { 0.0 } else { 1.0 };
+        let load = if kind.ramps_load() { 0.0 } else { 1.0 };
         for (k, amplitude) in self.model.amplitudes.iter().enumerate() {
             let (from, [to, ..]) = (amplitude.reached(), amplitude.at(self.state.time, load));
             if amplitude.follows_history() && amplitude.acts_in(before.number) && differ(from, to, SAME_VALUE) {
@@ -220,7 +213,7 @@ impl<'p> Rehearser<'p> {
 
     /// In dynamic stages they are refused.
     fn look_at_static_motions(&mut self, number: usize, kind: StageKind) {
-        if self.before.is_none() || kind != StageKind::Static {
+        if self.before.is_none() || !kind.ramps_load() {
             return;
         }
         for (k, motion) in self.model.motions.iter().enumerate() {
@@ -291,15 +284,12 @@ impl<'p> Rehearser<'p> {
 
     fn end(&mut self, number: usize, stage: &Stage) {
         let kind = stage.work.kind();
-        let (time, load) = match stage.work {
-            StageWork::Dynamic { end, .. } => (end, 1.0),
-            StageWork::Static { .. } | StageWork::Path { .. } => (self.state.time, 1.0),
-            StageWork::Modal { .. } | StageWork::Buckling { .. } => (self.state.time, self.state.load),
-        };
+        let time = stage.work.end().unwrap_or(self.state.time);
+        let load = kind.last_load(self.state.load);
         self.model.set_clock(&mut self.state, time, load);
         self.model.end_stage(&self.state);
         self.sure &= stage.until.is_none();
-        if !matches!(kind, StageKind::Static | StageKind::Dynamic) {
+        if !kind.advances_state() {
             return;
         }
         self.before = Some(Before {

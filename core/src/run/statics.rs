@@ -1,8 +1,9 @@
 //! Load control: equal levels, approached in smaller steps where Newton fails, and along the path where those fail too.
 
 use super::failure::Failure;
-use super::levels::{Approach, Levels, Way};
+use super::levels::{Levels, Way};
 use super::path::Arrival;
+use super::plan::Approach;
 use super::stage_run::{Run, StageRun};
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;

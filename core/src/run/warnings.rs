@@ -231,7 +231,7 @@ impl Run<'_> {
 
     /// A planar scene that a stage does not find in its plane.
     pub(super) fn warn_of_space(&mut self, kind: StageKind) {
-        let planar = self.model.plane.is_some() && matches!(kind, StageKind::Static | StageKind::Dynamic);
+        let planar = self.model.plane.is_some() && kind.advances_state();
         if planar && self.plane.is_none() {
             let stage = self.stage + 1;
             let message = format!(
