@@ -1,9 +1,9 @@
 //! `[cost]`: what a study of accuracy and time varies, and what it looks at.
 
+use super::Deck;
 use super::diagnostic::{Diagnostic, Spanned};
 use super::geometry::InterpolationWord;
 use super::reader::{Context, Item, Table, choose};
-use super::{Deck, StageBody};
 use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
@@ -93,7 +93,7 @@ impl Cost {
 /// Keys that vary what the deck has nothing of.
 pub fn warn_of_idle_keys(top: &Table, deck: &Deck) {
     let Some(DeValue::Table(given)) = top.get("cost").map(|item| item.get_ref()) else { return };
-    let moves = deck.stages.iter().any(|stage| matches!(stage.body, StageBody::Dynamic { .. }));
+    let moves = deck.stages.iter().any(|stage| stage.body.advances_time());
     for key in given.keys() {
         let message = match key.get_ref().as_ref() {
             "elements" | "order" | "interpolation" if deck.beams.is_empty() => {

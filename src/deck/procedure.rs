@@ -76,6 +76,40 @@ pub enum StageBody {
     },
 }
 
+impl StageBody {
+    /// Loads come in and balance is found, by load levels or by arc length.
+    pub fn finds_balance(&self) -> bool {
+        match self {
+            Self::Static { .. } | Self::Path { .. } => true,
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => false,
+        }
+    }
+
+    /// The clock runs.
+    pub fn advances_time(&self) -> bool {
+        match self {
+            Self::Dynamic { .. } => true,
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => false,
+        }
+    }
+
+    /// Mass and its inertia count.
+    pub fn needs_inertia(&self) -> bool {
+        match self {
+            Self::Dynamic { .. } | Self::Modal { .. } => true,
+            Self::Static { .. } | Self::Path { .. } | Self::Buckling { .. } => false,
+        }
+    }
+
+    /// Rows are written as it goes on.
+    pub fn writes_rows(&self) -> bool {
+        match self {
+            Self::Static { .. } | Self::Path { .. } | Self::Dynamic { .. } => true,
+            Self::Modal { .. } | Self::Buckling { .. } => false,
+        }
+    }
+}
+
 /// `scheme = …` with its coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SchemeWord {

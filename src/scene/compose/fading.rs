@@ -1,7 +1,7 @@
 //! What static stages take over from a motion.
 
 use super::Composer;
-use crate::deck::{EffectWord, StageBody};
+use crate::deck::EffectWord;
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::fading_inertia::FadingInertia;
 use beamsim_core::model::StageSet;
@@ -28,13 +28,11 @@ impl Composer<'_> {
     fn stages_after_motion(&self) -> Vec<usize> {
         let (mut stages, mut moves) = (Vec::new(), false);
         for (number, stage) in self.deck.stages.iter().enumerate() {
-            match stage.body {
-                StageBody::Dynamic { .. } => moves = true,
-                StageBody::Static { .. } | StageBody::Path { .. } => {
-                    stages.extend(moves.then_some(number));
-                    moves &= stage.until.is_some();
-                }
-                StageBody::Modal { .. } | StageBody::Buckling { .. } => {}
+            if stage.body.advances_time() {
+                moves = true;
+            } else if stage.body.finds_balance() {
+                stages.extend(moves.then_some(number));
+                moves &= stage.until.is_some();
             }
         }
         stages

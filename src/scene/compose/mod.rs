@@ -309,9 +309,7 @@ impl Composer<'_> {
 
 /// Inertia is there for dynamic stages, where momenta are looked at, and where only small vibrations tell whether a static stage ends stable.
 fn needs_mass(deck: &Deck) -> bool {
-    let inertia =
-        |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
-    let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
+    let dynamic = deck.stages.iter().any(|stage| stage.body.needs_inertia() || stage.frame.is_some());
     let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
     let expected = deck.expects.iter().any(|expect| match &expect.body {
         deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
@@ -327,11 +325,7 @@ fn may_flutter(deck: &Deck) -> bool {
         deck::Frame::Space => load.moment.is_some(),
         deck::Frame::Body | deck::Frame::Section => true,
     };
-    let settles = |body: &deck::StageBody| match body {
-        deck::StageBody::Static { .. } | deck::StageBody::Path { .. } => true,
-        deck::StageBody::Modal { .. } | deck::StageBody::Buckling { .. } | deck::StageBody::Dynamic { .. } => false,
-    };
-    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| settles(&stage.body))
+    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| stage.body.finds_balance())
 }
 
 /// The stages of the deck count from 1, those of a run from 0.
