@@ -1,8 +1,7 @@
 //! What a run finds out beside its rows: points on the way, the stability of ends, warnings.
 
-use super::analysis_results::Event;
 use super::failure::Moment;
-use super::vibrations::Vibrations;
+use super::results::Event;
 use crate::integrate::Largest;
 use crate::warning::{About, WarningKind};
 use std::fmt;
@@ -74,17 +73,6 @@ impl StageStability {
             Some(_) => StabilityVerdict::Unstable,
         };
         Self { stage, verdict, negative }
-    }
-
-    /// As small vibrations tell.
-    pub(super) fn of_vibrations(stage: usize, vibrations: Vibrations) -> Self {
-        let verdict = match vibrations {
-            Vibrations::Counted(negative) => return Self::of_pivots(stage, Some(negative), Some(0)),
-            Vibrations::Bounded => StabilityVerdict::Stable,
-            Vibrations::Growing(_) | Vibrations::Diverging => StabilityVerdict::Unstable,
-            Vibrations::Unknown => StabilityVerdict::Unknown,
-        };
-        Self { stage, verdict, negative: None }
     }
 }
 

@@ -1,9 +1,9 @@
 //! What watches a run: rows of converged states, results of analyses, warnings, progress.
 
-use super::analysis_results::StageResult;
+use super::energy::Ledger;
 use super::failure::{Failure, Moment};
 use super::findings::{Findings, Warning};
-use super::ledger::Ledger;
+use super::results::StageResult;
 use crate::model::Model;
 use crate::solve::Work;
 use crate::system::{State, System};

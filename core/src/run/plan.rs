@@ -3,7 +3,8 @@
 use super::observer::Snapshot;
 use crate::integrate::Scheme;
 use crate::model::{Model, StageContext, StageKind};
-use crate::system::Node;
+use crate::rotation::Rotation;
+use crate::system::{Node, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
@@ -37,6 +38,18 @@ pub struct InitialMotion {
     pub spin: Vec3,
     /// The point it turns about
     pub about: Vec3,
+}
+
+impl InitialMotion {
+    /// Gives a state these velocities: v = velocity + spin x (x - about), and the rate of P from the spin, Pd = T^-T w.
+    pub(super) fn give_to(&self, state: &mut State) {
+        for &(node, place) in &self.nodes {
+            let (u, p) = (node.u as usize, node.p as usize);
+            let x = place + state.q[u];
+            state.v[u] = self.velocity + self.spin.cross(x - self.about);
+            state.v[p] = Rotation::new(state.q[p]).t_inverse().transpose_mul(self.spin);
+        }
+    }
 }
 
 /// One stage.

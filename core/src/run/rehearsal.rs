@@ -3,7 +3,6 @@
 //! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
 
 use super::plan::{InitialMotion, Plan, Stage};
-use super::start::set_in_motion;
 use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
@@ -173,7 +172,7 @@ impl<'p> Rehearser<'p> {
         let begins = !std::mem::replace(&mut self.has_moved, true);
         if begins {
             self.state.stand_still();
-            self.initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
+            self.initial.iter().for_each(|motion| motion.give_to(&mut self.state));
         }
         let given = self.state.v.clone();
         self.model.set_clock(&mut self.state, clock, 1.0);

@@ -29,7 +29,7 @@ impl Ledger {
 
 /// Keeps the account from step to step.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Bookkeeper {
+pub struct Bookkeeper {
     ledger: Ledger,
     /// The total that an exact solution keeps; known while the account is open
     first: Option<f64>,

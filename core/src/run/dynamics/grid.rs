@@ -2,7 +2,7 @@
 
 /// Steps of one length, the last perhaps shorter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grid {
+pub struct Grid {
     start: f64,
     end: f64,
     step: f64,

@@ -7,7 +7,7 @@ const RUNNING: usize = 3;
 
 /// Follows the total from the start of a stage.
 #[derive(Clone, Debug)]
-pub(super) struct EnergyGuard {
+pub struct EnergyGuard {
     limit: f64,
     floor: f64,
     round_off: f64,
@@ -30,7 +30,7 @@ struct Balance {
 
 /// What an account is off by that should be closed, over the largest kinetic + strain energy or work from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Imbalance {
+pub struct Imbalance {
     /// Above zero where energy comes from nothing
     pub share: f64,
     /// Whether the stage itself is to blame, or those before it
@@ -41,7 +41,7 @@ pub(super) struct Imbalance {
 const UNBALANCED: f64 = 0.05;
 
 /// Whether an account that is off by a share of the largest energy is worth a warning.
-pub(super) fn is_unbalanced(share: f64) -> bool {
+pub fn is_unbalanced(share: f64) -> bool {
     share.abs() > UNBALANCED
 }
 
@@ -49,7 +49,7 @@ pub(super) fn is_unbalanced(share: f64) -> bool {
 const TO_BLAME: f64 = 0.4;
 
 /// By how much the total has grown, and what that is to be compared with.
-pub(super) struct Growth {
+pub struct Growth {
     pub grown: f64,
     pub largest: f64,
 }

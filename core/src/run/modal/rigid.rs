@@ -34,7 +34,7 @@ const NO_FORCE_OF_SPIN: f64 = 1e-8;
 
 /// The spins of straight parts about their own axes against which nothing acts, one number an equation each. The system holds the stiffness of
 /// the state.
-pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
+pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
     let dof_map = &system.pattern.dof_map;
     let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
     let mut found = Vec::new();
@@ -55,7 +55,7 @@ pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<V
 }
 
 /// The rigid motions of all free parts, one number an equation each. The system holds forces and stiffness of the state.
-pub(super) fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
+pub fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
     let parts = parts(system, places);
     if parts.len() > MOST_PARTS {
         return Vec::new();

@@ -12,7 +12,7 @@ use crate::system::State;
 /// tolerance, by its part of the stage; a step whose largest error is above its share is rejected, and the next is chosen so that it
 /// should be a little below.
 #[derive(Clone, Debug)]
-pub(super) struct Control {
+pub struct Control {
     /// The method
     pub scheme: Scheme,
     /// The error allowed to a step over its length
