@@ -4,6 +4,7 @@ mod distance;
 mod failure;
 mod findings;
 mod issued;
+mod refusal;
 mod results;
 
 mod energy;
@@ -14,6 +15,7 @@ mod hint;
 mod rehearsal;
 
 mod handover;
+mod naming;
 mod spatial;
 mod stage_run;
 mod warnings;
@@ -27,9 +29,10 @@ mod run;
 
 pub use self::run::Run;
 pub use energy::Ledger;
-pub use failure::{Failure, Moment, Place, refusal, refusal_help};
+pub use failure::{Failure, Moment, Place};
 pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
 pub use observer::{Counters, Observer, Snapshot};
 pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
+pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};

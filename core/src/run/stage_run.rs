@@ -1,12 +1,12 @@
 //! One stage of a run: its state, its unknowns, Newton's iteration, and what all kinds of stages do.
 
 use super::energy::Bookkeeper;
-use super::failure::{Failure, Moment, Place, Tried, place, refusal, refusal_help};
+use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
 use super::observer::{Counters, Observer, Snapshot};
 use super::plan::{Plan, Stage};
 use crate::model::{Assembly, Model, StageError, charts};
-use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector};
+use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
 use crate::system::{Plane, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
@@ -90,13 +90,6 @@ pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model) -> R
     };
     let convergence = Convergence { tolerance: stage.tolerance };
     Ok(Newton::new(convergence, stage.max_iterations, solver, &assembly.system))
-}
-
-/// Why a stage (from 0) cannot begin, with what helps.
-pub(super) fn describe(error: StageError, model: &Model, number: usize) -> Failure {
-    let message = format!("stage {}: {}", number + 1, refusal(&error, model));
-    let help = refusal_help(&error, model, number);
-    Failure::Deck(help.map_or(message.clone(), |help| format!("{message}; {help}")))
 }
 
 impl StageRun<'_> {
@@ -255,12 +248,6 @@ impl StageRun<'_> {
         Ok(())
     }
 
-    fn name_coarse(&self, element: usize, angle: f64) -> Failure {
-        let rotations = self.model.charted.elements[element].rotations();
-        let names = [rotations[0], rotations[rotations.len() - 1]].map(|slot| self.model.node_at(slot as usize));
-        Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
-    }
-
     /// Where a spring or the spring of a joint seems to have been wound by more than half a turn since the last good state nobody knows
     /// whether that were the load or the corrections on their way to the balance: smaller levels tell.
     pub fn refuse_windings(&self) -> Result<(), NewtonFailure> {
@@ -310,49 +297,6 @@ impl StageRun<'_> {
         if !self.counters.linear_solvers.contains(&name) {
             self.counters.linear_solvers.push(name);
         }
-    }
-
-    /// Names what Newton ended with.
-    pub fn name_failure(&self, failure: NewtonFailure, system: &System) -> Failure {
-        let at = self.moment();
-        match failure {
-            NewtonFailure::NotConverged { residual, history } => Failure::NotConverged {
-                at,
-                place: place(&self.model, residual.slot as usize, residual.value),
-                residual: residual.value.norm(),
-                force: residual.force,
-                history,
-                tried: Tried { cutbacks: self.counters.cutbacks - self.cutbacks_before, soft: self.soft },
-            },
-            NewtonFailure::StepTooSmall { slot, error, share } => {
-                Failure::StepTooSmall { at, place: place(&self.model, slot, Vec3::ZERO), error, share }
-            }
-            NewtonFailure::Singular(vector) => self.name_mechanism(vector, system),
-            NewtonFailure::TurnsTooFar { slot, angle } => {
-                Failure::TurnsTooFar { at, node: self.model.node_at(slot), angle }
-            }
-            NewtonFailure::LeapsTooFar { element, angle } => self.name_coarse(element, angle),
-            NewtonFailure::NotFinite { effect, slot } => {
-                Failure::NonFinite { at, effect, node: self.model.node_at(slot) }
-            }
-        }
-    }
-
-    /// Names the node and the direction that move most in a motion without stiffness.
-    pub fn name_mechanism(&self, vector: Option<NullVector>, system: &System) -> Failure {
-        let at = self.moment();
-        Failure::Singular { at, place: vector.map(|vector| self.place_of(&vector, system)) }
-    }
-
-    /// Where a motion moves most.
-    pub fn place_of(&self, vector: &NullVector, system: &System) -> Place {
-        let (largest, motion) = vector.by_slot(&system.pattern.dof_map, self.model.slots());
-        place(&self.model, largest, motion[largest])
-    }
-
-    /// Why the stage cannot go on.
-    pub fn describe(&self, error: StageError) -> Failure {
-        describe(error, self.model, self.number)
     }
 }
 

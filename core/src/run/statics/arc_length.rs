@@ -96,6 +96,25 @@ pub fn detour(stage: &mut StageRun, space: &mut SpatialLook, levels: &Levels, go
     Follower { stage, space, path: &mut path }.go_to(goal, bounds)
 }
 
+/// The signs that were passed last: on a located point itself they are nobody's.
+#[derive(Clone, Copy)]
+struct Signs {
+    /// The load factor grows.
+    rising: bool,
+    /// The displacement that the loads do work on grows.
+    working: bool,
+}
+
+impl Signs {
+    fn pass(&mut self, target: Option<Target>) {
+        match target {
+            Some(Target::Limit) => self.rising = !self.rising,
+            Some(Target::Turning) => self.working = !self.working,
+            Some(Target::Load(_)) | None => {}
+        }
+    }
+}
+
 /// Follows a path.
 struct Follower<'f, 'r> {
     stage: &'f mut StageRun<'r>,
@@ -107,8 +126,7 @@ impl Follower<'_, '_> {
     /// Goes on until the load factor reaches `goal` from below, or `until`, or a bound.
     fn go_to(&mut self, goal: f64, bounds: Bounds) -> Result<Arrival, Failure> {
         let (mut highest, mut in_vain) = (self.stage.state.load, 0);
-        // The signs that were passed last: on a located point itself they are nobody's.
-        let (mut rising, mut working) = (self.path.here.load_rate > 0.0, self.path.here.work_rate > 0.0);
+        let mut signs = Signs { rising: self.path.here.load_rate > 0.0, working: self.path.here.work_rate > 0.0 };
         let goal = Target::Load(goal);
         for number in 0..bounds.increments {
             if in_vain >= bounds.patience {
@@ -117,40 +135,16 @@ impl Follower<'_, '_> {
             let done = if bounds.are_whole_stage { number as f64 / bounds.increments as f64 } else { self.path.begun };
             self.stage.tell_progress(done)?;
             let (next, length) = self.path.step(self.stage)?;
-            let mut targets = Vec::new();
-            if (next.load_rate > 0.0) != rising {
-                targets.push(Target::Limit);
-            }
-            if (next.work_rate > 0.0) != working {
-                targets.push(Target::Turning);
-            }
-            if goal.value(&self.path.here) < 0.0 && goal.value(&next) >= 0.0 {
-                targets.push(goal);
-            }
-            let behind = next.signature;
-            let beyond = (self.stage.plane.is_some() && targets.contains(&Target::Limit)).then(|| next.state.clone());
-            let (mut arrived, mut target) = self.path.nearest(self.stage, next, length, &targets);
-            if target == Some(Target::Limit) {
-                // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
-                arrived.signature = behind;
-                arrived.on_limit = true;
-                if let Some(beyond) = &beyond {
-                    self.stage.state.copy_from(beyond);
-                    self.space.warn_of_instability(self.stage, behind.and_then(Signature::negative))?;
-                }
-            }
-            if targets.contains(&goal) && (target.is_none() || target == Some(goal)) {
+            let targets = self.targets(&next, signs, goal);
+            let (mut arrived, mut target) = self.nearest(next, length, &targets)?;
+            if targets.contains(&goal) && target.is_none_or(|target| target == goal) {
                 if !self.hit(goal, &mut arrived) && self.path.shorten() {
                     self.stage.counters.cutbacks += 1;
                     continue;
                 }
                 target = Some(goal);
             }
-            match target {
-                Some(Target::Limit) => rising = !rising,
-                Some(Target::Turning) => working = !working,
-                _ => {}
-            }
+            signs.pass(target);
             self.arrive(arrived, target)?;
             in_vain = if self.stage.state.load > highest { 0 } else { in_vain + 1 };
             highest = highest.max(self.stage.state.load);
@@ -162,6 +156,38 @@ impl Follower<'_, '_> {
             }
         }
         Ok(Arrival::OutOfSteps)
+    }
+
+    /// What lies between here and the next point.
+    fn targets(&self, next: &Point, signs: Signs, goal: Target) -> Vec<Target> {
+        let mut targets = Vec::new();
+        if (next.load_rate > 0.0) != signs.rising {
+            targets.push(Target::Limit);
+        }
+        if (next.work_rate > 0.0) != signs.working {
+            targets.push(Target::Turning);
+        }
+        if goal.value(&self.path.here) < 0.0 && goal.value(next) >= 0.0 {
+            targets.push(goal);
+        }
+        targets
+    }
+
+    /// The nearest of these points, or else the next one, `length` ahead.
+    fn nearest(&mut self, next: Point, length: f64, targets: &[Target]) -> Result<(Point, Option<Target>), Failure> {
+        let behind = next.signature;
+        let beyond = (self.stage.plane.is_some() && targets.contains(&Target::Limit)).then(|| next.state.clone());
+        let (mut arrived, target) = self.path.nearest(self.stage, next, length, targets);
+        if target == Some(Target::Limit) {
+            // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
+            arrived.signature = behind;
+            arrived.on_limit = true;
+            if let Some(beyond) = &beyond {
+                self.stage.state.copy_from(beyond);
+                self.space.warn_of_instability(self.stage, behind.and_then(Signature::negative))?;
+            }
+        }
+        Ok((arrived, target))
     }
 
     /// From a point near it to a load factor itself, not further away than an increment.
@@ -189,7 +215,7 @@ impl Follower<'_, '_> {
         let kind = match target {
             Some(Target::Limit) => Some(EventKind::Limit),
             Some(Target::Turning) => Some(EventKind::Turning),
-            _ => None,
+            Some(Target::Load(_)) | None => None,
         };
         tell_of_points(self.stage, self.space, kind, self.path.here.signature, point.signature)?;
         self.path.here = point;
