@@ -5,10 +5,11 @@ use crate::rotation::{Rotation, relative_angle};
 use crate::system::State;
 use crate::threads;
 
-/// What moves less is round-off: relative to the length of the scene, and in radians.
+/// The largest motion that is round-off: over the length of the scene, and in radians.
 pub(super) const NO_MOTION: f64 = 1e-9;
 
-/// The largest difference of two states: displacements over the length of the scene, rotations in radians, whatever their charts.
+/// The largest difference of two states: displacements over the length of the scene, rotations in
+/// radians, whatever their charts.
 pub(super) fn distance(model: &Model, a: &State, b: &State) -> f64 {
     let one = |slot: usize| match model.kinds[slot] {
         SlotKind::Displacement => (b.q[slot] - a.q[slot]).norm() / model.length,

@@ -1,4 +1,4 @@
-//! What a run can end with, by name and with its numbers.
+//! The failures of a run, with their numbers.
 
 use crate::failure::{Cause, FailureKind};
 use crate::model::{Model, SlotKind};
@@ -27,12 +27,12 @@ pub struct Place {
     pub direction: Vec3,
 }
 
-/// What had been tried where no balance was found, and what is known that may be its cause.
+/// Attempts at a balance that was not found, and a known cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tried {
     /// Attempts that were taken back
     pub cutbacks: u64,
-    /// Whether round-off takes the stiffness of the softest motion
+    /// Round-off takes the stiffness of the softest motion.
     pub soft: bool,
 }
 
@@ -53,7 +53,7 @@ pub enum Failure {
         force: f64,
         /// The largest residual of each iterate of the last attempt, over what is allowed
         history: Vec<f64>,
-        /// What had been tried
+        /// Attempts before it
         tried: Tried,
     },
     /// A node turns so far at once that nobody could tell which way.
@@ -84,14 +84,14 @@ pub enum Failure {
         place: Place,
         /// Relative to the scene's length, or in radians
         error: f64,
-        /// What the step is allowed
+        /// The error that the step is allowed
         share: f64,
     },
     /// A mechanism or a loose part
     Singular {
         /// When
         at: Moment,
-        /// What moves freely
+        /// The node and the direction that move freely
         place: Option<Place>,
     },
     /// A force, a motion or a result that is not finite
@@ -144,7 +144,7 @@ impl Place {
         }
     }
 
-    /// Whether it is a condition of a joint.
+    /// True if it is a condition of a joint.
     pub fn is_joint(&self) -> bool {
         matches!(self.kind, SlotKind::Force | SlotKind::Moment)
     }
@@ -174,7 +174,8 @@ impl Failure {
         self.kind().name()
     }
 
-    /// Whether the deck itself asks for what cannot be: in a stage that cannot begin, or with a mechanism before anything is loaded.
+    /// True if the deck itself asks for what cannot be: in a stage that cannot begin, or with a
+    /// mechanism before anything is loaded.
     pub fn is_of_start(&self) -> bool {
         match self {
             Self::Singular { at, .. } => at.stage == 1 && at.time == 0.0 && at.load == 0.0,
@@ -182,7 +183,7 @@ impl Failure {
         }
     }
 
-    /// Whether no balance was found: another way to it may find one.
+    /// True if no balance was found: another way to it may find one.
     pub(super) fn is_of_balance(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::Singular { .. })
     }

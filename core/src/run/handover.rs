@@ -36,7 +36,8 @@ impl StageRun<'_> {
         state.fading = Arc::new(fading);
     }
 
-    /// At the start of a static stage: what it knows itself of inertia, as seen from a frame that rotates, does not fade.
+    /// At the start of a static stage: what it knows itself of inertia, as seen from a frame that
+    /// rotates, does not fade.
     pub fn take_over(&mut self) {
         if self.state.fading.is_empty() {
             return;
@@ -54,7 +55,7 @@ impl StageRun<'_> {
     }
 }
 
-/// What inertia and damping do at a slot of a node.
+/// The force of inertia and damping at a slot of a node.
 fn carried(kind: SlotKind, system: &System, slot: usize) -> Vec3 {
     let [inertia, damping] = [Category::Inertia, Category::Damping].map(|category| system.part_of(category, slot));
     if kind.is_multiplier() { Vec3::ZERO } else { inertia + damping }

@@ -1,4 +1,4 @@
-//! What to try after a failure: what the plan does not do already.
+//! Hints after a failure: cures that the plan does not have already.
 
 use super::failure::{Failure, Moment, Tried};
 use super::plan::{Approach, Plan, Stage};
@@ -9,7 +9,7 @@ use crate::system::Category;
 const MANY_LEVELS: usize = 1000;
 
 impl Failure {
-    /// What to try, in the plan that ended with it.
+    /// A cure, in the plan that ended with it.
     pub fn hint(&self, plan: &Plan) -> Option<String> {
         let has = |at: &Moment| Has::new(plan, at.stage);
         match self {
@@ -42,7 +42,7 @@ impl Failure {
     }
 }
 
-/// What a stage of a plan has already.
+/// A stage of a plan, and the cures that it has already.
 struct Has<'a> {
     plan: &'a Plan,
     stage: &'a Stage,
@@ -171,7 +171,7 @@ impl<'a> Has<'a> {
     }
 }
 
-/// What a scheme is called in a deck.
+/// The name of a scheme in a deck.
 enum SchemeFamily {
     Newmark,
     Hht,

@@ -1,4 +1,4 @@
-//! What a run has told its user already.
+//! Warnings that a run has given already.
 
 /// Warnings that have been given already, and how bad what they tell of was.
 #[derive(Clone, Debug)]
@@ -7,9 +7,11 @@ pub(super) struct IssuedWarnings {
     pub coarse: bool,
     /// How many limit and branch points
     pub points: usize,
-    /// How uncertain round-off leaves displacements; below the first value nothing is worth a warning.
+    /// How uncertain round-off leaves displacements; below the first value nothing is worth a
+    /// warning.
     pub uncertainty: f64,
-    /// By how much strains depend on the orientation; below the first value nothing is worth a warning.
+    /// By how much strains depend on the orientation; below the first value nothing is worth a
+    /// warning.
     pub frame: f64,
     pub soft: bool,
     pub axis: bool,

@@ -1,4 +1,4 @@
-//! What watches a run: rows of converged states, results of analyses, warnings, progress.
+//! Observers of a run: rows of converged states, results of analyses, warnings, progress.
 
 use super::energy::Ledger;
 use super::failure::{Failure, Moment};
@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::solve::Work;
 use crate::system::{State, System};
 
-/// What an observer sees of a converged state.
+/// A converged state as an observer sees it.
 pub struct Snapshot<'a> {
     /// Stage, from 1
     pub stage: usize,
@@ -55,7 +55,8 @@ pub trait Observer {
 pub struct Counters {
     /// Converged levels and time steps
     pub steps: u64,
-    /// Attempts that were taken back: a level or step whose Newton failed, or whose error was too large
+    /// Attempts that were taken back: a level or step whose Newton failed, or whose error was too
+    /// large
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,

@@ -8,7 +8,7 @@ use crate::system::{Node, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
-/// What is to be done.
+/// The scene and its stages.
 #[derive(Clone)]
 pub struct Plan {
     /// The scene
@@ -19,9 +19,9 @@ pub struct Plan {
     pub stages: Vec<Stage>,
     /// Rows of dynamic stages are wanted at multiples of this time.
     pub interval: Option<f64>,
-    /// Whether the energy account is asked for
+    /// The energy account is asked for.
     pub energy: bool,
-    /// Whether somebody looks at continued rotation vectors
+    /// Somebody looks at continued rotation vectors.
     pub continued: bool,
     /// The initial places of all nodes, where a modal stage asks for them
     pub places: Vec<(Node, Vec3)>,
@@ -41,7 +41,8 @@ pub struct InitialMotion {
 }
 
 impl InitialMotion {
-    /// Gives a state these velocities: v = velocity + spin x (x - about), and the rate of P from the spin, Pd = T^-T w.
+    /// Gives a state these velocities: v = velocity + spin x (x - about), and the rate of P from
+    /// the spin, Pd = T^-T w.
     pub(super) fn give_to(&self, state: &mut State) {
         for &(node, place) in &self.nodes {
             let (u, p) = (node.u as usize, node.p as usize);
@@ -55,7 +56,7 @@ impl InitialMotion {
 /// One stage.
 #[derive(Clone)]
 pub struct Stage {
-    /// What is done
+    /// The analysis
     pub work: StageWork,
     /// Newton's tolerance
     pub tolerance: f64,
@@ -63,7 +64,7 @@ pub struct Stage {
     pub max_iterations: usize,
     /// Ends the stage early
     pub until: Option<Until>,
-    /// Whether it is seen from a rotating frame
+    /// It is seen from a rotating frame.
     pub rotating: bool,
 }
 
@@ -74,14 +75,14 @@ impl Stage {
     }
 }
 
-/// What a stage does.
+/// The analysis of a stage, with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StageWork {
     /// Equal load levels
     Static {
         /// Their number
         steps: usize,
-        /// What it may do where one is not reached at once
+        /// The means where one is not reached at once
         approach: Approach,
     },
     /// A path that may pass limit points
@@ -165,7 +166,8 @@ impl StageWork {
         }
     }
 
-    /// Follows an equilibrium path in the load factor, so that a load or a motion must grow with it.
+    /// Follows an equilibrium path in the load factor, so that a load or a motion must grow with
+    /// it.
     pub fn follows_path(&self) -> bool {
         match self {
             Self::Path { .. } | Self::Buckling { .. } => true,
@@ -203,14 +205,15 @@ impl StageWork {
     }
 }
 
-/// What a stage may do where Newton does not reach a level at once.
+/// The means of a stage where Newton does not reach a level at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Approach {
     /// Nothing
     Straight,
     /// Smaller steps
     Parts,
-    /// Smaller steps, then arc length along the path; only where everything is linear in the load factor
+    /// Smaller steps, then arc length along the path; only where everything is linear in the load
+    /// factor
     Path,
 }
 

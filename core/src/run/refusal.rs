@@ -38,7 +38,7 @@ pub fn refusal(error: &StageError, model: &Model) -> String {
     }
 }
 
-/// What helps where stage number `stage` (from 0) cannot begin.
+/// A cure where stage number `stage` (from 0) cannot begin.
 pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<String> {
     let driven = |own_stages: Option<bool>| match own_stages {
         None if stage == 0 => {
@@ -71,7 +71,7 @@ pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<S
     }
 }
 
-/// What helps where the first stage is dynamic.
+/// The cure where the first stage is dynamic.
 const START: &str =
     "a dynamic stage starts where the scene is: its history must begin with 0 there, or a static stage come before it";
 

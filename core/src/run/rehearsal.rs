@@ -1,6 +1,8 @@
-//! What can be told of the stages of a plan before anything is computed: which of them cannot begin, and where histories jump.
+//! Faults of a plan that show before anything is computed: stages that cannot begin, and histories
+//! that jump.
 //!
-//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
+//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but
+//! prescribed motions moves.
 
 use super::plan::{InitialMotion, Plan, Stage};
 use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
@@ -11,13 +13,14 @@ use std::collections::HashMap;
 /// Values of a history that agree to this part of the larger one are the same.
 const SAME_VALUE: f64 = 1e-9;
 
-/// Velocities that agree to this part of the larger one are the same: those of initial motions come from other numbers.
+/// Velocities that agree to this part of the larger one are the same: those of initial motions come
+/// from other numbers.
 const SAME_VELOCITY: f64 = 1e-6;
 
 /// Axes with this cosine are the same.
 const SAME_AXIS: f64 = 1.0 - 1e-9;
 
-/// What is known of a plan beforehand.
+/// Faults of a plan.
 #[derive(Debug, Default)]
 pub struct Rehearsal {
     /// Stages, from 0, that cannot begin
@@ -31,16 +34,16 @@ pub struct Rehearsal {
 pub struct HistoryJump {
     /// The stage, from 0
     pub stage: usize,
-    /// What jumps
+    /// The load, motion or motor that jumps
     pub what: Driven,
     /// How
     pub how: JumpKind,
 }
 
-/// What a history drives.
+/// A load, motion or motor that a history drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driven {
-    /// What has the amplitude with this number
+    /// The loads with the amplitude of this number
     Amplitude(usize),
     /// The motion with this number
     Motion(usize),
@@ -60,9 +63,9 @@ pub enum JumpKind {
     },
     /// From one velocity to another where a dynamic stage begins
     Velocity {
-        /// What its nodes have
+        /// The velocity of its nodes
         from: f64,
-        /// What it begins with
+        /// The velocity that it begins with
         to: f64,
     },
     /// In its velocity, within a stage
@@ -84,8 +87,8 @@ pub fn rehearse(plan: &Plan) -> Rehearsal {
     rehearser.found
 }
 
-/// What a stage lacks to begin with, whatever the state: a load that grows, or mass. `fading`: whether what a motion left may fade
-/// with the load factor.
+/// The condition that a stage lacks to begin, whatever the state: a load that grows, or mass.
+/// `fading`: forces that a motion left may fade with the load factor.
 pub(super) fn lacking(
     model: &Model,
     stage: &Stage,
@@ -108,14 +111,14 @@ struct Rehearser<'p> {
     found: Rehearsal,
     /// For each motion whether where its node is depends on nothing but motions and supports
     determined: Vec<bool>,
-    /// Whether the stages so far end where they say, and not at an `until`
+    /// True if the stages so far end where they say, and not at an `until`
     sure: bool,
-    /// What computed the state before this one
+    /// The stage that led to the present state
     before: Option<Before>,
     has_moved: bool,
 }
 
-/// What is known of the last static or dynamic stage.
+/// The last static or dynamic stage.
 struct Before {
     number: usize,
     /// For each amplitude its rate at the end
@@ -124,11 +127,11 @@ struct Before {
     velocities: Vec<Option<f64>>,
 }
 
-/// What motions and supports hold of a slot.
+/// The axes of a slot that motions and supports hold.
 #[derive(Default)]
 struct HeldAxes {
     axes: Vec<Vec3>,
-    /// Whether it is a rotation that is prescribed as a whole
+    /// True if it is a rotation that is prescribed as a whole
     turned: bool,
 }
 
@@ -197,7 +200,8 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in the one before.
+    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in
+    /// the one before.
     fn look_at_amplitudes(&mut self, number: usize, kind: StageKind) {
         let Some(before) = &self.before else { return };
         let load = if kind.ramps_load() { 0.0 } else { 1.0 };
@@ -225,7 +229,8 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give, where they do.
+    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give,
+    /// where they do.
     fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>) {
         for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
             let [value, rate, rate2] = motion.at(self.state.time, 1.0);
@@ -245,7 +250,7 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// The same of motors. `begins`: initial motions set the scene in motion.
+    /// Motors at the start of a dynamic stage. `begins`: initial motions set the scene in motion.
     fn look_at_motors(&mut self, number: usize, begins: bool) {
         // How fast a joint turns that a static stage has turned before is known to nobody yet.
         if begins && self.before.is_some() && !self.initial.is_empty() {
@@ -324,7 +329,8 @@ impl<'p> Rehearser<'p> {
     }
 }
 
-/// The velocity that a motion's node has along it; that of a rotation about another axis is none that it could go on with.
+/// The velocity that a motion's node has along it; that of a rotation about another axis is none
+/// that it could go on with.
 fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     let own = given[motion.slot as usize];
     let along = own.dot(motion.axis);
@@ -333,7 +339,8 @@ fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     if fits { along } else { 0.0 }
 }
 
-/// What initial motions give a motion that begins at rest is none of its business: the scene begins with the velocity of the motion.
+/// A jump of a velocity; none where initial motions move the node of a motion that begins at rest:
+/// the scene begins with the velocity of the motion.
 fn velocity_jump(from: f64, to: f64, fastest: Option<f64>, begins: bool) -> Option<JumpKind> {
     let noticed = fastest.is_none_or(|fastest| (to - from).abs() > NOTICED * fastest);
     let jumps = noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);

@@ -4,7 +4,7 @@ use super::failure::Moment;
 use crate::warning::WarningKind;
 use std::fmt;
 
-/// What a stage finds beside its rows.
+/// The result of an analysis, beside its rows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StageResult {
     /// Small motions, by frequency
@@ -44,7 +44,7 @@ impl Mode {
 pub struct CriticalLoad {
     /// The load factor
     pub load: f64,
-    /// What lies there
+    /// Its kind
     pub kind: CriticalKind,
 }
 
@@ -55,7 +55,8 @@ pub enum CriticalKind {
     Branch,
     /// The load is stationary.
     Limit,
-    /// The path has no critical point that was reached: the load at which the tangent, extrapolated from smaller loads, would be singular
+    /// The path has no critical point that was reached: the load at which the tangent, extrapolated
+    /// from smaller loads, would be singular
     Estimate,
 }
 
@@ -75,7 +76,7 @@ impl CriticalKind {
 pub struct Event {
     /// Where
     pub at: Moment,
-    /// What
+    /// Its kind
     pub kind: EventKind,
     /// How many pivots of the tangent are negative behind it, where that is known
     pub negative_pivots: Option<usize>,

@@ -26,7 +26,8 @@ impl InSpace {
     }
 }
 
-/// The look out of the plane, which a stage in space does not need. What it takes is set up by the first look.
+/// The look out of the plane, which a stage in space does not need. What it takes is set up by the
+/// first look.
 #[derive(Default)]
 pub(super) struct SpatialLook {
     in_space: Option<InSpace>,
@@ -41,7 +42,8 @@ impl SpatialLook {
         Ok(self.in_space.as_mut())
     }
 
-    /// Warns where the state is unstable in space by more than the `negative` pivots that it has in its plane.
+    /// Warns where the state is unstable in space by more than the `negative` pivots that it has in
+    /// its plane.
     pub fn warn_of_instability(&mut self, stage: &mut StageRun, negative: Option<usize>) -> Result<(), Failure> {
         let Some(in_plane) = negative else { return Ok(()) };
         if stage.issued.unstable == Some(stage.number) {
@@ -53,8 +55,8 @@ impl SpatialLook {
         Ok(())
     }
 
-    /// How many more pivots are negative in space than the `in_plane` ones of a stage that is treated in a plane; none where it is
-    /// treated in space, `None` where it is not known.
+    /// How many more pivots are negative in space than the `in_plane` ones of a stage that is
+    /// treated in a plane; none where it is treated in space, `None` where it is not known.
     pub fn count(&mut self, stage: &mut StageRun, in_plane: usize) -> Result<Option<usize>, Failure> {
         let Some(InSpace { assembly, solver }) = self.of(stage)? else { return Ok(Some(0)) };
         assembly.evaluate(stage.state, Weights::STIFFNESS, None);
@@ -64,8 +66,8 @@ impl SpatialLook {
         Ok(in_space.and_then(|in_space| in_space.checked_sub(in_plane)))
     }
 
-    /// Refuses what nothing holds in the plane or out of it, with these weights of stiffness, damping and mass and without
-    /// velocities.
+    /// Refuses what nothing holds in the plane or out of it, with these weights of stiffness,
+    /// damping and mass and without velocities.
     pub fn refuse_loose(&mut self, stage: &mut StageRun, weights: Weights) -> Result<(), Failure> {
         let Some(InSpace { assembly, solver }) = self.of(stage)? else { return Ok(()) };
         let still = stage.state.at_rest();

@@ -1,4 +1,5 @@
-//! One stage of a run: its state, its unknowns, Newton's iteration, and what all kinds of stages do.
+//! One stage of a run: its state, its unknowns, Newton's iteration, and what all kinds of stages
+//! do.
 
 use super::energy::Bookkeeper;
 use super::failure::{Failure, Moment};
@@ -25,7 +26,7 @@ pub(super) trait Analysis<'r> {
     fn judge(&mut self);
 }
 
-/// What stages leave to later ones, beside the state and the account of the energy.
+/// Facts that stages leave to later ones, beside the state and the account of the energy.
 #[derive(Default)]
 pub(super) struct Past {
     /// The first row is written.
@@ -77,7 +78,8 @@ pub(super) struct StageRun<'r> {
     pub soft: bool,
     /// Energies are counted, since somebody asks for them or watches them.
     pub keeps_account: bool,
-    /// Increments of prescribed directions in a load step, or over a unit of load; known where there are any
+    /// Increments of prescribed directions in a load step, or over a unit of load; known where
+    /// there are any
     pub prescribed_increment: Vec<Vec3>,
     /// Attempts that earlier stages have taken back
     pub cutbacks_before: u64,
@@ -93,13 +95,13 @@ pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model) -> R
 }
 
 impl StageRun<'_> {
-    /// What is to be done in it.
+    /// The stage in the plan.
     pub fn stage(&self) -> &Stage {
         &self.plan.stages[self.number]
     }
 
-    /// Where the stage is linear, it is so about the state in which the first such stage began, and the springs and loads that act when it
-    /// begins itself.
+    /// Where the stage is linear, it is so about the state in which the first such stage began, and
+    /// the springs and loads that act when it begins itself.
     pub fn linearise(&mut self) -> Result<(), Failure> {
         if !self.is_linear() {
             return Ok(());
@@ -112,7 +114,7 @@ impl StageRun<'_> {
         linear.map_err(|conflict| self.describe(StageError::Conflict(conflict)))
     }
 
-    /// Whether the stage is linear.
+    /// True if the stage is linear.
     pub fn is_linear(&self) -> bool {
         self.model.is_linear(self.stage().work.kind())
     }
@@ -135,7 +137,7 @@ impl StageRun<'_> {
         self.show()
     }
 
-    /// What follows every converged state: turns are counted, the mesh is judged, work is booked.
+    /// Accepts a converged state: turns are counted, the mesh is judged, work is booked.
     pub fn accept(&mut self) -> Result<(), Failure> {
         self.continue_to_state()?;
         self.judge_mesh()?;
@@ -157,7 +159,8 @@ impl StageRun<'_> {
         Ok(())
     }
 
-    /// What follows a state on the way to a balance: it becomes the good one, turns are counted, and the work of its forces is booked. No row.
+    /// Passes a state on the way to a balance: it becomes the good one, turns are counted, and the
+    /// work of its forces is booked. No row.
     pub fn pass_through(&mut self, system: &System) -> Result<(), Failure> {
         self.state.anchor = None;
         self.continue_to_state()?;
@@ -199,7 +202,7 @@ impl StageRun<'_> {
         Teller { observer: self.observer, at, number: self.number, stages: self.plan.stages.len() }.tell(done)
     }
 
-    /// Whether the stage shall end at the present row.
+    /// True if the stage ends at the present row by its `until`.
     pub fn is_over(&self) -> bool {
         let Some(until) = &self.stage().until else { return false };
         let value = (until.column)(&self.snapshot());
@@ -214,7 +217,8 @@ impl StageRun<'_> {
         Err(Failure::NonFinite { at: self.moment(), effect: Some("the motion"), node: self.model.node_at(slot) })
     }
 
-    /// Counts turns; a rotational spring whose node leaves its axis near a whole turn has no law that would go on.
+    /// Counts turns; a rotational spring whose node leaves its axis near a whole turn has no law
+    /// that would go on.
     fn wind(&mut self) -> Result<(), Failure> {
         if self.is_linear() {
             // Rotations of any size, without charts.
@@ -248,8 +252,9 @@ impl StageRun<'_> {
         Ok(())
     }
 
-    /// Where a spring or the spring of a joint seems to have been wound by more than half a turn since the last good state nobody knows
-    /// whether that were the load or the corrections on their way to the balance: smaller levels tell.
+    /// Where a spring or the spring of a joint seems to have been wound by more than half a turn
+    /// since the last good state nobody knows whether that were the load or the corrections on
+    /// their way to the balance: smaller levels tell.
     pub fn refuse_windings(&self) -> Result<(), NewtonFailure> {
         let turned = |slot: Slot| self.state.unwrapped_at(slot) - self.good.unwrapped_at(slot);
         let of_joint = |[a, b]: [Option<Slot>; 2]| {
@@ -264,7 +269,8 @@ impl StageRun<'_> {
         }
     }
 
-    /// Between the last good state and this one neighbours may have turned past pi against each other: smaller steps tell.
+    /// Between the last good state and this one neighbours may have turned past pi against each
+    /// other: smaller steps tell.
     pub fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
         match charts::leapt(&self.state, &self.good, &self.model.charted.elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
@@ -272,7 +278,8 @@ impl StageRun<'_> {
         }
     }
 
-    /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how many did. `lag`: see [`charts::switch`].
+    /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how
+    /// many did. `lag`: see [`charts::switch`].
     pub fn change_charts(&mut self, lag: Option<f64>) -> usize {
         let switched = charts::switch(&mut self.state, &self.model.charted.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;

@@ -1,4 +1,4 @@
-//! What any kind of stage tells its user beside its results, each thing once.
+//! Warnings of any kind of stage, each given once.
 
 use super::energy::is_unbalanced;
 use super::failure::Moment;
@@ -10,8 +10,8 @@ use crate::solve::{Convergence, Verdict};
 use crate::system::Slot;
 use crate::warning::WarningKind;
 
-/// The largest relative error of the curvature of two-node elements with total vectors, over the square of the relative rotation of
-/// their nodes: measured over 4000 orientations.
+/// The largest relative error of the curvature of two-node elements with total vectors, over the
+/// square of the relative rotation of their nodes: measured over 4000 orientations.
 const FRAME_ERROR: f64 = 0.0533;
 
 /// The tolerance, relative, of a balance that a stage before has found.
@@ -88,7 +88,8 @@ impl StageRun<'_> {
         }
     }
 
-    /// Total rotation vectors are interpolated in charts that do not turn with the element: the strains of a turned scene differ.
+    /// Total rotation vectors are interpolated in charts that do not turn with the element: the
+    /// strains of a turned scene differ.
     pub fn warn_of_frame(&mut self) {
         // Rotations about one axis are interpolated without any error.
         if self.plane.is_some() {

@@ -28,18 +28,21 @@ pub struct Newton {
     /// Solves with the tangent
     pub solver: LinearSolver,
     dq: Vec<Vec3>,
-    /// The size of the last correction of a solution: `None` before the first, infinite after a change of chart
+    /// The size of the last correction of a solution: `None` before the first, infinite after a
+    /// change of chart
     last: Option<f64>,
-    /// The first correction of the last solution in statics, along the tangent of the path; empty where nothing was to correct
+    /// The first correction of the last solution in statics, along the tangent of the path; empty
+    /// where nothing was to correct
     pub first: CompressedField<3>,
-    /// The largest ratio of a correction of the last solution to the one before it, of those that are no round-off: an iteration that
-    /// follows the path contracts
+    /// The largest ratio of a correction of the last solution to the one before it, of those that
+    /// are no round-off: an iteration that follows the path contracts
     pub contraction: f64,
     reuse: Reuse,
     stress_predictor: StressPredictor,
-    /// What follows the error of time steps, where something does
+    /// The estimate of the error of time steps, where it is made
     pub time_error: Option<TimeError>,
-    /// The tangent that is known to be that of the state a solution begins with, see [`Newton::begin_with`]
+    /// The tangent that is known to be that of the state a solution begins with, see
+    /// [`Newton::begin_with`]
     given: Option<u64>,
 }
 
@@ -67,7 +70,7 @@ impl Newton {
         }
     }
 
-    /// What the pivots of a tangent tell, see [`LinearSolver::signature`].
+    /// The signs of the eigenvalues of a tangent, see [`LinearSolver::signature`].
     pub fn signature(&mut self, tangent: &mut Tangent, work: &mut Work) -> Option<Signature> {
         let known = self.solver.has_factorised(tangent.system());
         let signature = self.solver.signature(tangent);
@@ -82,7 +85,8 @@ impl Newton {
         self.signature(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS), work)
     }
 
-    /// The tangent that is there is that of another state than the one the next solution begins with.
+    /// The tangent that is there is that of another state than the one the next solution begins
+    /// with.
     pub fn begin_anew(&mut self) {
         self.given = None;
     }
@@ -92,14 +96,16 @@ impl Newton {
         &mut self.dq
     }
 
-    /// The tangent of the system is that of the state that the next solution begins with, but for the loads.
+    /// The tangent of the system is that of the state that the next solution begins with, but for
+    /// the loads.
     pub fn begin_with(&mut self, system: &System) {
         self.given = Some(system.revision);
     }
 
-    /// Brings the state into balance. `prescribed_increment` holds increments of held directions that are not in the state yet: they go
-    /// in with the first correction, so that the rest of the structure follows them linearly. The forces of the system are then those of
-    /// the state; its tangent need not be.
+    /// Brings the state into balance. `prescribed_increment` holds increments of held directions
+    /// that are not in the state yet: they go in with the first correction, so that the rest of the
+    /// structure follows them linearly. The forces of the system are then those of the state; its
+    /// tangent need not be.
     pub fn solve(
         &mut self,
         model: &Model,
@@ -160,7 +166,7 @@ struct Solution<'s> {
     has_formed_anew: bool,
 }
 
-/// What follows an iterate.
+/// The fate of an iterate.
 #[derive(PartialEq)]
 enum Next {
     /// It is the solution.
@@ -191,7 +197,7 @@ impl Solution<'_> {
         }
     }
 
-    /// Whether the tangent is formed with the forces of the present iterate.
+    /// True if the tangent is formed with the forces of the present iterate.
     fn forms_tangent(&self) -> bool {
         let is_last = self.iterations >= self.newton.max_iterations;
         self.prescribed_increment.is_some() || is_last || self.newton.reuse.expects_tangent()
@@ -211,7 +217,7 @@ impl Solution<'_> {
         (verdict, residual)
     }
 
-    /// Whether the iterate is the solution, is to be corrected, or leads nowhere.
+    /// The fate of the iterate: it is the solution, is corrected, or leads nowhere.
     fn decide(&mut self, verdict: Verdict, residual: Residual, forms: bool) -> Result<Next, NewtonFailure> {
         let is_last = self.iterations >= self.newton.max_iterations;
         match verdict {
@@ -222,7 +228,8 @@ impl Solution<'_> {
                 self.end();
                 return Ok(Next::Done);
             }
-            // Each correction with a new residual refines the solution, until round-off makes it no smaller.
+            // Each correction with a new residual refines the solution, until round-off makes it no
+            // smaller.
             Verdict::Noisy if self.prescribed_increment.is_none() && self.iterations > 0 => {
                 return Ok(self.refine(is_last));
             }
@@ -285,7 +292,8 @@ impl Solution<'_> {
         Ok(length)
     }
 
-    /// What the next tangent is formed with: where balance is expected it is that of the state itself, if there is any.
+    /// Foresees the stress that the next tangent is formed with. Where balance is expected that is
+    /// the stress of the state itself.
     fn foresee_stress(&mut self, noisy: bool) {
         let Newton { stress_predictor, reuse, .. } = &mut *self.newton;
         if !noisy && reuse.expects_balance() {
@@ -324,8 +332,8 @@ impl Solution<'_> {
         solver.succeeded();
     }
 
-    /// What follows the error of a time step sees the state that a new tangent is that of. That of a linear stage, which is formed once, fits
-    /// the states of all steps.
+    /// Shows the state of a new tangent to the estimate of the error of time steps. The tangent of
+    /// a linear stage, which is formed once, fits the states of all steps.
     fn show_rates(&mut self) {
         let Newton { time_error, solver, .. } = &mut *self.newton;
         let is_new = !solver.has_factorised(&self.assembly.system);
@@ -343,12 +351,15 @@ impl Solution<'_> {
         timed(seconds, || self.assembly.evaluate(self.state, self.method.weights(), None));
     }
 
-    /// Another correction with a tangent of this solution takes most of a residual away for the price of a substitution: what is
-    /// left of it may grow from time step to time step. Forces stay those of the iterate before, from which they differ by less
-    /// than the stop test allows. A time step that is in balance at once has no tangent but its own; `formed` where it is there.
+    /// Another correction with a tangent of this solution takes most of a residual away for the
+    /// price of a substitution: what is left of it may grow from time step to time step. Forces
+    /// stay those of the iterate before, from which they differ by less than the stop test allows.
+    /// A time step that is in balance at once has no tangent but its own; `formed` where it is
+    /// there.
     fn polish(&mut self, formed: bool) {
         let last = self.newton.last;
-        // A correction that grows is none; without one before, one that is large for its residual is of something loose.
+        // A correction that grows is none; without one before, one that is large for its residual
+        // is of something loose.
         let most = last.unwrap_or_else(|| self.newton.convergence.tolerance.sqrt());
         if last.is_none() && self.method.changes_charts() {
             return;
@@ -371,7 +382,8 @@ impl Solution<'_> {
         self.method.correct(self.state, dq);
     }
 
-    /// The next attempt is better off with pivots where round-off has taken most of the softest stiffness.
+    /// The next attempt is better off with pivots where round-off has taken most of the softest
+    /// stiffness.
     fn not_converged(&mut self, residual: Residual) -> NewtonFailure {
         let mut tangent = Tangent::that_may_go(self.assembly, self.state, self.method.weights());
         self.newton.solver.doubt(&mut tangent);
@@ -384,8 +396,8 @@ impl Solution<'_> {
         mechanism(&mut self.newton.solver, &mut tangent, self.model)
     }
 
-    /// Solves J dq = -g; held directions take their part of `prescribed_increment`. `looks`: at what the solver leaves. `false` where there is
-    /// no solution.
+    /// Solves J dq = -g; held directions take their part of `prescribed_increment`. `looks`: at
+    /// what the solver leaves. `false` where there is no solution.
     fn substitute(&mut self, prescribed_increment: Option<&[Vec3]>, looks: bool) -> bool {
         let Newton { solver, dq, .. } = &mut *self.newton;
         let mut tangent = Tangent::that_may_go(self.assembly, self.state, self.method.weights());
@@ -397,7 +409,8 @@ impl Solution<'_> {
         })
     }
 
-    /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn; whether one did.
+    /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent
+    /// stays regular at any turn; whether one did.
     fn change_charts(&mut self) -> bool {
         let rotations = &self.model.charted.rotations;
         if charts::first_beyond(self.state, rotations, charts::STATIC_BAND).is_none() {

@@ -1,4 +1,4 @@
-//! What Newton's iteration can end with.
+//! The failures of Newton's iteration.
 
 use super::convergence::Residual;
 use super::softest::NullVector;
@@ -17,25 +17,25 @@ pub enum NewtonFailure {
     },
     /// A prescribed rotation goes too far at once.
     TurnsTooFar {
-        /// Of this slot
+        /// The slot
         slot: usize,
         /// Radians
         angle: f64,
     },
     /// Neighbouring nodes turn past pi against each other at once.
     LeapsTooFar {
-        /// Of this element
+        /// The element
         element: usize,
-        /// What their relative rotation would be
+        /// Their relative rotation, in radians
         angle: f64,
     },
     /// The error of the smallest step is above what it may be.
     StepTooSmall {
-        /// Of this slot
+        /// The slot
         slot: usize,
         /// Relative to the scene's length, or in radians
         error: f64,
-        /// What is allowed
+        /// The error that is allowed
         share: f64,
     },
     /// The tangent cannot be solved with.
@@ -50,7 +50,8 @@ pub enum NewtonFailure {
 }
 
 impl NewtonFailure {
-    /// Names the effect whose forces are not finite; of a sum that overflows nobody alone is to blame.
+    /// Names the effect whose forces are not finite; of a sum that overflows nobody alone is to
+    /// blame.
     pub fn not_finite(assembly: &mut Assembly, state: &State) -> Self {
         match assembly.culprit(state) {
             Some((effect, slot)) => Self::NotFinite { effect: Some(effect), slot },

@@ -1,22 +1,25 @@
-//! Negative pivots of symmetric tangents, counted by L D L^T without pivoting (Sylvester's law of inertia).
+//! Negative pivots of symmetric tangents, counted by L D L^T without pivoting (Sylvester's law of
+//! inertia).
 
 use super::block::BlockSolver;
 use super::constraints::Constraints;
 use crate::system::{Pattern, Slot, Symmetry, System};
 
-/// A factorisation L D L^T whose D tells the inertia, for a solver whose own factorisation does not.
+/// A factorisation L D L^T whose D tells the inertia, for a solver whose own factorisation does
+/// not.
 pub(super) struct Pivots {
     blocks: BlockSolver,
     constraints: Option<Constraints>,
 }
 
-/// A tangent whose entries differ from their mirror images by more than this is not symmetric: relative to the roots of the
-/// diagonal entries that they stand between, so that stiff directions do not hide soft ones.
+/// A tangent whose entries differ from their mirror images by more than this is not symmetric:
+/// relative to the roots of the diagonal entries that they stand between, so that stiff directions
+/// do not hide soft ones.
 const SYMMETRY: f64 = 1e-9;
 
 impl Pivots {
-    /// For tangents of the pattern of a system. Its order of elimination is that of the `solver` in blocks, where there is one. `None` where
-    /// memory cannot be had.
+    /// For tangents of the pattern of a system. Its order of elimination is that of the `solver` in
+    /// blocks, where there is one. `None` where memory cannot be had.
     pub fn beside(solver: Option<&BlockSolver>, multipliers: &[Slot], system: &System) -> Option<Self> {
         let constraints = Constraints::new(&system.pattern, multipliers);
         let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
@@ -27,7 +30,8 @@ impl Pivots {
         Some(Self { blocks, constraints })
     }
 
-    /// The number of negative eigenvalues on the space that constraints leave; `None` where a pivot is lost.
+    /// The number of negative eigenvalues on the space that constraints leave; `None` where a pivot
+    /// is lost.
     pub fn negative(&mut self, system: &System) -> Option<usize> {
         let done = match &mut self.constraints {
             Some(constraints) => {
@@ -41,7 +45,8 @@ impl Pivots {
     }
 }
 
-/// Whether each entry is what its mirror image is. Of tiles of which one is kept nothing is to be told.
+/// True if each entry equals its mirror image. Where one of two mirrored tiles is kept they count
+/// as equal.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     if pattern.symmetry == Symmetry::Whole {
         return true;

@@ -1,19 +1,20 @@
-//! The signs of the eigenvalues of a tangent: of a symmetric one, how many directions have lost their stiffness; of any, the sign of its
-//! determinant.
+//! The signs of the eigenvalues of a tangent: of a symmetric one, how many directions have lost
+//! their stiffness; of any, the sign of its determinant.
 
 use super::linear::LinearSolver;
 use super::pivots::{Pivots, is_symmetric};
 use super::tangent::Tangent;
 use crate::system::System;
 
-/// What is known of the signs of the eigenvalues of a tangent, on the space that constraints leave.
+/// The signs of the eigenvalues of a tangent, on the space that constraints leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signature {
     /// It is symmetric, and so many are negative.
     Negative(usize),
-    /// It is not symmetric, and the number of those that are real and negative is odd, or even: the sign of the determinant.
+    /// It is not symmetric, and the number of those that are real and negative is odd, or even: the
+    /// sign of the determinant.
     Parity {
-        /// Whether it is odd
+        /// The number is odd.
         is_odd: bool,
     },
 }
@@ -27,7 +28,7 @@ impl Signature {
         }
     }
 
-    /// Whether an odd number of eigenvalues is real and negative: then one of them is.
+    /// True if an odd number of eigenvalues is real and negative: then one of them is.
     pub fn is_odd(self) -> bool {
         match self {
             Self::Negative(count) => count % 2 == 1,
@@ -35,7 +36,7 @@ impl Signature {
         }
     }
 
-    /// Whether at least one eigenvalue is real and negative for sure.
+    /// True if at least one eigenvalue is real and negative for sure.
     pub fn tells_unstable(self) -> bool {
         match self {
             Self::Negative(count) => count > 0,
@@ -43,7 +44,7 @@ impl Signature {
         }
     }
 
-    /// Of how many eigenvalues the sign has changed at least, from this tangent to another.
+    /// The number of eigenvalues whose sign has changed, at least, from this tangent to another.
     pub fn changes_to(self, other: Self) -> usize {
         match (self, other) {
             (Self::Negative(before), Self::Negative(after)) => before.abs_diff(after),
@@ -54,7 +55,8 @@ impl Signature {
 }
 
 impl LinearSolver {
-    /// The number of negative eigenvalues of a tangent or the sign of its determinant, see [`LinearSolver::negative_pivots`].
+    /// The number of negative eigenvalues of a tangent or the sign of its determinant, see
+    /// [`LinearSolver::negative_pivots`].
     pub fn signature(&mut self, tangent: &mut Tangent) -> Option<Signature> {
         if let Some(negative) = self.negative_pivots(tangent) {
             return Some(Signature::Negative(negative));
@@ -64,9 +66,9 @@ impl LinearSolver {
         Some(Signature::Parity { is_odd })
     }
 
-    /// How many eigenvalues of the tangent are negative on the space that constraints leave; `None` where it is not symmetric, or a
-    /// pivot is lost. Where this solver's own factorisation tells, the tangent is what it has factorised last,
-    /// and may be used up by that.
+    /// How many eigenvalues of the tangent are negative on the space that constraints leave; `None`
+    /// where it is not symmetric, or a pivot is lost. Where this solver's own factorisation tells,
+    /// the tangent is what it has factorised last, and may be used up by that.
     pub fn negative_pivots(&mut self, tangent: &mut Tangent) -> Option<usize> {
         if self.is_symmetric() {
             return self.negative_of_own(tangent);
@@ -74,7 +76,8 @@ impl LinearSolver {
         self.negative_beside(tangent.look())
     }
 
-    /// The number of negative eigenvalues of a system that this solver need not have factorised; its own last factorisation stays.
+    /// The number of negative eigenvalues of a system that this solver need not have factorised;
+    /// its own last factorisation stays.
     pub(super) fn negative_beside(&mut self, system: &System) -> Option<usize> {
         if !is_symmetric(&system.pattern, &system.values) {
             return None;

@@ -15,7 +15,8 @@ pub struct Work {
     pub evaluation_seconds: f64,
     /// Seconds spent on factorising and solving
     pub solve_seconds: f64,
-    /// What round-off still leaves to correct where an iteration ended, relative to the unknowns
+    /// The correction that round-off still leaves where an iteration ended, relative to the
+    /// unknowns
     pub uncertainty: f64,
 }
 

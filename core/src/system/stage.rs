@@ -54,7 +54,8 @@ impl StageKind {
         }
     }
 
-    /// The load factor that it begins with, where the stages before have come to `reached`; `fresh`: whether loads act for the first time.
+    /// The load factor that it begins with, where the stages before have come to `reached`;
+    /// `fresh`: whether loads act for the first time.
     pub fn first_load(self, reached: f64, fresh: bool) -> f64 {
         match self {
             Self::Static => 0.0,

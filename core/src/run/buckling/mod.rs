@@ -1,8 +1,9 @@
 //! Where the path of equilibrium loses its stiffness: K(q(load), load) x = 0.
 //!
-//! About the present state the tangent varies along the path as K + m K', with K' its derivative over the load factor; the
-//! eigenvalues m of K x = -m K' x tell how far away the critical loads are. Each is then followed: the path is continued to
-//! the load found, and looked at again from there, until it is reached.
+//! About the present state the tangent varies along the path as K + m K', with K' its derivative
+//! over the load factor; the eigenvalues m of K x = -m K' x tell how far away the critical loads
+//! are. Each is then followed: the path is continued to the load found, and looked at again from
+//! there, until it is reached.
 
 mod search;
 mod spectrum;
@@ -21,26 +22,30 @@ use crate::warning::WarningKind;
 
 /// Looks at one critical load.
 const MOST_LOOKS: usize = 80;
-/// Where pivots cannot be counted: an estimate this near to where it was made; what is left over is its square.
+/// Where pivots cannot be counted: an estimate this near to where it was made; what is left over is
+/// its square.
 const NEAR: f64 = 1e-4;
-/// Just before a limit point a unit of load moves the scene so many times further than at the start: by the root of one over [`CLOSED`].
+/// Just before a limit point a unit of load moves the scene so many times further than at the
+/// start: by the root of one over [`CLOSED`].
 const RUNS_AWAY: f64 = 50.0;
 /// A path that goes on so far behind a load, relative to it, has no limit point there.
 const BEHIND: f64 = 1e-4;
-/// A load that the tangent next to it foresees, to this part of it, is critical for all that can be told.
+/// A load that the tangent next to it foresees, to this part of it, is critical for all that can be
+/// told.
 const FORESEEN: f64 = 1e-4;
 /// Where it foresees the load to this part of it only, an imperfection turns the path aside.
 const ASIDE: f64 = 1e-2;
 /// States on both sides of a critical load that are further apart than this do not lie on one path.
 const APART: f64 = 1e-3;
-/// Where the tangent is extrapolated: the part of the way to where it would be singular between two looks.
+/// Where the tangent is extrapolated: the part of the way to where it would be singular between two
+/// looks.
 const STRIDE_AHEAD: f64 = 0.15;
 /// The part of a critical load by which the last extrapolation lies before it.
 const NEAREST_EXTRAPOLATION: f64 = 5e-3;
 /// Looks of one extrapolation.
 const MOST_EXTRAPOLATIONS: usize = 48;
 
-/// What a scene without critical loads is told.
+/// The message about a scene without critical loads.
 const NOTHING_BUCKLES: &str = "no load of this scene takes stiffness away: nothing can buckle (under following loads it may flutter: see a modal \
                                stage)";
 
@@ -65,7 +70,8 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
             return Err(Failure::Deck(NOTHING_BUCKLES.into()));
         }
         let start = self.stage.state.clone();
-        // Next to a critical load round-off moves the scene along; the load itself is closed in by pivots.
+        // Next to a critical load round-off moves the scene along; the load itself is closed in by
+        // pivots.
         let uncertainty = self.stage.counters.work.uncertainty;
         let mut found = Vec::new();
         for number in 0..loads.len() {
@@ -100,7 +106,8 @@ impl Buckling<'_, '_> {
         Ok(())
     }
 
-    /// The critical load that looks from the start as number `number` of these. The state is then the start again.
+    /// The critical load that looks from the start as number `number` of these. The state is then
+    /// the start again.
     fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<CriticalLoad, Failure> {
         let is_back = |load: f64| load < start.load;
         // Of the loads on this side of the present one it is number `before`.
@@ -117,9 +124,9 @@ impl Buckling<'_, '_> {
         Ok(critical)
     }
 
-    /// Follows the path to the critical load behind which `before` + 1 more pivots are negative. Every attempt starts from the
-    /// last point before it, since behind it the way back is not sure to be the same. `done` tells the part of the stage that lies behind with
-    /// some part of this.
+    /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
+    /// Every attempt starts from the last point before it, since behind it the way back is not sure
+    /// to be the same. `done` tells the part of the stage that lies behind with some part of this.
     fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<CriticalLoad, Failure> {
         let start_rate = self.size_of_rate()?;
         let none = negative_pivots(self.stage);
@@ -171,15 +178,17 @@ impl Buckling<'_, '_> {
         Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
     }
 
-    /// How far from a load, relative to it, the tangent of the last point before it looks singular. A structure with a small imperfection has no
-    /// critical point there, but its path runs aside as if it had, the more sharply the smaller the imperfection.
+    /// How far from a load, relative to it, the tangent of the last point before it looks singular.
+    /// A structure with a small imperfection has no critical point there, but its path runs aside
+    /// as if it had, the more sharply the smaller the imperfection.
     fn foreseen(&mut self, search: &Search, load: f64, before: usize) -> Result<f64, Failure> {
         self.stage.state.copy_from(&search.here);
         let seen = critical_loads(self.stage, before + 4)?;
         Ok(seen.into_iter().map(|seen| (seen - load).abs() / load.abs()).fold(f64::INFINITY, f64::min))
     }
 
-    /// Whether load control follows the path past a load from next to it, with so many negative pivots. The state is then that point.
+    /// True if load control follows the path past a load from next to it, with so many negative
+    /// pivots. The state is then that point.
     fn goes_on(&mut self, search: &Search, load: f64, negative: Option<usize>) -> Result<bool, Failure> {
         self.stage.go_back_to(&search.here);
         let walked = continue_path(self.stage, load + search.way * BEHIND * load.abs());
@@ -188,14 +197,16 @@ impl Buckling<'_, '_> {
             && negative.is_some_and(|most| negative_pivots(self.stage).is_some_and(|count| count <= most)))
     }
 
-    /// The critical load with `before` others between it and the present one, as it looks from here.
+    /// The critical load with `before` others between it and the present one, as it looks from
+    /// here.
     fn next_critical(&mut self, way: f64, before: usize) -> Result<Option<f64>, Failure> {
         let load = self.stage.state.load;
         let ahead = critical_loads(self.stage, before + 4)?;
         Ok(ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before))
     }
 
-    /// What lies just ahead of the present state: towards a limit point the path moves without bounds.
+    /// The kind of the critical load just ahead of the present state: towards a limit point the
+    /// path moves without bounds.
     fn kind_of_critical(&mut self, start_rate: f64) -> Result<CriticalKind, Failure> {
         let runs_away = self.size_of_rate()? > RUNS_AWAY * start_rate;
         Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
@@ -208,9 +219,10 @@ impl Buckling<'_, '_> {
         Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.stage.model.length)).fold(0.0, f64::max))
     }
 
-    /// A structure that an imperfection lets turn aside has no critical point. From smaller loads its tangent looks like that of the perfect one:
-    /// there the load at which it seems to be singular does not move, until the imperfection is felt. That load, of the critical
-    /// load with `before` others below it; `None` where nothing is seen.
+    /// A structure that an imperfection lets turn aside has no critical point. From smaller loads
+    /// its tangent looks like that of the perfect one: there the load at which it seems to be
+    /// singular does not move, until the imperfection is felt. That load, of the critical load with
+    /// `before` others below it; `None` where nothing is seen.
     fn extrapolate(&mut self, first: f64, before: usize) -> Result<Option<f64>, Failure> {
         let way = (first - self.stage.state.load).signum();
         let mut last: Option<Sight> = None;
@@ -251,7 +263,8 @@ impl Buckling<'_, '_> {
             self.stage.tell_progress(done(0.0))?;
             let from = self.stage.state.load;
             let near = critical_loads(self.stage, before + 4)?;
-            // Those that were passed lie behind: it is the one that looks most like the last estimate.
+            // Those that were passed lie behind: it is the one that looks most like the last
+            // estimate.
             let off = |load: &f64| (load - critical).abs();
             let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
             critical = next;

@@ -3,12 +3,13 @@
 use super::walk::Walked;
 use crate::system::State;
 
-/// A critical load is known when it lies between two points of the path this near to each other, relative to itself.
+/// A critical load is known when it lies between two points of the path this near to each other,
+/// relative to itself.
 const CLOSED: f64 = 1e-7;
 /// Where load control ends, the tangent must see a critical load this near.
 const SEEN: f64 = 1e-3;
 
-/// What a critical load looks like from a load.
+/// An estimate of a critical load from the tangent at another load.
 pub struct Sight {
     pub from: f64,
     pub critical: f64,
@@ -27,14 +28,15 @@ pub struct Search {
     pub beyond: Option<f64>,
     /// The state at the load that lies beyond, where load control comes to it
     pub behind: Option<State>,
-    /// What it looks like from here
+    /// The estimate from here
     pub estimate: f64,
     /// How much farther than the estimate the next look goes: it may fall short again and again
     pub stretch: f64,
     pub way: f64,
-    /// What the tangent of the last point before it said
+    /// The estimate from the last point before it
     seen: f64,
-    /// How load control went where what lies beyond is known only from that it did not get there, or not on this branch
+    /// How load control went where what lies beyond is known only from that it did not get there,
+    /// or not on this branch
     pub ended: Option<Walked>,
 }
 
@@ -77,7 +79,8 @@ impl Search {
         self.estimate = 0.5 * (self.here.load + load);
     }
 
-    /// Whether load control ends there for want of stiffness: a limit point looks twice as far away as it is.
+    /// True if load control ends there for want of stiffness: a limit point looks twice as far away
+    /// as it is.
     pub fn is_a_limit(&self, found: f64) -> bool {
         match self.ended {
             None => true,
@@ -86,8 +89,8 @@ impl Search {
         }
     }
 
-    /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the middle where the
-    /// estimate does not lie between.
+    /// Where to look next: a little beyond the estimate, so that it is closed in from there; in the
+    /// middle where the estimate does not lie between.
     pub fn target(&self) -> f64 {
         let from = self.here.load;
         let ahead = self.estimate + self.way * 0.5 * CLOSED * self.estimate.abs();
@@ -102,7 +105,8 @@ impl Search {
         }
     }
 
-    /// The path goes on past what was taken for its end, to this point, with what a critical load looks like from there.
+    /// The path goes on past what was taken for its end, to this point, with what a critical load
+    /// looks like from there.
     pub fn go_on_from(&mut self, state: &State, next: Option<f64>) {
         (self.beyond, self.behind, self.ended) = (None, None, None);
         self.stretch = 1.0;

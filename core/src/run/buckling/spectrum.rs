@@ -1,4 +1,5 @@
-//! Critical loads as they look from a state: the eigenvalues of its tangent and of how that varies along the path.
+//! Critical loads as they look from a state: the eigenvalues of its tangent and of how that varies
+//! along the path.
 
 use crate::kernel::Weights;
 use crate::run::failure::Failure;
@@ -9,12 +10,15 @@ use crate::system::System;
 use crate::tensor::Vec3;
 use nalgebra::Complex;
 
-/// How far the state is moved along the path to see the tangent vary: lengths of the scene, and radians.
+/// How far the state is moved along the path to see the tangent vary: lengths of the scene, and
+/// radians.
 const PROBE: f64 = 1e-5;
-/// Imaginary part up to which a critical load counts as real, relative; double ones come apart a little.
+/// Imaginary part up to which a critical load counts as real, relative; double ones come apart a
+/// little.
 const REAL: f64 = 1e-3;
 
-/// Of the tangent at the present state, where it is symmetric.
+/// The number of negative pivots of the tangent at the present state; `None` where it is not
+/// symmetric.
 pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
     let StageRun { assembly, newton, state, .. } = stage;
     assembly.forget();
@@ -39,7 +43,8 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
         let vector = mechanism(&mut newton.solver, &mut tangent, model);
         return Err(stage.name_mechanism(vector, &stage.assembly.system));
     }
-    // A stable state of a conservative scene: the tangent is an inner product in which everything is symmetric.
+    // A stable state of a conservative scene: the tangent is an inner product in which everything
+    // is symmetric.
     let stable = newton.solver.negative_pivots(&mut tangent) == Some(0);
     let system = &assembly.system;
     let symmetric = stable && model.multipliers.is_empty();

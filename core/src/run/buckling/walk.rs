@@ -1,4 +1,5 @@
-//! Ways along the path by load control, of which the analysis keeps an eye on whether they stay on it.
+//! Ways along the path by load control, of which the analysis keeps an eye on whether they stay on
+//! it.
 
 use crate::model::charts;
 use crate::run::distance::{NO_MOTION, distance};
@@ -7,12 +8,13 @@ use crate::run::stage_run::StageRun;
 use crate::run::statics::{Direction, LARGEST_CONTRACTION};
 use crate::system::State;
 
-/// A state that has moved so many times further than the tangent said has come down on another branch.
+/// A state that has moved so many times further than the tangent said has come down on another
+/// branch.
 const LEAP: f64 = 8.0;
 /// States of one load that lie nearer together than this are one.
 const SAME: f64 = 1e-5;
-/// A step along the path moves nothing further than this, in lengths of the scene and radians: a longer one may come down on
-/// another branch.
+/// A step along the path moves nothing further than this, in lengths of the scene and radians: a
+/// longer one may come down on another branch.
 const STRIDE: f64 = 0.5;
 /// The path is not followed in steps smaller than this part of the way.
 const SMALLEST_PART: f64 = 1e-4;
@@ -68,8 +70,8 @@ fn step_along(stage: &mut StageRun, load: f64) -> Option<f64> {
     (stage.is_linear() || moved <= STRIDE).then_some(moved)
 }
 
-/// Whether the state is on another branch than one before it: it has moved much further than the path goes there, or does not
-/// come back to it.
+/// True if the state is on another branch than one before it: it has moved much further than the
+/// path goes there, or does not come back to it.
 pub fn has_leapt(stage: &mut StageRun, from: &State) -> Result<bool, Failure> {
     let (to, step) = (stage.state.clone(), stage.state.load - from.load);
     stage.state.copy_from(from);

@@ -1,4 +1,5 @@
-//! What shows behind a dynamic stage: the energy that its steps have made or lost, and their estimated error.
+//! Judgement of a dynamic stage: the energy that its steps have made or lost, and their estimated
+//! error.
 
 use super::Dynamics;
 use crate::integrate::{Largest, Rotations};
@@ -8,11 +9,12 @@ use crate::run::stage_run::StageRun;
 use crate::warning::WarningKind;
 use std::f64::consts::PI;
 
-/// The estimated error of displacements that is told, over the largest motion: of random runs with a true error of 5 % the lowest estimates
-/// were 2.5 % to 3 %.
+/// The estimated error of displacements that is told, over the largest motion: of random runs with
+/// a true error of 5 % the lowest estimates were 2.5 % to 3 %.
 const TOLD_ERROR: f64 = 0.03;
-/// The estimated error of rotations that is told where displacements tell, too, in radians: beside them small parts may turn to and fro faster
-/// than steps resolve, which errs by no more than they turn.
+/// The estimated error of rotations that is told where displacements tell, too, in radians: beside
+/// them small parts may turn to and fro faster than steps resolve, which errs by no more than they
+/// turn.
 const TOLD_ANGLE_BESIDE_MOTION: f64 = PI;
 /// The estimated error of rotations that is told where nothing else moves, in radians.
 const TOLD_ANGLE_ALONE: f64 = 0.3;
@@ -100,7 +102,8 @@ struct Excess {
 }
 
 impl Excess {
-    /// Of the largest errors of a stage in a run whose nodes have `moved` so far at most; `length` is that of the scene.
+    /// The excess in the largest errors of a stage in a run whose nodes have `moved` so far at
+    /// most; `length` is that of the scene.
     fn of(largest: &Largest, moved: f64, length: f64) -> Option<Self> {
         let Largest { displacement, rotation, .. } = *largest;
         let is_moving = moved > STANDING_STILL * length;

@@ -48,8 +48,8 @@ pub(super) struct Dynamics<'s, 'r> {
 }
 
 impl<'s, 'r> Dynamics<'s, 'r> {
-    /// Time steps of a scheme up to `end` on the run's clock; `energy_limit` is the part of the largest energies so far by which the total
-    /// may grow.
+    /// Time steps of a scheme up to `end` on the run's clock; `energy_limit` is the part of the
+    /// largest energies so far by which the total may grow.
     pub fn new(
         stage: &'s mut StageRun<'r>,
         end: f64,
@@ -77,7 +77,8 @@ impl<'s, 'r> Dynamics<'s, 'r> {
     }
 }
 
-/// Strains that Newton leaves have an energy of their own, of the stiffest section along the length of the scene.
+/// Strains that Newton leaves have an energy of their own, of the stiffest section along the length
+/// of the scene.
 fn energy_guard(stage: &StageRun, limit: f64) -> EnergyGuard {
     let round_off = stage.assembly.round_off(stage.state).force;
     let stiffest = round_off / f64::EPSILON;
@@ -141,10 +142,11 @@ impl Dynamics<'_, '_> {
         Ok(())
     }
 
-    /// A step of the grid at once, or where that fails in halves, and halves of halves. Returns the last of them, which is
-    /// not settled yet. `next` is the time it ends at.
+    /// A step of the grid at once, or where that fails in halves, and halves of halves. Returns the
+    /// last of them, which is not settled yet. `next` is the time it ends at.
     fn stride(&mut self, whole: Step, next: f64) -> Result<Step, Failure> {
-        // Parts are counted: the clock is rounded, and late in a run a short step is not much longer than that.
+        // Parts are counted: the clock is rounded, and late in a run a short step is not much
+        // longer than that.
         let mut step = whole;
         let mut parts = 1;
         loop {
@@ -174,7 +176,7 @@ impl Dynamics<'_, '_> {
         }
     }
 
-    /// What every step is followed by, written or not.
+    /// Settles a step that is taken, written or not.
     fn settle(&mut self, step: &Step) -> Result<(), Failure> {
         self.stage.accept()?;
         self.settle_charts(step);
@@ -192,7 +194,8 @@ impl Dynamics<'_, '_> {
         }
     }
 
-    /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller one.
+    /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller
+    /// one.
     fn run_adaptive(&mut self, mut control: Control) -> Result<(), Failure> {
         while self.stage.state.time < self.end {
             let (next, length) = control.propose(self.stage.state.time, self.next_corner());
@@ -220,8 +223,8 @@ impl Dynamics<'_, '_> {
                 if self.complete(&step)? {
                     return Ok(());
                 }
-                // Where velocities leave the joints by the error of a step, accelerations of a shorter one must jump to
-                // bring them back, more and more the shorter it is.
+                // Where velocities leave the joints by the error of a step, accelerations of a
+                // shorter one must jump to bring them back, more and more the shorter it is.
                 self.close_joints()?;
             } else {
                 self.predictor.withdraw();
@@ -265,7 +268,8 @@ impl Dynamics<'_, '_> {
         Ok(())
     }
 
-    /// Predicts the state at the end of a step by its scheme, and puts prescribed directions where they belong.
+    /// Predicts the state at the end of a step by its scheme, and puts prescribed directions where
+    /// they belong.
     fn predict(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
         let StageRun { newton, state, model, .. } = &mut *self.stage;
         if !self.rateless.is_empty() {
@@ -284,7 +288,8 @@ impl Dynamics<'_, '_> {
         }
     }
 
-    /// After an iteration: total vectors take the place of increments, and velocities that enter no force are those of the way.
+    /// After an iteration: total vectors take the place of increments, and velocities that enter no
+    /// force are those of the way.
     fn settle_rates(&mut self, step: &Step) {
         let StageRun { assembly, state, good, counters, .. } = &mut *self.stage;
         if let Some(increments) = &mut self.increments {
@@ -293,7 +298,8 @@ impl Dynamics<'_, '_> {
             // Forces conjugate to total vectors, for reactions and the energy account.
             assembly.evaluate(state, Weights::NONE, None);
         } else if !self.rateless.is_empty() {
-            // A rule for accelerations makes velocities that nothing resists swing from step to step, more and more.
+            // A rule for accelerations makes velocities that nothing resists swing from step to
+            // step, more and more.
             let State { q, v, a, algorithmic, .. } = &mut **state;
             let (v, rates2) = (&mut v[..], [&mut a[..], &mut algorithmic[..]]);
             self.rateless.iter().for_each(|&slot| v[slot] = (q[slot] - good.q[slot]) * (1.0 / step.length));
@@ -308,8 +314,8 @@ impl Dynamics<'_, '_> {
         turns_within(self.stage.state, turning.filter(|&slot| self.massive[slot as usize]), length)
     }
 
-    /// Rotations without inertia have no spin to speak of: they go where balance is. While a step is iterated the unknown is the
-    /// increment, or a total vector in the chart it began in.
+    /// Rotations without inertia have no spin to speak of: they go where balance is. While a step
+    /// is iterated the unknown is the increment, or a total vector in the chart it began in.
     fn refuse_massless_turns(&self) -> Result<(), NewtonFailure> {
         let massless = self.stage.model.charted.rotations.iter().copied().filter(|&slot| !self.massive[slot as usize]);
         let mut turned = massless.map(|slot| {
@@ -322,7 +328,7 @@ impl Dynamics<'_, '_> {
         }
     }
 
-    /// What follows a step that is taken: account, row, charts. Tells whether the stage is over.
+    /// Completes a step that is taken: account, row, charts. True if the stage is over.
     fn complete(&mut self, step: &Step) -> Result<bool, Failure> {
         self.stage.accept()?;
         self.stage.counters.steps += 1;
@@ -335,7 +341,8 @@ impl Dynamics<'_, '_> {
         Ok(false)
     }
 
-    /// A scheme that makes energy from nothing ends the run while its results can still be told from round-off.
+    /// A scheme that makes energy from nothing ends the run while its results can still be told
+    /// from round-off.
     fn refuse_growth(&mut self) -> Result<(), Failure> {
         let Some(guard) = &mut self.guard else { return Ok(()) };
         let moved = self.stage.model.farthest(&self.stage.good, &self.stage.state);
@@ -350,7 +357,8 @@ impl Dynamics<'_, '_> {
         named
     }
 
-    /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the next of those.
+    /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the
+    /// next of those.
     fn next_grid(&self) -> Grid {
         let stop = self.next_stop();
         let over = if self.stage.plan.interval.is_some() { Grid::equal } else { Grid::over };
@@ -364,8 +372,8 @@ impl Dynamics<'_, '_> {
         if next >= self.end - 1e-9 * interval { self.end } else { next }
     }
 
-    /// The next instant that must be hit, or at which a load or a motion takes another course: what begins and ends within a step
-    /// would leave no trace in the accelerations at its ends.
+    /// The next instant that must be hit, or at which a load or a motion takes another course: what
+    /// begins and ends within a step would leave no trace in the accelerations at its ends.
     fn next_corner(&self) -> f64 {
         let stop = self.next_stop();
         self.stage.model.next_corner(self.stage.state.time).map_or(stop, |corner| corner.min(stop))

@@ -1,4 +1,5 @@
-//! The start of a dynamic stage: velocities, and accelerations from equilibrium at its first instant.
+//! The start of a dynamic stage: velocities, and accelerations from equilibrium at its first
+//! instant.
 
 use super::Dynamics;
 use crate::integrate::Method;
@@ -39,7 +40,8 @@ impl Dynamics<'_, '_> {
         Ok(())
     }
 
-    /// The first dynamic stage gives the initial velocities; whether it is this one. Held directions have none.
+    /// The first dynamic stage gives the initial velocities; whether it is this one. Held
+    /// directions have none.
     fn set_in_motion(&mut self) -> bool {
         let StageRun { plan, state, past, assembly, .. } = &mut *self.stage;
         let begins = !std::mem::replace(&mut past.moving, true);
@@ -75,8 +77,8 @@ impl Dynamics<'_, '_> {
         }
     }
 
-    /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing the joints takes,
-    /// [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
+    /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing
+    /// the joints takes, [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
     pub(super) fn close_joints(&mut self) -> Result<(), Failure> {
         if self.stage.model.multipliers.is_empty() {
             return Ok(());
@@ -138,8 +140,8 @@ impl Dynamics<'_, '_> {
         Ok(())
     }
 
-    /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`; `None` where mass alone does not
-    /// tell the solution, but stiffness holds everything.
+    /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`;
+    /// `None` where mass alone does not tell the solution, but stiffness holds everything.
     fn solve_with_mass(&mut self, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
         let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
         let (solver, system) = (&mut newton.solver, &mut assembly.system);
@@ -152,7 +154,8 @@ impl Dynamics<'_, '_> {
         additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
         counters.work.factorisations += 1;
         let mut mass = Tangent::that_may_go(assembly, state, Weights::MASS).with(&additions);
-        // Along no axis round-off leaves pivots where the mass matrix is singular: solved with, they give accelerations of 1e16.
+        // Along no axis round-off leaves pivots where the mass matrix is singular: solved with,
+        // they give accelerations of 1e16.
         let massless = solver.null_vector(&mut mass);
         let factorised = massless.is_none() && solver.factorise_new(&mut mass).0;
         let system = mass.system();
@@ -165,7 +168,8 @@ impl Dynamics<'_, '_> {
         Ok(Some(solved))
     }
 
-    /// Whether stiffness holds what mass does not resist; a condition of joints that is said twice is none of its business.
+    /// True if stiffness holds the motions that mass does not resist; a condition of joints that is
+    /// said twice is none of its business.
     fn is_held(&mut self, without_mass: &Failure) -> bool {
         if matches!(without_mass, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
             return false;
@@ -179,8 +183,9 @@ impl Dynamics<'_, '_> {
     }
 }
 
-/// Directions without mass take no acceleration: their part of the mass matrix is replaced by one that leaves them at
-/// zero. They are the null directions of the diagonal blocks; what is to be added to these.
+/// Directions without mass take no acceleration: their part of the mass matrix is replaced by one
+/// that leaves them at zero. They are the null directions of the diagonal blocks; what is to be
+/// added to these.
 fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Vec<(Slot, Mat3)> {
     let mut additions = Vec::new();
     let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
@@ -206,8 +211,8 @@ fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) 
     additions
 }
 
-/// What a slot has of a mass matrix on its diagonal, and the largest entry of that. A held direction is given as much, so that it does
-/// not count as massless.
+/// The diagonal block of a mass matrix at a slot, and its largest entry. A held direction is given
+/// as much, so that it does not count as massless.
 fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
     let (mut block, numbers) = (system.own_block(slot), system.pattern.dof_map.of(slot));
     let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
@@ -217,15 +222,17 @@ fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
     (block, weight)
 }
 
-/// Whether a matrix has no eigenvalue that is next to nothing beside its entries: none is larger than three times the largest of these.
+/// True if a matrix has no eigenvalue that is next to nothing beside its entries: none is larger
+/// than three times the largest of these.
 fn is_regular(matrix: &Mat3) -> bool {
     let [a, b, c] = matrix.0.map(Vec3);
     a.dot(b.cross(c)).abs() > 1e-9 * matrix.max_abs().powi(3)
 }
 
 impl Dynamics<'_, '_> {
-    /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already: round-off would move them. It is
-    /// looked at without velocities, whose forces come and go with them.
+    /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already:
+    /// round-off would move them. It is looked at without velocities, whose forces come and go with
+    /// them.
     fn refuse_loose(&mut self, method: &dyn Method) -> Result<(), Failure> {
         let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
         let still = state.at_rest();
@@ -237,8 +244,8 @@ impl Dynamics<'_, '_> {
         loose.map_or(Ok(()), |vector| Err(self.stage.name_mechanism(Some(vector), &self.stage.assembly.system)))
     }
 
-    /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their motion is prescribed; and those
-    /// whose velocities do not, either.
+    /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their
+    /// motion is prescribed; and those whose velocities do not, either.
     pub(super) fn find_rates(&mut self) {
         let StageRun { assembly, model, state, .. } = &mut *self.stage;
         let mut moves = vec![false; model.slots()];

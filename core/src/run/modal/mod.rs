@@ -51,7 +51,7 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
         self.stage.observer.found(self.stage.number + 1, &StageResult::Modes(listed))
     }
 
-    /// What moved goes on behind it.
+    /// Nothing is off: motions go on behind a modal stage.
     fn judge(&mut self) {}
 }
 
@@ -103,8 +103,8 @@ impl Modal<'_, '_> {
         Err(self.stage.name_mechanism(loose, &self.stage.assembly.system))
     }
 
-    /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has lost are there again, as far as the
-    /// shape is right.
+    /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has
+    /// lost are there again, as far as the shape is right.
     fn refine(&mut self, motion: &mut SmallMotion) {
         let Some(ModeShape { unknowns, mass }) = motion.shape.take() else { return };
         let StageRun { assembly, state, .. } = &mut *self.stage;
@@ -147,7 +147,8 @@ impl Modal<'_, '_> {
     }
 }
 
-/// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones behind them.
+/// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones
+/// behind them.
 fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
     let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
     let mut stable: Vec<SmallMotion> = found.motions.iter().filter(|motion| !grows(motion)).cloned().collect();

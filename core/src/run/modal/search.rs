@@ -8,7 +8,8 @@ use crate::system::{State, System};
 
 /// Part of the lowest frequencies at which the first look is taken.
 const FIRST_SHIFT: f64 = 1e-4;
-/// Part of the lowest frequency found at which the others are taken: near enough to tell rigid motions from elastic ones.
+/// Part of the lowest frequency found at which the others are taken: near enough to tell rigid
+/// motions from elastic ones.
 const SHIFT: f64 = 0.3;
 /// A shift is near enough if it is not larger than this part of the lowest frequency.
 const NEAR_SHIFT: f64 = 0.5;
@@ -37,7 +38,7 @@ pub struct Found {
     pub rigid: usize,
     /// Unstable modes that are known to be there and were not found
     pub missing: usize,
-    /// Whether pivots count more among those that are asked for than were found
+    /// Pivots count more among those that are asked for than were found.
     pub is_short: bool,
 }
 
@@ -73,8 +74,9 @@ fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
     }
 }
 
-/// A few looks place the shift below the lowest frequency, from `shift` on; then all modes are searched from there. `tell` is told the part of
-/// the search that lies behind. `None` where a solve with the tangent fails.
+/// A few looks place the shift below the lowest frequency, from `shift` on; then all modes are
+/// searched from there. `tell` is told the part of the search that lies behind. `None` where a
+/// solve with the tangent fails.
 pub fn find_modes(
     search: &mut ModeSearch,
     mut shift: f64,
@@ -106,8 +108,9 @@ pub fn first_shift(matrices: &Matrices, system: &System) -> f64 {
     if shift > 0.0 && shift.is_finite() { shift } else { 1.0 }
 }
 
-/// All modes that are asked for, and all unstable ones: where pivots count them, until they are complete; else among more than are asked
-/// for, and from shifts further out. `None` where a solution fails.
+/// All modes that are asked for, and all unstable ones: where pivots count them, until they are
+/// complete; else among more than are asked for, and from shifts further out. `None` where a
+/// solution fails.
 fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
     let mut found = Found { rigid: search.rigid(), ..Found::default() };
     if !search.factorise(shift) {
@@ -144,12 +147,13 @@ fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallM
     if search.factorise(shift) { search.nearest(wanted) } else { None }
 }
 
-/// Of these the ones that grow; none where a shift hits a motion.
+/// The motions nearest to a shift that grow; none where the shift hits a motion.
 fn growing_from(search: &mut ModeSearch, shift: f64, wanted: usize) -> Vec<SmallMotion> {
     look(search, shift, wanted).unwrap_or_default().into_iter().filter(grows).collect()
 }
 
-/// From above: at a shift behind which nothing grows any faster. All of them are there then, or those that are new are added.
+/// From above: at a shift behind which nothing grows any faster. All of them are there then, or
+/// those that are new are added.
 fn find_growing(search: &mut ModeSearch, shift: f64, found: &mut Found, unstable: usize) {
     let mut above = shift;
     for _ in 0..MOST_DOUBLINGS {
@@ -169,7 +173,8 @@ fn find_growing(search: &mut ModeSearch, shift: f64, found: &mut Found, unstable
     }
 }
 
-/// Whether no mode is missing among those that are asked for: as many pivots are negative at a frequency behind them.
+/// True if no mode is missing among those that are asked for: as many pivots are negative at a
+/// frequency behind them.
 fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
     let mut omegas: Vec<f64> = found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
     omegas.sort_by(f64::total_cmp);

@@ -1,9 +1,12 @@
-//! Whether small vibrations about the end of a static stage grow: what tells its stability where negative pivots do not.
+//! Small vibrations about the end of a static stage, which tell its stability where negative pivots
+//! do not.
 //!
-//! Under an unsymmetric tangent K the motions x exp(s t) with (s^2 M + s C + K) x = 0 tell (Bolotin 1963, Nonconservative Problems of the Theory of
-//! Elastic Stability). A real s > 0 is divergence, a complex one with a positive real part is flutter. Where det K < 0 there is a real s > 0,
-//! whatever masses M and dampers C there are: det(s^2 M + s C + K) is negative at s = 0 and positive for large s. Without masses no more is
-//! known: for each K that is not symmetric there are masses with which something grows.
+//! Under an unsymmetric tangent K the motions x exp(s t) with (s^2 M + s C + K) x = 0 tell (Bolotin
+//! 1963, Nonconservative Problems of the Theory of Elastic Stability). A real s > 0 is divergence,
+//! a complex one with a positive real part is flutter. Where det K < 0 there is a real s > 0,
+//! whatever masses M and dampers C there are: det(s^2 M + s C + K) is negative at s = 0 and
+//! positive for large s. Without masses no more is known: for each K that is not symmetric there
+//! are masses with which something grows.
 
 use super::search::{find_modes, first_shift, grows, matrices};
 use crate::model::{Assembly, StageContext, StageKind};
@@ -21,10 +24,10 @@ const SURELY: f64 = 10.0;
 /// With more unknowns no modes are looked for: that would take longer than the stage.
 const MOST_UNKNOWNS: usize = 20_000;
 
-/// What small vibrations about an equilibrium do.
+/// Small vibrations about an equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::run) enum Vibrations {
-    /// So many eigenvalues of the tangent are negative, which is symmetric.
+    /// The number of negative eigenvalues of the tangent, which is symmetric
     Counted(usize),
     /// None of those that were looked at grows.
     Bounded,
@@ -36,7 +39,8 @@ pub(in crate::run) enum Vibrations {
     Unknown,
 }
 
-/// What small vibrations do about the state of a stage, in space and with the masses and dampers of the scene. `signature`: of the tangent as the stage is treated.
+/// Small vibrations about the state of a stage, in space and with the masses and dampers of the
+/// scene. `signature`: of the tangent as the stage is treated.
 pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signature>) -> Result<Vibrations, Failure> {
     if stage.is_linear() {
         return Ok(Vibrations::Unknown);
@@ -55,7 +59,8 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     };
     let matrices = matrices(&mut assembly, stage.state, stage.model);
     stage.counters.work.factorisations += 1;
-    // Without digits signs tell nothing, nor where a motion has no stiffness, such as a spin that statics holds.
+    // Without digits signs tell nothing, nor where a motion has no stiffness, such as a spin that
+    // statics holds.
     let is_sure = solver.factorise_surely(&assembly.system);
     if !is_sure || solver.null_vector(&mut Tangent::that_stays(&mut assembly, stage.state)).is_some() {
         return Ok(Vibrations::Unknown);
@@ -82,7 +87,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     Ok(found.map_or(Vibrations::Unknown, |found| judge(&found.motions)))
 }
 
-/// What these motions tell.
+/// The verdict of these motions.
 fn judge(motions: &[SmallMotion]) -> Vibrations {
     let surely = |motion: &&SmallMotion| motion.exponent.re > SURELY * motion.uncertainty * motion.exponent.norm();
     let growing = || motions.iter().filter(|motion| grows(motion));

@@ -1,4 +1,5 @@
-//! Arc-length control: a path of equilibrium is followed to a load factor, around the points where it turns back.
+//! Arc-length control: a path of equilibrium is followed to a load factor, around the points where
+//! it turns back.
 
 use super::begin;
 use super::levels::Levels;
@@ -14,9 +15,11 @@ use crate::solve::Signature;
 use crate::tensor::Vec3;
 use crate::warning::WarningKind;
 
-/// Increments that a detour of load control may take without coming to a higher load than before, at least.
+/// Increments that a detour of load control may take without coming to a higher load than before,
+/// at least.
 const LONGEST_DETOUR: usize = 1000;
-/// Increments that a detour may take without coming to a higher load, at least, times the levels of the stage.
+/// Increments that a detour may take without coming to a higher load, at least, times the levels of
+/// the stage.
 const DETOUR_OF_LEVEL: f64 = 10.0;
 /// Increments of a path, times those that bring no higher load.
 const LONGEST_PATH: usize = 100;
@@ -86,8 +89,8 @@ impl<'r> Analysis<'r> for ArcLength<'_, 'r> {
     }
 }
 
-/// From the present state along its path until that comes to the load factor `goal`: around limit points that load control
-/// cannot pass.
+/// From the present state along its path until that comes to the load factor `goal`: around limit
+/// points that load control cannot pass.
 pub fn detour(stage: &mut StageRun, space: &mut SpatialLook, levels: &Levels, goal: f64) -> Result<Arrival, Failure> {
     let increment = levels.level.clamp(DETOUR.0, DETOUR.1);
     let Some(mut path) = Path::onward(stage, &levels.start, increment)? else { return Ok(Arrival::Nowhere) };
@@ -158,7 +161,7 @@ impl Follower<'_, '_> {
         Ok(Arrival::OutOfSteps)
     }
 
-    /// What lies between here and the next point.
+    /// The special points between here and the next point.
     fn targets(&self, next: &Point, signs: Signs, goal: Target) -> Vec<Target> {
         let mut targets = Vec::new();
         if (next.load_rate > 0.0) != signs.rising {
@@ -179,7 +182,8 @@ impl Follower<'_, '_> {
         let beyond = (self.stage.plane.is_some() && targets.contains(&Target::Limit)).then(|| next.state.clone());
         let (mut arrived, target) = self.path.nearest(self.stage, next, length, targets);
         if target == Some(Target::Limit) {
-            // On a limit point itself one pivot is next to zero: what counts is what lies behind it.
+            // On a limit point itself one pivot is next to zero: what counts is what lies behind
+            // it.
             arrived.signature = behind;
             arrived.on_limit = true;
             if let Some(beyond) = &beyond {
@@ -205,7 +209,7 @@ impl Follower<'_, '_> {
         near
     }
 
-    /// What follows a point of the path: account, row, and a word where something special happened.
+    /// Takes a point of the path: account, row, and a word where something special happened.
     fn arrive(&mut self, point: Point, target: Option<Target>) -> Result<(), Failure> {
         self.stage.good.copy_from(&self.path.here.state);
         self.stage.state.copy_from(&point.state);

@@ -1,4 +1,5 @@
-//! Load control: equal levels, approached in smaller steps where Newton fails, and along the path where those fail too.
+//! Load control: equal levels, approached in smaller steps where Newton fails, and along the path
+//! where those fail too.
 
 use super::arc_length::{Arrival, detour};
 use super::begin;
@@ -12,11 +13,11 @@ use crate::run::stage_run::{Analysis, StageRun};
 use crate::solve::{NewtonFailure, Signature};
 use crate::warning::WarningKind;
 
-/// What helps a stage that took over much from a motion.
+/// The words about a stage that took over much from a motion.
 const IN_MOTION: &str =
     " (the stage began in motion, whose forces fade: `[damping]` in the dynamic stage before it leaves less of them)";
 
-/// What came of a step.
+/// The outcome of a step.
 enum Tried {
     /// Balance, with these signs of pivots
     Good(Option<Signature>),
@@ -24,7 +25,7 @@ enum Tried {
     Jumped(Option<Signature>),
     /// Balance, by an iteration that has not gone straight to it
     Strayed(Option<Signature>),
-    /// None
+    /// No balance
     Failed(NewtonFailure),
 }
 
@@ -71,7 +72,7 @@ struct LevelControl<'s, 'r> {
     space: SpatialLook,
     levels: Levels,
     stability: Stability,
-    /// What nothing holds before the first level
+    /// The mechanism that nothing holds before the first level
     loose: Option<Failure>,
 }
 
@@ -95,7 +96,8 @@ impl LevelControl<'_, '_> {
         conclude(self.stage, &mut self.space, signature, false)
     }
 
-    /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or along the path.
+    /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or
+    /// along the path.
     fn reach(&mut self, target: f64) -> Result<Reached, Failure> {
         debug_assert!(
             self.stage.state.q == self.stage.good.q && self.stage.state.load == self.stage.good.load,
@@ -125,7 +127,8 @@ impl LevelControl<'_, '_> {
         Ok(Reached::Level)
     }
 
-    /// A level is reached by a motion to a state of rest, where there is one that its loads hold; else the stage ends with `failure`.
+    /// A level is reached by a motion to a state of rest, where there is one that its loads hold;
+    /// else the stage ends with `failure`.
     fn rest_at(&mut self, target: f64, failure: Failure) -> Result<Reached, Failure> {
         let total = self.stage.bookkeeper.ledger().total();
         let may_rest =
@@ -184,8 +187,8 @@ impl LevelControl<'_, '_> {
         Ok(())
     }
 
-    /// Where load control stands still the path is followed by arc length until it comes to the level. `failure` is what
-    /// load control ended with, if it did not only seem to jump.
+    /// Where load control stands still the path is followed by arc length until it comes to the
+    /// level. `failure` is what load control ended with, if it did not only seem to jump.
     fn go_around(&mut self, target: f64, failure: Option<NewtonFailure>) -> Result<Reached, Failure> {
         let named = failure.map(|failure| self.stage.name_failure(failure, &self.stage.assembly.system));
         self.stage.state.copy_from(&self.stage.good);

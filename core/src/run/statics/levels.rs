@@ -8,26 +8,29 @@ use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads;
 
-/// A level is not approached in smaller parts than this.
+/// The smallest part of a level that is tried.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
 
-/// Nor, in parts of the stage, where it has few levels.
+/// The smallest part of a stage that is tried where it has few levels.
 const SMALLEST_OF_STAGE: f64 = 1.0 / 65536.0;
 
-/// Where round-off takes the stiffness smaller parts hardly help.
+/// The smallest part of a level where round-off takes the stiffness: smaller ones hardly help.
 const SMALLEST_SOFT_PART: f64 = 1.0 / 16.0;
 
-/// A step over which the signs of pivots change is cut back to this part of a level: it may have jumped.
+/// The part of a level to which a step is cut back over which the signs of pivots change: it may
+/// have jumped.
 const CLOSE: f64 = 1.0 / 256.0;
 
-/// And it may not have moved further than so many times what the path has moved so far by such a part of the load.
+/// The motion over such a step, over that of the path so far by such a part of the load, beyond
+/// which it has jumped.
 const JUMP: f64 = 8.0;
 
-/// A step that goes against the tangent it set out along, by a cosine below this, may have gone to another branch.
+/// A step that goes against the tangent it set out along, by a cosine below this, may have gone to
+/// another branch.
 const BACK: f64 = -0.5;
 
-/// How a stage has come to its last good state. Where levels lead on, one that is not reached is a limit of the path: the state of rest
-/// behind it is not looked for.
+/// How a stage has come to its last good state. Where levels lead on, one that is not reached is a
+/// limit of the path: the state of rest behind it is not looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Way {
     /// It is that of its start.
@@ -51,7 +54,7 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// So many levels from a state on.
+    /// `count` levels from a state on.
     pub fn new(start: State, count: usize, approach: Approach) -> Self {
         let level = 1.0 / count as f64;
         Self { start, level, approach, way: Way::Start, increment: level }
@@ -67,7 +70,8 @@ impl Levels {
         load + self.increment
     }
 
-    /// Takes the next step half as long; `false` where it may not be. `soft`: round-off takes the stiffness of the softest motion.
+    /// Takes the next step half as long; `false` where it may not be. `soft`: round-off takes the
+    /// stiffness of the softest motion.
     pub fn halve(&mut self, soft: bool) -> bool {
         let smaller = 0.5 * self.increment;
         let smallest = match soft {
@@ -89,8 +93,9 @@ impl Levels {
         self.increment = self.level;
     }
 
-    /// Whether a step may have gone to another branch: it went back against the `first` correction, or it has changed the signs of some
-    /// eigenvalues and is not small, or the state has moved further than on a path that goes on.
+    /// True if a step may have gone to another branch: it went back against the `first` correction,
+    /// or it has changed the signs of some eigenvalues and is not small, or the state has moved
+    /// further than on a path that goes on.
     pub fn may_have_jumped(
         &self,
         model: &Model,
@@ -113,8 +118,8 @@ impl Levels {
     }
 }
 
-/// Whether a step has moved against the `first` correction of its iteration, which goes along the tangent of the path: nodes'
-/// displacements tell.
+/// True if a step has moved against the `first` correction of its iteration, which goes along the
+/// tangent of the path: nodes' displacements tell.
 fn has_turned_back(model: &Model, from: &State, to: &State, first: &CompressedField<3>) -> bool {
     let [along, moved, expected] = threads::sums(first.len(), |part| {
         let [mut along, mut moved, mut expected] = [0.0; 3];

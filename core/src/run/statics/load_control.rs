@@ -22,15 +22,15 @@ pub(in crate::run) struct Direction {
 }
 
 impl Direction {
-    /// Of a path on which nothing varies with the load factor.
+    /// The direction of a path on which nothing varies with the load factor.
     pub fn none(slots: usize) -> Self {
         Self { rate: vec![Vec3::ZERO; slots], pull: vec![Vec3::ZERO; slots] }
     }
 }
 
 impl StageRun<'_> {
-    /// One attempt at a load factor. Prescribed motions enter with the first correction: they are taken back out of the
-    /// state and handed to Newton as increments.
+    /// One attempt at a load factor. Prescribed motions enter with the first correction: they are
+    /// taken back out of the state and handed to Newton as increments.
     pub fn attempt(&mut self, load: f64) -> Result<(), NewtonFailure> {
         let moves = self.set_load(load)?;
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
@@ -40,13 +40,15 @@ impl StageRun<'_> {
         self.refuse_windings()
     }
 
-    /// Sets the load factor. Increments of prescribed motions are not in the state yet, but in `prescribed_increment`; whether there are any.
+    /// Sets the load factor. Increments of prescribed motions are not in the state yet, but in
+    /// `prescribed_increment`; whether there are any.
     pub fn set_load(&mut self, load: f64) -> Result<bool, NewtonFailure> {
         let Self { prescribed_increment, state, model, .. } = self;
         set_load(model, state, load, prescribed_increment)
     }
 
-    /// The direction of the path; `None` where nothing varies with the load factor. The tangent stays factorised.
+    /// The direction of the path; `None` where nothing varies with the load factor. The tangent
+    /// stays factorised.
     pub fn path_direction(&mut self) -> Result<Option<Direction>, Failure> {
         let pull = self.load_derivative();
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
@@ -68,8 +70,9 @@ impl StageRun<'_> {
         Ok(Some(Direction { rate, pull }))
     }
 
-    /// The derivative of the forces over the load factor; that of prescribed directions goes into `prescribed_increment`.
-    /// Loads and motions without a history are linear in it; the step is small, so that no motion goes around.
+    /// The derivative of the forces over the load factor; that of prescribed directions goes into
+    /// `prescribed_increment`. Loads and motions without a history are linear in it; the step is
+    /// small, so that no motion goes around.
     pub fn load_derivative(&mut self) -> Vec<Vec3> {
         let Self { assembly, prescribed_increment, state, model, .. } = self;
         prescribed_increment.resize(state.q.len(), Vec3::ZERO);
@@ -83,7 +86,8 @@ impl StageRun<'_> {
         };
         let before = forces(state);
         model.set_clock(&mut shifted, state.time, state.load + LOAD_STEP);
-        // From where the motions put their directions now, not from where round-off has left them: the step is small.
+        // From where the motions put their directions now, not from where round-off has left them:
+        // the step is small.
         for (prescribed_increment, (moved, from)) in prescribed_increment.iter_mut().zip(shifted.q.iter().zip(&here.q))
         {
             *prescribed_increment = (*moved - *from) * inverse;
@@ -94,8 +98,8 @@ impl StageRun<'_> {
     }
 }
 
-/// Sets the load factor of a state. `increment` takes the increments of prescribed motions, which are not in the state yet; whether there are
-/// any.
+/// Sets the load factor of a state. `increment` takes the increments of prescribed motions, which
+/// are not in the state yet; whether there are any.
 pub(in crate::run) fn set_load(
     model: &mut Model,
     state: &mut State,

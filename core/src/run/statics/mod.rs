@@ -21,7 +21,8 @@ use crate::model::charts;
 use crate::solve::{SoftMode, Tangent};
 use crate::warning::WarningKind;
 
-/// Puts the stage at rest, at load factor 0. What nothing holds as long as nothing is loaded is named: levels may bring what holds it.
+/// Puts the stage at rest, at load factor 0. What nothing holds as long as nothing is loaded is
+/// named: levels may bring what holds it.
 fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure>, Failure> {
     unload(stage);
     stage.take_over();
@@ -36,7 +37,8 @@ fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure
             Some(named)
         }
         held => {
-            // What cannot be factorised as long as nothing is loaded may be held by what the first step brings.
+            // What cannot be factorised as long as nothing is loaded may be held by what the first
+            // step brings.
             held.into_iter().for_each(|soft_mode| warn_of_soft_mode(stage, soft_mode));
             space.refuse_loose(stage, Weights::STIFFNESS).err()
         }

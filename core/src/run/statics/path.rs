@@ -1,14 +1,15 @@
 //! Arc-length control: paths of equilibrium that turn back in load or in displacement.
 //!
-//! Along a path the state q and the load factor are both unknown; a step goes a given length ds along the tangent t of the
-//! last point and then back to the path in the plane normal to it (Riks 1979, doi:10.1016/0020-7683(79)90081-7):
+//! Along a path the state q and the load factor are both unknown; a step goes a given length ds
+//! along the tangent t of the last point and then back to the path in the plane normal to it (Riks
+//! 1979, doi:10.1016/0020-7683(79)90081-7):
 //!
 //! ```text
 //! <t_u, u - u_n>/U^2 + t_l (l - l_n) = ds,     K dq = -g - g_l dl
 //! ```
 //!
-//! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in the load factor; rotation
-//! vectors follow through the equations, so that no chart enters.
+//! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in
+//! the load factor; rotation vectors follow through the equations, so that no chart enters.
 
 use super::load_control::Direction;
 use crate::kernel::Weights;
@@ -19,7 +20,7 @@ use crate::solve::{self, NewtonFailure, Signature, Tangent, Verdict, mechanism, 
 use crate::system::State;
 use crate::tensor::Vec3;
 
-/// Iterations after which the next step stays as long.
+/// Iterations of a step after which the next one stays as long
 const EASY: f64 = 5.0;
 /// The longest step, over the first one.
 const LONGEST: f64 = 2.0;
@@ -29,16 +30,16 @@ const STRETCH: f64 = 8.0;
 const STRAIGHT: f64 = 0.995;
 /// The shortest step, over the first one.
 const SHORTEST: f64 = 1.0 / 16384.0;
-/// Cosine between tangents, or between a tangent and its chord, below which a step was too long: it may have come down on another
-/// branch.
+/// The cosine between tangents, or between a tangent and its chord, below which a step was too
+/// long: it may have come down on another branch.
 const MIN_COSINE: f64 = 0.8;
 /// Part of the first step below which a change of pivots is believed that no limit point explains.
 const BELIEVED: f64 = 1.0 / 1024.0;
-/// Attempts to come nearer to a special point.
+/// Attempts to come nearer to a special point
 const MOST_LOOKS: usize = 40;
-/// A correction of so many times the step is a flight.
+/// The size of a correction, over the step, beyond which it is a flight.
 const FLIGHT: f64 = 100.0;
-/// Relative length to which it is located.
+/// The length, over the step, to which a special point is located.
 const LOCATED: f64 = 1e-9;
 
 /// A point of the path and its unit tangent.
@@ -51,11 +52,11 @@ pub struct Point {
     /// The rate of the displacement that the loads do work on
     pub work_rate: f64,
     pub signature: Option<Signature>,
-    /// Whether it is a limit point: one pivot is next to zero, with the sign of round-off
+    /// It is a limit point: one pivot is next to zero, with the sign of round-off
     pub on_limit: bool,
 }
 
-/// What is looked for between two points, as a function that changes its sign there.
+/// A special point between two points of a path, as a function that changes its sign there.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Target {
     Limit,
@@ -78,7 +79,7 @@ pub struct Path {
     /// The load factor at which it was begun
     pub begun: f64,
     pub here: Point,
-    /// Of the next step
+    /// The length of the next step
     length: f64,
     /// Length of the first step
     first: f64,
@@ -98,8 +99,8 @@ impl Path {
         path.begin_with(stage, first).map(Some)
     }
 
-    /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`: near a limit point the
-    /// tangent moves without bounds.
+    /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`:
+    /// near a limit point the tangent moves without bounds.
     pub fn onward(stage: &mut StageRun, from: &State, increment: f64) -> Result<Option<Self>, Failure> {
         let risen = stage.state.load - from.load;
         if risen <= 0.0 {
@@ -113,8 +114,8 @@ impl Path {
         path.begin_with(stage, std::f64::consts::SQRT_2 * increment).map(Some)
     }
 
-    /// With its first length. Forces near the limits of floating point have no measure of displacements: then lengths are no numbers,
-    /// and no search for a shorter one would end.
+    /// With its first length. Forces near the limits of floating point have no measure of
+    /// displacements: then lengths are no numbers, and no search for a shorter one would end.
     fn begin_with(mut self, stage: &StageRun, first: f64) -> Result<Self, Failure> {
         (self.first, self.length, self.first_rate) = (first, first, self.here.load_rate);
         if first.is_finite() && self.here.load_rate.is_finite() {
@@ -126,7 +127,8 @@ impl Path {
         Err(Failure::NonFinite { at: stage.moment(), effect: Some("what a unit of load moves"), node })
     }
 
-    /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to go on in.
+    /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to
+    /// go on in.
     fn with_measure(stage: &StageRun, rate: Vec<Vec3>) -> Self {
         let moved = squared(stage, &rate);
         let rotated = stage.model.kinds.iter().zip(&rate).filter(|(kind, _)| **kind == SlotKind::Rotation);
@@ -220,12 +222,13 @@ impl Path {
         }
     }
 
-    /// Whether a motion is not longer than the next step.
+    /// True if a motion is not longer than the next step.
     pub fn is_within_a_step(&self, stage: &StageRun, moved: &[Vec3]) -> bool {
         squared(stage, moved) * self.scale <= self.length * self.length
     }
 
-    /// The longest step where the path is straight: it brings as much load as the longest one at the beginning.
+    /// The longest step where the path is straight: it brings as much load as the longest one at
+    /// the beginning.
     fn longest(&self, load_rate: f64) -> f64 {
         LONGEST * self.first * (self.first_rate / load_rate).abs().clamp(1.0, STRETCH)
     }
@@ -237,8 +240,9 @@ impl Path {
         (squared(stage, &moved) * self.scale + risen * risen).sqrt()
     }
 
-    /// Whether a step of this length may have gone to another branch: along a path one pivot changes its sign where the load turns,
-    /// and else only where another branch begins, which a short step passes by.
+    /// True if a step of this length may have gone to another branch: along a path one pivot
+    /// changes its sign where the load turns, and else only where another branch begins, which a
+    /// short step passes by.
     fn may_have_jumped(&self, next: &Point, length: f64) -> bool {
         let (Some(before), Some(after)) = (self.here.signature, next.signature) else { return false };
         // On a limit point the load has turned already.
@@ -246,7 +250,8 @@ impl Path {
         before.changes_to(after) != usize::from(turned) && length > BELIEVED * self.first
     }
 
-    /// Goes `length` along the tangent and back to the path; leaves the run's state there and returns the iterations.
+    /// Goes `length` along the tangent and back to the path; leaves the run's state there and
+    /// returns the iterations.
     fn advance(&self, stage: &mut StageRun, length: f64) -> Result<usize, NewtonFailure> {
         let mut load = self.predict(stage, length);
         stage.assembly.forget();
@@ -254,7 +259,8 @@ impl Path {
         let mut last = None;
         let (mut iterations, mut history) = (0, Vec::new());
         loop {
-            // Held directions are put where they belong, free of the round-off of predictor and corrections.
+            // Held directions are put where they belong, free of the round-off of predictor and
+            // corrections.
             stage.model.set_clock(&mut stage.state, self.here.state.time, load);
             let pull = stage.load_derivative();
             let StageRun { assembly, newton, prescribed_increment, .. } = stage;
@@ -293,8 +299,8 @@ impl Path {
         here.state.load + here.load_rate * length
     }
 
-    /// The correction of Newton within the plane normal to the tangent: of the unknowns, and of the load factor. The
-    /// assembly holds forces and tangent of the run's state.
+    /// The correction of Newton within the plane normal to the tangent: of the unknowns, and of the
+    /// load factor. The assembly holds forces and tangent of the run's state.
     fn correction(&self, stage: &mut StageRun, pull: &[Vec3]) -> Result<(Vec<Vec3>, f64), NewtonFailure> {
         let StageRun { assembly, newton, prescribed_increment, .. } = stage;
         let (system, solver, work) = (&assembly.system, &mut newton.solver, &mut stage.counters.work);
@@ -325,7 +331,7 @@ impl Path {
         Ok((a.iter().zip(&b).map(|(a, b)| *a + *b * dl).collect(), dl))
     }
 
-    /// Of the special points between here and `next` the nearest, or `next` itself.
+    /// The nearest of the special points between here and `next`, or `next` itself.
     pub fn nearest(
         &mut self,
         stage: &mut StageRun,
@@ -342,8 +348,8 @@ impl Path {
         (best.0, best.2)
     }
 
-    /// Where a function of the path has its zero between here and a point `length` ahead (Illinois' regula falsi); `None`
-    /// where it has none.
+    /// Where a function of the path has its zero between here and a point `length` ahead (Illinois'
+    /// regula falsi); `None` where it has none.
     fn locate(&mut self, stage: &mut StageRun, end: &Point, length: f64, target: Target) -> Option<(Point, f64)> {
         let mut low = Bracket { at: 0.0, value: target.value(&self.here) };
         let mut high = Bracket { at: length, value: target.value(end) };
@@ -393,8 +399,8 @@ fn correct(stage: &mut StageRun, dq: &[Vec3]) -> bool {
     switched > 0
 }
 
-/// The rate of the displacement that the loads do work on; `None` without loads. What stands at multipliers are gaps of motors,
-/// not forces.
+/// The rate of the displacement that the loads do work on; `None` without loads. What stands at
+/// multipliers are gaps of motors, not forces.
 fn work_of_loads(stage: &StageRun, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
     let acting = || pull.iter().zip(rate).zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
     let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);

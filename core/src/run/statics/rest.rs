@@ -1,8 +1,9 @@
-//! States of rest that small load levels do not lead to: of what only its loads hold, as hanging chains and blades on free hinges, and of
-//! cables that are laid loosely.
+//! States of rest that small load levels do not lead to: of what only its loads hold, as hanging
+//! chains and blades on free hinges, and of cables that are laid loosely.
 //!
-//! The structure moves along the forces on it, against an artificial resistance that fades (see [`crate::effect::resistance`]), until it
-//! comes to rest. Balance is then found without any resistance, from that state.
+//! The structure moves along the forces on it, against an artificial resistance that fades (see
+//! [`crate::effect::resistance`]), until it comes to rest. Balance is then found without any
+//! resistance, from that state.
 
 use super::load_control::set_load;
 use super::stability::LARGEST_UNCOUNTED;
@@ -19,11 +20,13 @@ use crate::system::{Anchor, Slot, State, System};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The first resistance lets the largest force move its node by this part of the length of the scene.
+/// The first resistance lets the largest force move its node by this part of the length of the
+/// scene.
 const GENTLE: f64 = 0.05;
 
-/// What the resistance is multiplied by after a step that came to balance, and after one that did not.
+/// The factor of the resistance after a step that came to balance.
 const EASIER: f64 = 0.2;
+/// The factor of the resistance after a step that did not.
 const HARDER: f64 = 8.0;
 
 /// More than so many times the first resistance is not tried.
@@ -32,7 +35,8 @@ const HARDEST: f64 = 1e8;
 /// The arm by which rotations are resisted, as part of the length of the scene.
 const ARM: f64 = 0.05;
 
-/// After a step that moves less (lengths of the scene, radians) balance is tried without resistance.
+/// After a step that moves less (lengths of the scene, radians) balance is tried without
+/// resistance.
 const SLOW: f64 = 1e-2;
 
 /// Where steps move less, and there is no balance without resistance, there will be none.
@@ -41,20 +45,21 @@ const STANDING: f64 = 1e-10;
 /// Balance is not further away than that.
 const NEIGHBOURHOOD: f64 = 0.1;
 
-/// What is unstable is pushed by this (lengths of the scene, radians).
+/// The size of a push along an unstable motion (lengths of the scene, radians).
 const PUSH: f64 = 1e-3;
 
 /// Steps after a push before balance is tried again: it has to grow.
 const STEPS_OF_PUSH: usize = 8;
 
-/// What has less stiffness than this part of the largest force over the length of the scene is held by nothing.
+/// The stiffness, over the largest force over the length of the scene, below which nothing holds a
+/// motion.
 const LOOSE: f64 = 1e-7;
 
-/// A turn without any displacement that has less stiffness than this part of the largest force times the length is held by nothing: thin
-/// cables have next to no torsional stiffness.
+/// A turn without any displacement that has less stiffness than this part of the largest force
+/// times the length is held by nothing: thin cables have next to no torsional stiffness.
 const LOOSE_TURN: f64 = 1e-12;
 
-/// What moves further than so many lengths of the scene, nothing holds.
+/// The motion, in lengths of the scene, beyond which nothing holds a structure.
 const FARTHEST: f64 = 100.0;
 
 /// Steps in all, those that fail among them.
@@ -72,7 +77,8 @@ const DIVISOR: f64 = 4.0;
 /// Parts of the stage that are not divided further.
 const SMALLEST: f64 = 1.0 / 65536.0;
 
-/// From the last good state to one at rest at the load factor `target`; `false`, with the last good state, where none is found.
+/// From the last good state to one at rest at the load factor `target`; `false`, with the last good
+/// state, where none is found.
 pub fn come_to_rest(stage: &mut StageRun, target: f64) -> Result<bool, Failure> {
     Descent::new(stage)?.go_to(target)
 }
@@ -98,7 +104,8 @@ impl<'s, 'r> Descent<'s, 'r> {
         Ok(Self { stage, assembly, newton, steps: MOST_STEPS })
     }
 
-    /// From the last good state to one at rest at the load factor `target`; `false`, with the last good state, where none is found.
+    /// From the last good state to one at rest at the load factor `target`; `false`, with the last
+    /// good state, where none is found.
     fn go_to(&mut self, target: f64) -> Result<bool, Failure> {
         let start = self.stage.good.kept();
         let account = self.stage.bookkeeper.clone();
@@ -138,8 +145,8 @@ impl<'s, 'r> Descent<'s, 'r> {
         PACE / moved.unwrap_or(PI).max(PACE)
     }
 
-    /// At one load factor: steps against a resistance that fades, until the state is in balance without it. Each step leaves its state as
-    /// the good one.
+    /// At one load factor: steps against a resistance that fades, until the state is in balance
+    /// without it. Each step leaves its state as the good one.
     fn fall(&mut self, load: f64) -> Result<bool, Failure> {
         let start = self.stage.good.kept();
         let gentle = self.gentle_resistance(load);
@@ -186,8 +193,8 @@ impl<'s, 'r> Descent<'s, 'r> {
         Ok(false)
     }
 
-    /// The resistance that lets the largest force at a load factor move its node by little. Motions that are prescribed are in the state at
-    /// once: what they strain is to be resisted, too.
+    /// The resistance that lets the largest force at a load factor move its node by little. Motions
+    /// that are prescribed are in the state at once: what they strain is to be resisted, too.
     fn gentle_resistance(&mut self, load: f64) -> f64 {
         let StageRun { model, state, good, .. } = &mut *self.stage;
         state.copy_all_but_rates(good);
@@ -197,8 +204,9 @@ impl<'s, 'r> Descent<'s, 'r> {
         model.largest_force(&self.assembly.system) / (GENTLE * model.length)
     }
 
-    /// One step from the run's state; in the first, whose load factor is given, prescribed motions come in. `false` where it finds no balance,
-    /// or none that is a minimum: with less resistance than some motion gains by the forces there is no way along them.
+    /// One step from the run's state; in the first, whose load factor is given, prescribed motions
+    /// come in. `false` where it finds no balance, or none that is a minimum: with less resistance
+    /// than some motion gains by the forces there is no way along them.
     fn step_against(&mut self, resistance: f64, first: Option<f64>) -> bool {
         let StageRun { model, state, counters, .. } = &mut *self.stage;
         let mut increment = Vec::new();
@@ -219,7 +227,8 @@ impl<'s, 'r> Descent<'s, 'r> {
         !signature.is_some_and(Signature::tells_unstable)
     }
 
-    /// Whether there is balance without resistance at the last good state; then it is the state of the run.
+    /// True if there is balance without resistance at the last good state; then it is the state of
+    /// the run.
     fn balances(&mut self, load: f64) -> bool {
         self.stage.newton.begin_anew();
         let found = self.stage.attempt(load).is_ok()
@@ -250,7 +259,8 @@ impl<'s, 'r> Descent<'s, 'r> {
     }
 }
 
-/// Refuses a state of rest that leaves a motion which neither loads nor stiffness hold, in the plane of the stage or out of it.
+/// Refuses a state of rest that leaves a motion which neither loads nor stiffness hold, in the
+/// plane of the stage or out of it.
 pub fn refuse_loose(stage: &mut StageRun, space: &mut SpatialLook) -> Result<(), Failure> {
     stage.counters.work.factorisations += 1;
     let StageRun { assembly, newton, model, state, .. } = &mut *stage;
@@ -270,8 +280,8 @@ fn name_unheld(stage: &StageRun, vector: NullVector, system: &System) -> Failure
     Failure::Singular { at: Moment { load: 0.0, ..stage.moment() }, place: Some(stage.place_of(&vector, system)) }
 }
 
-/// The softest motion, where it has no stiffness but for what the tolerance of balance leaves: that of a motion that loads hold is a force over
-/// a length.
+/// The softest motion, where it has no stiffness but for what the tolerance of balance leaves: that
+/// of a motion that loads hold is a force over a length.
 fn loose_at_rest(
     assembly: &mut Assembly,
     solver: &mut LinearSolver,

@@ -1,4 +1,5 @@
-//! The stability of equilibria: signs of pivots from step to step, and what is told of the end of a stage.
+//! The stability of equilibria: signs of pivots from step to step, and what is told of the end of a
+//! stage.
 
 use crate::kernel::Weights;
 use crate::run::failure::Failure;
@@ -13,16 +14,17 @@ use crate::warning::WarningKind;
 /// Limit and branch points of a run that are told one by one.
 const MOST_TOLD: usize = 10;
 
-/// A step whose corrections grow has left the neighbourhood of the path: where they do not contract, it was too long (Deuflhard 2011, Newton
-/// Methods for Nonlinear Problems, 5.1).
+/// A step whose corrections grow has left the neighbourhood of the path: where they do not
+/// contract, it was too long (Deuflhard 2011, Newton Methods for Nonlinear Problems, 5.1).
 pub(in crate::run) const LARGEST_CONTRACTION: f64 = 1.0;
 
-/// Where pivots do not count whether a step ended on another branch, no correction may be larger than this part of the one before it.
+/// Where pivots do not count whether a step ended on another branch, no correction may be larger
+/// than this part of the one before it.
 pub(super) const LARGEST_UNCOUNTED: f64 = 0.5;
 
 /// Follows the signs of pivots from step to step.
 pub(super) struct Stability {
-    /// Whether there is something to follow
+    /// Pivots are followed.
     counts: bool,
     pub signature: Option<Signature>,
 }
@@ -51,13 +53,14 @@ impl Stability {
         signature
     }
 
-    /// Of how many eigenvalues the sign changes at least.
+    /// The number of eigenvalues whose sign has changed, at least.
     pub fn changes_to(&self, signature: Option<Signature>) -> usize {
         self.signature.zip(signature).map_or(0, |(before, after)| before.changes_to(after))
     }
 
-    /// Whether a step was too long to tell that it follows the path: its corrections did not contract, or it passed several critical points
-    /// at once, of which each may have a branch that the path turns into.
+    /// True if a step was too long to tell that it follows the path: its corrections did not
+    /// contract, or it passed several critical points at once, of which each may have a branch that
+    /// the path turns into.
     pub fn may_have_strayed(&self, contraction: f64, signature: Option<Signature>) -> bool {
         let is_counted = [self.signature, signature].iter().all(|s| s.and_then(Signature::negative).is_some());
         let largest = if is_counted { LARGEST_CONTRACTION } else { LARGEST_UNCOUNTED };
@@ -65,8 +68,9 @@ impl Stability {
     }
 }
 
-/// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is not. `signature`: of its tangent, as the
-/// stage is treated, where it is known; `on_limit`: the state is a limit point, with the pivots behind it.
+/// At the end of a static stage: notes whether the equilibrium is stable, and warns where it is
+/// not. `signature`: of its tangent, as the stage is treated, where it is known; `on_limit`: the
+/// state is a limit point, with the pivots behind it.
 pub(super) fn conclude(
     stage: &mut StageRun,
     space: &mut SpatialLook,
@@ -107,7 +111,8 @@ fn stability_of(stage: usize, vibrations: Vibrations) -> StageStability {
     StageStability { stage, verdict, negative: None }
 }
 
-/// Names limit and turning points, and branches that were passed: where the signs of pivots changed.
+/// Names limit and turning points, and branches that were passed: where the signs of pivots
+/// changed.
 pub(super) fn tell_of_points(
     stage: &mut StageRun,
     space: &mut SpatialLook,
@@ -134,7 +139,8 @@ pub(super) fn tell_of_points(
 }
 
 impl StageRun<'_> {
-    /// An equilibrium that a stage ends in, judged by the small vibrations about it: pivots do not tell.
+    /// An equilibrium that a stage ends in, judged by the small vibrations about it: pivots do not
+    /// tell.
     fn warn_of_vibrations(&mut self, vibrations: Vibrations) {
         let how = match vibrations {
             Vibrations::Bounded | Vibrations::Unknown => return,
@@ -155,7 +161,8 @@ impl StageRun<'_> {
         self.warn(WarningKind::Unstable, format!("stage {stage} ends in an unstable equilibrium ({how}"));
     }
 
-    /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number of negative pivots, where it is known.
+    /// An equilibrium that a stage ends in, and that the next begins with. `negative`: its number
+    /// of negative pivots, where it is known.
     fn warn_of_instability(&mut self, negative: Option<usize>) {
         if let Some(count @ 1..) = negative {
             let stage = self.number + 1;

@@ -1,11 +1,11 @@
-//! What factorisations in blocks have in common.
+//! Factorisations in blocks, of whatever kind.
 
 use super::elimination::Elimination;
 use crate::system::{Matrix, System};
 
 /// The numbers of a factorisation.
 pub trait Factor: Send {
-    /// What it does, in a word.
+    /// Its name, in a word.
     fn name(&self) -> &'static str;
 
     /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
