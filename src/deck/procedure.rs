@@ -101,6 +101,15 @@ impl StageBody {
         }
     }
 
+    /// Load levels or increments along a path, at most.
+    pub fn increments(&self) -> Option<usize> {
+        match *self {
+            Self::Static { steps, .. } => Some(steps),
+            Self::Path { max_steps, .. } => Some(max_steps),
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+        }
+    }
+
     /// Rows are written as it goes on.
     pub fn writes_rows(&self) -> bool {
         match self {
