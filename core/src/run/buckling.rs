@@ -64,7 +64,7 @@ impl Run<'_> {
         }
         let (time, load) = (self.state.time, self.state.load);
         let held = self.state.q.clone();
-        self.model.set_clock(&mut self.state, time, load);
+        self.schedule.set_clock(&self.model, &mut self.state, time, load);
         self.state.q = held;
         self.change_charts(None);
         self.open_account(workshop)?;
@@ -350,9 +350,9 @@ impl Run<'_> {
                 }
                 continue;
             };
-            charts::freeze(&mut self.state, &self.model.charted.elements);
-            charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
-            if charts::coarsest(&self.state, &self.model.charted.elements, charts::COARSE).is_some() {
+            charts::freeze(&mut self.state, &self.schedule.charted(&self.model).elements);
+            charts::wind(&mut self.state, &self.good, &self.schedule.charted(&self.model).rotations);
+            if charts::coarsest(&self.state, &self.schedule.charted(&self.model).elements, charts::COARSE).is_some() {
                 self.state.copy_from(&self.good);
                 return Walked::TooCoarse;
             }
@@ -411,7 +411,7 @@ impl Run<'_> {
         assembly.forget();
         let mut tangent = |reach: f64| {
             let mut state = self.state.clone();
-            self.model.set_clock(&mut state, self.state.time, self.state.load + reach);
+            self.schedule.set_clock(&self.model, &mut state, self.state.time, self.state.load + reach);
             state.q.copy_from_slice(&self.state.q);
             state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * reach);
             assembly.evaluate(&state, Weights::STIFFNESS, None);

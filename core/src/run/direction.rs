@@ -55,13 +55,13 @@ impl Run<'_> {
         prescribed_increment.resize(self.state.q.len(), Vec3::ZERO);
         let (mut here, mut shifted) = (self.state.clone(), self.state.clone());
         let inverse = 1.0 / LOAD_STEP;
-        self.model.set_clock(&mut here, self.state.time, self.state.load);
+        self.schedule.set_clock(&self.model, &mut here, self.state.time, self.state.load);
         let mut forces = |state: &State| -> Vec<Vec3> {
             assembly.evaluate(state, Weights::NONE, None);
             (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
         };
         let before = forces(&self.state);
-        self.model.set_clock(&mut shifted, self.state.time, self.state.load + LOAD_STEP);
+        self.schedule.set_clock(&self.model, &mut shifted, self.state.time, self.state.load + LOAD_STEP);
         // From where the motions put their directions now, not from where round-off has left them: the step is small.
         for (prescribed_increment, (moved, from)) in prescribed_increment.iter_mut().zip(shifted.q.iter().zip(&here.q))
         {

@@ -27,7 +27,7 @@ impl Run<'_> {
         adaptive: Option<f64>,
     ) -> Result<(), Failure> {
         workshop.increments = (scheme.rotations == Rotations::Increments)
-            .then(|| Increments::new(&self.model, &workshop.assembly.system.pattern.dof_map));
+            .then(|| Increments::new(&self.model, self.schedule.kind(), &workshop.assembly.system.pattern.dof_map));
         workshop.trend = Predictor::new(&self.model);
         self.start_dynamic(workshop, &Step { scheme, length: step })?;
         self.find_rates(workshop);
@@ -119,7 +119,7 @@ impl Run<'_> {
     fn settle_charts(&mut self, workshop: &mut StageRun, step: &Step) {
         let totals = workshop.increments.is_none();
         if let Some(error) = workshop.newton.time_error.as_mut().filter(|_| totals) {
-            error.change_charts(&self.state, &self.model.charted.rotations);
+            error.change_charts(&self.state, &self.schedule.charted(&self.model).rotations);
         }
         let switched = self.change_charts(totals.then_some(step.scheme.lag() * step.length));
         if totals && switched > 0 {
@@ -208,7 +208,7 @@ impl Run<'_> {
             increments.begin(&mut self.state, &step, before);
         }
         step.predict(&mut self.state, before);
-        if let Some((slot, angle)) = self.model.set_clock(&mut self.state, next, 1.0) {
+        if let Some((slot, angle)) = self.schedule.set_clock(&self.model, &mut self.state, next, 1.0) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
         trend.begin(&assembly.system.pattern.dof_map, &mut self.state, &step, newton.scratch());
@@ -228,7 +228,8 @@ impl Run<'_> {
             let kept = rates2.into_iter().filter(|rates| !rates.is_empty());
             kept.for_each(|rates| rateless.iter().for_each(|&slot| rates[slot] = Vec3::ZERO));
         }
-        let turning = self.model.charted.rotations.iter().copied().filter(|&slot| massive[slot as usize]);
+        let turning =
+            self.schedule.charted(&self.model).rotations.iter().copied().filter(|&slot| massive[slot as usize]);
         turns_within(&self.state, turning, step.length)?;
         self.refuse_leaps()?;
         newton.end_step(&assembly.system, (&self.good, &self.state), &step, increments.as_ref());
@@ -238,7 +239,8 @@ impl Run<'_> {
     /// Rotations without inertia have no spin to speak of: they go where balance is. While a step is iterated the unknown is the
     /// increment, or a total vector in the chart it began in.
     fn refuse_massless_turns(&self, massive: &[bool]) -> Result<(), NewtonFailure> {
-        let massless = self.model.charted.rotations.iter().copied().filter(|&slot| !massive[slot as usize]);
+        let massless =
+            self.schedule.charted(&self.model).rotations.iter().copied().filter(|&slot| !massive[slot as usize]);
         let mut turned = massless.map(|slot| {
             let (k, q) = (slot as usize, self.state.q[slot as usize]);
             (k, if self.state.turn(slot).is_some() { q.norm() } else { (q - self.good.q[k]).norm() })
@@ -279,9 +281,10 @@ impl Run<'_> {
 
     /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how many did. `lag`: see [`charts::switch`].
     pub(super) fn change_charts(&mut self, lag: Option<f64>) -> usize {
-        let switched = charts::switch(&mut self.state, &self.model.charted.rotations, charts::DYNAMIC_BAND, lag);
+        let switched =
+            charts::switch(&mut self.state, &self.schedule.charted(&self.model).rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut self.state, &self.model.charted.elements);
+        charts::freeze(&mut self.state, &self.schedule.charted(&self.model).elements);
         switched
     }
 
@@ -303,7 +306,7 @@ impl Run<'_> {
     /// would leave no trace in the accelerations at its ends.
     fn next_corner(&self, end: f64) -> f64 {
         let stop = self.next_stop(end);
-        self.model.next_corner(self.state.time).map_or(stop, |corner| corner.min(stop))
+        self.schedule.next_corner(&self.model, self.state.time).map_or(stop, |corner| corner.min(stop))
     }
 
     fn dynamic_progress(&self, time: f64, end: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! What a run can end with, by name and with its numbers.
 
-use crate::model::{Jump, Model, MotionKind, MotorJump, Reading, SlotKind, StageError, StageKind};
+use crate::model::{Jump, Model, MotionKind, MotorJump, SlotKind, StageError, StageKind};
 use crate::tensor::Vec3;
 use std::fmt;
 
@@ -323,9 +323,8 @@ pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<S
     match error {
         StageError::Jump(Jump { from, to, .. }) if from == to => None,
         StageError::Jump(jump) => {
-            let history = model.motions[jump.motion].history.as_ref();
             // At the very start there is no stage before that could hold anything.
-            match history.map(Reading::has_own_stages) {
+            match model.motions[jump.motion].amplitude.has_own_stages() {
                 Some(false) if stage == 0 => Some(START.into()),
                 own_stages => Some(driven(own_stages)),
             }

@@ -66,7 +66,7 @@ impl Run<'_> {
         let moving = self.state.clone();
         self.stand_still();
         let (time, load) = (self.state.time, self.state.load);
-        self.model.set_clock(&mut self.state, time, load);
+        self.schedule.set_clock(&self.model, &mut self.state, time, load);
         self.change_charts(None);
         self.open_account(workshop)?;
         self.warn_out_of_balance(workshop);

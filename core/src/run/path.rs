@@ -446,7 +446,7 @@ impl Path {
         let (mut iterations, mut history) = (0, Vec::new());
         loop {
             // Held directions are put where they belong, free of the round-off of predictor and corrections.
-            run.model.set_clock(&mut run.state, self.here.state.time, load);
+            run.schedule.set_clock(&run.model, &mut run.state, self.here.state.time, load);
             let pull = run.load_derivative(workshop);
             let StageRun { assembly, newton, prescribed_increment, .. } = workshop;
             let seconds = &mut run.counters.work.evaluation_seconds;
@@ -479,7 +479,7 @@ impl Path {
         let here = &self.here;
         run.state.copy_from(&here.state);
         let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
-        charts::carry(&mut run.state, &ahead, &run.model.charted.rotations);
+        charts::carry(&mut run.state, &ahead, &run.schedule.charted(&run.model).rotations);
         run.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
         here.state.load + here.load_rate * length
     }
@@ -579,12 +579,13 @@ impl Path {
 /// Adds a correction; whether nodes changed their charts by it.
 fn correct(run: &mut Run, workshop: &mut StageRun, dq: &[Vec3]) -> bool {
     workshop.assembly.extrapolate(&run.state, dq);
-    charts::carry(&mut run.state, dq, &run.model.charted.rotations);
+    charts::carry(&mut run.state, dq, &run.schedule.charted(&run.model).rotations);
     run.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
-    let switched = charts::switch(&mut run.state, &run.model.charted.rotations, charts::STATIC_BAND, None);
+    let switched =
+        charts::switch(&mut run.state, &run.schedule.charted(&run.model).rotations, charts::STATIC_BAND, None);
     if switched > 0 {
         run.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut run.state, &run.model.charted.elements);
+        charts::freeze(&mut run.state, &run.schedule.charted(&run.model).elements);
     }
     switched > 0
 }

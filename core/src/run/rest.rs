@@ -122,12 +122,13 @@ impl Run<'_> {
 
     fn resist(&self) -> Result<Resisted, Failure> {
         let stage = &self.plan.stages[self.stage];
-        let dof_map = self.model.number(self.stage, self.plane).map_err(|error| self.describe(error))?;
+        let dof_map = self.schedule.dof_map(&self.model, self.plane).map_err(|error| self.describe(error))?;
         let slots = self.model.kinds.iter().enumerate().filter(|(_, kind)| !kind.is_multiplier());
         let slots = slots.map(|(slot, kind)| (slot as Slot, *kind == SlotKind::Rotation)).collect();
-        let mut model = self.model.clone();
-        model.effects.push(Arc::new(Resistance { slots, arm: ARM * model.length }));
-        let assembly = Assembly::new(&stage.context(self.stage), dof_map, &model);
+        let context = stage.context(self.stage);
+        let mut acting = self.model.acting(&context);
+        acting.push(Arc::new(Resistance { slots, arm: ARM * self.model.length }));
+        let assembly = Assembly::of(acting, &context, dof_map, &self.model);
         let newton = self.newton_for(stage, &assembly)?;
         Ok(Resisted { assembly, newton, steps: MOST_STEPS })
     }
@@ -185,7 +186,7 @@ impl Run<'_> {
     fn gentle_resistance(&mut self, resisted: &mut Resisted, load: f64) -> f64 {
         self.state.copy_all_but_rates(&self.good);
         let time = self.state.time;
-        self.model.set_clock(&mut self.state, time, load);
+        self.schedule.set_clock(&self.model, &mut self.state, time, load);
         resisted.assembly.evaluate(&self.state, Weights::NONE, None);
         self.model.largest_force(&resisted.assembly.system) / (GENTLE * self.model.length)
     }
@@ -237,7 +238,7 @@ impl Run<'_> {
         let scale = if extent > 0.0 { PUSH / extent } else { 0.0 };
         let scales = self.model.kinds.iter().map(|kind| if kind.is_multiplier() { 0.0 } else { scale });
         motion.iter_mut().zip(scales).for_each(|(motion, scale)| *motion = *motion * scale);
-        charts::carry(&mut self.state, &motion, &self.model.charted.rotations);
+        charts::carry(&mut self.state, &motion, &self.schedule.charted(&self.model).rotations);
         Equilibrium.correct(&mut self.state, &motion);
     }
 

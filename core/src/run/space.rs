@@ -24,7 +24,7 @@ impl Run<'_> {
 
     fn set_up_in_space(&self, in_plane: &StageRun) -> Result<Space, Failure> {
         let context = self.plan.stages[self.stage].context(self.stage);
-        let dof_map = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
+        let dof_map = self.schedule.dof_map(&self.model, None).map_err(|error| self.describe(error))?;
         let assembly = Assembly::new(&context, dof_map, &self.model);
         let (solver, system) = (&in_plane.newton.solver, &in_plane.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &self.model.multipliers) {

@@ -9,20 +9,23 @@ use super::rehearsal::lacking;
 use super::space::Space;
 use super::warnings::IssuedWarnings;
 use crate::integrate::{Increments, Predictor};
-use crate::model::{Assembly, Model, StageError, charts};
+use crate::model::{Assembly, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure, NullVector};
 use crate::system::{Plane, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads;
 use crate::warning::WarningKind;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Strains that may be left where an iteration ends.
 const TOLERATED_STRAIN: f64 = 1e-9;
 
 /// A run in progress.
 pub struct Run<'o> {
-    pub(super) model: Model,
+    pub(super) model: Arc<Model>,
+    /// What loads and motions do in the present stage
+    pub(super) schedule: Schedule,
     pub(super) state: State,
     /// The last converged state, to go back to
     pub(super) good: State,
@@ -71,11 +74,13 @@ pub(super) struct StageRun {
 impl<'o> Run<'o> {
     /// A run at its start.
     pub fn new(plan: Plan, observer: &'o mut dyn Observer) -> Self {
-        let (model, state) = (plan.model.clone(), plan.model.rest());
+        let model = plan.model.clone();
+        let state = model.rest();
         Self {
             good: state.clone(),
             state,
             bookkeeper: Bookkeeper::default(),
+            schedule: Schedule::new(&model),
             model,
             plan,
             counters: Counters::default(),
@@ -122,7 +127,7 @@ impl<'o> Run<'o> {
             self.judge_steps(&mut workshop);
             result?;
             self.hand_over(&mut workshop);
-            self.model.end_stage(&self.state);
+            self.schedule.end_stage(&self.model, &self.state);
         }
         Ok(())
     }
@@ -144,11 +149,11 @@ impl<'o> Run<'o> {
     fn open_stage(&mut self, stage: &Stage) -> Result<StageRun, Failure> {
         let kind = stage.work.kind();
         (self.soft, self.cutbacks_before) = (false, self.counters.cutbacks);
-        self.fresh = self.stage == 0 || self.model.has_fresh_loads(self.stage);
-        let begun = self.model.begin_stage(self.stage, kind, &self.state);
+        self.fresh = self.stage == 0 || self.schedule.has_fresh_loads(&self.model, self.stage);
+        let begun = self.schedule.begin_stage(&self.model, self.stage, kind, &self.state);
         let dof_map = begun.map_err(|error| self.describe(error))?;
         let fading = !self.state.fading.is_empty();
-        if let Some(error) = lacking(&self.model, stage, self.stage, fading, || Some(dof_map.clone())) {
+        if let Some(error) = lacking(&self.model, &self.schedule, stage, self.stage, fading, || Some(dof_map.clone())) {
             return Err(self.describe(error));
         }
         self.plane = dof_map.plane().copied();
@@ -309,9 +314,11 @@ impl<'o> Run<'o> {
             // Rotations of any size, without charts.
             self.state.unwrapped.clear();
         }
-        let is_prescribed = |slot: Slot| self.model.motions.iter().any(|motion| motion.slot == slot && motion.acts());
-        charts::unwind(&mut self.state, &self.good, &self.model.charted, is_prescribed);
-        let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
+        let (model, schedule) = (&self.model, &self.schedule);
+        let moves = |slot: Slot, (motion, timeline): (&Motion, Timeline)| motion.slot == slot && timeline.acts();
+        let is_prescribed = |slot: Slot| schedule.motions(model).any(|motion| moves(slot, motion));
+        charts::unwind(&mut self.state, &self.good, self.schedule.charted(&self.model), is_prescribed);
+        let ambiguous = charts::wind(&mut self.state, &self.good, &self.schedule.charted(&self.model).rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
         }
@@ -325,7 +332,8 @@ impl<'o> Run<'o> {
 
     pub(super) fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.told.coarse { charts::COARSE } else { charts::COARSE_WARNING };
-        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.charted.elements, limit) else {
+        let Some((element, angle)) = charts::coarsest(&self.state, &self.schedule.charted(&self.model).elements, limit)
+        else {
             return Ok(());
         };
         let failure = self.name_coarse(element, angle);
@@ -338,7 +346,7 @@ impl<'o> Run<'o> {
     }
 
     fn name_coarse(&self, element: usize, angle: f64) -> Failure {
-        let rotations = self.model.charted.elements[element].rotations();
+        let rotations = self.schedule.charted(&self.model).elements[element].rotations();
         let names = [rotations[0], rotations[rotations.len() - 1]].map(|slot| self.model.node_at(slot as usize));
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
     }
@@ -361,7 +369,7 @@ impl<'o> Run<'o> {
 
     /// Between the last good state and this one neighbours may have turned past pi against each other: smaller steps tell.
     pub(super) fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
-        match charts::leapt(&self.state, &self.good, &self.model.charted.elements) {
+        match charts::leapt(&self.state, &self.good, &self.schedule.charted(&self.model).elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
             None => Ok(()),
         }

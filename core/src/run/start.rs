@@ -28,7 +28,7 @@ impl Run<'_> {
         });
         self.state.a.fill(Vec3::ZERO);
         let (time, amplitude) = (self.state.time, self.state.amplitude.clone());
-        self.model.set_clock(&mut self.state, time, 1.0);
+        self.schedule.set_clock(&self.model, &mut self.state, time, 1.0);
         if let Some(jump) = self.model.motor_jumps(&amplitude, &self.state).into_iter().next() {
             return Err(self.describe(StageError::MotorJump(jump)));
         }

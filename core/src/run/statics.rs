@@ -79,10 +79,10 @@ impl Run<'_> {
         self.stand_still();
         let time = self.state.time;
         let held = self.state.q.clone();
-        self.model.set_clock(&mut self.state, time, 0.0);
+        self.schedule.set_clock(&self.model, &mut self.state, time, 0.0);
         self.state.q = held;
-        charts::switch(&mut self.state, &self.model.charted.rotations, charts::STATIC_BAND, None);
-        charts::freeze(&mut self.state, &self.model.charted.elements);
+        charts::switch(&mut self.state, &self.schedule.charted(&self.model).rotations, charts::STATIC_BAND, None);
+        charts::freeze(&mut self.state, &self.schedule.charted(&self.model).elements);
         self.take_over(workshop);
         self.linearise(workshop)?;
         workshop.assembly.evaluate(&self.state, Weights::STIFFNESS, None);
@@ -286,7 +286,7 @@ impl Run<'_> {
     pub(super) fn set_load(&mut self, prescribed_increment: &mut Vec<Vec3>, load: f64) -> Result<bool, NewtonFailure> {
         threads::copy(prescribed_increment, if self.model.motions.is_empty() { &[] } else { &self.state.q });
         let time = self.state.time;
-        if let Some((slot, angle)) = self.model.set_clock(&mut self.state, time, load) {
+        if let Some((slot, angle)) = self.schedule.set_clock(&self.model, &mut self.state, time, load) {
             return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
         }
         for (prescribed_increment, q) in prescribed_increment.iter_mut().zip(&mut self.state.q) {

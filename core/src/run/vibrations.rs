@@ -44,7 +44,7 @@ impl Run<'_> {
         }
         let stage = self.plan.stages[self.stage].context(self.stage);
         let context = StageContext { kind: StageKind::Modal, ..stage };
-        let dof_map = self.model.number(self.stage, None).map_err(|error| self.describe(error))?;
+        let dof_map = self.schedule.dof_map(&self.model, None).map_err(|error| self.describe(error))?;
         let is_massless = self.model.lacks_mass(&context, &dof_map);
         let is_even_in_space = self.plane.is_none() && signature.is_some_and(|signature| !signature.tells_unstable());
         if dof_map.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {

@@ -215,7 +215,7 @@ impl Run<'_> {
         if self.plane.is_some() {
             return;
         }
-        let angle = charts::widest_in_one_chart(&self.state, &self.model.charted.elements);
+        let angle = charts::widest_in_one_chart(&self.state, &self.schedule.charted(&self.model).elements);
         let error = FRAME_ERROR * angle * angle;
         if error > self.told.frame {
             self.told.frame = 2.0 * error;

@@ -11,7 +11,7 @@ use super::stress_predictor::StressPredictor;
 use super::tangent::Tangent;
 use crate::integrate::{Increments, Method, Step, TimeError};
 use crate::kernel::Weights;
-use crate::model::{Assembly, Model, charts};
+use crate::model::{Assembly, Charted, Model, charts};
 use crate::scalar::CompressedField;
 use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
@@ -271,7 +271,7 @@ impl Newton {
             if changes_charts && iterations == 1 {
                 self.first.take(self.dq.len(), |slot| self.dq[slot].0);
             }
-            Self::add(model, state, method, &self.dq);
+            Self::add(model.charted(assembly.stage.kind), state, method, &self.dq);
             // What was a correction before is none in a new chart: it may not end the iteration.
             let switched = changes_charts && self.change_charts(model, assembly, state, work);
             self.last = Some(if switched { f64::INFINITY } else { length });
@@ -343,14 +343,14 @@ impl Newton {
         self.show_rates(assembly, state, method, work);
         let mut tangent = Tangent::that_may_go(assembly, state, method.weights());
         if self.substitute(&mut tangent, None, formed, work) && size(model, &self.dq) <= most {
-            Self::add(model, state, method, &self.dq);
+            Self::add(model.charted(assembly.stage.kind), state, method, &self.dq);
         }
     }
 
     /// Corrects a state.
-    fn add(model: &Model, state: &mut State, method: &dyn Method, dq: &[Vec3]) {
+    fn add(charted: &Charted, state: &mut State, method: &dyn Method, dq: &[Vec3]) {
         if method.changes_charts() {
-            charts::carry(state, dq, &model.charted.rotations);
+            charts::carry(state, dq, &charted.rotations);
         }
         method.correct(state, dq);
     }
@@ -391,13 +391,13 @@ impl Newton {
 
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent stays regular at any turn; whether one did.
     fn change_charts(&mut self, model: &Model, assembly: &mut Assembly, state: &mut State, work: &mut Work) -> bool {
-        let rotations = &model.charted.rotations;
-        if charts::first_beyond(state, rotations, charts::STATIC_BAND).is_none() {
+        let charted = model.charted(assembly.stage.kind);
+        if charts::first_beyond(state, &charted.rotations, charts::STATIC_BAND).is_none() {
             return false;
         }
         self.foresight.foresee(assembly, state, &self.dq);
-        work.chart_switches += charts::switch(state, rotations, charts::STATIC_BAND, None) as u64;
-        charts::freeze(state, &model.charted.elements);
+        work.chart_switches += charts::switch(state, &charted.rotations, charts::STATIC_BAND, None) as u64;
+        charts::freeze(state, &charted.elements);
         self.reuse.forget();
         true
     }
