@@ -4,7 +4,7 @@ use super::load::Loaded;
 use super::{Status, Verdict, json, load, on_threads, say, threads_of};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use beamsim_core::model::{Assembly, EffectSize};
+use beamsim_core::model::{Assembly, EffectSize, Schedule};
 use beamsim_core::run::{Failure, Moment, refusal};
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::threads;
@@ -212,18 +212,19 @@ const VECTORS_IN_SPACE: usize = 6;
 
 /// Unknowns, entries of the tangent, memory, and what each effect adds to them; and whether the first stage can begin.
 fn tell_size(scene: &Scene) -> Result<Vec<EffectSize>, String> {
-    let mut model = scene.plan.model.clone();
+    let model = &scene.plan.model;
+    let mut schedule = Schedule::new(model);
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
-    let begun = model.begin_stage(0, kind, &state);
-    let equations = begun.map_err(|error| format!("stage 1: {}", refusal(&error, &model)))?;
+    let begun = schedule.begin_stage(model, 0, kind, &state);
+    let equations = begun.map_err(|error| format!("stage 1: {}", refusal(&error, model)))?;
     let (free, slots) = (equations.count(), model.slots());
     let context = scene.plan.stages[0].context(0);
     let shares = model.shares(&context, &equations);
     // A planar scene is kept in space, too, for the looks out of the plane.
-    let in_space = equations.plane().and_then(|_| model.number(0, None).ok());
-    let in_space = in_space.map(|equations| Assembly::new(&context, equations, &model).system.pattern.values());
-    let assembly = Assembly::new(&context, equations, &model);
+    let in_space = equations.plane().and_then(|_| schedule.dof_map(model, None).ok());
+    let in_space = in_space.map(|equations| Assembly::new(&context, equations, model).system.pattern.values());
+    let assembly = Assembly::new(&context, equations, model);
     let entries = assembly.system.pattern.nonzeros();
     let vectors = if kind.advances_time() { VECTORS_IN_DYNAMICS } else { VECTORS };
     let vectors = vectors + in_space.map_or(0, |_| VECTORS_IN_SPACE);

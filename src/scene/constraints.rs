@@ -5,7 +5,7 @@ use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
-use beamsim_core::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
+use beamsim_core::model::{Amplitude, History, Motion, MotionKind, Reading, StageSet, Support, Table};
 use beamsim_core::run::Driven;
 use beamsim_core::system::{Direction, Node, Slot};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -97,7 +97,7 @@ pub fn constraints(
             Ok(None) => {}
             Ok(Some(motor)) => {
                 let (span, history) = (&connection.joint.span, connection.joint.motor.as_ref());
-                note(&mut held, &motor.directions(), &motor.stages, span, "motion");
+                note(&mut held, &motor.directions(), motor.amplitude.stages(), span, "motion");
                 driven.push(table(motions.len(), "motor", span, history.and_then(|(_, history)| history.as_ref())));
                 motions.push(motor);
             }
@@ -108,7 +108,7 @@ pub fn constraints(
         match read_motion(deck, mesh, histories, motion) {
             Ok(found) => {
                 driven.push(table(motions.len(), "motion", &motion.span, motion.history.as_ref()));
-                note(&mut held, &found.directions(), &found.stages, &motion.span, "motion");
+                note(&mut held, &found.directions(), found.amplitude.stages(), &motion.span, "motion");
                 motions.push(found);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -142,7 +142,7 @@ fn ground_motor(
         deck::JointKind::Prismatic => (MotionKind::Translation, node.u),
         _ => (MotionKind::Rotation, node.p),
     };
-    Ok(Some(Motion::new(kind, slot, axis, *value, history, StageSet::default())))
+    Ok(Some(Motion { kind, slot, axis, amplitude: Amplitude::of_motion(*value, history, StageSet::default()) }))
 }
 
 /// The history that a table names.
@@ -181,13 +181,23 @@ fn read_motion(
     Ok(match motion.what {
         MotionWhat::Displacement { direction, value } => {
             let axis = axes(motion.axes).column(direction);
-            Motion::new(MotionKind::Translation, node.u, axis, value, history, stages)
+            Motion {
+                kind: MotionKind::Translation,
+                slot: node.u,
+                axis,
+                amplitude: Amplitude::of_motion(value, history, stages),
+            }
         }
         MotionWhat::Rotation { axis, angle } => {
             let Some(axis) = (axes(motion.axes) * Vec3(axis)).normalized() else {
                 return Err(Diagnostic::error("`rotate` is an axis and must not be zero", motion.span.clone()));
             };
-            Motion::new(MotionKind::Rotation, node.p, axis, angle, history, stages)
+            Motion {
+                kind: MotionKind::Rotation,
+                slot: node.p,
+                axis,
+                amplitude: Amplitude::of_motion(angle, history, stages),
+            }
         }
     })
 }

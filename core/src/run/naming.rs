@@ -60,7 +60,7 @@ impl StageRun<'_> {
     }
 
     pub fn name_coarse(&self, element: usize, angle: f64) -> Failure {
-        let rotations = self.model.charted.elements[element].rotations();
+        let rotations = self.charted.elements[element].rotations();
         let names = [rotations[0], rotations[rotations.len() - 1]].map(|slot| self.model.node_at(slot as usize));
         Failure::MeshTooCoarse { at: self.moment(), nodes: names, relative_rotation: angle }
     }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Plan {
     /// The scene
-    pub model: Model,
+    pub model: Arc<Model>,
     /// Velocities at the start of the first dynamic stage
     pub initial: Vec<InitialMotion>,
     /// The stages in their order

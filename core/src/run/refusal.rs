@@ -1,6 +1,6 @@
 //! Why stages cannot begin, in words.
 
-use crate::model::{Jump, Model, MotionKind, MotorJump, Reading, StageError, StageKind};
+use crate::model::{Jump, Model, MotionKind, MotorJump, StageError, StageKind};
 
 /// Why a stage cannot begin.
 pub fn refusal(error: &StageError, model: &Model) -> String {
@@ -55,9 +55,8 @@ pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<S
     match error {
         StageError::Jump(Jump { from, to, .. }) if from == to => None,
         StageError::Jump(jump) => {
-            let history = model.motions[jump.motion].history.as_ref();
             // At the very start there is no stage before that could hold anything.
-            match history.map(Reading::has_own_stages) {
+            match model.motions[jump.motion].amplitude.has_own_stages() {
                 Some(false) if stage == 0 => Some(START.into()),
                 own_stages => Some(driven(own_stages)),
             }

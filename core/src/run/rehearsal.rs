@@ -5,7 +5,7 @@
 //! prescribed motions moves.
 
 use super::plan::{InitialMotion, Plan, Stage};
-use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
+use crate::model::{Model, Motion, MotionKind, NOTICED, Schedule, StageError, StageKind, Timeline};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
 use std::collections::HashMap;
@@ -91,13 +91,14 @@ pub fn rehearse(plan: &Plan) -> Rehearsal {
 /// `fading`: forces that a motion left may fade with the load factor.
 pub(super) fn lacking(
     model: &Model,
+    schedule: &Schedule,
     stage: &Stage,
     number: usize,
     fading: bool,
     dof_map: impl FnOnce() -> Option<DofMap>,
 ) -> Option<StageError> {
     let kind = stage.work.kind();
-    if stage.work.follows_path() && !fading && !stage.rotating && model.is_idle() {
+    if stage.work.follows_path() && !fading && !stage.rotating && schedule.is_idle() {
         return Some(StageError::NothingGrows(kind));
     }
     let lacks_mass = kind.needs_mass() && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
@@ -105,7 +106,8 @@ pub(super) fn lacking(
 }
 
 struct Rehearser<'p> {
-    model: Model,
+    model: &'p Model,
+    schedule: Schedule,
     state: State,
     initial: &'p [InitialMotion],
     found: Rehearsal,
@@ -137,8 +139,9 @@ struct HeldAxes {
 
 impl<'p> Rehearser<'p> {
     fn new(plan: &'p Plan) -> Self {
-        let model = plan.model.clone();
+        let model = &*plan.model;
         Self {
+            schedule: Schedule::new(model),
             state: model.rest(),
             initial: &plan.initial,
             found: Rehearsal::default(),
@@ -153,8 +156,8 @@ impl<'p> Rehearser<'p> {
     fn begin(&mut self, number: usize, stage: &Stage) {
         let kind = stage.work.kind();
         let clock = self.state.time;
-        let fresh = number == 0 || self.model.has_fresh_loads(number);
-        let jumps = self.model.settle(number, kind, &self.state);
+        let fresh = number == 0 || self.schedule.has_fresh_loads(self.model, number);
+        let jumps = self.schedule.settle(self.model, number, kind, &self.state);
         if self.sure {
             let certain = jumps.into_iter().filter(|jump| self.determined[jump.motion]);
             self.found.refusals.extend(certain.map(|jump| (number, StageError::Jump(jump))));
@@ -163,13 +166,14 @@ impl<'p> Rehearser<'p> {
             self.look_at_static_motions(number, kind);
         }
         let fading = self.has_moved && kind.ramps_load();
-        let lacks = lacking(&self.model, stage, number, fading, || self.model.number(number, None).ok());
+        let lacks =
+            lacking(self.model, &self.schedule, stage, number, fading, || self.schedule.dof_map(self.model, None).ok());
         self.found.refusals.extend(lacks.map(|error| (number, error)));
         let amplitude = self.state.amplitude.clone();
         self.state.load = kind.first_load(self.state.load, fresh);
         if !kind.advances_time() {
             let load = self.state.load;
-            self.model.set_clock(&mut self.state, clock, load);
+            self.schedule.set_clock(self.model, &mut self.state, clock, load);
             return;
         }
         let begins = !std::mem::replace(&mut self.has_moved, true);
@@ -178,7 +182,7 @@ impl<'p> Rehearser<'p> {
             self.initial.iter().for_each(|motion| motion.give_to(&mut self.state));
         }
         let given = self.state.v.clone();
-        self.model.set_clock(&mut self.state, clock, 1.0);
+        self.schedule.set_clock(self.model, &mut self.state, clock, 1.0);
         if !self.sure {
             return;
         }
@@ -195,7 +199,7 @@ impl<'p> Rehearser<'p> {
     /// Rotations that motions have turned.
     fn look_at_hinges(&mut self, number: usize) {
         if self.model.motions.iter().any(|motion| motion.kind == MotionKind::Rotation) {
-            let turned = self.model.refuse_turned_hinges(number, &self.state);
+            let turned = self.schedule.refuse_turned_hinges(self.model, &self.state);
             self.found.refusals.extend(turned.err().map(|error| (number, error)));
         }
     }
@@ -205,9 +209,11 @@ impl<'p> Rehearser<'p> {
     fn look_at_amplitudes(&mut self, number: usize, kind: StageKind) {
         let Some(before) = &self.before else { return };
         let load = if kind.ramps_load() { 0.0 } else { 1.0 };
-        for (k, amplitude) in self.model.amplitudes.iter().enumerate() {
-            let (from, [to, ..]) = (amplitude.reached(), amplitude.at(self.state.time, load));
-            if amplitude.follows_history() && amplitude.acts_in(before.number) && differ(from, to, SAME_VALUE) {
+        for (k, timeline) in self.schedule.loads(self.model).enumerate() {
+            let from = timeline.reached();
+            let [to, ..] = timeline.at(self.state.time, load);
+            let acted = self.model.amplitudes[k].acts_in(before.number);
+            if timeline.follows_history() && acted && differ(from, to, SAME_VALUE) {
                 let how = JumpKind::Value { from, to };
                 self.found.jumps.push(HistoryJump { stage: number, what: Driven::Amplitude(k), how });
             }
@@ -219,9 +225,10 @@ impl<'p> Rehearser<'p> {
         if self.before.is_none() || !kind.ramps_load() {
             return;
         }
-        for (k, motion) in self.model.motions.iter().enumerate() {
-            let ((from, _), to) = (motion.reached(&self.state), motion.start(self.state.time));
-            let jumps = motion.follows_history() && motion.is_apart(from, to, self.model.length);
+        for (k, (motion, timeline)) in self.schedule.motions(self.model).enumerate() {
+            let from = timeline.reached();
+            let [to, ..] = timeline.at(self.state.time, 0.0);
+            let jumps = timeline.follows_history() && motion.is_apart(from, to, self.model.length);
             if self.determined[k] && jumps {
                 let how = JumpKind::Value { from, to };
                 self.found.jumps.push(HistoryJump { stage: number, what: Driven::Motion(k), how });
@@ -232,8 +239,9 @@ impl<'p> Rehearser<'p> {
     /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give,
     /// where they do.
     fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>) {
-        for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
-            let [value, rate, rate2] = motion.at(self.state.time, 1.0);
+        let motions = self.schedule.motions(self.model).enumerate();
+        for (k, (motion, timeline)) in motions.filter(|(_, (_, timeline))| timeline.acts()) {
+            let [value, rate, rate2] = timeline.at(self.state.time, 1.0);
             let from = match (given, &self.before) {
                 (Some(given), _) => Some(velocity_along(motion, given, rate)),
                 (None, Some(before)) => before.velocities[k],
@@ -242,9 +250,7 @@ impl<'p> Rehearser<'p> {
             let how = if ![value, rate, rate2].iter().all(|value| value.is_finite()) {
                 Some(JumpKind::NotFinite)
             } else {
-                let fastest =
-                    motion.history.as_ref().and_then(Reading::fastest).map(|rate| (rate * motion.value).abs());
-                from.and_then(|from| velocity_jump(from, rate, fastest, given.is_some()))
+                from.and_then(|from| velocity_jump(from, rate, motion.amplitude.fastest(), given.is_some()))
             };
             self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motion(k), how }));
         }
@@ -277,12 +283,11 @@ impl<'p> Rehearser<'p> {
             let how = next.filter(|&time| time < end).map(|time| JumpKind::Kink { time });
             jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
         };
-        for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
-            look(motion.next_kink(clock), Driven::Motion(k));
+        for (k, (_, timeline)) in self.schedule.motions(self.model).enumerate() {
+            look(timeline.next_kink(clock), Driven::Motion(k));
         }
-        let amplitudes = &self.model.amplitudes;
         self.model.each_motor(&self.state, &mut |motor| {
-            look(amplitudes[motor.amplitude].next_kink(clock), Driven::Motor(motor.slot));
+            look(self.schedule.load(self.model, motor.amplitude).next_kink(clock), Driven::Motor(motor.slot));
         });
     }
 
@@ -290,16 +295,18 @@ impl<'p> Rehearser<'p> {
         let kind = stage.work.kind();
         let time = stage.work.end().unwrap_or(self.state.time);
         let load = kind.last_load(self.state.load);
-        self.model.set_clock(&mut self.state, time, load);
-        self.model.end_stage(&self.state);
+        self.schedule.set_clock(self.model, &mut self.state, time, load);
+        self.schedule.end_stage(self.model, &self.state);
         self.sure &= stage.until.is_none();
         if !kind.advances_state() {
             return;
         }
+        let velocity = |timeline: Timeline| timeline.acts().then(|| timeline.rate_before(time));
+        let velocities = self.schedule.motions(self.model).map(|(_, timeline)| velocity(timeline));
         self.before = Some(Before {
             number,
-            rates: self.model.amplitudes.iter().map(|amplitude| amplitude.rate_before(time)).collect(),
-            velocities: self.model.motions.iter().map(|m| m.acts().then(|| m.velocity_before(time))).collect(),
+            rates: self.schedule.loads(self.model).map(|timeline| timeline.rate_before(time)).collect(),
+            velocities: velocities.collect(),
         });
         self.look_for_loose_ends(number);
     }
@@ -307,9 +314,9 @@ impl<'p> Rehearser<'p> {
     /// Finds the motions whose nodes motions and supports of this stage alone do not hold.
     fn look_for_loose_ends(&mut self, stage: usize) {
         let mut held: HashMap<Slot, HeldAxes> = HashMap::new();
-        for motion in &self.model.motions {
+        for (motion, timeline) in self.schedule.motions(self.model) {
             let held = held.entry(motion.slot).or_default();
-            if motion.acts() {
+            if timeline.acts() {
                 held.axes.push(motion.axis);
                 held.turned |= motion.kind == MotionKind::Rotation;
             }

@@ -12,13 +12,16 @@ use super::plan::{Plan, StageWork};
 use super::rehearsal::lacking;
 use super::stage_run::{Analysis, Past, StageRun, newton_for};
 use super::statics::{ArcLength, LoadLevels};
-use crate::model::{Assembly, Model};
+use crate::model::{Assembly, Model, Schedule};
 use crate::system::State;
+use std::sync::Arc;
 
 /// A run in progress, between its stages.
 pub struct Run<'o> {
     plan: Plan,
-    model: Model,
+    model: Arc<Model>,
+    /// The courses of loads and motions
+    schedule: Schedule,
     state: State,
     /// The last converged state
     good: State,
@@ -36,6 +39,7 @@ impl<'o> Run<'o> {
         let state = model.rest();
         Self {
             plan,
+            schedule: Schedule::new(&model),
             model,
             good: state.clone(),
             state,
@@ -68,18 +72,18 @@ impl<'o> Run<'o> {
             }
         }?;
         run.hand_over();
-        self.model.end_stage(&self.state);
+        self.schedule.end_stage(&self.model, &self.state);
         Ok(())
     }
 
     /// Settles loads and constraints of a stage, and analyses the pattern of its unknowns.
     fn open_stage(&mut self, number: usize) -> Result<StageRun<'_>, Failure> {
         let stage = &self.plan.stages[number];
-        let fresh = number == 0 || self.model.has_fresh_loads(number);
-        let begun = self.model.begin_stage(number, stage.work.kind(), &self.state);
+        let fresh = number == 0 || self.schedule.has_fresh_loads(&self.model, number);
+        let begun = self.schedule.begin_stage(&self.model, number, stage.work.kind(), &self.state);
         let dof_map = begun.map_err(|error| describe(error, &self.model, number))?;
         let fading = !self.state.fading.is_empty();
-        if let Some(error) = lacking(&self.model, stage, number, fading, || Some(dof_map.clone())) {
+        if let Some(error) = lacking(&self.model, &self.schedule, stage, number, fading, || Some(dof_map.clone())) {
             return Err(describe(error, &self.model, number));
         }
         let plane = dof_map.plane().copied();
@@ -89,7 +93,9 @@ impl<'o> Run<'o> {
             keeps_account: self.plan.energy,
             plan: &self.plan,
             number,
-            model: &mut self.model,
+            model: &self.model,
+            charted: self.model.charted(stage.work.kind()),
+            schedule: &mut self.schedule,
             state: &mut self.state,
             good: &mut self.good,
             observer: &mut *self.observer,

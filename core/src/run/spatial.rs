@@ -16,7 +16,7 @@ pub(super) struct InSpace {
 impl InSpace {
     fn new(stage: &StageRun) -> Result<Self, Failure> {
         let context = stage.stage().context(stage.number);
-        let dof_map = stage.model.number(stage.number, None).map_err(|error| stage.describe(error))?;
+        let dof_map = stage.schedule.dof_map(stage.model, None).map_err(|error| stage.describe(error))?;
         let assembly = Assembly::new(&context, dof_map, stage.model);
         let (solver, system) = (&stage.newton.solver, &stage.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &stage.model.multipliers) {

@@ -6,7 +6,7 @@ use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
 use super::observer::{Counters, Observer, Snapshot};
 use super::plan::{Plan, Stage};
-use crate::model::{Assembly, Model, StageError, charts};
+use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
 use crate::system::{Plane, Slot, State, System};
 use crate::tensor::Vec3;
@@ -59,7 +59,11 @@ pub(super) struct StageRun<'r> {
     pub plan: &'r Plan,
     /// From 0
     pub number: usize,
-    pub model: &'r mut Model,
+    pub model: &'r Model,
+    /// The rotations and elements that have charts in the stage: none where it is linear
+    pub charted: &'r Charted,
+    /// The courses of loads and motions
+    pub schedule: &'r mut Schedule,
     pub state: &'r mut State,
     /// The last converged state, to go back to
     pub good: &'r mut State,
@@ -224,9 +228,10 @@ impl StageRun<'_> {
             // Rotations of any size, without charts.
             self.state.unwrapped.clear();
         }
-        let is_prescribed = |slot: Slot| self.model.motions.iter().any(|motion| motion.slot == slot && motion.acts());
-        charts::unwind(&mut self.state, &self.good, &self.model.charted, is_prescribed);
-        let ambiguous = charts::wind(&mut self.state, &self.good, &self.model.charted.rotations);
+        let moves = |slot: Slot, (motion, timeline): (&Motion, Timeline)| motion.slot == slot && timeline.acts();
+        let is_prescribed = |slot: Slot| self.schedule.motions(self.model).any(|motion| moves(slot, motion));
+        charts::unwind(self.state, self.good, self.charted, is_prescribed);
+        let ambiguous = charts::wind(&mut self.state, &self.good, &self.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
         }
@@ -240,7 +245,7 @@ impl StageRun<'_> {
 
     pub fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.issued.coarse { charts::COARSE } else { charts::COARSE_WARNING };
-        let Some((element, angle)) = charts::coarsest(&self.state, &self.model.charted.elements, limit) else {
+        let Some((element, angle)) = charts::coarsest(&self.state, &self.charted.elements, limit) else {
             return Ok(());
         };
         let failure = self.name_coarse(element, angle);
@@ -272,7 +277,7 @@ impl StageRun<'_> {
     /// Between the last good state and this one neighbours may have turned past pi against each
     /// other: smaller steps tell.
     pub fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
-        match charts::leapt(&self.state, &self.good, &self.model.charted.elements) {
+        match charts::leapt(&self.state, &self.good, &self.charted.elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
             None => Ok(()),
         }
@@ -281,9 +286,9 @@ impl StageRun<'_> {
     /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how
     /// many did. `lag`: see [`charts::switch`].
     pub fn change_charts(&mut self, lag: Option<f64>) -> usize {
-        let switched = charts::switch(&mut self.state, &self.model.charted.rotations, charts::DYNAMIC_BAND, lag);
+        let switched = charts::switch(&mut self.state, &self.charted.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut self.state, &self.model.charted.elements);
+        charts::freeze(&mut self.state, &self.charted.elements);
         switched
     }
 

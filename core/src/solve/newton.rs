@@ -14,7 +14,7 @@ use super::work::{Work, timed};
 use crate::effect::RoundOff;
 use crate::integrate::{Increments, Method, Step, TimeError};
 use crate::kernel::Weights;
-use crate::model::{Assembly, Model, charts};
+use crate::model::{Assembly, Charted, Model, charts};
 use crate::scalar::CompressedField;
 use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
@@ -120,6 +120,7 @@ impl Newton {
         let mut solution = Solution {
             newton: self,
             model,
+            charted: model.charted(assembly.stage.kind),
             assembly,
             state,
             method,
@@ -152,6 +153,8 @@ impl Newton {
 struct Solution<'s> {
     newton: &'s mut Newton,
     model: &'s Model,
+    /// The rotations and elements that have charts in the stage
+    charted: &'s Charted,
     assembly: &'s mut Assembly,
     state: &'s mut State,
     method: &'s dyn Method,
@@ -377,7 +380,7 @@ impl Solution<'_> {
     fn add(&mut self) {
         let dq = &self.newton.dq;
         if self.method.changes_charts() {
-            charts::carry(self.state, dq, &self.model.charted.rotations);
+            charts::carry(self.state, dq, &self.charted.rotations);
         }
         self.method.correct(self.state, dq);
     }
@@ -412,14 +415,14 @@ impl Solution<'_> {
     /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent
     /// stays regular at any turn; whether one did.
     fn change_charts(&mut self) -> bool {
-        let rotations = &self.model.charted.rotations;
+        let rotations = &self.charted.rotations;
         if charts::first_beyond(self.state, rotations, charts::STATIC_BAND).is_none() {
             return false;
         }
         let Newton { stress_predictor, reuse, dq, .. } = &mut *self.newton;
         stress_predictor.foresee(self.assembly, self.state, dq);
         self.work.chart_switches += charts::switch(self.state, rotations, charts::STATIC_BAND, None) as u64;
-        charts::freeze(self.state, &self.model.charted.elements);
+        charts::freeze(self.state, &self.charted.elements);
         reuse.forget();
         true
     }

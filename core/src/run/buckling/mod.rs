@@ -91,14 +91,14 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
 impl Buckling<'_, '_> {
     /// Paths are followed from rest.
     fn stand_still(&mut self) -> Result<(), Failure> {
-        let StageRun { model, state, fresh, .. } = &mut *self.stage;
+        let StageRun { model, state, fresh, schedule, .. } = &mut *self.stage;
         state.stand_still();
         if *fresh {
             state.load = 0.0;
         }
         let (time, load) = (state.time, state.load);
         let held = state.q.clone();
-        model.set_clock(state, time, load);
+        schedule.set_clock(model, state, time, load);
         state.q = held;
         self.stage.change_charts(None);
         self.stage.open_account()?;

@@ -61,11 +61,11 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
 
 /// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r
 fn varied_tangent(stage: &mut StageRun, direction: &[Vec3], reach: f64) -> Vec<f64> {
-    let StageRun { assembly, model, state: here, .. } = stage;
+    let StageRun { assembly, model, state: here, schedule, .. } = stage;
     assembly.forget();
     let mut tangent = |reach: f64| {
         let mut state = (*here).clone();
-        model.set_clock(&mut state, here.time, here.load + reach);
+        schedule.set_clock(model, &mut state, here.time, here.load + reach);
         state.q.copy_from_slice(&here.q);
         state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * reach);
         assembly.evaluate(&state, Weights::STIFFNESS, None);

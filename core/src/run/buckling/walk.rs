@@ -46,9 +46,9 @@ pub fn continue_path(stage: &mut StageRun, target: f64) -> Walked {
             }
             continue;
         };
-        charts::freeze(stage.state, &stage.model.charted.elements);
-        charts::wind(stage.state, stage.good, &stage.model.charted.rotations);
-        if charts::coarsest(stage.state, &stage.model.charted.elements, charts::COARSE).is_some() {
+        charts::freeze(stage.state, &stage.charted.elements);
+        charts::wind(stage.state, stage.good, &stage.charted.rotations);
+        if charts::coarsest(stage.state, &stage.charted.elements, charts::COARSE).is_some() {
             stage.state.copy_from(stage.good);
             return Walked::TooCoarse;
         }

@@ -67,7 +67,8 @@ impl<'s, 'r> Dynamics<'s, 'r> {
             scheme,
             adaptive,
             last_length: step,
-            increments: has_increments.then(|| Increments::new(stage.model, &stage.assembly.system.pattern.dof_map)),
+            increments: has_increments
+                .then(|| Increments::new(stage.model, stage.schedule.kind(), &stage.assembly.system.pattern.dof_map)),
             predictor: Predictor::new(stage.model),
             massive: Vec::new(),
             rateless: Vec::new(),
@@ -186,7 +187,7 @@ impl Dynamics<'_, '_> {
     fn settle_charts(&mut self, step: &Step) {
         let totals = self.increments.is_none();
         if let Some(error) = self.stage.newton.time_error.as_mut().filter(|_| totals) {
-            error.change_charts(&self.stage.state, &self.stage.model.charted.rotations);
+            error.change_charts(&self.stage.state, &self.stage.charted.rotations);
         }
         let switched = self.stage.change_charts(totals.then_some(step.scheme.lag() * step.length));
         if totals && switched > 0 {
@@ -271,7 +272,7 @@ impl Dynamics<'_, '_> {
     /// Predicts the state at the end of a step by its scheme, and puts prescribed directions where
     /// they belong.
     fn predict(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
-        let StageRun { newton, state, model, .. } = &mut *self.stage;
+        let StageRun { newton, state, model, schedule, .. } = &mut *self.stage;
         if !self.rateless.is_empty() {
             model.steady(state);
         }
@@ -282,7 +283,7 @@ impl Dynamics<'_, '_> {
             increments.begin(state, &step, self.last_length);
         }
         step.predict(state, self.last_length);
-        match model.set_clock(state, next, 1.0) {
+        match schedule.set_clock(model, state, next, 1.0) {
             Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
             None => Ok(()),
         }
@@ -310,14 +311,14 @@ impl Dynamics<'_, '_> {
 
     /// Beyond half a turn in a step nobody could count the turns of a node.
     fn refuse_turns(&self, length: f64) -> Result<(), NewtonFailure> {
-        let turning = self.stage.model.charted.rotations.iter().copied();
+        let turning = self.stage.charted.rotations.iter().copied();
         turns_within(self.stage.state, turning.filter(|&slot| self.massive[slot as usize]), length)
     }
 
     /// Rotations without inertia have no spin to speak of: they go where balance is. While a step
     /// is iterated the unknown is the increment, or a total vector in the chart it began in.
     fn refuse_massless_turns(&self) -> Result<(), NewtonFailure> {
-        let massless = self.stage.model.charted.rotations.iter().copied().filter(|&slot| !self.massive[slot as usize]);
+        let massless = self.stage.charted.rotations.iter().copied().filter(|&slot| !self.massive[slot as usize]);
         let mut turned = massless.map(|slot| {
             let (k, q) = (slot as usize, self.stage.state.q[slot as usize]);
             (k, if self.stage.state.turn(slot).is_some() { q.norm() } else { (q - self.stage.good.q[k]).norm() })
@@ -376,7 +377,7 @@ impl Dynamics<'_, '_> {
     /// begins and ends within a step would leave no trace in the accelerations at its ends.
     fn next_corner(&self) -> f64 {
         let stop = self.next_stop();
-        self.stage.model.next_corner(self.stage.state.time).map_or(stop, |corner| corner.min(stop))
+        self.stage.schedule.next_corner(self.stage.model, self.stage.state.time).map_or(stop, |corner| corner.min(stop))
     }
 
     /// Tells the observer the part of the stage that lies behind at a time.

@@ -57,10 +57,10 @@ impl Dynamics<'_, '_> {
 
     /// Sets the clock; motors must not jump.
     fn set_clock(&mut self) -> Result<(), Failure> {
-        let StageRun { model, state, .. } = &mut *self.stage;
+        let StageRun { model, state, schedule, .. } = &mut *self.stage;
         state.a.fill(Vec3::ZERO);
         let (time, amplitude) = (state.time, state.amplitude.clone());
-        model.set_clock(state, time, 1.0);
+        schedule.set_clock(model, state, time, 1.0);
         match model.motor_jumps(&amplitude, state).into_iter().next() {
             Some(jump) => Err(self.stage.describe(StageError::MotorJump(jump))),
             None => Ok(()),

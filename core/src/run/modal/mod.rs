@@ -58,10 +58,10 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
 impl Modal<'_, '_> {
     /// Modes are those of the state at rest.
     fn stand_still(&mut self) -> Result<(), Failure> {
-        let StageRun { model, state, .. } = &mut *self.stage;
+        let StageRun { model, state, schedule, .. } = &mut *self.stage;
         state.stand_still();
         let (time, load) = (state.time, state.load);
-        model.set_clock(state, time, load);
+        schedule.set_clock(model, state, time, load);
         self.stage.change_charts(None);
         self.stage.open_account()?;
         self.stage.warn_out_of_balance();

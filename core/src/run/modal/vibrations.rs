@@ -47,7 +47,7 @@ pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signatu
     }
     let own = stage.stage().context(stage.number);
     let context = StageContext { kind: StageKind::Modal, ..own };
-    let dof_map = stage.model.number(stage.number, None).map_err(|error| stage.describe(error))?;
+    let dof_map = stage.schedule.dof_map(stage.model, None).map_err(|error| stage.describe(error))?;
     let is_massless = stage.model.lacks_mass(&context, &dof_map);
     let is_even_in_space = stage.plane.is_none() && signature.is_some_and(|signature| !signature.tells_unstable());
     if dof_map.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {

@@ -2,7 +2,7 @@
 
 use crate::integrate::Equilibrium;
 use crate::kernel::Weights;
-use crate::model::Model;
+use crate::model::{Model, Schedule};
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
 use crate::solve::{NewtonFailure, Tangent, mechanism};
@@ -43,8 +43,8 @@ impl StageRun<'_> {
     /// Sets the load factor. Increments of prescribed motions are not in the state yet, but in
     /// `prescribed_increment`; whether there are any.
     pub fn set_load(&mut self, load: f64) -> Result<bool, NewtonFailure> {
-        let Self { prescribed_increment, state, model, .. } = self;
-        set_load(model, state, load, prescribed_increment)
+        let Self { prescribed_increment, state, model, schedule, .. } = self;
+        set_load(model, schedule, state, load, prescribed_increment)
     }
 
     /// The direction of the path; `None` where nothing varies with the load factor. The tangent
@@ -74,18 +74,18 @@ impl StageRun<'_> {
     /// `prescribed_increment`. Loads and motions without a history are linear in it; the step is
     /// small, so that no motion goes around.
     pub fn load_derivative(&mut self) -> Vec<Vec3> {
-        let Self { assembly, prescribed_increment, state, model, .. } = self;
+        let Self { assembly, prescribed_increment, state, model, schedule, .. } = self;
         prescribed_increment.resize(state.q.len(), Vec3::ZERO);
         let mut here = state.clone();
         let mut shifted = state.clone();
         let inverse = 1.0 / LOAD_STEP;
-        model.set_clock(&mut here, state.time, state.load);
+        schedule.set_clock(model, &mut here, state.time, state.load);
         let mut forces = |state: &State| -> Vec<Vec3> {
             assembly.evaluate(state, Weights::NONE, None);
             (0..state.q.len()).map(|slot| assembly.system.total(slot)).collect()
         };
         let before = forces(state);
-        model.set_clock(&mut shifted, state.time, state.load + LOAD_STEP);
+        schedule.set_clock(model, &mut shifted, state.time, state.load + LOAD_STEP);
         // From where the motions put their directions now, not from where round-off has left them:
         // the step is small.
         for (prescribed_increment, (moved, from)) in prescribed_increment.iter_mut().zip(shifted.q.iter().zip(&here.q))
@@ -101,14 +101,15 @@ impl StageRun<'_> {
 /// Sets the load factor of a state. `increment` takes the increments of prescribed motions, which
 /// are not in the state yet; whether there are any.
 pub(in crate::run) fn set_load(
-    model: &mut Model,
+    model: &Model,
+    schedule: &Schedule,
     state: &mut State,
     load: f64,
     increment: &mut Vec<Vec3>,
 ) -> Result<bool, NewtonFailure> {
     threads::copy(increment, if model.motions.is_empty() { &[] } else { &state.q });
     let time = state.time;
-    if let Some((slot, angle)) = model.set_clock(state, time, load) {
+    if let Some((slot, angle)) = schedule.set_clock(model, state, time, load) {
         return Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle });
     }
     for (increment, q) in increment.iter_mut().zip(&mut state.q) {

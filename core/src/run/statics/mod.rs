@@ -49,14 +49,14 @@ fn begin(stage: &mut StageRun, space: &mut SpatialLook) -> Result<Option<Failure
 
 /// No velocities, and no load that grows.
 fn unload(stage: &mut StageRun) {
-    let StageRun { model, state, .. } = stage;
+    let StageRun { model, state, schedule, charted, .. } = stage;
     state.stand_still();
     let time = state.time;
     let held = state.q.clone();
-    model.set_clock(state, time, 0.0);
+    schedule.set_clock(model, state, time, 0.0);
     state.q = held;
-    charts::switch(state, &model.charted.rotations, charts::STATIC_BAND, None);
-    charts::freeze(state, &model.charted.elements);
+    charts::switch(state, &charted.rotations, charts::STATIC_BAND, None);
+    charts::freeze(state, &charted.elements);
 }
 
 /// The softest motion of the stiffness, which is formed.

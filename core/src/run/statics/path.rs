@@ -261,7 +261,7 @@ impl Path {
         loop {
             // Held directions are put where they belong, free of the round-off of predictor and
             // corrections.
-            stage.model.set_clock(&mut stage.state, self.here.state.time, load);
+            stage.schedule.set_clock(stage.model, &mut stage.state, self.here.state.time, load);
             let pull = stage.load_derivative();
             let StageRun { assembly, newton, prescribed_increment, .. } = stage;
             let seconds = &mut stage.counters.work.evaluation_seconds;
@@ -294,7 +294,7 @@ impl Path {
         let here = &self.here;
         stage.state.copy_from(&here.state);
         let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
-        charts::carry(&mut stage.state, &ahead, &stage.model.charted.rotations);
+        charts::carry(&mut stage.state, &ahead, &stage.charted.rotations);
         stage.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
         here.state.load + here.load_rate * length
     }
@@ -389,12 +389,12 @@ struct Bracket {
 /// Adds a correction; whether nodes changed their charts by it.
 fn correct(stage: &mut StageRun, dq: &[Vec3]) -> bool {
     stage.assembly.extrapolate(&stage.state, dq);
-    charts::carry(&mut stage.state, dq, &stage.model.charted.rotations);
+    charts::carry(&mut stage.state, dq, &stage.charted.rotations);
     stage.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
-    let switched = charts::switch(&mut stage.state, &stage.model.charted.rotations, charts::STATIC_BAND, None);
+    let switched = charts::switch(&mut stage.state, &stage.charted.rotations, charts::STATIC_BAND, None);
     if switched > 0 {
         stage.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut stage.state, &stage.model.charted.elements);
+        charts::freeze(&mut stage.state, &stage.charted.elements);
     }
     switched > 0
 }

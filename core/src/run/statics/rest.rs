@@ -94,12 +94,13 @@ struct Descent<'s, 'r> {
 
 impl<'s, 'r> Descent<'s, 'r> {
     fn new(stage: &'s mut StageRun<'r>) -> Result<Self, Failure> {
-        let dof_map = stage.model.number(stage.number, stage.plane).map_err(|error| stage.describe(error))?;
+        let dof_map = stage.schedule.dof_map(stage.model, stage.plane).map_err(|error| stage.describe(error))?;
         let slots = stage.model.kinds.iter().enumerate().filter(|(_, kind)| !kind.is_multiplier());
         let slots = slots.map(|(slot, kind)| (slot as Slot, *kind == SlotKind::Rotation)).collect();
-        let mut model = stage.model.clone();
-        model.effects.push(Arc::new(Resistance { slots, arm: ARM * model.length }));
-        let assembly = Assembly::new(&stage.stage().context(stage.number), dof_map, &model);
+        let context = stage.stage().context(stage.number);
+        let mut acting = stage.model.acting(&context);
+        acting.push(Arc::new(Resistance { slots, arm: ARM * stage.model.length }));
+        let assembly = Assembly::of(acting, &context, dof_map, stage.model);
         let newton = newton_for(stage.stage(), &assembly, stage.model)?;
         Ok(Self { stage, assembly, newton, steps: MOST_STEPS })
     }
@@ -135,10 +136,10 @@ impl<'s, 'r> Descent<'s, 'r> {
 
     /// The part of a load increment that prescribed motions begin with.
     fn first_part(&mut self, target: f64) -> f64 {
-        let StageRun { model, state, good, .. } = &mut *self.stage;
+        let StageRun { model, schedule, state, good, .. } = &mut *self.stage;
         let mut increment = Vec::new();
         state.copy_all_but_rates(good);
-        let moves = set_load(model, state, target, &mut increment);
+        let moves = set_load(model, schedule, state, target, &mut increment);
         let moved = moves.map(|moves| if moves { size(model, &increment) } else { 0.0 });
         state.copy_all_but_rates(good);
         // What turns too far at once tells no size.
@@ -196,10 +197,10 @@ impl<'s, 'r> Descent<'s, 'r> {
     /// The resistance that lets the largest force at a load factor move its node by little. Motions
     /// that are prescribed are in the state at once: what they strain is to be resisted, too.
     fn gentle_resistance(&mut self, load: f64) -> f64 {
-        let StageRun { model, state, good, .. } = &mut *self.stage;
+        let StageRun { model, state, good, schedule, .. } = &mut *self.stage;
         state.copy_all_but_rates(good);
         let time = state.time;
-        model.set_clock(state, time, load);
+        schedule.set_clock(model, state, time, load);
         self.assembly.evaluate(state, Weights::NONE, None);
         model.largest_force(&self.assembly.system) / (GENTLE * model.length)
     }
@@ -208,9 +209,9 @@ impl<'s, 'r> Descent<'s, 'r> {
     /// come in. `false` where it finds no balance, or none that is a minimum: with less resistance
     /// than some motion gains by the forces there is no way along them.
     fn step_against(&mut self, resistance: f64, first: Option<f64>) -> bool {
-        let StageRun { model, state, counters, .. } = &mut *self.stage;
+        let StageRun { model, schedule, state, counters, .. } = &mut *self.stage;
         let mut increment = Vec::new();
-        let moves = match first.map(|load| set_load(model, state, load, &mut increment)) {
+        let moves = match first.map(|load| set_load(model, schedule, state, load, &mut increment)) {
             Some(Err(_)) => return false,
             Some(Ok(moves)) => moves,
             None => false,
@@ -242,7 +243,7 @@ impl<'s, 'r> Descent<'s, 'r> {
 
     /// From the last good state a little along its softest motion.
     fn push(&mut self) {
-        let StageRun { model, state, good, .. } = &mut *self.stage;
+        let StageRun { model, state, good, charted, .. } = &mut *self.stage;
         let Self { assembly, newton, .. } = self;
         state.copy_all_but_rates(good);
         assembly.forget();
@@ -254,7 +255,7 @@ impl<'s, 'r> Descent<'s, 'r> {
         let scale = if extent > 0.0 { PUSH / extent } else { 0.0 };
         let scales = model.kinds.iter().map(|kind| if kind.is_multiplier() { 0.0 } else { scale });
         motion.iter_mut().zip(scales).for_each(|(motion, scale)| *motion = *motion * scale);
-        charts::carry(state, &motion, &model.charted.rotations);
+        charts::carry(state, &motion, &charted.rotations);
         Equilibrium.correct(state, &motion);
     }
 }
