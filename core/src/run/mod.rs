@@ -25,9 +25,8 @@ mod dynamics;
 mod modal;
 mod statics;
 
-mod run;
+mod sequence;
 
-pub use self::run::Run;
 pub use energy::Ledger;
 pub use failure::{Failure, Moment, Place};
 pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
@@ -36,3 +35,4 @@ pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
 pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
+pub use sequence::Run;

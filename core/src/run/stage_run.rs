@@ -114,7 +114,7 @@ impl StageRun<'_> {
         (origin.time, origin.load) = (self.state.time, self.state.load);
         origin.amplitude.copy_from_slice(&self.state.amplitude);
         origin.amplitude_rates.copy_from_slice(&self.state.amplitude_rates);
-        let linear = self.assembly.linearise(&self.model, &origin);
+        let linear = self.assembly.linearise(self.model, &origin);
         linear.map_err(|conflict| self.describe(StageError::Conflict(conflict)))
     }
 
@@ -147,7 +147,7 @@ impl StageRun<'_> {
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
         if self.keeps_account {
-            self.bookkeeper.add_step(&self.model, &self.state, &self.assembly.system);
+            self.bookkeeper.add_step(self.model, self.state, &self.assembly.system);
         }
         Ok(())
     }
@@ -156,10 +156,10 @@ impl StageRun<'_> {
     fn continue_to_state(&mut self) -> Result<(), Failure> {
         self.refuse_infinities()?;
         if let Some(plane) = &self.plane {
-            self.model.flatten(plane, &mut self.state);
+            self.model.flatten(plane, self.state);
         }
         self.wind()?;
-        self.model.remember(&mut self.state);
+        self.model.remember(self.state);
         Ok(())
     }
 
@@ -169,9 +169,9 @@ impl StageRun<'_> {
         self.state.anchor = None;
         self.continue_to_state()?;
         if self.plan.energy {
-            self.bookkeeper.add_step(&self.model, &self.state, system);
+            self.bookkeeper.add_step(self.model, self.state, system);
         }
-        self.good.copy_all_but_rates(&self.state);
+        self.good.copy_all_but_rates(self.state);
         Ok(())
     }
 
@@ -231,7 +231,7 @@ impl StageRun<'_> {
         let moves = |slot: Slot, (motion, timeline): (&Motion, Timeline)| motion.slot == slot && timeline.acts();
         let is_prescribed = |slot: Slot| self.schedule.motions(self.model).any(|motion| moves(slot, motion));
         charts::unwind(self.state, self.good, self.charted, is_prescribed);
-        let ambiguous = charts::wind(&mut self.state, &self.good, &self.charted.rotations);
+        let ambiguous = charts::wind(self.state, self.good, &self.charted.rotations);
         if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
             self.warn_of_lost_axis(slot);
         }
@@ -245,7 +245,7 @@ impl StageRun<'_> {
 
     pub fn judge_mesh(&mut self) -> Result<(), Failure> {
         let limit = if self.issued.coarse { charts::COARSE } else { charts::COARSE_WARNING };
-        let Some((element, angle)) = charts::coarsest(&self.state, &self.charted.elements, limit) else {
+        let Some((element, angle)) = charts::coarsest(self.state, &self.charted.elements, limit) else {
             return Ok(());
         };
         let failure = self.name_coarse(element, angle);
@@ -277,7 +277,7 @@ impl StageRun<'_> {
     /// Between the last good state and this one neighbours may have turned past pi against each
     /// other: smaller steps tell.
     pub fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
-        match charts::leapt(&self.state, &self.good, &self.charted.elements) {
+        match charts::leapt(self.state, self.good, &self.charted.elements) {
             Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
             None => Ok(()),
         }
@@ -286,9 +286,9 @@ impl StageRun<'_> {
     /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how
     /// many did. `lag`: see [`charts::switch`].
     pub fn change_charts(&mut self, lag: Option<f64>) -> usize {
-        let switched = charts::switch(&mut self.state, &self.charted.rotations, charts::DYNAMIC_BAND, lag);
+        let switched = charts::switch(self.state, &self.charted.rotations, charts::DYNAMIC_BAND, lag);
         self.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut self.state, &self.charted.elements);
+        charts::freeze(self.state, &self.charted.elements);
         switched
     }
 

@@ -20,22 +20,22 @@ use super::statics::Direction;
 use crate::system::State;
 use crate::warning::WarningKind;
 
-/// Looks at one critical load.
+/// Looks at one critical load
 const MOST_LOOKS: usize = 80;
 /// Where pivots cannot be counted: an estimate this near to where it was made; what is left over is
 /// its square.
 const NEAR: f64 = 1e-4;
-/// Just before a limit point a unit of load moves the scene so many times further than at the
-/// start: by the root of one over [`CLOSED`].
+/// The motion by a unit of load just before a limit point, over that at the start: the root of one
+/// over the part of a load to which it is closed in.
 const RUNS_AWAY: f64 = 50.0;
-/// A path that goes on so far behind a load, relative to it, has no limit point there.
+/// The way, over a load, that a path goes on behind it where it has no limit point there.
 const BEHIND: f64 = 1e-4;
-/// A load that the tangent next to it foresees, to this part of it, is critical for all that can be
-/// told.
+/// The part of a load to which the tangent next to it must foresee it: then it is critical for all
+/// that can be told.
 const FORESEEN: f64 = 1e-4;
-/// Where it foresees the load to this part of it only, an imperfection turns the path aside.
+/// The part of a load to which the tangent foresees it where an imperfection turns the path aside.
 const ASIDE: f64 = 1e-2;
-/// States on both sides of a critical load that are further apart than this do not lie on one path.
+/// The largest distance of states on both sides of a critical load that lie on one path.
 const APART: f64 = 1e-3;
 /// Where the tangent is extrapolated: the part of the way to where it would be singular between two
 /// looks.
@@ -140,10 +140,10 @@ impl Buckling<'_, '_> {
                     }
                     // A step from further away came down elsewhere, or nowhere.
                     let ahead = self.next_critical(search.way, before)?;
-                    search.go_on_from(&self.stage.state, ahead);
+                    search.go_on_from(self.stage.state, ahead);
                     continue;
                 }
-                let is_apart = |behind: &State| distance(&self.stage.model, &search.here, behind) > APART;
+                let is_apart = |behind: &State| distance(self.stage.model, &search.here, behind) > APART;
                 if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
                     self.stage.state.copy_from(&search.here);
                     self.stage.judge_mesh()?;
@@ -171,7 +171,7 @@ impl Buckling<'_, '_> {
                 search.close_at(target, self.stage.state.clone());
             } else {
                 let ahead = self.next_critical(search.way, before - passed)?;
-                search.advance(&self.stage.state, ahead);
+                search.advance(self.stage.state, ahead);
             }
         }
         self.warn_of_estimate(search.here.load, search.ended);
@@ -241,7 +241,7 @@ impl Buckling<'_, '_> {
                 break;
             }
             let none = negative_pivots(self.stage);
-            self.stage.good.copy_from(&self.stage.state);
+            self.stage.good.copy_from(self.stage.state);
             if continue_path(self.stage, load + STRIDE_AHEAD * (critical - load)) != Walked::There
                 || negative_pivots(self.stage) != none
             {

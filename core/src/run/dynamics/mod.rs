@@ -170,7 +170,7 @@ impl Dynamics<'_, '_> {
                         return Err(self.give_up(failure));
                     }
                     self.warn_of_subdivision();
-                    self.stage.state.copy_from(&self.stage.good);
+                    self.stage.state.copy_from(self.stage.good);
                     self.stage.counters.cutbacks += 1;
                 }
             }
@@ -187,7 +187,7 @@ impl Dynamics<'_, '_> {
     fn settle_charts(&mut self, step: &Step) {
         let totals = self.increments.is_none();
         if let Some(error) = self.stage.newton.time_error.as_mut().filter(|_| totals) {
-            error.change_charts(&self.stage.state, &self.stage.charted.rotations);
+            error.change_charts(self.stage.state, &self.stage.charted.rotations);
         }
         let switched = self.stage.change_charts(totals.then_some(step.scheme.lag() * step.length));
         if totals && switched > 0 {
@@ -208,7 +208,7 @@ impl Dynamics<'_, '_> {
                 Ok(()) => {
                     let increments = self.increments.as_ref();
                     let (error, slot) =
-                        control.error(&self.stage.model, increments, &self.stage.good, &self.stage.state, length);
+                        control.error(self.stage.model, increments, self.stage.good, self.stage.state, length);
                     let taken = control.judge(length, error);
                     if !taken && at_floor {
                         let failure = NewtonFailure::StepTooSmall { slot, error, share: control.share(length) };
@@ -229,7 +229,7 @@ impl Dynamics<'_, '_> {
                 self.close_joints()?;
             } else {
                 self.predictor.withdraw();
-                self.stage.state.copy_from(&self.stage.good);
+                self.stage.state.copy_from(self.stage.good);
                 self.stage.counters.cutbacks += 1;
             }
         }
@@ -238,12 +238,12 @@ impl Dynamics<'_, '_> {
 
     /// One attempt at a step; what was foreseen of it may not be what it fails for.
     fn advance(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
-        self.stage.good.copy_from(&self.stage.state);
+        self.stage.good.copy_from(self.stage.state);
         self.predictor.reset();
         let mut result = self.attempt_step(step, next);
         if result.is_err() && self.predictor.has_foreseen() {
             self.predictor.fail();
-            self.stage.state.copy_from(&self.stage.good);
+            self.stage.state.copy_from(self.stage.good);
             result = self.attempt_step(step, next);
         }
         if result.is_err() {
@@ -346,7 +346,7 @@ impl Dynamics<'_, '_> {
     /// from round-off.
     fn refuse_growth(&mut self) -> Result<(), Failure> {
         let Some(guard) = &mut self.guard else { return Ok(()) };
-        let moved = self.stage.model.farthest(&self.stage.good, &self.stage.state);
+        let moved = self.stage.model.farthest(self.stage.good, self.stage.state);
         let Some(Growth { grown, largest }) = guard.judge(self.stage.bookkeeper.ledger(), moved) else { return Ok(()) };
         Err(Failure::EnergyGrowth { at: self.stage.moment(), grown, largest })
     }
@@ -354,7 +354,7 @@ impl Dynamics<'_, '_> {
     /// Names the failure and goes back to the last good state.
     fn give_up(&mut self, failure: NewtonFailure) -> Failure {
         let named = self.stage.name_failure(failure, &self.stage.assembly.system);
-        self.stage.state.copy_from(&self.stage.good);
+        self.stage.state.copy_from(self.stage.good);
         named
     }
 

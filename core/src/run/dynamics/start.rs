@@ -83,8 +83,8 @@ impl Dynamics<'_, '_> {
         if self.stage.model.multipliers.is_empty() {
             return Ok(());
         }
-        let [rates, _] = self.stage.assembly.drift(&self.stage.state);
-        self.stage.assembly.evaluate(&self.stage.state, Weights::MASS, None);
+        let [rates, _] = self.stage.assembly.drift(self.stage.state);
+        self.stage.assembly.evaluate(self.stage.state, Weights::MASS, None);
         self.refuse_open_joints()?;
         self.stage.assembly.system.forget_forces();
         let Some(impulse) = self.solve_with_mass(&rates)? else { return Ok(()) };
@@ -127,7 +127,7 @@ impl Dynamics<'_, '_> {
                 "mass does not determine the accelerations at the start (a point mass with an offset and without inertia?): the motion \
                  begins without them",
             );
-            self.stage.assembly.evaluate(&self.stage.state, Weights::NONE, None);
+            self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
             return Ok(());
         };
         let StageRun { model, state, .. } = &mut *self.stage;
@@ -136,7 +136,7 @@ impl Dynamics<'_, '_> {
             field[slot] += solved[slot];
         }
         // The forces of the start, for reactions and the energy account.
-        self.stage.assembly.evaluate(&self.stage.state, Weights::NONE, None);
+        self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
         Ok(())
     }
 

@@ -204,7 +204,7 @@ impl Follower<'_, '_> {
         let moved: Vec<Vec3> = self.stage.state.q.iter().zip(&point.state.q).map(|(q, near)| *q - *near).collect();
         let near = self.path.is_within_a_step(self.stage, &moved);
         if near {
-            point.state.copy_from(&self.stage.state);
+            point.state.copy_from(self.stage.state);
         }
         near
     }
@@ -213,7 +213,7 @@ impl Follower<'_, '_> {
     fn arrive(&mut self, point: Point, target: Option<Target>) -> Result<(), Failure> {
         self.stage.good.copy_from(&self.path.here.state);
         self.stage.state.copy_from(&point.state);
-        self.stage.assembly.evaluate(&self.stage.state, Weights::NONE, None);
+        self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         let kind = match target {

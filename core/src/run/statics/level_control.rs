@@ -113,7 +113,7 @@ impl LevelControl<'_, '_> {
                 Tried::Good(signature) => self.take_step(signature)?,
                 _ if self.levels.halve(self.stage.soft) => {
                     self.stage.counters.cutbacks += 1;
-                    self.stage.state.copy_all_but_rates(&self.stage.good);
+                    self.stage.state.copy_all_but_rates(self.stage.good);
                 }
                 // Nothing tells better.
                 Tried::Strayed(signature) => self.take_step(signature)?,
@@ -177,7 +177,7 @@ impl LevelControl<'_, '_> {
         self.stage.accept()?;
         let before = std::mem::replace(&mut self.stability.signature, signature);
         tell_of_points(self.stage, &mut self.space, None, before, signature)?;
-        self.stage.good.copy_all_but_rates(&self.stage.state);
+        self.stage.good.copy_all_but_rates(self.stage.state);
         self.levels.way = self.levels.way.max(Way::Levels);
         // Where pivots were looked at the stiffness is that of this state.
         if signature.is_some() {
@@ -191,7 +191,7 @@ impl LevelControl<'_, '_> {
     /// level. `failure` is what load control ended with, if it did not only seem to jump.
     fn go_around(&mut self, target: f64, failure: Option<NewtonFailure>) -> Result<Reached, Failure> {
         let named = failure.map(|failure| self.stage.name_failure(failure, &self.stage.assembly.system));
-        self.stage.state.copy_from(&self.stage.good);
+        self.stage.state.copy_from(self.stage.good);
         let hopeless = self.levels.approach != Approach::Path || self.stage.soft;
         match named {
             Some(named) if self.levels.approach == Approach::Straight || !named.is_of_balance() => return Err(named),
@@ -225,7 +225,7 @@ impl LevelControl<'_, '_> {
 
     /// Load control goes on where a detour has come to its level.
     fn resume(&mut self, target: f64, increments: u64) {
-        self.stage.good.copy_from(&self.stage.state);
+        self.stage.good.copy_from(self.stage.state);
         self.stability.signature = self.stability.look(self.stage);
         self.levels.restart();
         self.stage.warn(

@@ -166,7 +166,7 @@ impl Path {
         let Direction { rate, pull } = stage.path_direction()?.unwrap_or_else(|| Direction::none(slots));
         // The tangent of the last evaluation tells the pivots.
         let StageRun { assembly, newton, .. } = stage;
-        let mut tangent = Tangent::that_may_go(assembly, &stage.state, Weights::STIFFNESS);
+        let mut tangent = Tangent::that_may_go(assembly, stage.state, Weights::STIFFNESS);
         let signature = newton.solver.signature(&mut tangent);
         let along = dot(stage, &rate, &before.tangent) * self.scale + before.load_rate;
         let size = (squared(stage, &rate) * self.scale + 1.0).sqrt();
@@ -255,22 +255,22 @@ impl Path {
     fn advance(&self, stage: &mut StageRun, length: f64) -> Result<usize, NewtonFailure> {
         let mut load = self.predict(stage, length);
         stage.assembly.forget();
-        let round_off = stage.assembly.round_off(&stage.state);
+        let round_off = stage.assembly.round_off(stage.state);
         let mut last = None;
         let (mut iterations, mut history) = (0, Vec::new());
         loop {
             // Held directions are put where they belong, free of the round-off of predictor and
             // corrections.
-            stage.schedule.set_clock(stage.model, &mut stage.state, self.here.state.time, load);
+            stage.schedule.set_clock(stage.model, stage.state, self.here.state.time, load);
             let pull = stage.load_derivative();
             let StageRun { assembly, newton, prescribed_increment, .. } = stage;
             let seconds = &mut stage.counters.work.evaluation_seconds;
-            timed(seconds, || assembly.evaluate(&stage.state, Weights::STIFFNESS, Some(prescribed_increment)));
-            let (verdict, residual) = newton.convergence.judge(&stage.model, &assembly.system, round_off, last);
+            timed(seconds, || assembly.evaluate(stage.state, Weights::STIFFNESS, Some(prescribed_increment)));
+            let (verdict, residual) = newton.convergence.judge(stage.model, &assembly.system, round_off, last);
             history.push(residual.ratio);
             match verdict {
                 Verdict::Converged | Verdict::Noisy => return Ok(iterations),
-                Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, &stage.state)),
+                Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, stage.state)),
                 Verdict::Continue if iterations == newton.max_iterations => {
                     return Err(NewtonFailure::NotConverged { residual, history });
                 }
@@ -284,7 +284,7 @@ impl Path {
             load += dl;
             let switched = correct(stage, &dq);
             // What was a correction before is none in a new chart.
-            last = Some(if switched { f64::INFINITY } else { solve::size(&stage.model, &dq) });
+            last = Some(if switched { f64::INFINITY } else { solve::size(stage.model, &dq) });
             iterations += 1;
         }
     }
@@ -294,7 +294,7 @@ impl Path {
         let here = &self.here;
         stage.state.copy_from(&here.state);
         let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
-        charts::carry(&mut stage.state, &ahead, &stage.charted.rotations);
+        charts::carry(stage.state, &ahead, &stage.charted.rotations);
         stage.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
         here.state.load + here.load_rate * length
     }
@@ -319,8 +319,8 @@ impl Path {
         if !solved {
             return Err(NewtonFailure::Singular(mechanism(
                 solver,
-                &mut Tangent::that_stays(assembly, &stage.state),
-                &stage.model,
+                &mut Tangent::that_stays(assembly, stage.state),
+                stage.model,
             )));
         }
         let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
@@ -388,13 +388,13 @@ struct Bracket {
 
 /// Adds a correction; whether nodes changed their charts by it.
 fn correct(stage: &mut StageRun, dq: &[Vec3]) -> bool {
-    stage.assembly.extrapolate(&stage.state, dq);
-    charts::carry(&mut stage.state, dq, &stage.charted.rotations);
+    stage.assembly.extrapolate(stage.state, dq);
+    charts::carry(stage.state, dq, &stage.charted.rotations);
     stage.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
-    let switched = charts::switch(&mut stage.state, &stage.charted.rotations, charts::STATIC_BAND, None);
+    let switched = charts::switch(stage.state, &stage.charted.rotations, charts::STATIC_BAND, None);
     if switched > 0 {
         stage.counters.work.chart_switches += switched as u64;
-        charts::freeze(&mut stage.state, &stage.charted.elements);
+        charts::freeze(stage.state, &stage.charted.elements);
     }
     switched > 0
 }

@@ -152,7 +152,7 @@ impl<'s, 'r> Descent<'s, 'r> {
         let start = self.stage.good.kept();
         let gentle = self.gentle_resistance(load);
         let (mut resistance, mut lifts, mut growing) = (gentle, true, 0_usize);
-        self.stage.state.copy_all_but_rates(&self.stage.good);
+        self.stage.state.copy_all_but_rates(self.stage.good);
         let enough = self.steps.saturating_sub(MOST_AT_ONCE);
         while gentle > 0.0 && resistance <= HARDEST * gentle && self.steps > enough {
             self.stage.tell_progress(start.load)?;
@@ -161,14 +161,14 @@ impl<'s, 'r> Descent<'s, 'r> {
             if !self.step_against(resistance, first) {
                 self.stage.counters.cutbacks += 1;
                 resistance *= HARDER;
-                self.stage.state.copy_all_but_rates(&self.stage.good);
+                self.stage.state.copy_all_but_rates(self.stage.good);
                 continue;
             }
             lifts = false;
             resistance *= EASIER;
-            let moved = distance(&self.stage.model, &self.stage.good, &self.stage.state);
+            let moved = distance(self.stage.model, self.stage.good, self.stage.state);
             self.stage.pass_through(&self.assembly.system)?;
-            if distance(&self.stage.model, &start, &self.stage.good) > FARTHEST {
+            if distance(self.stage.model, &start, self.stage.good) > FARTHEST {
                 return Ok(false);
             }
             growing = growing.saturating_sub(1);
@@ -184,7 +184,7 @@ impl<'s, 'r> Descent<'s, 'r> {
             let StageRun { assembly, newton, state, counters, .. } = &mut *self.stage;
             let signature = newton.signature_at(assembly, state, &mut counters.work);
             if signature.is_none_or(|signature| !signature.tells_unstable()) {
-                self.stage.good.copy_all_but_rates(&self.stage.state);
+                self.stage.good.copy_all_but_rates(self.stage.state);
                 return Ok(true);
             }
             // In balance, but not at rest.
@@ -234,9 +234,9 @@ impl<'s, 'r> Descent<'s, 'r> {
         self.stage.newton.begin_anew();
         let found = self.stage.attempt(load).is_ok()
             && self.stage.newton.contraction <= LARGEST_UNCOUNTED
-            && distance(&self.stage.model, &self.stage.good, &self.stage.state) < NEIGHBOURHOOD;
+            && distance(self.stage.model, self.stage.good, self.stage.state) < NEIGHBOURHOOD;
         if !found {
-            self.stage.state.copy_all_but_rates(&self.stage.good);
+            self.stage.state.copy_all_but_rates(self.stage.good);
         }
         found
     }
