@@ -8,9 +8,8 @@ use super::verdict::Verdict;
 use super::{console, json, load};
 use crate::scene::{Mesh, Rule, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use beamsim_core::model::{Assembly, EffectSize};
+use beamsim_core::model::{Assembly, EffectSize, Schedule};
 use beamsim_core::run::{Failure, Moment, refusal};
-use beamsim_core::system::StageKind;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::threads;
 use std::path::{Path, PathBuf};
@@ -234,21 +233,22 @@ const VECTORS_IN_SPACE: usize = 6;
 /// Prints unknowns, entries of the tangent and memory; gives the part of each effect. `Err` where
 /// the first stage cannot begin.
 fn print_size(scene: &Scene) -> Result<Vec<EffectSize>, Failure> {
-    let mut model = scene.plan.model.clone();
+    let model = &scene.plan.model;
+    let mut schedule = Schedule::new(model);
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
-    let begun = model.begin_stage(0, kind, &state);
-    let equations = begun.map_err(|error| Failure::Deck(format!("stage 1: {}", refusal(&error, &model))))?;
+    let begun = schedule.begin_stage(model, 0, kind, &state);
+    let equations = begun.map_err(|error| Failure::Deck(format!("stage 1: {}", refusal(&error, model))))?;
     let free = equations.count();
     let slots = model.slots();
     let context = scene.plan.stages[0].context(0);
     let shares = model.shares(&context, &equations);
     // A planar scene is also set up in space, to check its stability out of the plane.
-    let in_space = equations.plane().and_then(|_| model.number(0, None).ok());
-    let in_space = in_space.map(|equations| Assembly::new(&context, equations, &model).system.pattern.values());
-    let assembly = Assembly::new(&context, equations, &model);
+    let in_space = equations.plane().and_then(|_| schedule.dof_map(model, None).ok());
+    let in_space = in_space.map(|equations| Assembly::new(&context, equations, model).system.pattern.values());
+    let assembly = Assembly::new(&context, equations, model);
     let entries = assembly.system.pattern.nonzeros();
-    let vectors = if kind == StageKind::Dynamic { VECTORS_IN_DYNAMICS } else { VECTORS };
+    let vectors = if kind.advances_time() { VECTORS_IN_DYNAMICS } else { VECTORS };
     let vectors = vectors + in_space.map_or(0, |_| VECTORS_IN_SPACE);
     let bytes = 8 * (assembly.system.pattern.values() + in_space.unwrap_or(0)) + 24 * vectors * slots;
     console::line(&format!(

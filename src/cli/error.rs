@@ -4,6 +4,7 @@ use super::console;
 use super::status::Status;
 use crate::output::OutputError;
 use crate::study::StudyError;
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use thiserror::Error;
 
@@ -85,11 +86,11 @@ impl CommandError {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Usage(_) => "usage",
-            Self::Deck(error) if error.is_limit => "limit",
-            Self::Deck(_) => "deck",
-            Self::Io(_) => "io",
+            Self::Deck(error) if error.is_limit => FailureKind::Limit.name(),
+            Self::Deck(_) => FailureKind::Deck.name(),
+            Self::Io(_) => FailureKind::Io.name(),
             Self::Run(failure) | Self::SearchStopped { by: failure, .. } => failure.name(),
-            Self::Stopped { .. } => "interrupted",
+            Self::Stopped { .. } => FailureKind::Interrupted.name(),
             Self::Missed(_) => "accuracy",
             Self::Unexpected(_) => "unexpected",
             Self::Sweep(_) => "sweep",
@@ -102,7 +103,7 @@ impl CommandError {
         match self {
             Self::Usage(_) | Self::Deck(_) => Status::Wrong,
             Self::Io(_) => Status::Io,
-            Self::Run(failure) | Self::SearchStopped { by: failure, .. } => status_of(failure),
+            Self::Run(failure) | Self::SearchStopped { by: failure, .. } => Status::of_failure(failure),
             Self::Stopped { signal, .. } => Status::after(*signal),
             Self::Missed(_) => Status::Missed,
             Self::Unexpected(_) | Self::Warnings(_) => Status::Unexpected,
@@ -151,22 +152,5 @@ impl From<StudyError> for CommandError {
             | StudyError::Comparison(_)
             | StudyError::Sweep(_) => Self::deck(error),
         }
-    }
-}
-
-/// The exit status after a failed simulation.
-fn status_of(failure: &Failure) -> Status {
-    match failure {
-        Failure::Deck(_) | Failure::Limit(_) => Status::Wrong,
-        Failure::Io(_) => Status::Io,
-        Failure::Interrupted { signal, .. } => Status::after(*signal),
-        Failure::NotConverged { .. }
-        | Failure::TurnsTooFar { .. }
-        | Failure::LimitPoint { .. }
-        | Failure::StepTooSmall { .. }
-        | Failure::Singular { .. }
-        | Failure::NonFinite { .. }
-        | Failure::MeshTooCoarse { .. }
-        | Failure::EnergyGrowth { .. } => Status::GaveUp,
     }
 }

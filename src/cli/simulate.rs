@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
 use crate::study::{self, Recorder};
 use beamsim_core::model::StageKind;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Warning};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::threads;
 use std::path::Path;
 use std::time::Instant;
@@ -197,15 +197,9 @@ impl Observer for Watcher<'_> {
         self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
     }
 
-    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
-        self.modes.push_modes(stage, modes);
-        Ok(())
-    }
-
-    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
-        self.modes.push_loads(stage, loads);
+    fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
+        self.modes.push(stage, result);
         Ok(())
     }
 

@@ -1,11 +1,11 @@
 //! `[cost]`: variants and outputs of a study of accuracy and time.
 
+use super::Deck;
 use super::beam::InterpolationWord;
 use super::diagnostic::{Diagnostic, Spanned};
 use super::reader::{Context, Item, Table};
 use super::scheme::SchemeName;
 use super::words::{Words, words};
-use super::{Deck, StageBody};
 use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
@@ -91,7 +91,7 @@ const OF_STEPS: [&str; 3] = ["step", "step_tolerance", "scheme"];
 /// Warns of keys that vary beams or dynamic stages where the deck has none.
 pub fn warn_of_idle_keys(top: &Table, deck: &Deck) {
     let Some(DeValue::Table(given)) = top.get("cost").map(|item| item.get_ref()) else { return };
-    let moves = deck.stages.iter().any(|stage| matches!(stage.body, StageBody::Dynamic { .. }));
+    let moves = deck.stages.iter().any(|stage| stage.body.advances_time());
     for key in given.keys() {
         let name: &str = key.get_ref();
         let message = if OF_BEAMS.contains(&name) && deck.beams.is_empty() {

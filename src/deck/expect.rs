@@ -4,6 +4,7 @@ use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
 use super::hints::{self, nearest};
 use super::reader::{Context, Item, Table, kind_of};
 use super::words::{Words, words};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
@@ -35,7 +36,7 @@ pub enum ExpectBody {
         above: Option<f64>,
     },
     /// A failure
-    Fails(FailureWord),
+    Fails(FailureKind),
     /// A warning of this kind
     Warns(WarningKind),
     /// No warning that puts an answer in doubt
@@ -97,27 +98,19 @@ words! {
     }
 }
 
-words! {
-    /// Failures that a run can end with.
-    pub enum FailureWord {
-        /// The deck is wrong, or a stage cannot begin.
-        Deck = "deck",
-        /// An element turns too far for its chart.
-        MeshTooCoarse = "mesh_too_coarse",
-        /// Newton's method did not converge.
-        NotConverged = "not_converged",
-        /// The tangent is singular.
-        Singular = "singular",
-        /// A number is not finite.
-        NonFinite = "non_finite",
-        /// The total energy grew.
-        EnergyGrowth = "energy_growth",
-        /// A number is beyond the stated bounds.
-        Limit = "limit",
-        /// A file could not be read or written.
-        Io = "io",
-        /// The run was interrupted.
-        Interrupted = "interrupted",
+impl Words for FailureKind {
+    const ALL: &'static [(&'static str, Self)] = &{
+        let mut rows = [("", FailureKind::ALL[0]); FailureKind::ALL.len()];
+        let mut k = 0;
+        while k < rows.len() {
+            rows[k] = (FailureKind::ALL[k].name(), FailureKind::ALL[k]);
+            k += 1;
+        }
+        rows
+    };
+
+    fn word(self) -> &'static str {
+        self.name()
     }
 }
 
@@ -172,10 +165,10 @@ fn read_warns(table: &Table) -> Option<ExpectBody> {
 fn read_fails(table: &Table) -> Option<ExpectBody> {
     refuse_keys_beside(table, "fails", "an expected failure")?;
     let name = table.text("fails")?;
-    if let Some(failure) = FailureWord::of(&name.value) {
+    if let Some(failure) = FailureKind::of(&name.value) {
         return Some(ExpectBody::Fails(failure));
     }
-    let known: Vec<&str> = FailureWord::words().collect();
+    let known: Vec<&str> = FailureKind::words().collect();
     let hint = hints::for_word("fails", &name.value, &known).help();
     let help = hint.unwrap_or_else(|| format!("failures are {}", one_of(known)));
     table.context.report(Diagnostic::error(format!("there is no failure `{}`", name.value), name.span).help(help));

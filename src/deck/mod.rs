@@ -46,7 +46,7 @@ pub use body::Body;
 pub use cost::{Cost, NormWord};
 pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use effects::{EffectWord, Effects};
-pub use expect::{Expect, ExpectBody, FailureWord, Instant, Reduce, Reduction, Target};
+pub use expect::{Expect, ExpectBody, Instant, Reduce, Reduction, Target};
 pub use expression::{Expression, Jet};
 pub use hints::{hint, nearest};
 pub use history::{HistoryBody, HistoryTable, HistoryUse};

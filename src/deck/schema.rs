@@ -152,10 +152,9 @@ fn to_toml(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deck::{
-        self, EffectWord, FailureWord, Frame, InterpolationWord, NormWord, Reduction, SchemeName, Words,
-    };
+    use crate::deck::{self, EffectWord, Frame, InterpolationWord, NormWord, Reduction, SchemeName, Words};
     use beamsim_core::effect::joint::JointKind;
+    use beamsim_core::failure::FailureKind;
     use beamsim_core::warning::WarningKind;
 
     /// Keys of every table with a fixed set of them, by the path of the table in the schema.
@@ -204,7 +203,7 @@ mod tests {
             ("cost.interpolation", words::<InterpolationWord>()),
             ("cost.norm", words::<NormWord>()),
             ("cost.scheme", words::<SchemeName>()),
-            ("expect.fails", words::<FailureWord>()),
+            ("expect.fails", words::<FailureKind>()),
             ("expect.reduce", words::<Reduction>()),
             ("expect.warns", warnings.chain(["false".to_string()]).collect()),
             ("joint.kind", words::<JointKind>()),

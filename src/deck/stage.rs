@@ -76,6 +76,49 @@ pub enum StageBody {
     },
 }
 
+impl StageBody {
+    /// Loads come in and balance is found, by load levels or by arc length.
+    pub fn finds_balance(&self) -> bool {
+        match self {
+            Self::Static { .. } | Self::Path { .. } => true,
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => false,
+        }
+    }
+
+    /// The clock runs.
+    pub fn advances_time(&self) -> bool {
+        match self {
+            Self::Dynamic { .. } => true,
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => false,
+        }
+    }
+
+    /// Mass and its inertia count.
+    pub fn needs_inertia(&self) -> bool {
+        match self {
+            Self::Dynamic { .. } | Self::Modal { .. } => true,
+            Self::Static { .. } | Self::Path { .. } | Self::Buckling { .. } => false,
+        }
+    }
+
+    /// Load levels or increments along a path, at most.
+    pub fn increments(&self) -> Option<usize> {
+        match *self {
+            Self::Static { steps, .. } => Some(steps),
+            Self::Path { max_steps, .. } => Some(max_steps),
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+        }
+    }
+
+    /// Rows are written as it goes on.
+    pub fn writes_rows(&self) -> bool {
+        match self {
+            Self::Static { .. } | Self::Path { .. } | Self::Dynamic { .. } => true,
+            Self::Modal { .. } | Self::Buckling { .. } => false,
+        }
+    }
+}
+
 words! {
     /// `kind = …` of a stage
     pub enum StageWord {

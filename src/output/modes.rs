@@ -2,7 +2,7 @@
 
 use super::OutputError;
 use super::files::{PartFile, remove_if_there};
-use beamsim_core::run::{CriticalLoad, Mode};
+use beamsim_core::run::{CriticalLoad, Mode, StageResult};
 use std::path::Path;
 
 /// Collects modes and critical loads, and writes them when the run has ended.
@@ -27,14 +27,12 @@ fn numbered<T: Copy>(stage: usize, results: &[T]) -> impl Iterator<Item = Number
 }
 
 impl ModesWriter {
-    /// Adds the modes of a stage (from 1).
-    pub fn push_modes(&mut self, stage: usize, modes: &[Mode]) {
-        self.modes.extend(numbered(stage, modes));
-    }
-
-    /// Adds the critical loads of a stage (from 1).
-    pub fn push_loads(&mut self, stage: usize, loads: &[CriticalLoad]) {
-        self.loads.extend(numbered(stage, loads));
+    /// Adds the result of a stage (from 1).
+    pub fn push(&mut self, stage: usize, result: &StageResult) {
+        match result {
+            StageResult::Modes(modes) => self.modes.extend(numbered(stage, modes)),
+            StageResult::CriticalLoads(loads) => self.loads.extend(numbered(stage, loads)),
+        }
     }
 
     /// Writes the files that have rows, and removes those of an earlier run.

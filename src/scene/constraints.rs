@@ -6,7 +6,7 @@ use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
 use beamsim_core::effect::joint::FreeCoordinate;
-use beamsim_core::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
+use beamsim_core::model::{Amplitude, History, Motion, MotionKind, Reading, StageSet, Support, Table};
 use beamsim_core::run::Driven;
 use beamsim_core::system::{Direction, Node, Slot};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -101,7 +101,7 @@ pub fn constraints(
             Ok(Some(motor)) => {
                 let span = &connection.joint.span;
                 let history = connection.joint.motor.as_ref().and_then(|motor| motor.history.as_ref());
-                note(&mut held, &motor.directions(), &motor.stages, span, "motion");
+                note(&mut held, &motor.directions(), motor.amplitude.stages(), span, "motion");
                 driven.push(table(motions.len(), "motor", span, history));
                 motions.push(motor);
             }
@@ -112,7 +112,7 @@ pub fn constraints(
         match read_motion(deck, mesh, histories, motion) {
             Ok(found) => {
                 driven.push(table(motions.len(), "motion", &motion.span, motion.history.as_ref()));
-                note(&mut held, &found.directions(), &found.stages, &motion.span, "motion");
+                note(&mut held, &found.directions(), found.amplitude.stages(), &motion.span, "motion");
                 motions.push(found);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -142,8 +142,10 @@ fn ground_motor(
     let Some(motor) = &connection.joint.motor else { return Ok(None) };
     let history = find_history(deck, histories, motor.history.as_ref())?;
     let axis = connection.axes.column(0);
-    let motion =
-        |(kind, slot): (MotionKind, Slot)| Motion::new(kind, slot, axis, motor.value, history, StageSet::default());
+    let motion = |(kind, slot): (MotionKind, Slot)| {
+        let amplitude = Amplitude::of_motion(motor.value, history, StageSet::default());
+        Motion { kind, slot, axis, amplitude }
+    };
     let driven = connection.joint.kind.driven.map(|coordinate| match coordinate {
         FreeCoordinate::Angle => (MotionKind::Rotation, node.p),
         FreeCoordinate::Slide => (MotionKind::Translation, node.u),
@@ -187,13 +189,23 @@ fn read_motion(
     Ok(match motion.what {
         MotionWhat::Displacement { direction, value } => {
             let axis = axes(motion.axes).column(direction);
-            Motion::new(MotionKind::Translation, node.u, axis, value, history, stages)
+            Motion {
+                kind: MotionKind::Translation,
+                slot: node.u,
+                axis,
+                amplitude: Amplitude::of_motion(value, history, stages),
+            }
         }
         MotionWhat::Rotation { axis, angle } => {
             let Some(axis) = (axes(motion.axes) * Vec3(axis)).normalized() else {
                 return Err(Diagnostic::error("`rotate` is an axis and must not be zero", motion.span.clone()));
             };
-            Motion::new(MotionKind::Rotation, node.p, axis, angle, history, stages)
+            Motion {
+                kind: MotionKind::Rotation,
+                slot: node.p,
+                axis,
+                amplitude: Amplitude::of_motion(angle, history, stages),
+            }
         }
     })
 }

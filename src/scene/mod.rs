@@ -250,7 +250,6 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
     let first_multiplier = mesh.slots() as u32;
     let multipliers = composition.multipliers.len();
-    let rotating = Arc::new(charted(&mesh));
     let mut kinds = kinds(&mesh);
     let mut names = mesh.names.clone();
     for (kind, name) in composition.multipliers {
@@ -265,8 +264,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
         sprung_joints: composition.sprung_joints,
         elements: mesh.element_count,
-        charted: rotating.clone(),
-        rotating,
+        rotating: charted(&mesh),
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
@@ -281,7 +279,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let plan = Plan {
         energy: expected || watched || probes.iter().any(energy),
         continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
-        model,
+        model: Arc::new(model),
         initial,
         places: places(&mesh, &stages),
         stages,

@@ -77,7 +77,7 @@ impl Teller<'_> {
 
     /// Motors that jump into a dynamic stage are refused, not warned of.
     fn concerns(&self, jump: &HistoryJump, table: &DrivenTable) -> bool {
-        let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage) == StageKind::Dynamic;
+        let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage).advances_time();
         !(jumps && self.is_motor(table))
     }
 
@@ -147,7 +147,7 @@ impl Teller<'_> {
     fn help(&self, told: &Warned) -> String {
         let Warned { jump: HistoryJump { stage, .. }, table, history, .. } = told;
         let own_stages = table.history.as_ref().is_some_and(|history| history.stages.is_some());
-        let before = (0..*stage).rev().find(|&k| matches!(self.kind(k), StageKind::Static | StageKind::Dynamic));
+        let before = (0..*stage).rev().find(|&k| self.kind(k).advances_state());
         let before = before.unwrap_or_default();
         match (own_stages, self.kind(*stage) == self.kind(before)) {
             (true, _) => "a static stage reads it over the load factor from 0 to 1: let it begin where the stage before has left it".into(),

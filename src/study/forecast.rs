@@ -1,16 +1,9 @@
 //! Predicts the duration of a run from its first moments on this machine.
 
 use crate::scene::Scene;
-use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, StageWork};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot};
 use std::fmt::Write;
 use std::time::{Duration, Instant};
-
-/// Usual numbers of iterations of levels, steps, modes and critical loads, for stages that have not
-/// begun.
-const ITERATIONS_OF_A_LEVEL: f64 = 6.0;
-const ITERATIONS_OF_A_STEP: f64 = 3.0;
-const ITERATIONS_OF_A_MODE: f64 = 10.0;
-const ITERATIONS_OF_A_CRITICAL_LOAD: f64 = 60.0;
 
 /// The prediction for a run.
 pub struct Forecast {
@@ -95,7 +88,7 @@ impl Watch<'_> {
         let an_iteration = (watched - self.seen[0].elapsed) / counters.work.iterations.max(1) as f64;
         let pace = |from: &Attempt| (last.elapsed - from.elapsed) / (last.done - from.done);
         // Searches for critical loads are slow at first and fast at the end.
-        let searches = matches!(self.scene.plan.stages[last.stage].work, StageWork::Buckling { .. });
+        let searches = self.scene.plan.stages[last.stage].work.speeds_up();
         let from = if searches { [first, middle] } else { [middle, first] };
         let of_this = from.into_iter().map(pace).find(|pace| pace.is_finite() && *pace > 0.0);
         let of_this = of_this.unwrap_or(an_iteration * self.iterations(last.stage));
@@ -115,15 +108,9 @@ impl Watch<'_> {
 
     /// The usual number of iterations of a stage.
     fn iterations(&self, stage: usize) -> f64 {
-        let end = |work: &StageWork| if let StageWork::Dynamic { end, .. } = work { Some(*end) } else { None };
-        let start = || self.scene.plan.stages[..stage].iter().rev().find_map(|s| end(&s.work)).unwrap_or(0.0);
-        match self.scene.plan.stages[stage].work {
-            StageWork::Static { steps, .. } => steps as f64 * ITERATIONS_OF_A_LEVEL,
-            StageWork::Path { max_steps, .. } => max_steps as f64 * ITERATIONS_OF_A_LEVEL,
-            StageWork::Dynamic { end, step, .. } => (end - start()) / step * ITERATIONS_OF_A_STEP,
-            StageWork::Modal { modes } => modes as f64 * ITERATIONS_OF_A_MODE,
-            StageWork::Buckling { modes } => modes as f64 * ITERATIONS_OF_A_CRITICAL_LOAD,
-        }
+        let before = self.scene.plan.stages[..stage].iter().rev();
+        let start = before.filter_map(|stage| stage.work.end()).next().unwrap_or(0.0);
+        self.scene.plan.stages[stage].work.usual_iterations(start)
     }
 }
 

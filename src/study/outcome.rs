@@ -4,8 +4,7 @@ use crate::deck::{Diagnostic, Spanned, is_named, nearest};
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
 use crate::study::Recorder;
-use beamsim_core::model::StageKind;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, Stage, StageResult};
 use std::time::Instant;
 
 /// The clock of a row in its stage.
@@ -170,7 +169,7 @@ impl Outcome {
 
 /// For each stage: true if its clock is the time.
 fn are_dynamic(scene: &Scene) -> Vec<bool> {
-    scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect()
+    scene.plan.stages.iter().map(|stage| stage.work.kind().advances_time()).collect()
 }
 
 /// The names of all outputs: the columns of the history, then modes and critical loads, stage by
@@ -199,12 +198,7 @@ pub(in crate::study) fn columns_of_history(scene: &Scene) -> usize {
 
 /// The columns of the modes or critical loads of a stage (from 1).
 fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
-    let mode = |mode: usize| ["omega", "growth"].map(|quantity| format!("stage{number}.mode{mode}.{quantity}"));
-    match stage.work {
-        StageWork::Modal { modes } => (1..=modes).flat_map(mode).collect(),
-        StageWork::Buckling { modes } => (1..=modes).map(|mode| format!("stage{number}.buckling{mode}.load")).collect(),
-        StageWork::Static { .. } | StageWork::Path { .. } | StageWork::Dynamic { .. } => Vec::new(),
-    }
+    stage.work.results().into_iter().map(|result| format!("stage{number}.{result}")).collect()
 }
 
 /// Observer that collects all outputs.
@@ -238,18 +232,10 @@ impl Observer for OutputCollector<'_> {
         Ok(())
     }
 
-    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
-        self.found.push_modes(stage, modes);
-        let found = modes.iter().flat_map(|mode| [mode.omega, mode.growth]);
-        self.take_modes(stage, found.collect());
-        Ok(())
-    }
-
-    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
-        self.found.push_loads(stage, loads);
-        self.take_modes(stage, loads.iter().map(|critical| critical.load).collect());
+    fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
+        self.found.push(stage, result);
+        self.take_modes(stage, result.values());
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 use crate::deck::{Instant, Reduce, Reduction, Target, Words};
 use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, RunCounter, Scene};
 use beamsim_core::probe::Probe;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
+use beamsim_core::run::{Counters, Failure, Mode, Snapshot, StageResult, Warning};
 use serde::Serialize;
 
 /// Records the expected columns of every converged state.
@@ -67,14 +67,12 @@ impl Recorder {
         }
     }
 
-    /// Takes the modes of a stage.
-    pub fn modes(&mut self, modes: &[Mode]) {
-        self.modes = modes.to_vec();
-    }
-
-    /// Takes the critical loads of a stage.
-    pub fn buckling(&mut self, loads: &[CriticalLoad]) {
-        self.critical = loads.iter().map(|critical| critical.load).collect();
+    /// Takes the result of an analysis.
+    pub fn found(&mut self, result: &StageResult) {
+        match result {
+            StageResult::Modes(modes) => self.modes.clone_from(modes),
+            StageResult::CriticalLoads(loads) => self.critical = loads.iter().map(|critical| critical.load).collect(),
+        }
     }
 
     fn mode(&self, quantity: ModeQuantity, number: usize) -> Option<f64> {

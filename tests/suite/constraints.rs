@@ -3,11 +3,12 @@
 use crate::random::Random;
 use beamsim::scene;
 use beamsim_core::kernel::Weights;
-use beamsim_core::model::{Assembly, Model, SlotKind};
+use beamsim_core::model::{Assembly, Model, Schedule, SlotKind};
 use beamsim_core::solve::{LinearSolver, Tangent};
 use beamsim_core::system::{State, System};
 use beamsim_core::tensor::Vec3;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// The eigenvalues on the space that the constraints leave, of unknowns that are scaled so that they compare.
 fn eigenvalues_between_constraints(system: &System, model: &Model) -> DVector<f64> {
@@ -33,11 +34,12 @@ fn eigenvalues_between_constraints(system: &System, model: &Model) -> DVector<f6
     projected.symmetric_eigenvalues()
 }
 
-fn assembled(deck: &str) -> (Model, Assembly) {
+fn assembled(deck: &str) -> (Arc<Model>, Assembly) {
     let Ok((scene, _)) = scene::from_text(deck) else { panic!("the deck is good: {deck}") };
-    let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+    let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
     let rest = model.rest();
-    let Ok(dof_map) = model.begin_stage(0, stage.kind, &rest) else { panic!("the stage begins") };
+    let mut schedule = Schedule::new(&model);
+    let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &rest) else { panic!("the stage begins") };
     let assembly = Assembly::new(&stage, dof_map, &model);
     (model, assembly)
 }

@@ -3,7 +3,7 @@
 use beamsim::deck::{self, EffectWord};
 use beamsim::scene;
 use beamsim::study::effects::{EffectStudy, study_effects};
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Observer, Run, Snapshot, Warning};
+use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::tensor::Vec3;
 
 /// The state of the last node, row by row.
@@ -368,8 +368,10 @@ impl Observer for Loads {
         Ok(())
     }
 
-    fn buckling(&mut self, _stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.loads.extend(loads.iter().map(|critical| critical.load));
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        if let StageResult::CriticalLoads(loads) = result {
+            self.loads.extend(loads.iter().map(|critical| critical.load));
+        }
         Ok(())
     }
 

@@ -11,7 +11,7 @@ use beamsim_core::kernel::elastic::{Stiffness, Strain};
 use beamsim_core::kernel::inertia::{Inertia, Spin, body};
 use beamsim_core::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
 use beamsim_core::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
-use beamsim_core::model::Assembly;
+use beamsim_core::model::{Assembly, Schedule};
 use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot, Warning};
 use beamsim_core::scalar::Real;
 use beamsim_core::system::Plane;
@@ -343,14 +343,15 @@ fn supports_joints_and_curved_beams_act_as_in_space() {
 /// What increments that are prescribed push the rest with, and the forces of a shaken frame, along all free directions of the plane.
 fn pushes(text: &str, normal: Vec3) -> Vec<f64> {
     let plan = scene_of(text).plan;
-    let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+    let (model, stage) = (plan.model, plan.stages[0].context(0));
     let (mut state, mut random) = (model.rest(), Random::new(11));
     let mut in_plane = |slot: usize| {
         let v = random.vector(0.1);
         let along = normal * normal.dot(v);
         if slot.is_multiple_of(2) { v - along } else { along }
     };
-    let dof_map = model.begin_stage(0, stage.kind, &state).unwrap();
+    let mut schedule = Schedule::new(&model);
+    let dof_map = schedule.begin_stage(&model, 0, stage.kind, &state).unwrap();
     let mut prescribed_increment = state.q.clone();
     for field in [&mut state.q[..], &mut state.v, &mut state.a, &mut prescribed_increment] {
         field.iter_mut().enumerate().for_each(|(slot, value)| *value = in_plane(slot));

@@ -25,7 +25,7 @@ struct Rows(Outcome);
 
 impl Observer for Rows {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
-        let slots = &at.model.charted.rotations;
+        let slots = if at.model.linear { &[] } else { &at.model.rotating.rotations[..] };
         // The rotation of a node follows its displacement.
         let node = |&p: &u32| (at.state.q[p as usize - 1], Rotation::new(at.state.q[p as usize]).r);
         let nodes: Vec<(Vec3, Mat3)> = slots.iter().map(node).collect();

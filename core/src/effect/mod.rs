@@ -18,9 +18,7 @@ pub use volume::{VolumeElement, VolumeElements};
 
 use crate::kernel::Weights;
 use crate::kernel::inertia::Inertia;
-use crate::system::{
-    Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, StageKind, State,
-};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, State};
 use crate::tensor::Vec3;
 use batch::{
     AT_ONCE, after_displacement, at_slots, for_each_batch, motion_of, motions, one_by_one, own_blocks, own_part,
@@ -140,7 +138,7 @@ pub trait Effect: Send + Sync {
 
     /// It acts in a stage: inertia and damping do where something moves, inertia not where a rotating frame holds it.
     fn acts(&self, stage: &StageContext) -> bool {
-        let moves = matches!(stage.kind, StageKind::Dynamic | StageKind::Modal);
+        let moves = stage.kind.needs_inertia();
         match self.category() {
             Category::Inertia => moves && !stage.rotating,
             Category::Damping => moves,

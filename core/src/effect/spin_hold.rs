@@ -3,7 +3,7 @@
 
 use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageKind, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, State};
 use crate::tensor::Vec3;
 
 /// A straight part that may spin: beams that are joined rigidly along a line.
@@ -70,10 +70,8 @@ impl Effect for SpinHold {
     }
 
     fn acts(&self, stage: &StageContext) -> bool {
-        match stage.kind {
-            StageKind::Dynamic | StageKind::Modal => self.held_in == HeldIn::Motion,
-            StageKind::Static | StageKind::Buckling => self.held_in == HeldIn::Statics,
-        }
+        let held_in = if stage.kind.needs_inertia() { HeldIn::Motion } else { HeldIn::Statics };
+        self.held_in == held_in
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {

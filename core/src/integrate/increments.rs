@@ -7,8 +7,8 @@
 use super::Step;
 use crate::kernel::inertia::Inertia;
 use crate::kernel::turn::{Carrier, Start, Turn};
-use crate::model::Model;
 use crate::model::charts::DYNAMIC_BAND;
+use crate::model::{Model, StageKind};
 use crate::rotation::{Rotation, complement, log};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::{Mat3, Vec3};
@@ -32,8 +32,8 @@ pub struct Increments {
 }
 
 impl Increments {
-    /// For a stage with these equations.
-    pub fn new(model: &Model, dof_map: &DofMap) -> Self {
+    /// For a stage of this kind with these equations.
+    pub fn new(model: &Model, kind: StageKind, dof_map: &DofMap) -> Self {
         let bodies = bodies_by_rotation(model);
         let carrier = |&slot: &Slot| {
             // A hinge turns about a fixed axis: its spin has one component, its momentum three.
@@ -44,7 +44,7 @@ impl Increments {
             });
             (slot, carrier.unwrap_or(Carrier::SPIN))
         };
-        Self { carriers: model.charted.rotations.iter().map(carrier).collect() }
+        Self { carriers: model.charted(kind).rotations.iter().map(carrier).collect() }
     }
 
     /// At the start of a stage, after [`super::Scheme::start`]: the same of momenta.

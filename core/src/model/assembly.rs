@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// The effects of one stage with their scratch, and the system they add to.
 pub struct Assembly {
+    /// The stage
+    pub stage: StageContext,
     effects: Vec<Acting>,
     /// Forces and tangent
     pub system: System,
@@ -99,7 +101,11 @@ fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
 impl Assembly {
     /// The system of what acts in a stage on these equations.
     pub fn new(stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
-        let acting = model.acting(stage);
+        Self::of(model.acting(stage), stage, dof_map, model)
+    }
+
+    /// The system of these effects in a stage on these equations.
+    pub fn of(acting: Vec<Arc<dyn Effect>>, stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
         let connectivity = threads::map(acting.iter(), |effect| effect.connectivity());
         let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, dof_map.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&connectivity).map(acts).collect();
@@ -109,6 +115,7 @@ impl Assembly {
         let node_blocks = model.node_blocks(dof_map.layout());
         let symmetry = Symmetry::of(connectivity.iter().zip(effects.iter().map(Acting::is_symmetric)), &node_blocks);
         Self {
+            stage: *stage,
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
             system: System::new(
                 Pattern::new(dof_map, node_blocks, connectivity, symmetry),

@@ -1,36 +1,33 @@
 //! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
 
-mod amplitude;
 mod assembly;
 pub mod charts;
 mod constraint;
+mod course;
 mod effect_size;
 mod history;
 mod linear;
 mod names;
+mod schedule;
+mod stage_error;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
-pub use amplitude::Amplitude;
 pub use assembly::Assembly;
-pub use constraint::{Jump, Motion, MotionKind, Support};
+pub use constraint::{Motion, MotionKind, Support};
+pub use course::{Amplitude, Course, Progress, Ramp, Timeline};
 pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
+pub use schedule::Schedule;
+pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
 use crate::effect::{Constraint, Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
-use crate::system::{
-    Category, Direction, DofMap, FrameConflict, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System,
-    most_regions,
-};
+use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
 use crate::threads;
-use std::collections::HashMap;
 use std::sync::Arc;
-
-/// A prescribed rotation may go this far in one step or load increment.
-const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
 
 /// A state that is out of a plane by less, relative to the largest motion, is in it: a stage before that ran in space leaves round-off of
 /// a few thousand steps. What is left aside is dropped, a hundredth of what planar and spatial answers may differ by.
@@ -102,8 +99,7 @@ pub struct Charted {
     pub elements: Vec<ElementInfo>,
 }
 
-/// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
-#[derive(Clone)]
+/// A scene. Nothing of it changes in a run: what does is [`State`] and [`Schedule`].
 pub struct Model {
     /// What each slot holds
     pub kinds: Arc<Vec<SlotKind>>,
@@ -119,10 +115,8 @@ pub struct Model {
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
     /// How many beam elements there are
     pub elements: usize,
-    /// What large rotations ask for
-    pub rotating: Arc<Charted>,
-    /// The same in the present stage: nothing where that is linear
-    pub charted: Arc<Charted>,
+    /// Rotations and elements that large rotations change the charts of; see [`Self::charted`]
+    pub rotating: Charted,
     /// What acts
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs
@@ -138,41 +132,6 @@ pub struct Model {
     /// The length to which displacements are compared: the diagonal of the scene's box, or 1
     pub length: f64,
 }
-
-/// Why a stage cannot begin.
-#[derive(Clone, Debug, PartialEq)]
-pub enum StageError {
-    /// Two constraints on one node are neither the same nor orthogonal.
-    Conflict(FrameConflict),
-    /// A motion would have to jump.
-    Jump(Jump),
-    /// A support would hold single components of a rotation that is not zero there.
-    TurnedHinge(Slot),
-    /// A motor would have to jump.
-    MotorJump(MotorJump),
-    /// A path or a search for critical loads, and nothing goes with the load factor.
-    NothingGrows(StageKind),
-    /// A search for modes, and nothing that is free to move has mass.
-    NoMass,
-}
-
-/// A motor that would have to jump when a dynamic stage begins.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MotorJump {
-    /// The slot of its multiplier
-    pub slot: Slot,
-    /// The number of its amplitude
-    pub amplitude: usize,
-    /// Whether it turns, or slides
-    pub turns: bool,
-    /// The angle or displacement that it has reached
-    pub from: f64,
-    /// Where it begins
-    pub to: f64,
-}
-
-/// What a motor may jump by when a dynamic stage begins, in radians or relative to the scene's length.
-pub const LARGEST_GAP: f64 = 1e-6;
 
 impl Model {
     /// The number of slots.
@@ -190,6 +149,11 @@ impl Model {
         State::rest(self.slots(), self.elements, self.amplitudes.len(), self.angles)
     }
 
+    /// Whether a slot holds a rotation vector.
+    pub fn is_rotation(&self, slot: Slot) -> bool {
+        self.kinds[slot as usize] == SlotKind::Rotation
+    }
+
     /// The inner product of two motions, displacements over the length of the scene.
     pub fn inner_product(
         &self,
@@ -205,36 +169,6 @@ impl Model {
             sums
         });
         rotations + displacements / self.length.powi(2)
-    }
-
-    /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<DofMap, StageError> {
-        if let Some(jump) = self.settle(stage, kind, state).into_iter().next() {
-            return Err(StageError::Jump(jump));
-        }
-        let plane = self
-            .plane
-            .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
-        self.refuse_turned_hinges(stage, state)?;
-        self.number(stage, plane)
-    }
-
-    /// Settles the courses of loads and motions; the motions that would have to jump.
-    pub fn settle(&mut self, stage: usize, kind: StageKind, state: &State) -> Vec<Jump> {
-        let fresh = self.has_fresh_loads(stage);
-        self.charted = if self.is_linear(kind) { Arc::default() } else { self.rotating.clone() };
-        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind, state.time, fresh));
-        let mut jumps = Vec::new();
-        for (number, motion) in self.motions.iter_mut().enumerate() {
-            let begun = motion.begin_stage(stage, kind, state, self.length, fresh);
-            jumps.extend(begun.err().map(|(from, to)| Jump { motion: number, from, to }));
-        }
-        jumps
-    }
-
-    /// Whether neither a load nor a motion goes with the load factor in the present stage.
-    pub fn is_idle(&self) -> bool {
-        !self.amplitudes.iter().any(Amplitude::grows) && !self.motions.iter().any(Motion::grows)
     }
 
     /// Whether no mass of a stage sits where something is free to move.
@@ -262,7 +196,7 @@ impl Model {
     }
 
     /// The effects that close gaps by multipliers.
-    fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
+    pub(super) fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
         self.effects.iter().filter_map(|effect| effect.roles().constraint)
     }
 
@@ -271,20 +205,15 @@ impl Model {
         self.constraints().for_each(|constraint| constraint.motors(state, show));
     }
 
-    /// Whether stages of a kind are linear in the displacements.
-    pub fn is_linear(&self, kind: StageKind) -> bool {
-        self.linear && matches!(kind, StageKind::Static | StageKind::Dynamic)
+    /// The rotations and elements that have charts in stages of a kind: none where these are linear.
+    pub fn charted(&self, kind: StageKind) -> &Charted {
+        const NONE: &Charted = &Charted { rotations: Vec::new(), elements: Vec::new() };
+        if self.is_linear(kind) { NONE } else { &self.rotating }
     }
 
-    /// The unknowns that are free in a stage that has begun, in a plane or in space.
-    pub fn number(&self, stage: usize, plane: Option<Plane>) -> Result<DofMap, StageError> {
-        let (slots, held) = (self.slots(), self.held_directions(stage));
-        let turns = |slot: Slot| self.kinds[slot as usize] == SlotKind::Rotation;
-        let numbered = match plane {
-            None => DofMap::new(slots, &held),
-            Some(plane) => DofMap::planar(slots, &held, plane, turns),
-        };
-        numbered.map_err(StageError::Conflict)
+    /// Whether stages of a kind are linear in the displacements.
+    pub fn is_linear(&self, kind: StageKind) -> bool {
+        self.linear && kind.advances_state()
     }
 
     /// Shows what decides whether the scene lies in a plane, each with a name.
@@ -328,69 +257,6 @@ impl Model {
             let farthest = self.kinds.iter().zip(field).map(aside).fold(0.0, f64::max);
             farthest <= OUT_OF_PLANE * largest
         })
-    }
-
-    /// Whether loads or motions without a history act for the first time in this stage.
-    pub fn has_fresh_loads(&self, stage: usize) -> bool {
-        self.amplitudes.iter().any(|a| a.is_fresh(stage)) || self.motions.iter().any(|m| m.is_fresh(stage))
-    }
-
-    /// Remembers where the stage left the loads.
-    pub fn end_stage(&mut self, state: &State) {
-        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.end_stage(state.time, state.load));
-    }
-
-    fn held_directions(&self, stage: usize) -> Vec<Direction> {
-        let supports = self.supports.iter().filter(|support| support.stages.contains(stage));
-        let moved = self.motions.iter().filter(|motion| motion.acts());
-        // A prescribed rotation holds all of its node, so that what a joint about the same axis holds is no question any more.
-        moved.flat_map(Motion::directions).chain(supports.flat_map(|s| s.directions.clone())).collect()
-    }
-
-    /// One or two held components of a rotation vector survive a change of chart only where they are zero.
-    pub fn refuse_turned_hinges(&self, stage: usize, state: &State) -> Result<(), StageError> {
-        let mut held: HashMap<Slot, Vec<Vec3>> = HashMap::new();
-        self.held_directions(stage).iter().for_each(|d| held.entry(d.slot).or_default().push(d.axis));
-        for &slot in &self.charted.rotations {
-            let Some(axes) = held.get(&slot) else { continue };
-            let turned = axes.iter().any(|axis| state.q[slot as usize].dot(*axis).abs() > 1e-9);
-            let spans = |axis: &Vec3| axes.iter().any(|held| held.dot(*axis).abs() > 1e-9);
-            if turned && !Vec3::UNIT.iter().all(spans) {
-                return Err(StageError::TurnedHinge(slot));
-            }
-        }
-        Ok(())
-    }
-
-    /// The first time behind `time` at which a load or a motion takes another course.
-    pub fn next_corner(&self, time: f64) -> Option<f64> {
-        let loads = self.amplitudes.iter().filter_map(|amplitude| amplitude.next_corner(time));
-        loads.chain(self.motions.iter().filter_map(|motion| motion.next_corner(time))).min_by(f64::total_cmp)
-    }
-
-    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions. Where a motion turns
-    /// its node too far at once, its slot and the angle are returned.
-    pub fn set_clock(&self, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
-        let before = state.amplitude.clone();
-        (state.time, state.load) = (time, load);
-        for (k, amplitude) in self.amplitudes.iter().enumerate() {
-            let [value, rate, rate2] = amplitude.at(time, load);
-            state.amplitude[k] = value;
-            state.amplitude_rates[k] = [rate, rate2];
-        }
-        let mut too_far = None;
-        for turned in self.constraints().filter_map(|constraint| constraint.turned(&before, &state.amplitude)) {
-            if turned.1 > LARGEST_TURN {
-                too_far = Some(turned);
-            }
-        }
-        for motion in &self.motions {
-            let turned = motion.impose(state);
-            if turned > LARGEST_TURN {
-                too_far = Some((motion.slot, turned));
-            }
-        }
-        too_far
     }
 
     /// The largest displacement of a node from one state to another.

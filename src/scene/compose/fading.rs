@@ -1,7 +1,7 @@
 //! Fading inertia: static stages take forces of inertia and damping over from a motion before them.
 
 use super::Composer;
-use crate::deck::{EffectWord, StageBody};
+use crate::deck::EffectWord;
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::inertia::FadingInertia;
 use beamsim_core::model::StageSet;
@@ -31,13 +31,11 @@ impl Composer<'_> {
         let mut stages = Vec::new();
         let mut moves = false;
         for (number, stage) in self.deck.stages.iter().enumerate() {
-            match stage.body {
-                StageBody::Dynamic { .. } => moves = true,
-                StageBody::Static { .. } | StageBody::Path { .. } => {
-                    stages.extend(moves.then_some(number));
-                    moves &= stage.until.is_some();
-                }
-                StageBody::Modal { .. } | StageBody::Buckling { .. } => {}
+            if stage.body.advances_time() {
+                moves = true;
+            } else if stage.body.finds_balance() {
+                stages.extend(moves.then_some(number));
+                moves &= stage.until.is_some();
             }
         }
         stages

@@ -123,10 +123,9 @@ impl Composer<'_> {
         if framed.is_empty() {
             return self.reason("rotating frame", false, "no stage has a `frame`");
         }
-        let is_static =
-            |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Static { .. } | deck::StageBody::Path { .. });
         // One amplitude for all static stages: what one has brought in stays for the next.
-        let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
+        let ramped: Vec<usize> =
+            framed.iter().filter(|(_, stage)| stage.body.finds_balance()).map(|(k, _)| k + 1).collect();
         let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
         let (elements, nodal) =
             self.inertia_elements(|element, station, inertia| (inertia, element.between(&station.shape)));
@@ -144,7 +143,7 @@ impl Composer<'_> {
                 stage: *number,
                 spin: Vec3(frame.spin),
                 about,
-                amplitude: amplitude.filter(|_| is_static(stage)),
+                amplitude: amplitude.filter(|_| stage.body.finds_balance()),
                 elements: elements.clone(),
                 bodies: bodies.clone(),
             }));

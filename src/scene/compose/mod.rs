@@ -316,9 +316,7 @@ impl Composer<'_> {
 /// True where effects of inertia are needed: by dynamic and modal stages, by outputs of momentum,
 /// and by static stages whose stability only small vibrations show.
 fn needs_mass(deck: &Deck) -> bool {
-    let inertia =
-        |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
-    let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
+    let dynamic = deck.stages.iter().any(|stage| stage.body.needs_inertia() || stage.frame.is_some());
     let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
     let expected = deck.expects.iter().any(|expect| match &expect.body {
         deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
@@ -334,11 +332,7 @@ fn may_flutter(deck: &Deck) -> bool {
         deck::Frame::Space => load.moment.is_some(),
         deck::Frame::Body | deck::Frame::Section => true,
     };
-    let settles = |body: &deck::StageBody| match body {
-        deck::StageBody::Static { .. } | deck::StageBody::Path { .. } => true,
-        deck::StageBody::Modal { .. } | deck::StageBody::Buckling { .. } | deck::StageBody::Dynamic { .. } => false,
-    };
-    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| settles(&stage.body))
+    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| stage.body.finds_balance())
 }
 
 /// The stages of the deck count from 1, those of a run from 0.

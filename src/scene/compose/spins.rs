@@ -1,7 +1,7 @@
 //! Straight parts whose spin about their own axis nothing resists.
 
 use super::Composer;
-use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned, StageBody};
+use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
 use crate::scene::section::SectionMatrices;
@@ -50,11 +50,7 @@ impl StraightPart<'_> {
 impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
         let parts = self.straight_parts(&self.resisted_rotations(connections));
-        let is_static = |body: &StageBody| match body {
-            StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Buckling { .. } => true,
-            StageBody::Modal { .. } | StageBody::Dynamic { .. } => false,
-        };
-        let rests = self.deck.stages.iter().any(|stage| is_static(&stage.body));
+        let rests = self.deck.stages.iter().any(|stage| !stage.body.needs_inertia());
         let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<SpinningPart> {
             parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect()
         };

@@ -193,8 +193,7 @@ fn sampler(
 
 /// Refuses a history that ends before the deck does.
 fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
-    let rows = |body: &StageBody| !matches!(body, StageBody::Modal { .. } | StageBody::Buckling { .. });
-    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| rows(&stage.body)) else {
+    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| stage.body.writes_rows()) else {
         return Ok(());
     };
     let start = StageClock { stage: 1, clock: 0.0 };

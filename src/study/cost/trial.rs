@@ -135,15 +135,13 @@ fn attempts(deck: &Deck, patience: Patience) -> u64 {
     let mut start = 0.0;
     let mut most = patience.more;
     for stage in &deck.stages {
-        most += match stage.body {
-            StageBody::Static { steps, .. } => patience.per_level * steps as f64,
-            StageBody::Path { max_steps, .. } => patience.per_level * max_steps as f64,
-            StageBody::Dynamic { end, step, step_tolerance, .. } => {
-                let count = (end - start) / equal_part(deck, step) + 1.0;
-                start = end;
-                patience.per_step * if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
-            }
-            StageBody::Modal { .. } | StageBody::Buckling { .. } => patience.per_level,
+        most += if let StageBody::Dynamic { end, step, step_tolerance, .. } = stage.body {
+            let count = (end - start) / equal_part(deck, step) + 1.0;
+            start = end;
+            patience.per_step * if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
+        } else {
+            // An analysis without increments has the patience of one level.
+            patience.per_level * stage.body.increments().unwrap_or(1) as f64
         };
     }
     most as u64

@@ -10,7 +10,7 @@ use crate::kernel::load::force_on_complement;
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::complement;
 use crate::system::{
-    Assembler, Category, Connectivity, Fading, Memory, MirrorData, Slot, StageContext, StageKind, StageSet, State,
+    Assembler, Category, Connectivity, Fading, Memory, MirrorData, Slot, StageContext, StageSet, State,
 };
 use crate::tensor::{Mat3, Vec3};
 
@@ -41,7 +41,7 @@ impl Effect for FadingInertia {
     }
 
     fn acts(&self, stage: &StageContext) -> bool {
-        stage.kind == StageKind::Static && self.stages.contains(stage.number)
+        stage.kind.ramps_load() && self.stages.contains(stage.number)
     }
 
     /// Motion that lies in a plane has forces that do.

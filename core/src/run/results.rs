@@ -4,6 +4,25 @@ use super::failure::Moment;
 use crate::warning::WarningKind;
 use std::fmt;
 
+/// The result of an analysis, beside its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StageResult {
+    /// Small motions, by frequency
+    Modes(Vec<Mode>),
+    /// Critical loads, nearest above the load that was reached first
+    CriticalLoads(Vec<CriticalLoad>),
+}
+
+impl StageResult {
+    /// Its numbers, in the order of [`StageWork::results`](super::StageWork::results).
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            Self::Modes(modes) => modes.iter().flat_map(|mode| [mode.omega, mode.growth]).collect(),
+            Self::CriticalLoads(loads) => loads.iter().map(|critical| critical.load).collect(),
+        }
+    }
+}
+
 /// A small motion exp(s t), s = growth + i omega.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
@@ -25,7 +44,7 @@ impl Mode {
 pub struct CriticalLoad {
     /// The load factor
     pub load: f64,
-    /// What lies there
+    /// Its kind
     pub kind: CriticalKind,
 }
 
@@ -36,7 +55,8 @@ pub enum CriticalKind {
     Branch,
     /// The load is stationary.
     Limit,
-    /// The path has no critical point that was reached: the load at which the tangent, extrapolated from smaller loads, would be singular
+    /// The path has no critical point that was reached: the load at which the tangent, extrapolated
+    /// from smaller loads, would be singular
     Estimate,
 }
 
@@ -56,7 +76,7 @@ impl CriticalKind {
 pub struct Event {
     /// Where
     pub at: Moment,
-    /// What
+    /// Its kind
     pub kind: EventKind,
     /// How many pivots of the tangent are negative behind it, where that is known
     pub negative_pivots: Option<usize>,

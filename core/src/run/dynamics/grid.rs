@@ -2,7 +2,7 @@
 
 /// Steps of one length, the last perhaps shorter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grid {
+pub struct Grid {
     start: f64,
     end: f64,
     step: f64,
@@ -22,8 +22,9 @@ impl Grid {
         Self { start, end, step: (end - start) / steps, steps: steps as u64 }
     }
 
-    /// The end and the length of step `number`, from 1. Times are multiples, not sums, so that they do not drift; steps
-    /// that are equal but for the round-off of times have one length to the last bit.
+    /// The end and the length of step `number`, from 1. Times are multiples, not sums, so that they
+    /// do not drift; steps that are equal but for the round-off of times have one length to the
+    /// last bit.
     pub fn step(&self, number: u64) -> (f64, f64) {
         if number < self.steps {
             return (self.start + number as f64 * self.step, self.step);

@@ -29,7 +29,7 @@ impl Ledger {
 
 /// Keeps the account from step to step.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Bookkeeper {
+pub struct Bookkeeper {
     ledger: Ledger,
     /// The total that an exact solution keeps; known while the account is open
     first: Option<f64>,
@@ -43,7 +43,8 @@ pub(super) struct Bookkeeper {
 }
 
 impl Bookkeeper {
-    /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic energy that is new belongs to the account.
+    /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic
+    /// energy that is new belongs to the account.
     pub fn bring_in(&mut self, model: &Model, state: &State) {
         if let Some(first) = &mut self.first {
             *first += model.energy(state).kinetic - self.ledger.kinetic;
@@ -84,7 +85,8 @@ impl Bookkeeper {
         self.take(model, state);
     }
 
-    /// What an artificial resistance took on the way to a state of rest: all that is missing from the `total` before.
+    /// Books the energy that an artificial resistance took on the way to a state of rest: all that
+    /// is missing from the `total` before.
     pub fn damp_to(&mut self, total: f64) {
         self.ledger.damped += total - self.ledger.total();
     }
@@ -113,7 +115,8 @@ impl Bookkeeper {
     }
 }
 
-/// The way of all slots from one state to the next, by their unknowns and their unwrapped rotation vectors where they have some.
+/// The way of all slots from one state to the next, by their unknowns and their unwrapped rotation
+/// vectors where they have some.
 struct Way<'a> {
     kinds: &'a [SlotKind],
     from: (&'a [Vec3], &'a [Vec3]),
@@ -140,7 +143,8 @@ impl Way<'_> {
     }
 }
 
-/// Puts a force in the place of another one, which it gives back. Most are zero and stay so, in memory that nobody writes to.
+/// Puts a force in the place of another one, which it gives back. Most are zero and stay so, in
+/// memory that nobody writes to.
 #[inline(always)]
 fn put(place: &mut Vec3, force: Vec3) -> Vec3 {
     let before = *place;
@@ -150,7 +154,8 @@ fn put(place: &mut Vec3, force: Vec3) -> Vec3 {
     before
 }
 
-/// What acts from outside at a slot: loads, and the forces that hold or move constrained directions.
+/// The force from outside at a slot: loads, and the forces that hold or move constrained
+/// directions.
 fn outside(system: &System, slot: usize) -> Vec3 {
     let dof_map: &DofMap = &system.pattern.dof_map;
     let external = system.part_of(Category::External, slot);
@@ -160,8 +165,8 @@ fn outside(system: &System, slot: usize) -> Vec3 {
     }
 }
 
-/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A rotation tells by `unwrapped` how far it
-/// has gone.
+/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A
+/// rotation tells by `unwrapped` how far it has gone.
 fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrapped: Vec3) -> f64 {
     if f0 == Vec3::ZERO && f1 == Vec3::ZERO {
         return 0.0;
@@ -173,8 +178,8 @@ fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrappe
     }
 }
 
-/// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial moment m = T^-1 f
-/// and the spatial rotation vector from the one state to the other.
+/// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial
+/// moment m = T^-1 f and the spatial rotation vector from the one state to the other.
 fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3, unwrapped: Vec3) -> f64 {
     let (before, after) = (Rotation::new(p0), Rotation::new(p1));
     let shortest = log(after.r * before.r.transpose());

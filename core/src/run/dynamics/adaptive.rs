@@ -7,12 +7,13 @@ use crate::system::State;
 
 /// Chooses the length of steps.
 ///
-/// The local error of a step of a second-order method is e = h^2 (beta - 1/6 + (alpha_m - alpha_f)/2)(a1 - a0), translations
-/// over the length of the scene and rotations as spins T e. Errors of steps add up, so each step is given its share of the
-/// tolerance, by its part of the stage; a step whose largest error is above its share is rejected, and the next is chosen so that it
-/// should be a little below.
+/// The local error of a step of a second-order method is e = h^2 (beta - 1/6 + (alpha_m -
+/// alpha_f)/2)(a1 - a0), translations over the length of the scene and rotations as spins T e.
+/// Errors of steps add up, so each step is given its share of the tolerance, by its part of the
+/// stage; a step whose largest error is above its share is rejected, and the next is chosen so that
+/// it should be a little below.
 #[derive(Clone, Debug)]
-pub(super) struct Control {
+pub struct Control {
     /// The method
     pub scheme: Scheme,
     /// The error allowed to a step over its length
@@ -31,7 +32,8 @@ const GROWTH: f64 = 2.0;
 const SMALLEST: f64 = 1e-8;
 
 impl Control {
-    /// Begins with steps of this length; the tolerance is for all errors of the next `span` of time.
+    /// Begins with steps of this length; the tolerance is for all errors of the next `span` of
+    /// time.
     pub fn new(tolerance: f64, span: f64, length: f64, scheme: Scheme, judged: Vec<bool>) -> Self {
         Self { scheme, rate: tolerance / span, length, smallest: SMALLEST * length.min(span), judged }
     }
@@ -41,7 +43,8 @@ impl Control {
         self.rate * length
     }
 
-    /// The end and the length of the next step. What remains to the next stop is not left as a sliver.
+    /// The end and the length of the next step. What remains to the next stop is not left as a
+    /// sliver.
     pub fn propose(&self, time: f64, stop: f64) -> (f64, f64) {
         let rest = stop - time;
         if self.length >= rest * (1.0 - 1e-9) {
@@ -53,7 +56,7 @@ impl Control {
         }
     }
 
-    /// Whether a step cannot become smaller.
+    /// True if a step cannot become smaller.
     pub fn is_smallest(&self, length: f64) -> bool {
         length <= self.smallest
     }
@@ -76,7 +79,8 @@ impl Control {
         taken
     }
 
-    /// The largest local error of a step and its slot, from the accelerations at its ends; both states in one chart.
+    /// The largest local error of a step and its slot, from the accelerations at its ends; both
+    /// states in one chart.
     pub fn error(
         &self,
         model: &Model,
@@ -85,7 +89,8 @@ impl Control {
         end: &State,
         length: f64,
     ) -> (f64, usize) {
-        // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps sensible.
+        // Without a factor the difference is no estimate; that of the trapezoidal rule keeps steps
+        // sensible.
         let factor = self.scheme.error_factor().unwrap_or(1.0 / 12.0).abs();
         let of_slot = |(slot, kind): (usize, &SlotKind)| {
             if !self.judged[slot] {

@@ -1,13 +1,15 @@
 //! Rigid motions of free parts: motions against which nothing acts, whatever the state.
 //!
-//! A part may move rigidly where no support holds it and where all forces on it follow: when a part turns by an infinitesimal rotation w, its
-//! forces f turn with it. With the gradients g_u = f and g_P = T^T m of a node (m: material moment) this says
+//! A part may move rigidly where no support holds it and where all forces on it follow: when a part
+//! turns by an infinitesimal rotation w, its forces f turn with it. With the gradients g_u = f and
+//! g_P = T^T m of a node (m: material moment) this says
 //!
 //! ```text
 //! K r = dg,   r_u = d + w x (x - c),   r_P = T^-1 R^T w,   dg_u = w x f,   dg_P = D_P(T^T m) r_P
 //! ```
 //!
-//! It holds in balance and out of it, under pretension and under following loads, but for dead loads that turning changes.
+//! It holds in balance and out of it, under pretension and under following loads, but for dead
+//! loads that turning changes.
 
 use crate::effect::SomeIncrements;
 use crate::model::Model;
@@ -23,18 +25,20 @@ const HELD: f64 = 1e-7;
 /// Forces against a motion that are smaller than this part of their terms are round-off.
 const NO_FORCE: f64 = 1e-11;
 
-/// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid motions are found as other slow modes are.
+/// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid
+/// motions are found as other slow modes are.
 const MOST_PARTS: usize = 64;
 
 /// Directions of motion of one free part.
 const MOTIONS: usize = 6;
 
-/// Forces against a spin that are smaller than this part of their terms are what the tolerance of balance leaves.
+/// Forces against a spin that are smaller than this part of their terms are what the tolerance of
+/// balance leaves.
 const NO_FORCE_OF_SPIN: f64 = 1e-8;
 
-/// The spins of straight parts about their own axes against which nothing acts, one number an equation each. The system holds the stiffness of
-/// the state.
-pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
+/// The spins of straight parts about their own axes against which nothing acts, one number an
+/// equation each. The system holds the stiffness of the state.
+pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
     let dof_map = &system.pattern.dof_map;
     let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
     let mut found = Vec::new();
@@ -55,8 +59,9 @@ pub(super) fn free_spins(system: &System, model: &Model, state: &State) -> Vec<V
     found
 }
 
-/// The rigid motions of all free parts, one number an equation each. The system holds forces and stiffness of the state.
-pub(super) fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
+/// The rigid motions of all free parts, one number an equation each. The system holds forces and
+/// stiffness of the state.
+pub fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
     let parts = parts(system, places);
     if parts.len() > MOST_PARTS {
         return Vec::new();
@@ -195,7 +200,8 @@ fn add_gram(gram: &mut DMatrix<f64>, columns: &[[f64; 6]; MOTIONS]) {
     }
 }
 
-/// The vectors, as columns, whose squares a Gram matrix makes no larger than `least`; `None` where there are none.
+/// The vectors, as columns, whose squares a Gram matrix makes no larger than `least`; `None` where
+/// there are none.
 fn null_space(gram: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
     let eigen = gram.symmetric_eigen();
     let small: Vec<_> = (0..eigen.eigenvalues.len()).filter(|&k| eigen.eigenvalues[k] <= least).collect();

@@ -2,12 +2,13 @@
 
 use super::ledger::Ledger;
 
-/// So many steps running the energy must be too large: a single peak is the trapezoidal rule of the account.
+/// Consecutive steps over which the energy must be too large: a single peak is the trapezoidal rule
+/// of the account.
 const RUNNING: usize = 3;
 
 /// Follows the total from the start of a stage.
 #[derive(Clone, Debug)]
-pub(super) struct EnergyGuard {
+pub struct EnergyGuard {
     limit: f64,
     floor: f64,
     round_off: f64,
@@ -24,24 +25,25 @@ struct Balance {
     first: f64,
     /// At the start of the stage
     start: f64,
-    /// What the total was where it was farthest from that of the run's start, and from that of the stage's
+    /// The total where it was farthest from that of the run's start, and from that of the stage's
     farthest: [f64; 2],
 }
 
-/// What an account is off by that should be closed, over the largest kinetic + strain energy or work from outside.
+/// The error of an account that should be closed, over the largest kinetic + strain energy or work
+/// from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Imbalance {
+pub struct Imbalance {
     /// Above zero where energy comes from nothing
     pub share: f64,
-    /// Whether the stage itself is to blame, or those before it
+    /// The stage itself is to blame, not those before it.
     pub is_own: bool,
 }
 
 /// An account that is off by more than this part of the largest energy is told.
 const UNBALANCED: f64 = 0.05;
 
-/// Whether an account that is off by a share of the largest energy is worth a warning.
-pub(super) fn is_unbalanced(share: f64) -> bool {
+/// True if an account that is off by a share of the largest energy is worth a warning.
+pub fn is_unbalanced(share: f64) -> bool {
     share.abs() > UNBALANCED
 }
 
@@ -49,20 +51,21 @@ pub(super) fn is_unbalanced(share: f64) -> bool {
 const TO_BLAME: f64 = 0.4;
 
 /// By how much the total has grown, and what that is to be compared with.
-pub(super) struct Growth {
+pub struct Growth {
     pub grown: f64,
     pub largest: f64,
 }
 
 impl EnergyGuard {
-    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far. Energies below `floor` are
-    /// round-off: what Newton tolerates, and on the way the work of forces as large as `round_off`.
+    /// The total may grow by `limit` times the largest |kinetic| + |strain| + |external| so far.
+    /// Energies below `floor` are round-off: what Newton tolerates, and on the way the work of
+    /// forces as large as `round_off`.
     pub fn new(limit: f64, floor: f64, round_off: f64) -> Self {
         Self { limit, floor, round_off, start: None, largest: 0.0, running: 0, balance: Balance::default() }
     }
 
-    /// The account where the stage begins, and the total at the start of the run; `round_off` is the work of the forces there on the way that
-    /// places are rounded by.
+    /// The account where the stage begins, and the total at the start of the run; `round_off` is
+    /// the work of the forces there on the way that places are rounded by.
     pub fn open(&mut self, ledger: Ledger, first: f64, round_off: f64) {
         self.floor += round_off;
         let total = ledger.total();
@@ -72,12 +75,14 @@ impl EnergyGuard {
         self.largest = size(ledger);
     }
 
-    /// What the account of the run is off by, if that is worth a warning; `scale` is the largest energy of the run so far.
+    /// The error of the account of the run, if that is worth a warning; `scale` is the largest
+    /// energy of the run so far.
     pub fn imbalance(&self, scale: f64) -> Option<Imbalance> {
         if self.largest > self.floor { self.balance.imbalance(scale) } else { None }
     }
 
-    /// Looks at the account of a step over which nodes have moved by `moved` at most; tells a growth that lasts.
+    /// Looks at the account of a step over which nodes have moved by `moved` at most; tells a
+    /// growth that lasts.
     pub fn judge(&mut self, ledger: Ledger, moved: f64) -> Option<Growth> {
         self.floor += self.round_off * moved;
         self.largest = self.largest.max(size(ledger));
