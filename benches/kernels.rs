@@ -2,13 +2,13 @@
 //!
 //! `cargo bench --bench kernels`; compare figures of one run only.
 
-use beamsim::kernel::beam::StiffnessPoint;
-use beamsim::kernel::elastic::Stiffness;
-use beamsim::kernel::inertia::Rotary;
-use beamsim::kernel::volume::VolumePoint;
-use beamsim::kernel::{ElementSystem, NodeMotion, Weights, shape};
-use beamsim::rotation::Rotation;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::beam::StiffnessPoint;
+use beamsim_core::kernel::elastic::Stiffness;
+use beamsim_core::kernel::inertia::Rotary;
+use beamsim_core::kernel::volume::VolumePoint;
+use beamsim_core::kernel::{ElementSystem, NodeMotion, Weights, shape};
+use beamsim_core::rotation::Rotation;
+use beamsim_core::tensor::{Mat3, Vec3};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 

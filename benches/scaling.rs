@@ -3,14 +3,14 @@
 //!
 //! `cargo bench --bench scaling` prints the table; `-- --smoke` runs the small sizes only, `-- --elements 10000,1000000` these.
 
-use beamsim::drive::{Failure, Observer, Run, Snapshot};
-use beamsim::effect::Noise;
-use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::model::{Assembly, Model, StageContext, StageKind};
 use beamsim::scene;
-use beamsim::solve::{Convergence, LinearSolver};
-use beamsim::system::Leftover;
-use beamsim::tensor::Vec3;
+use beamsim_core::effect::RoundOff;
+use beamsim_core::kernel::{ElementSystem, Weights};
+use beamsim_core::model::{Assembly, Model, Schedule, StageContext, StageKind};
+use beamsim_core::run::{Failure, Observer, Run, Snapshot};
+use beamsim_core::solve::{Convergence, LinearSolver};
+use beamsim_core::system::Leftover;
+use beamsim_core::tensor::Vec3;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -44,19 +44,18 @@ fn deck(elements: usize, dynamic: bool, way: &str) -> String {
 
 /// Seconds that scattering one set of element systems takes.
 fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
-    let mut model = model.clone();
     let state = model.rest();
-    let Ok(equations) = model.begin_stage(0, kind, &state) else { return 0.0 };
+    let Ok(dof_map) = Schedule::new(model).begin_stage(model, 0, kind, &state) else { return 0.0 };
     let stage = StageContext { number: 0, kind, rotating: false };
     let effects = model.acting(&stage);
-    let shapes: Vec<_> = effects.iter().map(|effect| effect.cliques()).collect();
-    let mut assembly = Assembly::new(&stage, equations, &model);
+    let shapes: Vec<_> = effects.iter().map(|effect| effect.connectivity()).collect();
+    let mut assembly = Assembly::new(&stage, dof_map, model);
     let mut scatter = || {
         let start = Instant::now();
-        for (number, (effect, cliques)) in effects.iter().zip(&shapes).enumerate() {
-            let element = ElementSystem::new(cliques.iter().next().map_or(1, <[u32]>::len));
-            let mut sink = assembly.system.sink(number, effect.category(), effect.has_tangent());
-            for k in 0..cliques.len() {
+        for (number, (effect, connectivity)) in effects.iter().zip(&shapes).enumerate() {
+            let element = ElementSystem::new(connectivity.iter().next().map_or(1, <[u32]>::len));
+            let mut sink = assembly.system.sink(number, effect.category(), effect.tangent().exists());
+            for k in 0..connectivity.len() {
                 sink.add(k, black_box(&element));
             }
         }
@@ -81,15 +80,15 @@ fn quickest(mut part: impl FnMut()) -> f64 {
 fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     let (scene, _) =
         scene::from_text(&deck(elements, dynamic, interpolation)).unwrap_or_else(|_| panic!("the deck is good"));
-    let mut model = scene.plan.model;
+    let model = scene.plan.model;
     let state = model.rest();
     let (kind, weights) = if dynamic {
         (StageKind::Dynamic, Weights { stiffness: 1.0, damping: 200.0, mass: 4e4 })
     } else {
         (StageKind::Static, Weights::STIFFNESS)
     };
-    let Ok(equations) = model.begin_stage(0, kind, &state) else { return };
-    let mut assembly = Assembly::new(&StageContext { number: 0, kind, rotating: false }, equations, &model);
+    let Ok(dof_map) = Schedule::new(&model).begin_stage(&model, 0, kind, &state) else { return };
+    let mut assembly = Assembly::new(&StageContext { number: 0, kind, rotating: false }, dof_map, &model);
     let tangent = quickest(|| assembly.evaluate(&state, weights, None));
     let force = quickest(|| assembly.evaluate(&state, Weights::NONE, None));
     assembly.evaluate(&state, weights, None);
@@ -98,7 +97,7 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     let Some(mut solver) = LinearSolver::new(&assembly.system, &[]) else { return };
     let system = &assembly.system;
     let factorise = quickest(|| assert!(solver.factorise(system)));
-    let mut x = vec![1.0; system.pattern.equations.count()];
+    let mut x = vec![1.0; system.pattern.dof_map.count()];
     let solve = quickest(|| assert!(solver.solve_once(system, &mut x)));
     let b = vec![1.0; x.len()];
     let mut room = Leftover::default();
@@ -107,7 +106,7 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     });
     let convergence = Convergence { tolerance: 1e-8 };
     let judge = quickest(|| {
-        black_box(convergence.judge(&model, system, Noise::default(), None));
+        black_box(convergence.judge(&model, system, RoundOff::default(), None));
     });
     print!("{:<8} {interpolation:<9} {elements:>8}", if dynamic { "dynamic" } else { "static" });
     for seconds in [tangent, force, extrapolate, factorise, solve, residual, judge] {

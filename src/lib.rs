@@ -1,20 +1,13 @@
-//! beamsim simulates slender parts that bend, twist and spin far.
+//! beamsim simulates slender parts that bend, twist and spin far: a deck in TOML, nodal histories in CSV.
+//!
+//! The mechanics stand in the package `beamsim-core`; this one reads decks, writes results and has the command line.
+
+pub mod deck;
+
+pub mod scene;
+
+pub mod output;
+
+pub mod study;
 
 pub mod cli;
-pub mod deck;
-pub mod drive;
-pub mod effect;
-pub mod integrate;
-pub mod kernel;
-pub mod model;
-pub mod output;
-pub mod probe;
-pub mod real;
-pub mod rotation;
-pub mod scene;
-pub mod solve;
-pub mod study;
-pub mod system;
-pub mod tensor;
-pub mod threads;
-pub mod warning;

@@ -1,36 +1,40 @@
 //! `beamsim plot`
 
-use super::load::Refusal;
-use super::{Status, Verdict, json, load, say};
+use super::error::CommandError;
+use super::status::Status;
+use super::verdict::Verdict;
+use super::{console, json, load};
 use crate::deck::nearest;
 use crate::output::{
     Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
 };
 use std::path::{Path, PathBuf};
 
-/// Columns that are drawn where none is named.
-const USUAL: usize = 6;
-/// Displacements that change by less than this part of the largest change are still, but for round-off.
-const STILL: f64 = 1e-9;
+/// Largest number of columns that are drawn without `--column`.
+const MAX_DEFAULT_COLUMNS: usize = 6;
+/// Smallest change of a displacement relative to the largest one; smaller changes are round-off.
+const MIN_CHANGE: f64 = 1e-9;
 /// Columns that belong to every history.
 const CLOCKS: [&str; 3] = ["stage", "time", "load"];
 
-/// What is drawn.
+/// Arguments of `beamsim plot`.
 #[derive(clap::Args)]
-pub struct Wanted {
+pub struct PlotArguments {
     /// Folders of results, or histories (CSV); several are drawn on the same axes
     #[arg(required = true, value_name = "RESULTS")]
     results: Vec<PathBuf>,
     /// A column, such as tip.ux (default: displacements that change)
     #[arg(long = "column", value_name = "COLUMN")]
     columns: Vec<String>,
-    /// The column of the horizontal axis (default: time; if all stages are static, the load factor, stage by stage)
+    /// The column of the horizontal axis (default: time; if all stages are static, the load factor,
+    /// stage by stage)
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
     /// A stored history (CSV) to compare with
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// The picture, .svg or (in builds with `--features png`) .png (default: plot.svg in the first folder)
+    /// The picture, .svg or (in builds with `--features png`) .png (default: plot.svg in the first
+    /// folder)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -38,32 +42,32 @@ pub struct Wanted {
 /// A history with its name in the legend.
 struct NamedHistory {
     name: String,
-    /// Where it was read
+    /// The path that the user gave
     path: PathBuf,
     history: HistoryReader,
-    /// Of its run, where run.json lies beside the history
+    /// The record of the run, if run.json is beside the history
     record: Option<Record>,
     is_reference: bool,
 }
 
-/// What the horizontal axis shows.
+/// The quantity of the horizontal axis.
 enum Abscissa {
-    /// A column
+    /// A column of the histories
     Column(String),
     /// The load factors of static stages, one stage after the other
     StageByStage,
 }
 
 /// Draws histories.
-pub fn plot(wanted: &Wanted) -> Status {
+pub fn plot(wanted: &PlotArguments) -> Status {
     let mut verdict = Verdict::default();
-    if let Err(refusal) = draw(wanted) {
-        verdict.refuse(refusal);
+    if let Err(error) = draw(wanted) {
+        verdict.fail(error);
     }
     verdict.finish(1)
 }
 
-fn draw(wanted: &Wanted) -> Result<(), Refusal> {
+fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
     let mut runs = wanted.results.iter().map(|path| read(path, false)).collect::<Result<Vec<_>, _>>()?;
     runs.extend(wanted.reference.as_ref().map(|path| read(path, true)).transpose()?);
     tell_apart(&mut runs);
@@ -102,13 +106,13 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
     };
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
     let picture = picture(&plot, &path)?;
-    PartFile::write_to(&path, &picture).map_err(Refusal::io)?;
-    say::line(&format!("{}", path.display()));
+    PartFile::write_to(&path, &picture)?;
+    console::line(&format!("{}", path.display()));
     json::wrote("plot", &path);
     Ok(())
 }
 
-/// The title of the deck of one run, else the names of the runs.
+/// The title of the deck if one run is drawn, else the names of the runs.
 fn title(runs: &[NamedHistory]) -> String {
     let drawn: Vec<&NamedHistory> = runs.iter().filter(|run| !run.is_reference).collect();
     let names: Vec<&str> = drawn.iter().map(|run| run.name.as_str()).collect();
@@ -118,18 +122,20 @@ fn title(runs: &[NamedHistory]) -> String {
     }
 }
 
-/// The units that all runs with a deck share; a stored history has those of the runs that it is compared with.
+/// The units that all runs with a deck share. A stored history is taken to have the units of the runs
+/// that it is compared with.
 fn common_units(runs: &[NamedHistory]) -> Units {
     let mut known = runs.iter().filter_map(|run| run.record.as_ref()).map(Record::units);
     let first = known.next().unwrap_or_default();
     if known.all(|units| units == first) {
         return first;
     }
-    say::note("warning: the runs have different units, which are left out of the picture");
+    console::note("warning: the runs have different units; the plot shows no units");
     Units::default()
 }
 
-/// The column, or the quantity where all columns show the same; else nothing, and the legend tells the units.
+/// The title of the vertical axis: the column, or the quantity if all columns show the same one.
+/// Otherwise it is empty, and the legend shows the units.
 fn y_title(columns: &[String], units: &Units) -> String {
     if let [column] = columns {
         return units.title(column, column);
@@ -148,15 +154,15 @@ impl Abscissa {
         }
     }
 
-    /// Its value in each row.
-    fn values(&self, run: &NamedHistory) -> Result<Vec<f64>, Refusal> {
+    /// The values of the axis, one per row of a history.
+    fn values(&self, run: &NamedHistory) -> Result<Vec<f64>, CommandError> {
         match self {
             Self::Column(name) => run.column(name),
             Self::StageByStage => Ok(stage_by_stage(&run.column("stage")?, &run.column("load")?)),
         }
     }
 
-    /// Where stages begin, if the axis tells them apart.
+    /// Starts of stages, on axes on which stages follow one another.
     fn boundaries(&self, runs: &[NamedHistory]) -> Vec<Boundary> {
         let is_ordered = match self {
             Self::Column(name) => name == "time",
@@ -177,7 +183,8 @@ impl Abscissa {
     }
 }
 
-/// Load factors one stage after the other: each stage is as long as the range of its load factor, which begins at 0 or below.
+/// Load factors, one stage after another. The length of a stage on the axis is the range of its load
+/// factor, which includes 0.
 fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
     let mut values = Vec::new();
     let mut start = 0.0;
@@ -192,34 +199,34 @@ fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
 }
 
 /// In the format that the name of the file asks for.
-fn picture(plot: &LinePlot, path: &Path) -> Result<Vec<u8>, Refusal> {
+fn picture(plot: &LinePlot, path: &Path) -> Result<Vec<u8>, CommandError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         None | Some("svg") => Ok(plot.to_svg().into_bytes()),
         Some("png") => png(plot),
         Some(other) => {
             let message = format!("`.{other}`: pictures are written as .svg or .png");
-            Err(Refusal::of(Status::Wrong, "usage", message))
+            Err(CommandError::Usage(message))
         }
     }
 }
 
 #[cfg(feature = "png")]
-fn png(plot: &LinePlot) -> Result<Vec<u8>, Refusal> {
-    plot.to_png().map_err(|why| Refusal::of(Status::Wrong, "usage", format!("the picture cannot be drawn: {why}")))
+fn png(plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
+    plot.to_png().map_err(|why| CommandError::Usage(format!("the picture cannot be drawn: {why}")))
 }
 
 #[cfg(not(feature = "png"))]
-fn png(_plot: &LinePlot) -> Result<Vec<u8>, Refusal> {
+fn png(_plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
     let message =
         "this build draws .svg only: `cargo install --path . --locked --features png` makes one that draws .png";
-    Err(Refusal::of(Status::Wrong, "usage", message.into()))
+    Err(CommandError::Usage(message.into()))
 }
 
 /// The history in a folder, or the file itself.
-fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, Refusal> {
+fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, CommandError> {
     let file = HistoryReader::of_results(path).unwrap_or_else(|| path.to_path_buf());
-    let history = HistoryReader::read(&file).map_err(Refusal::io)?;
+    let history = HistoryReader::read(&file)?;
     let is_of_run = file.file_name().is_some_and(|name| name == "history.csv" || name == "history.partial.csv");
     let folder = file.parent().filter(|_| is_of_run).and_then(|folder| std::fs::canonicalize(folder.join(".")).ok());
     // `results/arm/history.csv` is `arm`.
@@ -228,7 +235,7 @@ fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, Refusal> {
     Ok(NamedHistory { name, path: path.into(), history, record, is_reference })
 }
 
-/// Runs of the same name are named by their paths.
+/// Renames runs that share a name: they are named by their paths.
 fn tell_apart(runs: &mut [NamedHistory]) {
     let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
     for run in runs {
@@ -240,31 +247,32 @@ fn tell_apart(runs: &mut [NamedHistory]) {
 
 impl NamedHistory {
     /// The values of a column.
-    fn column(&self, name: &str) -> Result<Vec<f64>, Refusal> {
-        let place = find(&self.history, name)
-            .map_err(|why| Refusal { message: format!("{}: {}", self.name, why.message), ..why })?;
+    fn column(&self, name: &str) -> Result<Vec<f64>, CommandError> {
+        let place =
+            find(&self.history, name).map_err(|error| CommandError::Usage(format!("{}: {error}", self.name)))?;
         Ok(self.history.rows.iter().map(|row| row[place]).collect())
     }
 
-    /// Whether a column changes.
+    /// True if the values of a column differ.
     fn varies(&self, name: &str) -> bool {
         self.column(name).is_ok_and(|values| values.iter().any(|value| *value != values[0]))
     }
 }
 
 /// The place of a column.
-fn find(history: &HistoryReader, name: &str) -> Result<usize, Refusal> {
+fn find(history: &HistoryReader, name: &str) -> Result<usize, CommandError> {
     history.names.iter().position(|known| known == name).ok_or_else(|| {
         let help = match nearest(name, history.names.iter().map(String::as_str)) {
             Some(meant) => format!("did you mean `{meant}`?"),
             None => format!("there are {}", history.names.join(", ")),
         };
-        Refusal::of(Status::Wrong, "usage", format!("the history has no column `{name}`: {help}"))
+        CommandError::Usage(format!("the history has no column `{name}`: {help}"))
     })
 }
 
-/// The columns that the user names; else displacements that change, all displacements, or any columns.
-fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refusal> {
+/// The columns that the user names; else the displacements that change, or all displacements, or all
+/// columns.
+fn columns(wanted: &PlotArguments, history: &HistoryReader) -> Result<Vec<String>, CommandError> {
     if !wanted.columns.is_empty() {
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
@@ -276,13 +284,13 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
     let displacements: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
     let changes: Vec<f64> = displacements.iter().map(|name| change(history, name)).collect();
     let largest = changes.iter().copied().fold(0.0, f64::max);
-    let changing = displacements.iter().zip(&changes).filter(|(_, change)| **change > STILL * largest);
+    let changing = displacements.iter().zip(&changes).filter(|(_, change)| **change > MIN_CHANGE * largest);
     let candidates = [changing.map(|(name, _)| name.clone()).collect(), displacements, all];
     let usual = candidates.into_iter().find(|names: &Vec<String>| !names.is_empty()).unwrap_or_default();
     if usual.is_empty() {
-        return Err(Refusal::of(Status::Wrong, "usage", "the history has no columns to draw".into()));
+        return Err(CommandError::Usage("the history has no columns to draw".into()));
     }
-    Ok(usual.into_iter().take(USUAL).collect())
+    Ok(usual.into_iter().take(MAX_DEFAULT_COLUMNS).collect())
 }
 
 /// The difference of the largest and the smallest value of a column.
@@ -292,7 +300,7 @@ fn change(history: &HistoryReader, name: &str) -> f64 {
     values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
 }
 
-/// The time where it advances in a run; else the load factor, of several stages one after the other.
+/// Time if it advances in any run; else the load factor, stage by stage if there are several stages.
 fn usual_abscissa(runs: &[NamedHistory]) -> Abscissa {
     let has = |name: &str| runs.iter().all(|run| run.history.names.iter().any(|known| known == name));
     let varies = |name: &str| runs.iter().any(|run| run.varies(name));
@@ -305,14 +313,14 @@ fn usual_abscissa(runs: &[NamedHistory]) -> Abscissa {
     }
 }
 
-/// Points of a column, and their error bars where the history has finite ones.
+/// The points of a column, and their error bars if the history has finite ones.
 type PointsAndBars = (Vec<(f64, f64)>, Option<Vec<f64>>);
 
-fn points(run: &NamedHistory, abscissa: &Abscissa, column: &str) -> Result<PointsAndBars, Refusal> {
+fn points(run: &NamedHistory, abscissa: &Abscissa, column: &str) -> Result<PointsAndBars, CommandError> {
     let points: Vec<(f64, f64)> = abscissa.values(run)?.into_iter().zip(run.column(column)?).collect();
     if let Some(row) = points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
         let message = format!("{}: row {} of `{column}` is not finite", run.name, row + 1);
-        return Err(Refusal::of(Status::Wrong, "usage", message));
+        return Err(CommandError::Usage(message));
     }
     let bars = run.column(&format!("{column}.err")).ok();
     Ok((points, bars.filter(|bars| bars.iter().all(|bar| bar.is_finite()))))

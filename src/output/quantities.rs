@@ -1,8 +1,8 @@
-//! What the columns of a history show, for titles: the name of the quantity, and its unit where the deck names units.
+//! Quantities and units of the columns of a history, for titles and labels.
 
 use serde_json::Value;
 
-/// Labels of the units of a deck, which are never converted.
+/// Labels of the units of a deck. Numbers are never converted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Units {
     length: Option<String>,
@@ -10,7 +10,7 @@ pub struct Units {
     time: Option<String>,
 }
 
-/// Exponents of the units that a unit is made of.
+/// A unit as exponents of base units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Dimension {
     angle: i32,
@@ -24,7 +24,7 @@ const ANGLE: Dimension = Dimension { angle: 1, ..NUMBER };
 const LENGTH: Dimension = Dimension { length: 1, ..NUMBER };
 const TIME: Dimension = Dimension { time: 1, ..NUMBER };
 const FORCE: Dimension = Dimension { force: 1, ..NUMBER };
-/// Of moments and energies.
+/// The dimension of moments and energies.
 const MOMENT: Dimension = Dimension { force: 1, length: 1, ..NUMBER };
 const ANGULAR_VELOCITY: Dimension = Dimension { angle: 1, time: -1, ..NUMBER };
 
@@ -34,9 +34,9 @@ impl Dimension {
     }
 }
 
-/// What a column shows.
+/// The quantity that some columns show.
 struct Quantity {
-    /// Ends of the names of its columns, which follow a dot where the column belongs to a node
+    /// Ends of the names of the columns, which follow a dot if a column belongs to a node
     suffixes: &'static [&'static str],
     name: &'static str,
     dimension: Dimension,
@@ -46,7 +46,7 @@ const fn quantity(suffixes: &'static [&'static str], name: &'static str, dimensi
     Quantity { suffixes, name, dimension }
 }
 
-/// Of a node, a place on a beam, the run, or a mode.
+/// Quantities of a node, a point on a beam, the run, or a mode.
 const OF_NODES: [Quantity; 21] = [
     quantity(&["stage"], "stage", NUMBER),
     quantity(&["time"], "time", TIME),
@@ -71,7 +71,7 @@ const OF_NODES: [Quantity; 21] = [
     quantity(&["growth"], "growth rate", NUMBER.per_time(1)),
 ];
 
-/// Of the whole scene; the names of columns begin with that of the group.
+/// Quantities of the whole scene, each with the name of its group, which columns begin with.
 const OF_SCENES: [(&str, Quantity); 4] = [
     ("energy", quantity(&["kinetic", "strain", "external", "damped", "total"], "energy", MOMENT)),
     ("momentum", quantity(&["px", "py", "pz"], "momentum", Dimension { force: 1, time: 1, ..NUMBER })),
@@ -87,20 +87,21 @@ fn find(column: &str) -> Option<&'static Quantity> {
     of_scene.or_else(|| OF_NODES.iter().find(has_suffix))
 }
 
-/// What a column shows, such as `displacement` for `tip.ux`.
+/// The name of the quantity of a column, such as `displacement` for `tip.ux`.
 pub fn quantity_of(column: &str) -> Option<&'static str> {
     find(column).map(|quantity| quantity.name)
 }
 
 impl Units {
-    /// Of a deck as `run.json` holds it.
+    /// The labels of a deck, in the form that `run.json` contains.
     pub fn of_deck(deck: &Value) -> Self {
         let label = |key: &str| deck["units"][key].as_str().map(str::trim).filter(|label| !label.is_empty());
         let [length, force, time] = ["length", "force", "time"].map(|key| label(key).map(str::to_string));
         Self { length, force, time }
     }
 
-    /// The unit of a column, such as `N·m` or `mm/s²`; none for plain numbers, and where the deck does not name all that it is made of.
+    /// The unit of a column, such as `N·m` or `mm/s²`. Plain numbers have none, nor have columns whose
+    /// unit has a part that the deck does not give.
     pub fn of_column(&self, column: &str) -> Option<String> {
         self.label(find(column)?.dimension)
     }
@@ -115,7 +116,7 @@ impl Units {
         self.label(MOMENT)
     }
 
-    /// A title with the unit of a column behind it, such as `tip.ux [mm]`.
+    /// A title followed by the unit of a column, such as `tip.ux [mm]`.
     pub fn title(&self, title: &str, column: &str) -> String {
         self.of_column(column).map_or_else(|| title.to_string(), |unit| format!("{title} [{unit}]"))
     }
@@ -145,7 +146,7 @@ impl Units {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::{NODE_GROUPS, WHOLE_GROUPS};
+    use beamsim_core::probe::{NODE_GROUPS, WHOLE_GROUPS};
     use serde_json::json;
 
     #[test]

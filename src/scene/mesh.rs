@@ -3,11 +3,11 @@
 use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use crate::kernel::{MAX_NODES, shape};
-use crate::model::Names;
-use crate::system::Node;
-use crate::tensor::{Mat3, Vec3};
+use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
+use beamsim_core::kernel::{MAX_NODES, shape};
+use beamsim_core::model::Names;
+use beamsim_core::system::Node;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ pub struct Station {
     pub fraction: f64,
     /// The section axes of the interpolated line as columns; the first is its tangent
     pub axes: Mat3,
-    /// How far along its piece of the curve, from 0 to 1
+    /// Fraction of the nodes of its piece that lie before it, from 0 to 1
     along: f64,
 }
 
@@ -44,7 +44,8 @@ pub enum Rule {
     Inner,
     /// For mass and line loads
     Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
+    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated
+    /// as vectors
     Nodal,
 }
 
@@ -74,7 +75,8 @@ impl BeamElement<'_> {
 
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
         let Part { piece, number, count } = self.beam.part_of_line(self.number);
-        let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
+        let line = &self.beam.line;
+        let (shape, slope) = shape_at(self.nodes.len(), xi);
         let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), count);
         let t = (number as f64 + 0.5 * (xi + 1.0)) / count as f64;
         let fraction = line.fraction(piece, t);
@@ -90,7 +92,8 @@ impl BeamElement<'_> {
 
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
-        let (Part { piece, .. }, line) = (self.beam.part_of_line(self.number), &self.beam.line);
+        let Part { piece, .. } = self.beam.part_of_line(self.number);
+        let line = &self.beam.line;
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
 
@@ -110,7 +113,7 @@ impl BeamElement<'_> {
         self.beam.line.pieces[piece].arms(self.places(), count)
     }
 
-    /// How much longer it is than others on its piece, by round-off.
+    /// Its chord relative to the equal part of a straight piece: 1 but for round-off.
     pub fn rounding(&self) -> f64 {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
         let place = |node: usize| self.mesh.nodes[node].place;
@@ -137,11 +140,12 @@ pub struct MeshBeam {
     pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
     pub elements: Range<usize>,
-    /// Where those on each piece of its centre line begin, counted from its first, and at last their number
+    /// First element of each piece of its centre line, counted from that of the beam, and at last
+    /// their number
     piece_starts: Vec<usize>,
     /// Nodes of an element, less one
     pub order: usize,
-    /// How rotations are interpolated
+    /// Interpolation of rotations
     pub interpolation: deck::InterpolationWord,
     /// Strain without stress
     pub free_strain: Option<deck::FreeStrain>,
@@ -158,18 +162,20 @@ impl MeshBeam {
         &self.nodes[first..=first + self.order]
     }
 
-    /// The piece of the centre line at a fraction of the length, and the part of its elements before that.
+    /// The piece of the centre line at a fraction of the length, and the part of its elements
+    /// before that.
     pub fn along(&self, fraction: f64) -> (usize, f64) {
         let (element, xi) = self.element_at(fraction);
         let Part { piece, number, count } = self.part_of_line(element);
         (piece, (number as f64 + 0.5 * (xi + 1.0)) / count as f64)
     }
 
-    /// Where on the centre line an element lies.
+    /// The part of the centre line on which an element lies.
     fn part_of_line(&self, element: usize) -> Part {
         let number = element - self.elements.start;
         let piece = self.piece_starts.partition_point(|&start| start <= number) - 1;
-        let (start, end) = (self.piece_starts[piece], self.piece_starts[piece + 1]);
+        let start = self.piece_starts[piece];
+        let end = self.piece_starts[piece + 1];
         Part { piece, number: number - start, count: end - start }
     }
 }
@@ -195,13 +201,14 @@ pub struct Mesh {
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
     pub parted: HashMap<(String, String), usize>,
-    /// What nodes are called: after their points, or by beam and number
+    /// Names of nodes: those of their points, or beam and number
     pub names: Names,
     slots: u32,
 }
 
 impl Mesh {
-    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to `diagnostics`.
+    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to
+    /// `diagnostics`.
     pub fn new(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let mut mesh = Self::default();
         mesh.part_joints(deck, diagnostics);
@@ -236,7 +243,8 @@ impl Mesh {
         self.names.of(self.nodes[node].node.p)
     }
 
-    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name is that of its first slot.
+    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name
+    /// is that of its first slot.
     fn add_node(&mut self, place: Vec3, shares: Option<usize>) -> usize {
         let mut slot = || {
             self.slots += 1;
@@ -283,7 +291,7 @@ impl Mesh {
                 }
                 // The first beam may have been parted from the point before.
                 let first = beams.first().and_then(|first| self.parted.get(&(first.value.clone(), point.clone())));
-                let shares = (joint.kind != JointKind::Prismatic).then_some(first.copied().unwrap_or(main));
+                let shares = joint.kind.shares_displacement().then_some(first.copied().unwrap_or(main));
                 self.names.give(self.slots, &format!("{point} ({})", second.value));
                 let node = self.add_node(place, shares);
                 self.parted.insert(key, node);
@@ -383,7 +391,8 @@ impl Mesh {
             named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
         let first_element = self.element_count;
         let all = (0..line.pieces.len()).map(count).sum::<usize>() * beam.order + 1;
-        let (mut nodes, mut fractions) = (Vec::with_capacity(all), Vec::with_capacity(all));
+        let mut nodes = Vec::with_capacity(all);
+        let mut fractions = Vec::with_capacity(all);
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
             for step in usize::from(piece > 0)..=steps {
@@ -398,7 +407,8 @@ impl Mesh {
                 fractions.push(line.fraction(piece, t));
             }
         }
-        let (mut first_node, mut piece_starts) = (0, vec![0]);
+        let mut first_node = 0;
+        let mut piece_starts = vec![0];
         for piece in 0..line.pieces.len() {
             piece_starts.push(piece_starts[piece] + count(piece));
             for _ in 0..count(piece) {
@@ -460,7 +470,8 @@ pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
     }
 }
 
-/// The fractions of the length where the pieces of a line are cut into so many equal parts, from start to end.
+/// Fractions of the length at which the pieces of a line are divided into equal parts, from start
+/// to end.
 fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
     let inner = (0..line.pieces.len()).flat_map(|piece| {
         let count = parts[piece.min(parts.len() - 1)];
@@ -495,7 +506,7 @@ fn named_between<'a>(
     ((at - at.round()).abs() < 1e-9).then(|| (name.as_str(), at.round() as usize))
 }
 
-/// Whether the path of a beam names a point.
+/// True if the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     let found = deck.beams.iter().find(|b| b.name.value == beam);
     found.is_some_and(|b| match &b.path {

@@ -1,11 +1,11 @@
-//! Whether a scene is simulated in a plane, and why.
+//! The plane of planar scenes, or the reason why a scene has none.
 
 use super::compose::Reason;
 use super::mesh::Mesh;
 use crate::deck::{Deck, Diagnostic, EffectWord, SchemeWord, StageBody};
-use crate::drive::InitialMotion;
-use crate::model::Model;
-use crate::system::{Aspect, Plane, rounded};
+use beamsim_core::model::Model;
+use beamsim_core::run::InitialMotion;
+use beamsim_core::system::{MirrorData, Plane, rounded};
 
 /// The plane of a scene, if it has one and the deck does not refuse it.
 pub fn plane(
@@ -56,11 +56,11 @@ fn find(deck: &Deck, model: &Model, mesh: &Mesh, initial: &[InitialMotion]) -> R
     }
     Plane::of(model.length, &|show| {
         let nodes = mesh.beams.iter().flat_map(|beam| &beam.nodes);
-        nodes.for_each(|&node| show("beams", Aspect::Place(mesh.nodes[node].place)));
-        model.aspects(show);
+        nodes.for_each(|&node| show("beams", MirrorData::Place(mesh.nodes[node].place)));
+        model.mirror_data(show);
         for motion in initial {
-            show("initial motion", Aspect::Vector(motion.velocity));
-            show("initial motion", Aspect::Axial(motion.spin));
+            show("initial motion", MirrorData::Vector(motion.velocity));
+            show("initial motion", MirrorData::Axial(motion.spin));
         }
     })
 }

@@ -2,11 +2,12 @@
 //! as dampers, wound springs and effects over increments.
 
 use crate::random::Random;
-use beamsim::integrate::{Increments, Method, Scheme, Step};
-use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model, StageKind, charts};
 use beamsim::scene;
-use beamsim::system::State;
+use beamsim_core::integrate::{Increments, Method, Scheme, Step};
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::{Assembly, Model, Schedule, StageKind, charts};
+use beamsim_core::system::State;
+use std::sync::Arc;
 
 const SECTION: &str = r#"
 [point]
@@ -83,24 +84,25 @@ at = "tip"
 moment = [0.1, 0.3, 0.2]
 "#;
 
-fn scene_of(text: &str) -> (Model, State, Assembly) {
+fn scene_of(text: &str) -> (Arc<Model>, State, Assembly) {
     let (scene, _) = scene::from_text(text).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
-    let mut model = scene.plan.model;
+    let model = scene.plan.model;
     let mut state = model.rest();
-    let equations = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
-    let assembly = Assembly::new(&scene.plan.stages[0].context(0), equations, &model);
-    model.set_clock(&mut state, 0.3, 1.0);
+    let mut schedule = Schedule::new(&model);
+    let dof_map = schedule.begin_stage(&model, 0, StageKind::Dynamic, &state).unwrap();
+    let assembly = Assembly::new(&scene.plan.stages[0].context(0), dof_map, &model);
+    schedule.set_clock(&model, &mut state, 0.3, 1.0);
     (model, state, assembly)
 }
 
-fn scatter(assembly: &Assembly, x: &[f64], field: &mut [beamsim::tensor::Vec3], factor: f64) {
-    let mut whole = vec![beamsim::tensor::Vec3::ZERO; field.len()];
-    assembly.system.pattern.equations.scatter(x, None, &mut whole);
+fn scatter(assembly: &Assembly, x: &[f64], field: &mut [beamsim_core::tensor::Vec3], factor: f64) {
+    let mut whole = vec![beamsim_core::tensor::Vec3::ZERO; field.len()];
+    assembly.system.pattern.dof_map.scatter(x, None, &mut whole);
     field.iter_mut().zip(whole).for_each(|(f, w)| *f += w * factor);
 }
 
 fn correct(assembly: &Assembly, step: &Step, x: &[f64], state: &mut State, factor: f64) {
-    let mut dq = vec![beamsim::tensor::Vec3::ZERO; state.q.len()];
+    let mut dq = vec![beamsim_core::tensor::Vec3::ZERO; state.q.len()];
     scatter(assembly, x, &mut dq, factor);
     step.correct(state, &dq);
 }
@@ -115,7 +117,7 @@ fn forces(assembly: &mut Assembly, state: &State, count: usize) -> Vec<f64> {
 fn tangent_holds(text: &str, incremental: bool, seed: u64) {
     let mut random = Random::new(seed);
     let (model, mut state, mut assembly) = scene_of(text);
-    let count = assembly.system.pattern.equations.count();
+    let count = assembly.system.pattern.dof_map.count();
     let numbers =
         |random: &mut Random, half: f64| -> Vec<f64> { (0..count).map(|_| random.range(-half, half)).collect() };
     // Somewhere, moving, and wound as the rotations are.
@@ -124,12 +126,12 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
         let field = [&mut state.q[..], &mut state.v[..], &mut state.a[..]].into_iter().nth(field).unwrap();
         scatter(&assembly, &x, field, 1.0);
     }
-    assert!(state.wound.is_empty(), "rotations that no chart has changed are wound as they are");
-    charts::freeze(&mut state, &model.charted.elements);
+    assert!(state.unwrapped.is_empty(), "rotations that no chart has changed are unwrapped as they are");
+    charts::freeze(&mut state, &model.charted(StageKind::Dynamic).elements);
     // Over increments, accelerations and velocities of rotations are functions of the unknown of the step.
     let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
     let combinations = if incremental {
-        let increments = Increments::new(&model, &assembly.system.pattern.equations);
+        let increments = Increments::new(&model, StageKind::Dynamic, &assembly.system.pattern.dof_map);
         step.scheme.start(&mut state);
         increments.start(&mut state);
         increments.begin(&mut state, &step, 0.5);
@@ -160,7 +162,7 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
         let exact: Vec<f64> = after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * h)).collect();
         let scale = exact.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         for k in 0..count {
-            let direction = assembly.system.pattern.equations.direction(k);
+            let direction = assembly.system.pattern.dof_map.direction(k);
             let slot = direction.slot as usize;
             assert!(
                 (got[k] - exact[k]).abs() <= 1e-8 * scale,

@@ -3,8 +3,8 @@
 #![allow(clippy::needless_range_loop, clippy::approx_constant)]
 
 use crate::dual::Dual;
-use beamsim::real::Real;
-use beamsim::rotation::{Coefficients, Series};
+use beamsim_core::rotation::{Coefficients, Series};
+use beamsim_core::scalar::Real;
 use std::f64::consts::PI;
 
 /// psi; c1 … c5; c1'/psi … c3'/psi. From the closed forms, computed with 60-digit arithmetic.

@@ -1,8 +1,8 @@
 //! What runs cost in counts: the same on every machine, so that a change which costs iterations, factorisations or evaluations shows at
 //! once. `BLESS=1 cargo test --release counters` records new counts in `tests/counters.csv`.
 
-use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot};
 use beamsim::scene::{self, Scene};
+use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot};
 use std::path::{Path, PathBuf};
 
 /// Scenes of each kind of work: statics in space and in a plane, paths, dynamics, charts, joints, modes, and the linear theory.

@@ -3,8 +3,8 @@
 // The product and quotient rules add and subtract.
 #![allow(clippy::suspicious_arithmetic_impl)]
 
-use beamsim::real::Real;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::scalar::Real;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

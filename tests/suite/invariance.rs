@@ -3,8 +3,8 @@
 
 use crate::random::Random;
 use crate::scenes::{Simulation, bend45, distance, simulate};
-use beamsim::rotation::Rotation;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::rotation::Rotation;
+use beamsim_core::tensor::{Mat3, Vec3};
 
 fn text(v: Vec3) -> String {
     format!("[{:?}, {:?}, {:?}]", v.0[0], v.0[1], v.0[2])

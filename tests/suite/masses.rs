@@ -1,9 +1,11 @@
 //! Mass matrices that are the same in all directions, added entry by entry, against what adds any element.
 
 use crate::random::Random;
-use beamsim::kernel::ElementSystem;
-use beamsim::system::{Category, Cliques, Direction, Equations, Groups, Layout, Pattern, Plane, Symmetry, System};
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::ElementSystem;
+use beamsim_core::system::{
+    Category, Connectivity, Direction, DofMap, Layout, NodeBlocks, Pattern, Plane, Symmetry, System,
+};
+use beamsim_core::tensor::{Mat3, Vec3};
 
 const NODES: usize = 6;
 
@@ -19,14 +21,14 @@ fn held(plane: Option<&Plane>) -> Vec<Direction> {
 /// An empty system of elements of two nodes, which couple displacements alone.
 fn system(plane: Option<&Plane>, symmetry: Symmetry) -> System {
     let turns = |slot: u32| slot % 2 == 1;
-    let (equations, layout) = match plane {
-        None => (Equations::new(2 * NODES, &held(None)).unwrap(), Layout::Spatial),
-        Some(plane) => (Equations::planar(2 * NODES, &held(Some(plane)), *plane, turns).unwrap(), Layout::Planar),
+    let (dof_map, layout) = match plane {
+        None => (DofMap::new(2 * NODES, &held(None)).unwrap(), Layout::Spatial),
+        Some(plane) => (DofMap::planar(2 * NODES, &held(Some(plane)), *plane, turns).unwrap(), Layout::Planar),
     };
-    let mut cliques = Cliques::default();
-    (1..NODES as u32).for_each(|node| cliques.push([2 * node - 2, 2 * node]));
-    let groups = Groups::new(2 * NODES, layout, turns);
-    System::new(Pattern::new(equations, groups, vec![cliques], symmetry), 2 * NODES, &[], &[])
+    let mut connectivity = Connectivity::default();
+    (1..NODES as u32).for_each(|node| connectivity.push([2 * node - 2, 2 * node]));
+    let node_blocks = NodeBlocks::new(2 * NODES, layout, turns);
+    System::new(Pattern::new(dof_map, node_blocks, vec![connectivity], symmetry), 2 * NODES, &[], &[])
 }
 
 #[test]
@@ -41,11 +43,11 @@ fn masses_are_added_as_elements_are() {
             let vector = random.vector(1.0);
             plane.map_or(vector, |plane| vector - plane.normal() * plane.normal().dot(vector))
         };
-        let lift: Vec<Vec3> = (0..2 * NODES).map(|_| vector()).collect();
-        for lift in [None, Some(&lift[..])] {
+        let prescribed_increment: Vec<Vec3> = (0..2 * NODES).map(|_| vector()).collect();
+        for prescribed_increment in [None, Some(&prescribed_increment[..])] {
             let (mut as_masses, mut as_elements) = (system(plane, symmetry), system(plane, symmetry));
-            as_masses.clear(lift);
-            as_elements.clear(lift);
+            as_masses.clear(prescribed_increment);
+            as_elements.clear(prescribed_increment);
             for k in 0..NODES - 1 {
                 let (forces, weight) = ([vector(), vector()], 3.0);
                 let mass = [[1.0 + k as f64, 0.4], [0.4, 2.0]];
@@ -57,9 +59,13 @@ fn masses_are_added_as_elements_are() {
                 as_masses.sink(0, Category::Internal, true).add_mass(k, &forces, &mass, weight);
                 as_elements.sink(0, Category::Internal, true).add(k, &element);
             }
-            let what = format!("plane {}, symmetry {symmetry:?}, lift {}", plane.is_some(), lift.is_some());
+            let what = format!(
+                "plane {}, symmetry {symmetry:?}, prescribed_increment {}",
+                plane.is_some(),
+                prescribed_increment.is_some()
+            );
             let sides = [&as_masses, &as_elements].map(|system| {
-                let mut side = vec![0.0; system.pattern.equations.count()];
+                let mut side = vec![0.0; system.pattern.dof_map.count()];
                 system.right_hand_side(&mut side);
                 side
             });

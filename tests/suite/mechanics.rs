@@ -1,7 +1,7 @@
 //! Bugs that were found by looking: each a small scene with an exact answer.
 
 use crate::scenes::{attempt, refusal, simulate};
-use beamsim::drive::Failure;
+use beamsim_core::run::Failure;
 
 const ROD: &str = r#"
 [point]

@@ -5,17 +5,17 @@
 use crate::dual::Dual;
 use crate::random::Random;
 use crate::tangents::{agree, symmetric};
-use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot, Warning};
-use beamsim::kernel::beam::StiffnessPoint;
-use beamsim::kernel::elastic::{Stiffness, Strain};
-use beamsim::kernel::inertia::{Inertia, Spin, body};
-use beamsim::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
-use beamsim::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
-use beamsim::model::Assembly;
-use beamsim::real::Real;
 use beamsim::scene::{self, Scene};
-use beamsim::system::Plane;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::beam::StiffnessPoint;
+use beamsim_core::kernel::elastic::{Stiffness, Strain};
+use beamsim_core::kernel::inertia::{Inertia, Spin, body};
+use beamsim_core::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
+use beamsim_core::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
+use beamsim_core::model::{Assembly, Schedule};
+use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot, Warning};
+use beamsim_core::scalar::Real;
+use beamsim_core::system::Plane;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::array::from_fn;
 
 /// Derivatives over the unknowns of the largest element.
@@ -191,7 +191,7 @@ struct Seen {
 
 impl Observer for Seen {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
-        self.planar = at.system.pattern.equations.plane().is_some();
+        self.planar = at.system.pattern.dof_map.plane().is_some();
         let fields = [&at.state.q[..], &at.state.v];
         let unknowns = fields.iter().flat_map(|field| field.iter().flat_map(|v| v.0));
         let energy = at.model.energy(at.state);
@@ -343,24 +343,25 @@ fn supports_joints_and_curved_beams_act_as_in_space() {
 /// What increments that are prescribed push the rest with, and the forces of a shaken frame, along all free directions of the plane.
 fn pushes(text: &str, normal: Vec3) -> Vec<f64> {
     let plan = scene_of(text).plan;
-    let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+    let (model, stage) = (plan.model, plan.stages[0].context(0));
     let (mut state, mut random) = (model.rest(), Random::new(11));
     let mut in_plane = |slot: usize| {
         let v = random.vector(0.1);
         let along = normal * normal.dot(v);
         if slot.is_multiple_of(2) { v - along } else { along }
     };
-    let equations = model.begin_stage(0, stage.kind, &state).unwrap();
-    let mut lift = state.q.clone();
-    for field in [&mut state.q[..], &mut state.v, &mut state.a, &mut lift] {
+    let mut schedule = Schedule::new(&model);
+    let dof_map = schedule.begin_stage(&model, 0, stage.kind, &state).unwrap();
+    let mut prescribed_increment = state.q.clone();
+    for field in [&mut state.q[..], &mut state.v, &mut state.a, &mut prescribed_increment] {
         field.iter_mut().enumerate().for_each(|(slot, value)| *value = in_plane(slot));
     }
-    let mut assembly = Assembly::new(&stage, equations, &model);
-    assembly.evaluate(&state, Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 }, Some(&lift));
-    let equations = &assembly.system.pattern.equations;
-    let (mut pushed, mut field) = (vec![0.0; equations.count()], state.q.clone());
+    let mut assembly = Assembly::new(&stage, dof_map, &model);
+    assembly.evaluate(&state, Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 }, Some(&prescribed_increment));
+    let dof_map = &assembly.system.pattern.dof_map;
+    let (mut pushed, mut field) = (vec![0.0; dof_map.count()], state.q.clone());
     assembly.system.right_hand_side(&mut pushed);
-    equations.scatter(&pushed, None, &mut field);
+    dof_map.scatter(&pushed, None, &mut field);
     let seen = |(slot, v): (usize, &Vec3)| {
         let along = normal * normal.dot(*v);
         if slot.is_multiple_of(2) { *v - along } else { along }.0
@@ -441,8 +442,8 @@ fn motions_come_to_rest_as_in_space() {
 fn several_turns_act_as_in_space() {
     for interpolation in ["relative", "total"] {
         let text = frame(true, interpolation, 1).replace("elements = 3", "elements = 8");
-        let wound = format!("{text}[[load]]\nat = \"tip\"\nmoment = {}\n{STATIC}", normal(true, 160.0));
-        agrees_with_space("several turns", &wound);
+        let rolled_up = format!("{text}[[load]]\nat = \"tip\"\nmoment = {}\n{STATIC}", normal(true, 160.0));
+        agrees_with_space("several turns", &rolled_up);
     }
 }
 
@@ -451,12 +452,12 @@ fn several_turns_act_as_in_space() {
 fn ends_of_an_element_turn_past_half_a_turn_as_in_space() {
     for (order, angle) in [(2, 3.9), (2, -3.9), (3, 4.8), (3, -4.8)] {
         let text = frame(true, "relative", order).replace("elements = 3", "elements = 1");
-        let wound = format!(
+        let rolled_up = format!(
             "{text}[[motion]]\nat = \"knee\"\nrotate = {}\nangle = {angle}\n{}",
             normal(true, 1.0),
             STATIC.replace("steps = 4", "steps = 8")
         );
-        agrees_with_space(&format!("order {order} by {angle}"), &wound);
+        agrees_with_space(&format!("order {order} by {angle}"), &rolled_up);
     }
 }
 

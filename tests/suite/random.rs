@@ -1,6 +1,6 @@
 //! Random states that are the same in every run (splitmix64).
 
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::tensor::{Mat3, Vec3};
 
 /// A generator.
 pub struct Random(u64);

@@ -3,13 +3,13 @@
 use crate::dual::{Dual, variables, with_room};
 use crate::random::Random;
 use crate::tangents::{agree, stiffness_points, symmetric};
-use beamsim::kernel::beam::StiffnessPoint;
-use beamsim::kernel::elastic::{Strain, Stress};
-use beamsim::kernel::relative::Relative;
-use beamsim::kernel::{ElementSystem, shape};
-use beamsim::real::Real;
-use beamsim::rotation::{Rotation, complement, log};
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::kernel::beam::StiffnessPoint;
+use beamsim_core::kernel::elastic::{Strain, Stress};
+use beamsim_core::kernel::relative::Relative;
+use beamsim_core::kernel::{ElementSystem, shape};
+use beamsim_core::rotation::{Rotation, complement, log};
+use beamsim_core::scalar::Real;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::array::from_fn;
 use std::f64::consts::PI;
 

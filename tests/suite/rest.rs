@@ -2,10 +2,10 @@
 
 use crate::random::Random;
 use crate::scenes::{attempt, simulate};
-use beamsim::drive::{Failure, Mode, Observer, Run, Snapshot, StabilityVerdict};
-use beamsim::rotation::Rotation;
-use beamsim::tensor::{Mat3, Vec3};
-use beamsim::warning::WarningKind;
+use beamsim_core::rotation::Rotation;
+use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot, StabilityVerdict, StageResult};
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::warning::WarningKind;
 use std::f64::consts::PI;
 
 /// Links of one length and weight between ball joints, hung between two points; in the vertical plane x, z.
@@ -266,8 +266,10 @@ impl Observer for Modes {
         Ok(())
     }
 
-    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.0 = modes.to_vec();
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        if let StageResult::Modes(modes) = result {
+            self.0.clone_from(modes);
+        }
         Ok(())
     }
 }

@@ -2,10 +2,10 @@
 
 use crate::dual::{Dual, along, jacobian, tensor_rate, values, variables, vector_rate};
 use crate::random::Random;
-use beamsim::model::charts;
-use beamsim::rotation::{Complement, Rotation, complement, log, nearest_turn, principal, relative_angle, unwound};
-use beamsim::system::State;
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::model::charts;
+use beamsim_core::rotation::{Complement, Rotation, complement, log, nearest_turn, principal, relative_angle, unwound};
+use beamsim_core::system::State;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
 type Jet = Dual<3>;
@@ -334,18 +334,18 @@ fn ten_turns_are_followed_and_undone() {
     let mut random = Random::new(10);
     for steps_a_turn in [3_i32, 8, 40] {
         let (axis, step) = (random.direction(), 2.0 * PI / f64::from(steps_a_turn));
-        let mut wound = Vec3::ZERO;
+        let mut unwrapped = Vec3::ZERO;
         let last = 10 * steps_a_turn;
         for k in (0..=last).chain((0..last).rev()) {
             let exact = axis * (f64::from(k) * step);
-            wound = unwound(principal(exact), wound);
-            let error = (wound - exact).norm();
-            assert!(error <= 1e-12, "step {k} of {steps_a_turn} a turn about {axis:?}: {wound:?}, error {error:e}");
+            unwrapped = unwound(principal(exact), unwrapped);
+            let error = (unwrapped - exact).norm();
+            assert!(error <= 1e-12, "step {k} of {steps_a_turn} a turn about {axis:?}: {unwrapped:?}, error {error:e}");
             if k == last {
-                assert!((wound.norm() - 20.0 * PI).abs() <= 1e-12, "ten turns read {}", wound.norm());
+                assert!((unwrapped.norm() - 20.0 * PI).abs() <= 1e-12, "ten turns read {}", unwrapped.norm());
             }
         }
-        assert!(wound.norm() <= 1e-12, "back again: {wound:?}");
+        assert!(unwrapped.norm() <= 1e-12, "back again: {unwrapped:?}");
     }
 }
 
@@ -404,12 +404,12 @@ fn near_vectors_are_continued_by_themselves() {
         let length = random.range(0.0, 0.62);
         let p = old + random.direction() * length;
         let mut before = State::rest(1, 0, 0, 0);
-        (before.q[0], before.wound) = (old, vec![old]);
+        (before.q[0], before.unwrapped) = (old, vec![old]);
         for carried in [old, p, old + aside] {
             let mut state = before.clone();
-            (state.q[0], state.wound) = (p, vec![carried]);
+            (state.q[0], state.unwrapped) = (p, vec![carried]);
             assert!(charts::wind(&mut state, &before, &[0]).is_empty());
-            assert!((state.wound[0] - p).norm() < 1e-12, "{old:?} to {p:?}");
+            assert!((state.unwrapped[0] - p).norm() < 1e-12, "{old:?} to {p:?}");
         }
     }
 }

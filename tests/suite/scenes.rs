@@ -1,8 +1,8 @@
 //! Runs decks through the library and keeps every converged row.
 
-use beamsim::drive::{Counters, Failure, Observer, Run, Snapshot};
-use beamsim::probe::Probe;
 use beamsim::scene;
+use beamsim_core::probe::Probe;
+use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot};
 
 /// A run with all its rows.
 pub struct Simulation {

@@ -2,15 +2,16 @@
 
 use crate::decks::decks;
 use crate::random::Random;
-use beamsim::kernel::{ElementSystem, Weights};
-use beamsim::model::{Assembly, Model, SlotKind, StageContext, StageKind, charts};
 use beamsim::scene;
-use beamsim::solve::{BlockSolver, GeneralSolver, LinearSolver, Tangent, is_symmetric};
-use beamsim::system::{
-    Category, Cliques, Direction, Equations, Groups, Layout, Leftover, Memory, Pattern, Plane, State, Symmetry, System,
+use beamsim_core::kernel::{ElementSystem, Weights};
+use beamsim_core::model::{Assembly, Model, Schedule, SlotKind, StageContext, StageKind, charts};
+use beamsim_core::solve::{BlockSolver, GeneralSolver, LinearSolver, Tangent, is_symmetric};
+use beamsim_core::system::{
+    Category, Connectivity, Direction, DofMap, Layout, Leftover, Memory, NodeBlocks, Pattern, Plane, State, Symmetry,
+    System,
 };
-use beamsim::tensor::{Mat3, Vec3};
-use beamsim::threads;
+use beamsim_core::tensor::{Mat3, Vec3};
+use beamsim_core::threads;
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
@@ -49,11 +50,11 @@ fn system_in(
     random: &mut Random,
 ) -> System {
     let nodes = 1 + edges.iter().flatten().max().unwrap();
-    let mut cliques = Cliques::default();
+    let mut connectivity = Connectivity::default();
     for [a, b] in edges {
-        cliques.push([a, a, b, b].into_iter().zip([0, 1, 0, 1]).map(|(&node, half)| (2 * node + half) as u32));
+        connectivity.push([a, a, b, b].into_iter().zip([0, 1, 0, 1]).map(|(&node, half)| (2 * node + half) as u32));
     }
-    let mut own = Cliques::default();
+    let mut own = Connectivity::default();
     (0..2 * nodes as u32).for_each(|slot| own.push([slot]));
     let turns = |slot: u32| slot % 2 == 1;
     let slanted = match plane {
@@ -66,12 +67,12 @@ fn system_in(
     let late = late.map(|(slot, axis)| Direction { slot, axis });
     let mut held = vec![first, slanted];
     held.extend(late.into_iter().filter(|_| nodes > 10));
-    let (equations, layout) = match plane {
-        None => (Equations::new(2 * nodes, &held).unwrap(), Layout::Spatial),
-        Some(plane) => (Equations::planar(2 * nodes, &held, plane, turns).unwrap(), Layout::Planar),
+    let (dof_map, layout) = match plane {
+        None => (DofMap::new(2 * nodes, &held).unwrap(), Layout::Spatial),
+        Some(plane) => (DofMap::planar(2 * nodes, &held, plane, turns).unwrap(), Layout::Planar),
     };
-    let groups = Groups::new(2 * nodes, layout, turns);
-    let pattern = Pattern::new(equations, groups, vec![cliques, own], symmetry);
+    let node_blocks = NodeBlocks::new(2 * nodes, layout, turns);
+    let pattern = Pattern::new(dof_map, node_blocks, vec![connectivity, own], symmetry);
     let mut system = System::new(pattern, 2 * nodes, &[], &[]);
     system.clear(None);
     for k in 0..edges.len() {
@@ -97,7 +98,7 @@ fn system_in(
 }
 
 fn dense(system: &System) -> DMatrix<f64> {
-    let n = system.pattern.equations.count();
+    let n = system.pattern.dof_map.count();
     let entry = |i: usize, j: usize| system.pattern.find(i as u32, j as u32).map_or(0.0, |k| system.values[k]);
     DMatrix::from_fn(n, n, entry)
 }
@@ -148,7 +149,7 @@ fn solve_both_ways(
 ) {
     let other = system_in(plane, edges, symmetry, 30.0, random);
     let system = system_in(plane, edges, symmetry, shift, random);
-    let n = system.pattern.equations.count();
+    let n = system.pattern.dof_map.count();
     let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
     let (mut by_blocks, mut by_faer) = (wanted.clone(), wanted.clone());
     let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
@@ -181,7 +182,7 @@ fn factors_in_the_place_of_a_tangent_solve_as_those_beside_it() {
             for symmetry in SYMMETRIES {
                 let what = format!("{name}, planar {}, symmetry {symmetry:?}", plane.is_some());
                 let system = system_in(plane, &edges, symmetry, 30.0, &mut random);
-                let n = system.pattern.equations.count();
+                let n = system.pattern.dof_map.count();
                 let wanted: Vec<f64> = (0..n).map(|_| random.range(-1.0, 1.0)).collect();
                 let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
                 let mut beside = wanted.clone();
@@ -229,7 +230,7 @@ fn corrections_by_nodes_are_those_by_equations() {
             system.force[Category::Internal as usize].copy_from_slice(&force);
             let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
             assert!(blocks.factorise(system.matrix()), "{name}");
-            let mut x = vec![0.0; system.pattern.equations.count()];
+            let mut x = vec![0.0; system.pattern.dof_map.count()];
             system.right_hand_side(&mut x);
             assert!(x.iter().all(|&x| x != 0.0), "{name}: no forces");
             blocks.solve(system.matrix(), &mut x);
@@ -237,7 +238,7 @@ fn corrections_by_nodes_are_those_by_equations() {
                 // Nothing of what stood there before may stay.
                 let (mut by_nodes, mut by_equations) = (force.clone(), force.clone());
                 assert!(blocks.correct(&system, held, &mut by_nodes), "{name}");
-                system.pattern.equations.scatter(&x, held, &mut by_equations);
+                system.pattern.dof_map.scatter(&x, held, &mut by_equations);
                 assert_eq!(by_nodes, by_equations, "{name}, normal {normal:?}, held {}", held.is_some());
             }
         }
@@ -248,9 +249,9 @@ fn corrections_by_nodes_are_those_by_equations() {
 fn taking(symmetry: Symmetry, taken: f64) -> System {
     let mut system = system(&chain(2), symmetry, 0.0, &mut Random::new(5));
     let pattern = system.pattern.clone();
-    let n = pattern.equations.count() as u32;
+    let n = pattern.dof_map.count() as u32;
     for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-        let [own, other] = [row, column].map(|k| pattern.equations.direction(k as usize));
+        let [own, other] = [row, column].map(|k| pattern.dof_map.direction(k as usize));
         let same = own.axis == other.axis && own.slot % 2 == other.slot % 2;
         let value = match (own.slot / 2, other.slot / 2) {
             _ if !same => 0.0,
@@ -294,12 +295,13 @@ fn tangents_are_used_up_where_that_loses_no_digits() {
              [effects]\nplanar = false\n"
         );
         let Ok((scene, _)) = scene::from_text(&deck) else { panic!("the deck is good: {deck}") };
-        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
         let rest = model.rest();
-        let Ok(equations) = model.begin_stage(0, stage.kind, &rest) else { panic!("the stage begins") };
-        let mut assembly = Assembly::new(&stage, equations, &model);
+        let mut schedule = Schedule::new(&model);
+        let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &rest) else { panic!("the stage begins") };
+        let mut assembly = Assembly::new(&stage, dof_map, &model);
         let mut solver = LinearSolver::new(&assembly.system, &[]).unwrap();
-        let wanted: Vec<f64> = (0..assembly.system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();
+        let wanted: Vec<f64> = (0..assembly.system.pattern.dof_map.count()).map(|k| (k as f64).sin()).collect();
         // Pulled apart it is definite; of pushed together there are negative pivots.
         for (sign, goes) in [
             (1.0, true),
@@ -328,7 +330,7 @@ fn tangents_are_used_up_where_that_loses_no_digits() {
 fn rows_with_small_pivots_wait() {
     let mut random = Random::new(12);
     let mut system = system(&tree(20, &mut random), Symmetry::None, 0.0, &mut random);
-    let n = system.pattern.equations.count() as u32;
+    let n = system.pattern.dof_map.count() as u32;
     for k in 0..n {
         let place = system.pattern.find(k, k).unwrap();
         system.values[place] = 1e-13;
@@ -348,7 +350,7 @@ fn pivots_that_are_no_numbers_end_a_factorisation() {
     for plane in [None, Plane::normal_to(Vec3::UNIT[2])] {
         for symmetry in SYMMETRIES {
             let system = system_in(plane, &tree(20, &mut random), symmetry, 30.0, &mut random);
-            let n = system.pattern.equations.count() as u32;
+            let n = system.pattern.dof_map.count() as u32;
             let mut blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
             let mut with = |values: &dyn Fn(u32, u32) -> Option<f64>| {
                 let mut changed = system.clone();
@@ -366,7 +368,7 @@ fn pivots_that_are_no_numbers_end_a_factorisation() {
             }
             // Nothing, or as good as nothing, in all rows and columns of a node.
             for value in [0.0, -0.0, 1e-310] {
-                let slot = |k: u32| system.pattern.equations.direction(k as usize).slot / 2;
+                let slot = |k: u32| system.pattern.dof_map.direction(k as usize).slot / 2;
                 let meets = |row: u32, column: u32| slot(row) == slot(at) || slot(column) == slot(at);
                 let entry = |row: u32, column: u32| if row == column { value } else { 0.0 };
                 assert!(!with(&|row, column| meets(row, column).then(|| entry(row, column))), "{value:e}");
@@ -398,7 +400,7 @@ fn large_patterns_are_eliminated_in_branches() {
         let system = system(&edges, Symmetry::Whole, 30.0, &mut random);
         let blocks = BlockSolver::new(&system.pattern, &[]).unwrap();
         let sizes = blocks.branches();
-        let nodes = system.pattern.groups.count();
+        let nodes = system.pattern.node_blocks.count();
         let trunk = nodes - sizes.iter().sum::<usize>();
         println!("{name}: {sizes:?} and {trunk}, {} blocks", blocks.blocks());
         assert!(sizes.len() > 1 && trunk < 64, "{name}: {sizes:?}");
@@ -421,7 +423,7 @@ fn what_a_system_multiplies_is_its_matrix() {
 /// Entry by entry, where tiles lie in regions and between them.
 fn multiply_in_regions(system: &System, random: &mut Random) {
     assert!(system.pattern.regions.len() > 1);
-    let x: Vec<f64> = (0..system.pattern.equations.count()).map(|_| random.range(-1.0, 1.0)).collect();
+    let x: Vec<f64> = (0..system.pattern.dof_map.count()).map(|_| random.range(-1.0, 1.0)).collect();
     let mut expected = vec![0.0; x.len()];
     for (column, x) in x.iter().enumerate() {
         for entry in system.pattern.entries(column as u32) {
@@ -456,10 +458,10 @@ fn a_lost_pivot_is_no_lost_solution() {
     let mut random = Random::new(6);
     let mut system = system(&chain(3), Symmetry::Whole, 0.0, &mut random);
     // Nodes that only meet each other: their own tiles are empty.
-    let n = system.pattern.equations.count() as u32;
+    let n = system.pattern.dof_map.count() as u32;
     for column in 0..n {
         for row in 0..n {
-            let node = |k: u32| system.pattern.equations.direction(k as usize).slot / 2;
+            let node = |k: u32| system.pattern.dof_map.direction(k as usize).slot / 2;
             if (node(row), node(column)) == (0, 0) || (node(row), node(column)) == (2, 2) {
                 let place = system.pattern.find(row, column).unwrap();
                 system.values[place] = 0.0;
@@ -468,7 +470,7 @@ fn a_lost_pivot_is_no_lost_solution() {
     }
     // Two nodes of one tile each hang on one: eleven unknowns on six are singular, so one of them gets stiffness.
     for k in 0..n {
-        if system.pattern.equations.direction(k as usize).slot / 2 == 2 {
+        if system.pattern.dof_map.direction(k as usize).slot / 2 == 2 {
             let place = system.pattern.find(k, k).unwrap();
             system.values[place] = 1.0;
         }
@@ -501,14 +503,14 @@ fn nets_are_left_to_faer() {
 /// Of several effects the least symmetric one counts, and of one whether it couples nodes at all.
 #[test]
 fn what_sits_at_single_nodes_leaves_halves() {
-    let groups = Groups::new(6, Layout::Spatial, |slot| slot % 2 == 1);
+    let node_blocks = NodeBlocks::new(6, Layout::Spatial, |slot| slot % 2 == 1);
     let clique = |slots: &[u32]| {
-        let mut cliques = Cliques::default();
-        cliques.push(slots.iter().copied());
-        cliques
+        let mut connectivity = Connectivity::default();
+        connectivity.push(slots.iter().copied());
+        connectivity
     };
     let (own, between, parted) = (clique(&[2, 3]), clique(&[0, 1, 2, 3]), clique(&[2, 5]));
-    let of = |effects: &[(&Cliques, bool)]| Symmetry::of(effects.iter().copied(), &groups);
+    let of = |effects: &[(&Connectivity, bool)]| Symmetry::of(effects.iter().copied(), &node_blocks);
     assert_eq!(of(&[]), Symmetry::Whole);
     assert_eq!(of(&[(&between, true), (&own, true)]), Symmetry::Whole);
     assert_eq!(of(&[(&between, true), (&own, false)]), Symmetry::BetweenGroups);
@@ -525,18 +527,19 @@ fn what_is_called_symmetric_is() {
     for path in ["decks", "decks/minimal", "decks/peers", "decks/hard", "decks/paths"].map(decks).concat() {
         let text = std::fs::read_to_string(&path).unwrap();
         let Ok((scene, _)) = scene::from_text(&text) else { continue };
-        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
         let mut state = model.rest();
-        let Ok(equations) = model.begin_stage(0, stage.kind, &state) else { continue };
-        if equations.count() == 0 || equations.count() > 600 {
+        let mut schedule = Schedule::new(&model);
+        let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &state) else { continue };
+        if dof_map.count() == 0 || dof_map.count() > 600 {
             continue;
         }
-        let mut assembly = Assembly::new(&stage, equations, &model);
+        let mut assembly = Assembly::new(&stage, dof_map, &model);
         let symmetry = assembly.system.pattern.symmetry;
         if !symmetry.halves() {
             continue;
         }
-        model.set_clock(&mut state, 0.1, 0.7);
+        schedule.set_clock(&model, &mut state, 0.1, 0.7);
         for turned in [false, true] {
             shake(&model, &stage, turned, &mut state, &mut random);
             let weights = Weights { stiffness: 1.0, damping: 0.3, mass: 0.2 };
@@ -550,7 +553,7 @@ fn what_is_called_symmetric_is() {
                 (half.pattern.nonzeros(), half.pattern.pairs()),
                 (whole.pattern.nonzeros(), whole.pattern.pairs())
             );
-            let x: Vec<f64> = (0..half.pattern.equations.count()).map(|_| random.range(-1.0, 1.0)).collect();
+            let x: Vec<f64> = (0..half.pattern.dof_map.count()).map(|_| random.range(-1.0, 1.0)).collect();
             let products = [half, &whole].map(|system| system.multiply(&system.values, &x));
             let sizes = whole.multiply(&whole.values.iter().map(|v| v.abs()).collect::<Vec<_>>(), &vec![1.0; x.len()]);
             let apart = products[0].iter().zip(&products[1]).zip(&sizes);
@@ -575,19 +578,19 @@ fn shake(model: &Model, stage: &StageContext, turned: bool, state: &mut State, r
             (state.v[slot], state.a[slot]) = (any(), any());
         }
     }
-    charts::switch(state, &model.charted.rotations, charts::DYNAMIC_BAND, None);
-    charts::freeze(state, &model.charted.elements);
+    charts::switch(state, &model.charted(stage.kind).rotations, charts::DYNAMIC_BAND, None);
+    charts::freeze(state, &model.charted(stage.kind).elements);
 }
 
 /// Blocks and entries on the diagonal are those that a search finds.
 fn own_blocks_are_entries(system: &System) {
     let entry = |row: u32, column: u32| system.pattern.find(row, column).map_or(0.0, |place| system.values[place]);
-    for slot in 0..system.pattern.groups.slots() as u32 {
-        let numbers = system.pattern.equations.of(slot);
+    for slot in 0..system.pattern.node_blocks.slots() as u32 {
+        let numbers = system.pattern.dof_map.of(slot);
         let block = numbers.map(|row| numbers.map(|column| entry(row, column)));
         assert_eq!(system.own_block(slot).0, block, "slot {slot}");
     }
-    let mut diagonal = vec![f64::NAN; system.pattern.equations.count()];
+    let mut diagonal = vec![f64::NAN; system.pattern.dof_map.count()];
     system.pattern.each_diagonal(|equation, place| diagonal[equation] = system.values[place]);
     for (equation, value) in (0..).zip(diagonal) {
         assert_eq!(value, entry(equation, equation), "equation {equation}");
@@ -596,12 +599,12 @@ fn own_blocks_are_entries(system: &System) {
 
 /// What the effects of a stage add to the tangent, on a pattern that keeps both halves.
 fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state: &State, weights: Weights) -> System {
-    let equations = assembly.system.pattern.equations.clone();
-    let (effects, plane) = (model.acting(stage), equations.plane().copied());
-    let cliques = effects.iter().map(|effect| effect.cliques()).collect();
-    let pattern = Pattern::new(equations.clone(), model.groups(equations.layout()), cliques, Symmetry::None);
+    let dof_map = assembly.system.pattern.dof_map.clone();
+    let (effects, plane) = (model.acting(stage), dof_map.plane().copied());
+    let connectivity = effects.iter().map(|effect| effect.connectivity()).collect();
+    let pattern = Pattern::new(dof_map.clone(), model.node_blocks(dof_map.layout()), connectivity, Symmetry::None);
     let mut system = System::new(pattern, model.slots(), &Category::ALL, &[]);
-    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
+    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.tangent().exists()) {
         let mut sink = system.sink(number, effect.category(), true);
         match plane.and_then(|plane| effect.clone().in_plane(&plane)) {
             Some(planar) => planar.add(state, &Memory::default(), weights, &mut sink),
@@ -623,16 +626,19 @@ fn space_takes_over_the_order_of_a_plane() {
              [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 5, 0]\n[[stage]]\n{stage}\n"
         );
         let Ok((scene, _)) = scene::from_text(&deck) else { panic!("the deck is good") };
-        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
-        let Ok(equations) = model.begin_stage(0, stage.kind, &model.rest()) else { panic!("the stage begins") };
-        let plane = Assembly::new(&stage, equations, &model);
-        (model, stage, plane)
+        let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let mut schedule = Schedule::new(&model);
+        let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &model.rest()) else {
+            panic!("the stage begins")
+        };
+        let plane = Assembly::new(&stage, dof_map, &model);
+        (model, schedule, stage, plane)
     };
     let (statics, dynamics) = ("kind = \"static\"\nsteps = 1", "kind = \"dynamic\"\nend = 1\nstep = 1");
     for (kind, symmetry) in [(statics, Symmetry::Whole), (dynamics, Symmetry::BetweenGroups)] {
-        let (model, stage, plane) = planar(9000, kind);
-        let Ok(equations) = model.number(0, None) else { panic!("so it does in space") };
-        let mut space = Assembly::new(&stage, equations, &model);
+        let (model, schedule, stage, plane) = planar(9000, kind);
+        let Ok(dof_map) = schedule.dof_map(&model, None) else { panic!("so it does in space") };
+        let mut space = Assembly::new(&stage, dof_map, &model);
         assert!(plane.system.pattern.width() < space.system.pattern.width());
         assert_eq!(plane.system.pattern.symmetry, Symmetry::Whole);
         assert_eq!(space.system.pattern.symmetry, symmetry);
@@ -648,14 +654,14 @@ fn space_takes_over_the_order_of_a_plane() {
             tangent.look();
         }
         let solves = |solver: &mut LinearSolver, system: &System| {
-            let b: Vec<f64> = (0..system.pattern.equations.count()).map(|k| (k as f64).sin()).collect();
+            let b: Vec<f64> = (0..system.pattern.dof_map.count()).map(|k| (k as f64).sin()).collect();
             let mut x = b.clone();
             assert!(solver.factorise(system) && solver.solve(system, &mut x));
             assert!(system.residual(&b, &x, &mut Leftover::default()) < 1e-11);
         };
         solves(&mut solver, &space.system);
         // Where others meet nothing is taken over.
-        let (model, _, mut other) = planar(7, kind);
+        let (model, _, _, mut other) = planar(7, kind);
         assert!(!space.system.pattern.is_like(&other.system.pattern));
         let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[]).unwrap();
         other.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);

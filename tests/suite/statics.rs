@@ -1,7 +1,7 @@
 //! The policy of static stages: it comes to the right branch whatever the number of load levels, and says what it did.
 
 use crate::scenes::{attempt, simulate};
-use beamsim::drive::{EventKind, Failure};
+use beamsim_core::run::{EventKind, Failure};
 
 /// Lee's frame (two-node mesh of twenty elements a leg) under P = 2, beyond its first limit.
 fn lee(stage: &str) -> String {

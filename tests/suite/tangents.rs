@@ -4,17 +4,17 @@
 
 use crate::dual::{Dual, along, jacobian, values, variables, vector_rate, with_room};
 use crate::random::Random;
-use beamsim::effect::spring::rotational;
-use beamsim::kernel::beam::StiffnessPoint;
-use beamsim::kernel::elastic::Stiffness;
-use beamsim::kernel::inertia::{Eccentric, Inertia, Rotary, Spin};
-use beamsim::kernel::load::{force_on_complement, material_force, material_moment, offset_force, spatial_moment};
-use beamsim::kernel::seam::{Conversion, Converted, conversion};
-use beamsim::kernel::volume::VolumePoint;
-use beamsim::kernel::{ElementSystem, NodeMotion, Weights, shape};
-use beamsim::real::Real;
-use beamsim::rotation::{Complement, Rotation, complement};
-use beamsim::tensor::{Mat3, Vec3};
+use beamsim_core::effect::spring::rotational;
+use beamsim_core::kernel::beam::StiffnessPoint;
+use beamsim_core::kernel::elastic::Stiffness;
+use beamsim_core::kernel::inertia::{Eccentric, Inertia, Rotary, Spin};
+use beamsim_core::kernel::load::{force_on_complement, material_force, material_moment, offset_force, spatial_moment};
+use beamsim_core::kernel::seam::{Conversion, Converted, conversion};
+use beamsim_core::kernel::volume::VolumePoint;
+use beamsim_core::kernel::{ElementSystem, NodeMotion, Weights, shape};
+use beamsim_core::rotation::{Complement, Rotation, complement};
+use beamsim_core::scalar::Real;
+use beamsim_core::tensor::{Mat3, Vec3};
 use std::array::from_fn;
 use std::f64::consts::PI;
 
@@ -456,8 +456,8 @@ fn rotational_springs_hold_through_whole_turns() {
                 let (stiffness, p) = (random.positive_definite(), random.vector(psi));
                 let moving = variables::<3>(p, 0);
                 let k: Mat3<Dual<3>> = Mat3::constant(stiffness);
-                let wound = moving * (Dual::<3>::one() + Dual::<3>::constant(2.0 * PI * turns) / moving.norm());
-                let energy = wound.dot(k * wound) * 0.5;
+                let unwrapped = moving * (Dual::<3>::one() + Dual::<3>::constant(2.0 * PI * turns) / moving.norm());
+                let energy = unwrapped.dot(k * unwrapped) * 0.5;
                 let (force, tangent) = rotational(stiffness, turns, p);
                 let lifted = rotational(stiffness, turns, moving).0;
                 let what = format!("rotational spring, {turns} turns at P = {p:?}, |P| = {psi}");

@@ -1,13 +1,13 @@
 //! Large scenes on several threads: the same results to the last bit, and the same as without regions but for the order of sums.
 
 use crate::random::Random;
-use beamsim::drive::{Failure, Ledger, Observer, Run, Snapshot};
-use beamsim::kernel::Weights;
-use beamsim::model::{Assembly, Model};
 use beamsim::scene;
-use beamsim::system::{Memory, State};
-use beamsim::tensor::Vec3;
-use beamsim::threads;
+use beamsim_core::kernel::Weights;
+use beamsim_core::model::{Assembly, Model, Schedule};
+use beamsim_core::run::{Failure, Ledger, Observer, Run, Snapshot};
+use beamsim_core::system::{Memory, State};
+use beamsim_core::tensor::Vec3;
+use beamsim_core::threads;
 
 /// Cantilevers side by side, tied at their tips, of enough nodes for several regions; effects of every kind that is cut.
 fn deck(stage: &str, order: usize, planar: bool) -> String {
@@ -59,7 +59,7 @@ fn history(text: &str, count: usize) -> (Vec<[u64; 3]>, String) {
             let energies = [ledger.kinetic, ledger.strain, ledger.external, ledger.damped];
             assert!(ledger.strain == 0.0 || ledger.external != 0.0, "no work was counted");
             let numbers = energies.map(|energy| Vec3([energy; 3]));
-            let all = state.q.iter().chain(&state.v[..]).chain(&state.wound).chain(&numbers);
+            let all = state.q.iter().chain(&state.v[..]).chain(&state.unwrapped).chain(&numbers);
             all.map(|v| v.0.map(f64::to_bits)).collect()
         };
         (states.0.iter().flat_map(of_row).collect(), format!("{:?}", counters.evaluations))
@@ -95,8 +95,8 @@ fn turns_are_counted_the_same_on_any_number_of_threads() {
     for stage in ["", "[[stage]]\nkind = \"dynamic\"\nend = 0.02\nstep = 0.01\n"] {
         let text = rolled(5.0, stage);
         let one = history(&text, 1);
-        let wound = one.0.iter().flatten().map(|&bits| f64::from_bits(bits));
-        assert!(wound.fold(0.0, f64::max) > 4.9, "not rolled up");
+        let angles = one.0.iter().flatten().map(|&bits| f64::from_bits(bits));
+        assert!(angles.fold(0.0, f64::max) > 4.9, "not rolled up");
         assert!(history(&text, 2) == one && history(&text, 3) == one, "{stage}");
     }
 }
@@ -119,10 +119,11 @@ fn regions_change_nothing_but_the_order_of_sums() {
         scenes.map(|(text, order)| deck(text, order, false)).into_iter().chain([loaded_at_a_node(), bodies_alone()])
     {
         let plan = model(&text).plan;
-        let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+        let (model, stage) = (plan.model, plan.stages[0].context(0));
         let state = shaken(&model);
-        let equations = model.begin_stage(0, stage.kind, &state).unwrap();
-        let mut assembly = Assembly::new(&stage, equations, &model);
+        let mut schedule = Schedule::new(&model);
+        let dof_map = schedule.begin_stage(&model, 0, stage.kind, &state).unwrap();
+        let mut assembly = Assembly::new(&stage, dof_map, &model);
         assert!(assembly.system.is_cut());
         let weights = Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 };
         // Nothing of another state is left.
@@ -133,7 +134,7 @@ fn regions_change_nothing_but_the_order_of_sums() {
         let cut = (forces(&assembly), assembly.system.values.clone());
         assembly.system.clear(None);
         for (number, effect) in model.acting(&stage).iter().enumerate() {
-            let with_tangent = effect.has_tangent();
+            let with_tangent = effect.tangent().exists();
             let weights = if with_tangent { weights } else { Weights::NONE };
             let mut sink = assembly.system.sink(number, effect.category(), with_tangent);
             effect.add(&state, &Memory::default(), weights, &mut sink);

@@ -2,9 +2,9 @@
 
 use super::folder::{Folder, last_line, status};
 use crate::scenes::{Simulation, simulate};
-use beamsim::integrate::Largest;
 use beamsim::output::HistoryReader;
-use beamsim::warning::{About, WarningKind};
+use beamsim_core::integrate::Largest;
+use beamsim_core::warning::{About, WarningKind};
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::fs;

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::scenes::simulate;
-use beamsim::drive::{StabilityVerdict, StageStability};
+use beamsim_core::run::{StabilityVerdict, StageStability};
 use nalgebra::DMatrix;
 use std::path::Path;
 

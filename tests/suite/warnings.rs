@@ -2,8 +2,8 @@
 
 use super::folder::{Folder, last_line, status};
 use crate::scenes::simulate;
-use beamsim::drive::{StabilityVerdict, StageStability};
-use beamsim::warning::WarningKind;
+use beamsim_core::run::{StabilityVerdict, StageStability};
+use beamsim_core::warning::WarningKind;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Where the parts of a plot stand, and how they are drawn.
+//! Positions and drawing of the parts of a plot.
 
 use super::svg::{Anchor, BACKGROUND, Colour, GRID, INK, LINES, MUTED, PAPER, Stroke, Svg, Text, Theme};
 use super::text::{Block, cut, width};
@@ -9,13 +9,13 @@ use std::fmt::Write;
 // Lengths are in pixels.
 
 const WIDTH: f64 = 860.0;
-/// Of pictures whose legend needs little room.
+/// Height of pictures with a small legend.
 const HEIGHT: f64 = 480.0;
 /// Least height of the area between the axes.
 const LEAST_AREA: f64 = 260.0;
-/// Free edge of the picture.
+/// Free margin at each edge of the picture.
 const EDGE: f64 = 14.0;
-/// Between parts.
+/// Distance between parts.
 const GAP: f64 = 8.0;
 const TITLE_SIZES: [f64; 2] = [17.0, 13.0];
 const AXIS_SIZES: [f64; 2] = [13.0, 11.0];
@@ -27,32 +27,32 @@ const MINOR_TICK_LENGTH: f64 = 3.0;
 const LEGEND_ROW: f64 = 19.0;
 /// Length of the sample line of an entry in the legend.
 const SAMPLE: f64 = 30.0;
-/// Labels of the vertical axis, at most.
+/// Largest number of labels on the vertical axis.
 const MAX_LABELS_UP: usize = 9;
-/// Labels of the horizontal axis, at most.
+/// Largest number of labels on the horizontal axis.
 const MAX_LABELS_ACROSS: usize = 10;
 
-/// Free part of the range above and below the lines of a linear axis.
+/// Free space above and below the lines on a linear axis, relative to their range.
 const MARGIN: f64 = 0.04;
-/// Free factor below and above the marks of a logarithmic axis.
+/// Free space below and above the marks on a logarithmic axis, as a factor.
 const MARGIN_FACTOR: f64 = 1.3;
-/// A level farther below the lines than this factor would only squeeze them.
+/// Smallest ratio of a drawn level to the lowest value; a lower level would squeeze the lines.
 const LEAST_LEVEL: f64 = 0.03;
-/// Bands count for the range as far as this part of what the lines need.
+/// Largest part of the lines' range by which error bands extend it.
 const MAX_BAND: f64 = 0.6;
-/// Ranges below this part of the values are round-off, and drawn as still.
+/// Smallest range relative to the values; smaller ones are round-off and drawn as constants.
 const LEAST_RANGE: f64 = 1e-12;
-/// Values are drawn up to here, so that differences stay finite.
+/// Larger values are drawn as this one, so that differences stay finite.
 const LARGEST: f64 = 1e300;
-/// Smaller values are not told from zero.
+/// Smaller values count as zero.
 const SMALLEST: f64 = 1e-290;
 
-/// Dashes of lines, the first solid.
+/// Dash patterns of lines; the first is solid.
 const DASHES: [&str; 4] = ["", "8 4", "2 3", "9 3 2 3"];
 const LINE_WIDTH: f64 = 1.6;
 const BACKGROUND_WIDTH: f64 = 7.0;
 const BAND_OPACITY: f64 = 0.2;
-/// Half the size of a mark at a point.
+/// Half the size of a mark on a line.
 const MARK: f64 = 4.0;
 /// Half the size of a mark beside a line.
 const SMALL_MARK: f64 = 2.2;
@@ -60,7 +60,7 @@ const FRAME: Stroke = Stroke::solid(MUTED, 1.0);
 const BOUNDARY: Stroke = Stroke { colour: MUTED, width: 1.0, dashes: "4 4" };
 const LEVEL: Stroke = Stroke { colour: MUTED, width: 1.5, dashes: "7 4" };
 
-/// The values of an axis and the pixels where they stand.
+/// The map from the values of an axis to pixels.
 struct Ruler {
     scale: Scale,
     low: f64,
@@ -71,7 +71,7 @@ struct Ruler {
 }
 
 impl Ruler {
-    /// Without pixels yet.
+    /// A ruler for a range of values; its ends in pixels are set later.
     fn new(scale: Scale, (low, high): (f64, f64), max_labels: usize) -> Self {
         Self { scale, low, high, start: 0.0, end: 1.0, ticks: Ticks::new(scale, low, high, max_labels) }
     }
@@ -85,13 +85,13 @@ impl Ruler {
         self.start + share * (self.end - self.start)
     }
 
-    /// The widest of its labels.
+    /// The width of the widest label in pixels.
     fn label_width(&self) -> f64 {
         self.ticks.labelled.iter().fold(0.0, |widest: f64, tick| widest.max(width(&tick.text, TICK_SIZE)))
     }
 }
 
-/// An entry of the legend: its line, or none for the level.
+/// An entry of the legend. The entry of the level has no line.
 struct Entry<'a> {
     line: Option<&'a Line>,
     name: String,
@@ -99,7 +99,7 @@ struct Entry<'a> {
     row: usize,
 }
 
-/// A plot with places for all its parts.
+/// A plot with the positions of all its parts.
 pub struct Layout<'a> {
     plot: &'a LinePlot,
     level: Option<&'a Level>,
@@ -114,7 +114,7 @@ pub struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    /// Places all parts of a plot.
+    /// Finds the positions of all parts of a plot.
     pub fn new(plot: &'a LinePlot) -> Self {
         let y_range = range_of_lines(plot);
         let level = plot.level.as_ref().filter(|level| is_level_shown(level, y_range, plot.y.scale));
@@ -181,7 +181,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The level and the boundaries.
+    /// Draws the level and the boundaries.
     fn draw_across(&self, svg: &mut Svg) {
         let mut boundaries = String::new();
         for boundary in &self.plot.boundaries {
@@ -201,7 +201,7 @@ impl<'a> Layout<'a> {
             let points = self.drawn(&line.points);
             let kept: Vec<(f64, f64)> = thinned(&points).into_iter().map(|k| points[k]).collect();
             if let [only] = points[..] {
-                // A line of one point would not be seen.
+                // A line through a single point would be invisible.
                 let at = (self.x.pixel(only.0), self.y.pixel(only.1));
                 svg.filled_path(&mark_data(0, at, MARK), colour, 1.0);
             } else if !points.is_empty() {
@@ -214,7 +214,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Points that the axes can show.
+    /// The points that the axes can show.
     fn drawn(&self, points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let is_drawn = |(x, y): &(f64, f64)| is_shown(*x, self.x.scale) && is_shown(*y, self.y.scale);
         points.iter().copied().filter(is_drawn).collect()
@@ -233,7 +233,8 @@ impl<'a> Layout<'a> {
         points.iter().map(|&(x, y)| mark_data(mark, (self.x.pixel(x), self.y.pixel(y)), size)).collect()
     }
 
-    /// Names stand at the top, to the right of their line, where they do not run into each other.
+    /// Draws names at the top, to the right of their lines. A name that would overlap the one before
+    /// it is left out.
     fn draw_boundary_names(&self, svg: &mut Svg) {
         let mut free_from = self.x.start;
         for boundary in &self.plot.boundaries {
@@ -329,12 +330,12 @@ fn draw_block(svg: &mut Svg, block: &Block, class: &'static str, (x, top): (f64,
     }
 }
 
-/// The height of a title with the gap to what is next to it.
+/// The height of a title with the gap beside it.
 fn part_height(block: &Block) -> f64 {
     if block.lines.is_empty() { 0.0 } else { block.height() + GAP }
 }
 
-/// The horizontal axis, with as many labels as fit its length.
+/// The horizontal axis, with as many labels as fit its length in pixels.
 fn across(plot: &LinePlot, length: f64) -> Ruler {
     let values = || plot.lines.iter().flat_map(|line| line.points.iter().chain(&line.beside)).map(|point| point.0);
     let range = still_widened(range(values(), plot.x.scale));
@@ -353,7 +354,7 @@ fn across(plot: &LinePlot, length: f64) -> Ruler {
     }
 }
 
-/// Entries one after the other in rows; names that are wider than a row are cut.
+/// The entries of the legend in rows; names that are wider than a row are cut.
 fn legend<'a>(plot: &'a LinePlot, level: Option<&'a Level>) -> Vec<Entry<'a>> {
     let lines = plot.lines.iter().map(|line| (Some(line), &line.name));
     let level = level.map(|level| (None, &level.name));
@@ -391,7 +392,7 @@ fn stroke_of(style: LineStyle) -> Stroke {
     }
 }
 
-/// A mark of a half size around a place, as path data; neighbouring numbers differ in shape.
+/// Path data of a mark with half size `h`; marks with neighbouring numbers differ in shape.
 fn mark_data(number: usize, (x, y): (f64, f64), h: f64) -> String {
     let (w, s) = (0.4 * h, 0.9 * h);
     let corners: &[(f64, f64)] = match number % 6 {
@@ -452,18 +453,21 @@ fn is_shown(value: f64, scale: Scale) -> bool {
     }
 }
 
-/// Lowest and highest of the values that an axis can show; 0 or 1 to 1 where there are none.
+/// The lowest and highest of the values that an axis can show. Without such values the range is 0 to
+/// 1 on a linear axis, and 1 to 1 on a logarithmic axis.
 fn range(values: impl Iterator<Item = f64>, scale: Scale) -> (f64, f64) {
     let shown = values.filter(|&value| is_shown(value, scale)).map(|value| value.clamp(-LARGEST, LARGEST));
     let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    if low <= high {
+        return (low, high);
+    }
     match scale {
-        _ if low <= high => (low, high),
         Scale::Linear => (0.0, 1.0),
         Scale::Logarithmic => (1.0, 1.0),
     }
 }
 
-/// Of the vertical axis: the lines, and bands as far as these leave the lines readable.
+/// The range of the vertical axis: that of the lines, extended by error bands within [`MAX_BAND`].
 fn range_of_lines(plot: &LinePlot) -> (f64, f64) {
     let scale = plot.y.scale;
     let points = plot.lines.iter().flat_map(|line| line.points.iter().chain(&line.beside));
@@ -477,7 +481,7 @@ fn range_of_lines(plot: &LinePlot) -> (f64, f64) {
     (lowest.max(low - room), highest.min(high + room))
 }
 
-/// Values that stand still, but for round-off, stand in the middle of a range.
+/// The range, or a wider one around it if it is only round-off.
 fn still_widened((low, high): (f64, f64)) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     if high - low > (LEAST_RANGE * size).max(SMALLEST) {
@@ -498,7 +502,7 @@ fn with_margin(scale: Scale, range: (f64, f64)) -> (f64, f64) {
     }
 }
 
-/// Levels that can be drawn, and do not squeeze the lines.
+/// True if a level can be drawn without squeezing the lines.
 fn is_level_shown(level: &Level, (low, _): (f64, f64), scale: Scale) -> bool {
     match scale {
         Scale::Linear => level.value.is_finite(),

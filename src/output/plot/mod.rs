@@ -1,7 +1,7 @@
-//! Plots of lines as SVG, for print and screen: light, or dark where the reader's system is.
+//! Line plots as SVG, for print and screen. Colours follow the light or dark mode of the reader.
 //!
-//! Colours are told apart by colour-blind readers, and dashes or marks tell lines apart without colours. The picture is 860 pixels wide; it
-//! grows in height where a long legend needs room.
+//! The colours suit colour-blind readers, and dashes or marks distinguish lines without colours.
+//! The picture is 860 pixels wide; its height grows with the legend.
 
 mod layout;
 #[cfg(feature = "png")]
@@ -15,7 +15,7 @@ use layout::Layout;
 /// A plot: lines over two axes, with a legend below.
 #[derive(Clone, Debug)]
 pub struct LinePlot {
-    /// Above it
+    /// The title above the plot
     pub title: String,
     /// The horizontal axis
     pub x: Axis,
@@ -23,22 +23,22 @@ pub struct LinePlot {
     pub y: Axis,
     /// The lines, the first behind the others
     pub lines: Vec<Line>,
-    /// A level of the vertical axis, drawn across
+    /// A horizontal line through the whole width
     pub level: Option<Level>,
-    /// Places on the horizontal axis, drawn through the whole height
+    /// Vertical lines through the whole height
     pub boundaries: Vec<Boundary>,
 }
 
 /// An axis of a plot.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with its unit
+    /// The title: a quantity with its unit
     pub title: String,
-    /// How values are spread over it
+    /// The map from values to positions
     pub scale: Scale,
 }
 
-/// How values are spread over an axis.
+/// A map from values to positions on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// Equal differences are equally long
@@ -50,49 +50,49 @@ pub enum Scale {
 /// A line of a plot.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// In the legend
+    /// The name in the legend
     pub name: String,
-    /// Its points, in order
+    /// The points of the line, in order
     pub points: Vec<(f64, f64)>,
-    /// Half the height of a band around each point, where that is known
+    /// Half the height of the error band at each point; `None` without a band
     pub bars: Option<Vec<f64>>,
-    /// Points that belong to it and lie beside it: small marks without a line
+    /// Further points of the line's family: small marks that no line joins
     pub beside: Vec<(f64, f64)>,
-    /// How it is drawn
+    /// Colour, dashes and marks
     pub style: LineStyle,
 }
 
-/// How a line is drawn.
+/// Colour, dashes and marks of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineStyle {
-    /// Without marks; numbers choose the colour and the dashes, where 0 is solid
+    /// A line without marks
     Dashed {
-        /// Of the colour
+        /// The number of the colour
         colour: usize,
-        /// Of the dashes
+        /// The number of the dash pattern; 0 is solid
         dash: usize,
     },
-    /// With a mark at each point; a number chooses colour and mark
+    /// A line with a mark at each point; the number selects colour and mark
     Marked(usize),
-    /// Broad and grey, without marks
+    /// A broad grey line without marks
     Background,
 }
 
 /// A level of the vertical axis.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// Its value
+    /// The value on the vertical axis
     pub value: f64,
-    /// In the legend
+    /// The name in the legend
     pub name: String,
 }
 
-/// A place on the horizontal axis, such as the start of a stage.
+/// A position on the horizontal axis, such as the start of a stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Boundary {
-    /// Its value
+    /// The value on the horizontal axis
     pub at: f64,
-    /// Beside the line
+    /// The name beside the line
     pub name: String,
 }
 
@@ -102,17 +102,18 @@ impl LinePlot {
         Layout::new(self).draw(svg::Theme::OfReader)
     }
 
-    /// The bytes of a PNG file in light colours, two pixels for each of the SVG.
+    /// The bytes of a PNG file in light colours, with two pixels per pixel of the SVG.
     #[cfg(feature = "png")]
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         png::draw(&Layout::new(self).draw(svg::Theme::Light))
     }
 }
 
-/// Points of a line that are drawn, at most; an eye sees no more.
+/// Largest number of drawn points per line; more would not be visible.
 const MAX_POINTS: usize = 2000;
 
-/// Indices of the points of a line that are drawn: of each stretch the lowest and the highest, and the ends.
+/// Indices of the drawn points of a line: the lowest and the highest point of each stretch, and both
+/// ends of the line.
 fn thinned(points: &[(f64, f64)]) -> Vec<usize> {
     if points.len() <= MAX_POINTS {
         return (0..points.len()).collect();

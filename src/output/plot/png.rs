@@ -1,13 +1,14 @@
-//! A plot in pixels.
+//! Plots in pixels.
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use std::sync::Arc;
 
-/// Pixels for each of the SVG.
+/// Pixels of the PNG per pixel of the SVG.
 const PIXELS: f32 = 2.0;
 
-/// The bytes of a PNG file. The font is in the binary, so that the picture is the same on every machine.
+/// The bytes of a PNG file. The font is in the binary, so that the picture is the same on every
+/// machine.
 pub fn draw(svg: &str) -> Result<Vec<u8>, String> {
     let mut options = Options { font_family: "Noto Sans".into(), ..Options::default() };
     Arc::make_mut(&mut options.fontdb).load_font_data(notosans::REGULAR_TTF.to_vec());

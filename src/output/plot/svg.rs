@@ -1,22 +1,22 @@
-//! The text of an SVG file. Light colours stand on the elements themselves, so that every program shows them; dark ones in a style sheet, which
-//! programs that know the reader's choice put in their place.
+//! The text of an SVG file. Light colours are attributes of the elements, which every program shows.
+//! Dark colours are in a style sheet for programs that know the reader's mode.
 
 use std::fmt::Write;
 
-/// Which colours a picture has.
+/// The colours of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Theme {
-    /// Light, or dark where the reader's system is
+    /// The light or dark mode of the reader
     OfReader,
-    /// Light everywhere
+    /// Light colours for all readers
     #[cfg_attr(not(feature = "png"), expect(dead_code, reason = "for pictures in pixels"))]
     Light,
 }
 
-/// A colour, light and dark.
+/// A colour in light and in dark mode.
 #[derive(Clone, Copy, Debug)]
 pub struct Colour {
-    /// Its class in the style sheet
+    /// The class in the style sheet
     class: &'static str,
     light: &'static str,
     dark: &'static str,
@@ -26,17 +26,18 @@ const fn colour(class: &'static str, light: &'static str, dark: &'static str) ->
     Colour { class, light, dark }
 }
 
-/// Behind everything.
+/// The background of the picture.
 pub const PAPER: Colour = colour("paper", "#FFFFFF", "#15191F");
 /// Titles and names.
 pub const INK: Colour = colour("ink", "#1A1A1A", "#E8EAED");
-/// Numbers, frame and boundaries.
+/// Tick labels, frame and boundaries.
 pub const MUTED: Colour = colour("muted", "#555555", "#A9B1BA");
-/// Lines at labelled ticks.
+/// Grid lines at labelled ticks.
 pub const GRID: Colour = colour("grid", "#DDDDDD", "#333B45");
-/// Lines behind the others.
+/// Broad lines behind the other lines.
 pub const BACKGROUND: Colour = colour("back", "#BBBBBB", "#596470");
-/// Of lines; they differ in hue and lightness (Okabe and Ito 2008; dark ones are lifted to be as legible).
+/// Colours of lines, which differ in hue and lightness (Okabe and Ito 2008; lighter in dark mode, for
+/// the same contrast).
 pub const LINES: [Colour; 7] = [
     colour("c0", "#0072B2", "#4BA8E0"),
     colour("c1", "#D55E00", "#F08A3C"),
@@ -48,25 +49,25 @@ pub const LINES: [Colour; 7] = [
 ];
 const OTHERS: [Colour; 5] = [PAPER, INK, MUTED, GRID, BACKGROUND];
 
-/// How the edge of a shape is drawn.
+/// Colour, width and dashes of a drawn line.
 #[derive(Clone, Copy, Debug)]
 pub struct Stroke {
     /// The colour
     pub colour: Colour,
-    /// In pixels
+    /// The width in pixels
     pub width: f64,
     /// Lengths of dashes and gaps in pixels; empty for a solid line
     pub dashes: &'static str,
 }
 
 impl Stroke {
-    /// A solid one.
+    /// A solid line.
     pub const fn solid(colour: Colour, width: f64) -> Self {
         Self { colour, width, dashes: "" }
     }
 }
 
-/// Which point of a text stands at its place.
+/// The point of a text that is at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
     Start,
@@ -74,26 +75,26 @@ pub enum Anchor {
     End,
 }
 
-/// A text and its place.
+/// A text and its position.
 #[derive(Clone, Copy, Debug)]
 pub struct Text<'a> {
-    /// What it says
+    /// The characters
     pub text: &'a str,
-    /// Across and down to the base line, in pixels
+    /// Position of the base line in pixels: to the right, and down
     pub at: (f64, f64),
-    /// The size of the font
+    /// The font size in pixels
     pub size: f64,
     /// The colour
     pub colour: Colour,
-    /// The point at the place
+    /// The point of the text at the position
     pub anchor: Anchor,
-    /// Whether it reads upward
+    /// True if the text reads upward
     pub upward: bool,
-    /// In the style sheet and for programs that read the picture
+    /// The class of the element, for programs that read the picture
     pub class: &'static str,
 }
 
-/// A picture in the making.
+/// An SVG file that is being written.
 pub struct Svg {
     out: String,
 }
@@ -123,7 +124,7 @@ impl Svg {
         let _ = writeln!(self.out, "<rect class=\"f-{class}\" {place} fill=\"{light}\"/>");
     }
 
-    /// The edge along path data.
+    /// A line along path data.
     pub fn path(&mut self, data: &str, stroke: Stroke) {
         if data.is_empty() {
             return;
@@ -134,7 +135,7 @@ impl Svg {
         let _ = writeln!(self.out, "<path class=\"s-{class}\" d=\"{data}\" fill=\"none\" {edge}/>");
     }
 
-    /// The inside of path data.
+    /// A filled shape with path data as its outline.
     pub fn filled_path(&mut self, data: &str, colour: Colour, opacity: f64) {
         if data.is_empty() {
             return;
@@ -160,13 +161,13 @@ impl Svg {
             writeln!(self.out, "<text class=\"{class} f-{colour}\" {place} fill=\"{light}\">{}</text>", escaped(text));
     }
 
-    /// Whatever follows is cut at the edges of a rectangle, until [`Self::end_clip`].
+    /// Starts clipping at the edges of a rectangle, until [`Self::end_clip`].
     pub fn begin_clip(&mut self, x: f64, y: f64, width: f64, height: f64) {
         let place = format!("x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"");
         let _ = writeln!(self.out, "<clipPath id=\"area\"><rect {place}/></clipPath>\n<g clip-path=\"url(#area)\">");
     }
 
-    /// Ends what [`Self::begin_clip`] began.
+    /// Ends the clipping that [`Self::begin_clip`] started.
     pub fn end_clip(&mut self) {
         self.out.push_str("</g>\n");
     }

@@ -1,6 +1,7 @@
-//! Texts of a plot, broken and cut so that they fit. Widths are estimated: the font is that of the reader.
+//! Texts of a plot, wrapped and cut to fit. Widths are estimated, since the font depends on the
+//! reader's machine.
 
-/// Widths of characters in parts of the font size, as in common sans-serif fonts, the broader ones.
+/// Widths of characters relative to the font size, as in the wider of the common sans-serif fonts.
 fn width_of(character: char) -> f64 {
     match character {
         'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '\'' | '|' | '!' | ' ' => 0.32,
@@ -17,7 +18,7 @@ pub fn width(text: &str, size: f64) -> f64 {
     size * text.chars().map(width_of).sum::<f64>()
 }
 
-/// The text, or its beginning and an ellipsis where it is wider than the room.
+/// The text, or its beginning and an ellipsis if it is wider than the room in pixels.
 pub fn cut(text: &str, size: f64, room: f64) -> String {
     if width(text, size) <= room {
         return text.into();
@@ -33,7 +34,8 @@ pub fn cut(text: &str, size: f64, room: f64) -> String {
     format!("{}…", kept.trim_end())
 }
 
-/// Lines that fit the room: broken at spaces, within words only where a word alone is too wide.
+/// Lines that fit the room in pixels: broken at spaces, and within words that are wider than the
+/// room.
 pub fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
     let mut lines = Vec::new();
     let mut line = String::new();
@@ -59,16 +61,17 @@ pub fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
     lines
 }
 
-/// A text that may take several lines, in a smaller font where it is long.
+/// A text on one or more lines, in a smaller font if it is long.
 pub struct Block {
-    /// Its lines
+    /// The lines of the text
     pub lines: Vec<String>,
-    /// The size of the font
+    /// The font size in pixels
     pub size: f64,
 }
 
 impl Block {
-    /// The text in the first of the sizes that needs no more than so many lines; in the last one it is cut.
+    /// The text in the first of the font sizes with which it needs at most `max_lines` lines; if no
+    /// size suffices, it is cut in the last size.
     pub fn fit(text: &str, sizes: &[f64], max_lines: usize, room: f64) -> Self {
         let mut block = Self { lines: Vec::new(), size: 0.0 };
         for &size in sizes {
@@ -82,12 +85,12 @@ impl Block {
         block
     }
 
-    /// The distance of its lines.
+    /// The distance between base lines in pixels.
     pub fn line_height(&self) -> f64 {
         1.25 * self.size
     }
 
-    /// Its height in pixels.
+    /// The height of the text in pixels.
     pub fn height(&self) -> f64 {
         self.line_height() * self.lines.len() as f64
     }

@@ -1,37 +1,38 @@
-//! Ticks of an axis: round numbers, whose texts are exact.
+//! Ticks of an axis: round numbers with exact labels.
 //!
-//! A tick is an integer times a power of ten. Its text is made of these two, and its value is read from the text: so the text of a tick never
-//! differs from the place where the tick stands.
+//! A tick is an integer times a power of ten. The label is made of these two, and the value is read
+//! from the label: so the label of a tick always agrees with its position.
 
 use super::Scale;
 
 /// A labelled tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// Where it stands
+    /// The value on the axis
     pub value: f64,
-    /// Reads back to the value
+    /// The label, which reads back to the value
     pub text: String,
 }
 
 /// Ticks of an axis.
 #[derive(Clone, Debug, Default)]
 pub struct Ticks {
-    /// With labels
+    /// Ticks with labels
     pub labelled: Vec<Tick>,
-    /// Between these, without labels
+    /// Values of ticks without labels between them
     pub minor: Vec<f64>,
 }
 
-/// Plain decimals are written for values from here …
+/// Smallest value that is written as a plain decimal; smaller ones have an exponent.
 const LEAST_PLAIN: f64 = 1e-3;
-/// … to here; others have an exponent.
+/// Values from here on have an exponent.
 const LARGEST_PLAIN: f64 = 1e6;
-/// Part of a step by which an end of the axis may miss a tick, for round-off.
+/// Part of a step by which an end of the axis may miss a tick because of round-off.
 const ROUND_OFF: f64 = 1e-9;
 
 impl Ticks {
-    /// Ticks between two ends of an axis, at most so many labels (two at least); the ends must differ.
+    /// Ticks between the two ends of an axis, which must differ, with at most `max_labels` labels
+    /// but at least two.
     pub fn new(scale: Scale, low: f64, high: f64, max_labels: usize) -> Self {
         match scale {
             Scale::Linear => Self { labelled: linear(low, high, max_labels), minor: Vec::new() },
@@ -70,16 +71,17 @@ impl Decimal {
     }
 
     fn tick(self, exponent: Option<i32>) -> Tick {
-        let text = match exponent {
-            _ if self.integer == 0 => "0".into(),
-            None => self.plain(),
-            Some(exponent) => self.with_exponent(exponent),
+        let text = if self.integer == 0 {
+            "0".into()
+        } else {
+            exponent.map_or_else(|| self.plain(), |exponent| self.with_exponent(exponent))
         };
         Tick { value: self.value(), text }
     }
 }
 
-/// At least two ticks, 1, 2 or 5 times a power of ten apart, with one exponent for all, a multiple of three (engineering notation).
+/// At least two ticks, 1, 2 or 5 times a power of ten apart. If they have an exponent, it is the same
+/// for all and a multiple of three (engineering notation).
 fn linear(low: f64, high: f64, max_labels: usize) -> Vec<Tick> {
     let wanted = (high - low) / max_labels.max(2) as f64;
     let mut power = wanted.log10().floor() as i32;
@@ -101,7 +103,8 @@ fn linear(low: f64, high: f64, max_labels: usize) -> Vec<Tick> {
     ticks.into_iter().map(|tick| tick.tick(exponent)).collect()
 }
 
-/// Ticks at powers of ten; where these are few also at 2 and 5 times them, and within a decade as on a linear axis.
+/// Ticks at powers of ten. If these are few, there are also ticks at 2 and 5 times them; within a
+/// decade ticks are those of a linear axis.
 fn logarithmic(low: f64, high: f64, max_labels: usize) -> Ticks {
     let decades = order(low)..=order(high);
     let times = |digit: i64, power: i32| Decimal { integer: digit, power };
@@ -128,13 +131,13 @@ fn logarithmic(low: f64, high: f64, max_labels: usize) -> Ticks {
     Ticks { labelled: labelled(&[1], stride), minor }
 }
 
-/// 0.002, 0.5, 20, 1e-6.
+/// A tick such as 0.002, 0.5, 20 or 1e-6.
 fn power_of_ten_notation(tick: Decimal) -> Tick {
     let is_plain = (LEAST_PLAIN..LARGEST_PLAIN).contains(&tick.value());
     tick.tick(if is_plain { None } else { Some(tick.power) })
 }
 
-/// The power of ten that is not above a positive value.
+/// The exponent of the largest power of ten that is at most a positive value.
 fn order(value: f64) -> i32 {
     let guess = value.log10().floor() as i32;
     let next = Decimal { integer: 1, power: guess + 1 };

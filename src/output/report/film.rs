@@ -2,12 +2,12 @@
 
 use super::super::{Row, Units};
 use super::encode::{base64, quantised};
-use crate::drive::Snapshot;
-use crate::model::SlotKind;
-use crate::probe::{Figure, Look, Place, Quantity};
 use crate::scene::Scene;
-use crate::system::{Node, State};
-use crate::tensor::{Mat3, Vec3};
+use beamsim_core::model::SlotKind;
+use beamsim_core::probe::{Figure, Look, Place, Quantity};
+use beamsim_core::run::Snapshot;
+use beamsim_core::system::{Node, State};
+use beamsim_core::tensor::{Mat3, Vec3};
 use serde_json::{Value, json};
 use std::collections::HashSet;
 
@@ -344,7 +344,7 @@ fn quaternion(axes: Mat3) -> [i16; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rotation::Rotation;
+    use beamsim_core::rotation::Rotation;
 
     #[test]
     fn quaternions_are_those_of_their_rotation_vectors() {

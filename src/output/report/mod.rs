@@ -5,10 +5,9 @@ mod film;
 
 pub use film::Film;
 
-use super::{HistoryReader, PartFile, Record, Units};
+use super::{HistoryReader, OutputError, PartFile, Record, Units};
 use encode::base64;
 use serde_json::{Value, json};
-use std::io;
 use std::path::Path;
 
 /// The page, which has places for a title and for data.
@@ -27,11 +26,11 @@ pub struct Report<'a> {
 
 impl Report<'_> {
     /// Writes the page of results in a folder.
-    pub fn write(&self, results: &Path, film: Film, path: &Path) -> io::Result<()> {
+    pub fn write(&self, results: &Path, film: Film, path: &Path) -> Result<(), OutputError> {
         PartFile::write_to(path, self.page(results, film)?.as_bytes())
     }
 
-    fn page(&self, results: &Path, mut film: Film) -> io::Result<String> {
+    fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
         let history = HistoryReader::of_results(results).map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
         // The last row of a run that was stopped is the one of that moment, which the film passes over.
@@ -61,12 +60,13 @@ impl Report<'_> {
     }
 }
 
-/// A small table of the results, where they have it; texts of its fields stay texts.
-fn small_table(path: &Path, units: &Units) -> io::Result<Value> {
+/// A small table of the results as columns, units and rows; null if there is no such file. Fields that
+/// are no numbers stay texts.
+fn small_table(path: &Path, units: &Units) -> Result<Value, OutputError> {
     if !path.exists() {
         return Ok(Value::Null);
     }
-    let wrong = |error: csv::Error| io::Error::other(format!("{}: {error}", path.display()));
+    let wrong = |error: csv::Error| OutputError::content(path, error);
     let mut reader = csv::Reader::from_path(path).map_err(wrong)?;
     let names: Vec<String> = reader.headers().map_err(wrong)?.iter().map(str::to_string).collect();
     let units: Vec<Option<String>> = names.iter().map(|name| units.of_column(name)).collect();
@@ -90,7 +90,8 @@ fn rows(history: &HistoryReader, frames: &[usize]) -> Vec<usize> {
     (0..count).filter(|k| k.is_multiple_of(stride) || frames.binary_search(k).is_ok() || k + 1 == count).collect()
 }
 
-/// Rows of some columns. Error bars have the names of the columns that they belong to.
+/// Rows of some columns of a history. Columns of error bars get the names of the columns that they
+/// belong to.
 fn table(history: &HistoryReader, rows: &[usize], columns: &[usize], units: &Units) -> Value {
     let name = |&k: &usize| {
         if is_bar(&history.names, k) { history.names[k].trim_end_matches(".err") } else { &history.names[k] }

@@ -1,0 +1,108 @@
+//! An artificial resistance against motion, by which a static stage finds the state of rest of what only its loads hold.
+//!
+//! Each node is pulled back to where an anchor saw it, by the potential
+//!
+//! ```text
+//! c/2 (|u - u_n|^2 + l^2 |theta|^2),   theta = log(R_n^T R)
+//! ```
+//!
+//! with the resistance c, a force per displacement, and an arm l. Balance against it is a step of an implicit Euler scheme for a motion
+//! along the forces, c dq/dt = -g (proximal point method: Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it
+//! stands beside the effects of a stage only while that looks for rest, and nothing is left of it in the balance that is found.
+
+use super::{Effect, Roles, TangentForm, one_by_one, own_part};
+use crate::kernel::{ElementSystem, Weights};
+use crate::rotation::{Rotation, log};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, StageContext, State};
+use crate::tensor::{Mat3, Vec3};
+
+/// At all slots of nodes; nothing without an anchor in the state.
+#[derive(Clone, Debug)]
+pub struct Resistance {
+    /// The slots, each with whether it is one of a rotation
+    pub slots: Vec<(Slot, bool)>,
+    /// The arm l by which rotations compare with displacements
+    pub arm: f64,
+}
+
+impl Effect for Resistance {
+    fn name(&self) -> &'static str {
+        "artificial resistance"
+    }
+
+    /// The work that it takes is booked as damped.
+    fn category(&self) -> Category {
+        Category::Damping
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        one_by_one(&self.slots)
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
+    }
+
+    fn acts(&self, _stage: &StageContext) -> bool {
+        true
+    }
+
+    /// It pulls back within the plane that a state moves in.
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
+
+    /// The tangent of rotations leaves out what falls with theta.
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let Some(anchor) = &at.anchor else { return };
+        let mut system = ElementSystem::new(1);
+        for k in own_part(0, self.slots.len(), &out.instances()) {
+            let (slot, turns) = self.slots[k];
+            let (q, before) = (at.q[slot as usize], anchor.q[slot as usize]);
+            system.clear();
+            if turns {
+                let (rotation, base) = (Rotation::new(q), Rotation::new(before));
+                let (t, resistance) = (rotation.t, anchor.resistance * self.arm * self.arm);
+                let theta = log(base.r.transpose() * rotation.r);
+                system.add_force(0, t.transpose_mul(theta) * resistance);
+                system.add_tangent(0, 0, (t.transpose() * t).scale(resistance * weights.stiffness));
+            } else {
+                system.add_force(0, (q - before) * anchor.resistance);
+                system.add_tangent(0, 0, Mat3::diagonal([anchor.resistance * weights.stiffness; 3]));
+            }
+            out.add(k, &system);
+        }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rotation::complement;
+
+    /// The moment over an increment of the rotation vector.
+    fn moment(p: Vec3, base: Vec3) -> Vec3 {
+        let (rotation, base) = (Rotation::new(p), Rotation::new(base));
+        rotation.t.transpose_mul(log(base.r.transpose() * rotation.r))
+    }
+
+    #[test]
+    fn moments_are_the_gradient_of_the_potential_in_every_chart() {
+        let potential =
+            |p: Vec3, base: Vec3| 0.5 * log(Rotation::new(base).r.transpose() * Rotation::new(p).r).squared();
+        let base = Vec3([0.4, 2.2, -1.1]);
+        for p in [Vec3([0.9, 1.9, -0.6]), complement(Vec3([0.9, 2.9, -0.6])), base] {
+            for axis in Vec3::UNIT {
+                let step = axis * 1e-5;
+                let slope = (potential(p + step, base) - potential(p - step, base)) / 2e-5;
+                assert!((slope - moment(p, base).dot(axis)).abs() < 1e-8, "{p:?} {axis:?}");
+            }
+        }
+    }
+}

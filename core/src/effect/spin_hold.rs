@@ -1,0 +1,129 @@
+//! Holds spins that nothing resists: a straight part between ball joints may spin about its own axis without any force, in statics
+//! always and in a dynamic stage without rotary inertia; then round-off alone would tell by how much.
+
+use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
+use crate::kernel::{ElementSystem, Weights};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, State};
+use crate::tensor::Vec3;
+
+/// A straight part that may spin: beams that are joined rigidly along a line.
+#[derive(Clone, Debug)]
+pub struct SpinningPart {
+    /// A node in the middle of a beam
+    pub node: Node,
+    /// All its nodes
+    pub nodes: Vec<Node>,
+    /// The axis at the start, a unit vector
+    pub axis: Vec3,
+    /// GJ/L, moment per angle
+    pub stiffness: f64,
+}
+
+/// The hold in load levels and time steps, as part of GJ/L: residuals that Newton tolerates may not turn the beam by much, and the swing of a
+/// beam that sags must not notice.
+const HOLD: f64 = 1e-3;
+
+/// The hold where no mass stands beside it, as part of GJ/L: modes must not notice at all.
+const HOLD_IN_MODES: f64 = 1e-8;
+
+/// The stages in which spins are held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldIn {
+    /// Dynamic and modal ones
+    Motion,
+    /// Static ones, and searches for critical loads
+    Statics,
+}
+
+/// The hold of all parts that may spin.
+///
+/// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness against corrections
+/// t.T dP about the axis t, and keeps predictions from carrying spins on, so that what no force asks for does not happen.
+#[derive(Clone, Debug)]
+pub struct SpinHold {
+    /// The parts
+    pub parts: Vec<SpinningPart>,
+    /// The stages that hold them
+    pub held_in: HeldIn,
+}
+
+impl Effect for SpinHold {
+    fn name(&self) -> &'static str {
+        match self.held_in {
+            HeldIn::Motion => "hold of spins without inertia",
+            HeldIn::Statics => "hold of free spins",
+        }
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.parts.iter().for_each(|part| connectivity.push([part.node.p]));
+        connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
+    }
+
+    fn acts(&self, stage: &StageContext) -> bool {
+        let held_in = if stage.kind.needs_inertia() { HeldIn::Motion } else { HeldIn::Statics };
+        self.held_in == held_in
+    }
+
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.parts.iter().for_each(|part| show(MirrorData::Line(part.axis)));
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        // An artificial resistance holds spins by itself, with a force that tells by how much.
+        if at.anchor.is_some() {
+            return;
+        }
+        let among_modes = self.held_in == HeldIn::Motion && weights.mass == 0.0;
+        let hold = weights.stiffness * if among_modes { HOLD_IN_MODES } else { HOLD };
+        let mut system = ElementSystem::new(1);
+        for (k, part) in self.parts.iter().enumerate() {
+            system.clear();
+            let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
+            system.add_tangent(0, 0, about.outer(about).scale(part.stiffness * hold));
+            out.add(k, &system);
+        }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { spins: Some(self), ..Roles::NONE }
+    }
+}
+
+impl FreeSpins for SpinHold {
+    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
+        // A material spin about the axis of each node of a part: what has no inertia is no mode.
+        let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
+        for part in parts {
+            let spin = |node: &Node| (node.p, at.rotation(node.p).t_inverse() * part.axis);
+            show(&part.nodes.iter().map(spin).collect::<Vec<_>>());
+        }
+    }
+
+    fn steady(&self, at: &mut State) {
+        // Parts that are held in statics may spin by their inertia.
+        let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
+        for part in parts {
+            for node in &part.nodes {
+                let (rotation, p) = (at.rotation(node.p), node.p as usize);
+                let about = rotation.t_inverse() * part.axis;
+                for rate in [&mut at.v[p], &mut at.a[p]] {
+                    *rate -= about * part.axis.dot(rotation.t * *rate);
+                }
+            }
+        }
+    }
+}

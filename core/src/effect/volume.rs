@@ -1,0 +1,219 @@
+//! Elements over which something per length is integrated: shared by the effects of rotary and eccentric inertia, weight and line loads.
+
+use super::{AT_ONCE, ByOrder, Connection, for_each_batch, motions, shared, side_by_side};
+use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
+use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
+use crate::scalar::{Instructions, LANES, Lanes, Pack, each_lane};
+use crate::system::{Assembler, Connectivity, State};
+use crate::tensor::Vec3;
+use crate::threads;
+use std::sync::Arc;
+
+/// An element of N nodes and as many points.
+#[derive(Clone, Debug)]
+pub struct VolumeElement<const N: usize, Q> {
+    /// Its place in the scene
+    pub connection: Connection<N>,
+    /// The initial place of its first node
+    place: Vec3,
+    /// All else, for it and neighbours that have the same
+    common: Arc<Common<N, Q>>,
+}
+
+/// The data that neighbours share.
+#[derive(Debug, PartialEq)]
+struct Common<const N: usize, Q> {
+    /// The initial places of the nodes as seen from the first
+    arms: [Vec3; N],
+    points: [VolumePoint<N, Q>; N],
+}
+
+impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
+    /// From its first node at `place` on; it shares with a neighbour what both have in common.
+    pub fn new(
+        connection: Connection<N>,
+        place: Vec3,
+        arms: [Vec3; N],
+        points: [VolumePoint<N, Q>; N],
+        neighbour: Option<&Self>,
+    ) -> Self
+    where
+        Q: PartialEq,
+    {
+        let common = shared(Common { arms, points }, neighbour.map(|neighbour| &neighbour.common));
+        Self { connection, place, common }
+    }
+
+    /// The initial place of its first node.
+    pub fn place(&self) -> Vec3 {
+        self.place
+    }
+
+    /// The initial places of its nodes as seen from the first.
+    pub fn arms(&self) -> &[Vec3; N] {
+        &self.common.arms
+    }
+
+    /// Its integration points.
+    #[inline(always)]
+    pub fn points(&self) -> &[VolumePoint<N, Q>; N] {
+        &self.common.points
+    }
+
+    /// Shows each point's quantity, its weight, its initial place and its motion.
+    fn each_point(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3, &NodeMotion)) {
+        let nodes = self.connection.motions_in_one_chart(at);
+        for point in self.points() {
+            let place = self.place + beam::interpolate(&point.shape, |i| self.arms()[i]);
+            show(&point.quantity, point.weight, place, &point.motion(&nodes));
+        }
+    }
+
+    /// All elements share their points.
+    #[inline(always)]
+    fn share(elements: [&Self; LANES]) -> bool {
+        elements[1..].iter().all(|element| Arc::ptr_eq(&element.common, &elements[0].common))
+    }
+
+    /// Point g of elements side by side, which may share it, as a kernel takes it.
+    #[inline(always)]
+    fn side_by_side<K>(
+        elements: [&Self; LANES],
+        share: bool,
+        g: usize,
+        kernel: &K,
+    ) -> VolumePoint<N, K::Present<Lanes>, Lanes>
+    where
+        K: VolumeKernel<Quantity = Q>,
+        K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
+    {
+        let point = |k: usize| elements[k].points()[g].map(|quantity| kernel.at_present(quantity));
+        match share {
+            true => VolumePoint::pack([&point(0); LANES]),
+            false => VolumePoint::pack(each_lane!(|k| point(k)).each_ref()),
+        }
+    }
+}
+
+/// Elements of all orders.
+pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, VolumeElement<4, Q>>;
+
+impl<Q: Copy> VolumeElements<Q> {
+    /// The slots that meet in each element; effects add no others than those that an assembler takes.
+    pub fn connectivity(&self, blocks: Blocks) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
+        for_each_batch!(self, |_first, batch| for element in batch {
+            let nodes = element.connection.nodes.iter();
+            match blocks {
+                Blocks::Rotations => connectivity.push(nodes.map(|node| node.p)),
+                Blocks::Both => connectivity.push(element.connection.slots()),
+            }
+        });
+        connectivity
+    }
+
+    /// Adds forces and tangents of a kernel.
+    pub fn add<K>(&self, kernel: &K, at: &State, weights: Weights, out: &mut Assembler)
+    where
+        K: VolumeKernel<Quantity = Q>,
+        K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
+    {
+        for_each_batch!(*self, out.instances(), |first, batch| {
+            let done = Instructions::here().run_side_by_side(
+                #[inline(always)]
+                || add_batch(kernel, batch, first, at, weights, out),
+            );
+            if done.is_none() {
+                let each = batch.iter().enumerate();
+                each.for_each(|(k, element)| add_alone(kernel, element, first + k, at, weights, out));
+            }
+        });
+    }
+
+    /// Sums over points: `add` is shown each one's quantity, its weight, its initial place and its motion, and `take` the sums of parts in
+    /// their order, which are the same for any number of threads.
+    pub fn sum<S: Default + Send>(
+        &self,
+        at: &State,
+        add: impl Fn(&mut S, &Q, f64, Vec3, &NodeMotion) + Send + Sync,
+        mut take: impl FnMut(S),
+    ) where
+        Q: Send + Sync,
+    {
+        for_each_batch!(self, |_first, batch| {
+            let sum_of = |part: &[VolumeElement<_, Q>]| {
+                let mut sum = S::default();
+                part.iter()
+                    .for_each(|element| element.each_point(at, |q, w, x, motion| add(&mut sum, q, w, x, motion)));
+                sum
+            };
+            threads::in_order(batch.chunks(AT_ONCE), sum_of, &mut take);
+        });
+    }
+
+    /// Shows the quantity of each point.
+    pub fn each_quantity(&self, mut show: impl FnMut(&Q)) {
+        for_each_batch!(self, |_first, batch| {
+            batch.iter().flat_map(|element| element.points()).for_each(|point| show(&point.quantity));
+        });
+    }
+
+    /// Some point has a quantity of this kind.
+    pub fn any(&self, is: impl Fn(&Q) -> bool) -> bool {
+        let mut found = false;
+        for_each_batch!(self, |_first, batch| {
+            found |= batch.iter().flat_map(|element| element.points()).any(|point| is(&point.quantity));
+        });
+        found
+    }
+}
+
+/// Adds the elements of one order, `first` instances after the first one of the effect.
+#[inline(always)]
+fn add_batch<K, const N: usize>(
+    kernel: &K,
+    batch: &[VolumeElement<N, K::Quantity>],
+    first: usize,
+    at: &State,
+    weights: Weights,
+    out: &mut Assembler,
+) where
+    K: VolumeKernel,
+    K::Present<f64>: Pack<Packed = K::Present<Lanes>>,
+{
+    let mut systems = out.lend(K::BLOCKS.count(N), weights != Weights::NONE);
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let nodes = motions(each_lane!(|k| &elements[k].connection), at);
+        let share = VolumeElement::share(elements);
+        systems.clear_for(weights);
+        for g in 0..N {
+            VolumeElement::side_by_side(elements, share, g, kernel).add(kernel, &nodes, weights, &mut systems);
+        }
+        let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
+        out.add_lanes(first + start, LANES.min(batch.len() - start), &systems, is_mixed, |k, out| {
+            add_alone(kernel, elements[k], first + start + k, at, weights, out);
+        });
+    }
+    out.take_back(systems);
+}
+
+/// Adds force and tangent of one element, whose nodes may sit in different charts.
+#[inline(never)]
+fn add_alone<K: VolumeKernel, const N: usize>(
+    kernel: &K,
+    element: &VolumeElement<N, K::Quantity>,
+    number: usize,
+    at: &State,
+    weights: Weights,
+    out: &mut Assembler,
+) {
+    let mut system = ElementSystem::new(K::BLOCKS.count(N));
+    let sum = |nodes: &[NodeMotion; N], weights: Weights, system: &mut ElementSystem| {
+        for point in element.points() {
+            point.map(|quantity| kernel.at_present(quantity)).add(kernel, nodes, weights, system);
+        }
+    };
+    element.connection.evaluate(at, weights, K::RATES, |j| K::BLOCKS.rotation(j), &mut system, &sum);
+    out.add(number, &system);
+}

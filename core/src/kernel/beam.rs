@@ -1,0 +1,222 @@
+//! Beam elements of N nodes: interpolation, and the sums over Gauss points.
+
+use super::elastic::{Point, PointTangent, Stiffness, Strain, Stress};
+use super::element::{ElementSystem, Placed};
+use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use crate::tensor::{Mat3, Vec3};
+
+/// An integration point for internal forces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StiffnessPoint<const N: usize, T = f64> {
+    /// Shape functions
+    pub shape: [T; N],
+    /// Their derivatives over initial arc length
+    pub slope: [T; N],
+    /// Gauss weight times ds/dxi
+    pub weight: T,
+    /// E1, the unit tangent of the initial centre line
+    pub tangent: Vec3<T>,
+    /// The section in global components
+    pub stiffness: Stiffness<T>,
+    /// The strain that makes no stress, where there is one (natural curvature, thermal strain), for an amplitude of one
+    pub free: Option<Strain<T>>,
+}
+
+/// sum_i N_i v_i
+#[inline(always)]
+pub fn interpolate<T: Real, const N: usize>(shape: &[T; N], value: impl Fn(usize) -> Vec3<T>) -> Vec3<T> {
+    let mut sum = value(0) * shape[0];
+    for i in 1..N {
+        sum += value(i) * shape[i];
+    }
+    sum
+}
+
+impl<const N: usize> StiffnessPoint<N> {
+    /// The same point for another scalar.
+    #[inline(always)]
+    pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T> {
+        let Self { weight, tangent, stiffness, .. } = self;
+        let (mut shape, mut slope) = ([T::zero(); N], [T::zero(); N]);
+        for i in 0..N {
+            (shape[i], slope[i]) = (T::constant(self.shape[i]), T::constant(self.slope[i]));
+        }
+        let free = match &self.free {
+            None => None,
+            Some(own) => Some(Strain { gamma: Vec3::constant(own.gamma), kappa: Vec3::constant(own.kappa) }),
+        };
+        let cc = stiffness.cc.map(Mat3::constant);
+        let stiffness = Stiffness { cn: Mat3::constant(stiffness.cn), cm: Mat3::constant(stiffness.cm), cc };
+        StiffnessPoint {
+            shape,
+            slope,
+            weight: T::constant(*weight),
+            tangent: Vec3::constant(*tangent),
+            stiffness,
+            free,
+        }
+    }
+}
+
+impl<const N: usize> Pack for StiffnessPoint<N> {
+    type Packed = StiffnessPoint<N, Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        StiffnessPoint {
+            shape: pack!(of.shape),
+            slope: pack!(of.slope),
+            weight: pack!(of.weight),
+            tangent: pack!(of.tangent),
+            stiffness: pack!(of.stiffness),
+            free: pack!(of.free),
+        }
+    }
+}
+
+impl<const N: usize, T: Real> StiffnessPoint<N, T> {
+    /// Takes the point to an element that is so many times as long.
+    #[inline(always)]
+    pub fn lengthen(&mut self, times: T) {
+        let inverse = T::one() / times;
+        for i in 0..N {
+            self.slope[i] = self.slope[i] * inverse;
+        }
+        self.weight = self.weight * times;
+    }
+
+    /// The configuration at this point; x' = E1 + sum N_i' u_i.
+    #[inline(always)]
+    pub fn configuration(&self, nodes: &[impl Placed<T>; N]) -> Point<T> {
+        let p = interpolate(&self.shape, |i| nodes[i].place().p);
+        let p_slope = interpolate(&self.slope, |i| nodes[i].place().p);
+        let x_slope = self.tangent + interpolate(&self.slope, |i| nodes[i].place().u);
+        Point::new(p, p_slope, x_slope)
+    }
+
+    /// Strain and stress at this point; `free` is the amplitude of the free strain.
+    #[inline(always)]
+    pub fn strain_and_stress(&self, nodes: &[impl Placed<T>; N], free: T) -> (Strain<T>, Stress<T>) {
+        let strain = self.configuration(nodes).strain(self.tangent);
+        (strain, self.stress(&strain, free))
+    }
+
+    /// The stress of a strain, less its free part.
+    #[inline(always)]
+    pub fn stress(&self, strain: &Strain<T>, free: T) -> Stress<T> {
+        self.stiffness.stress(&self.elastic_part(strain, free))
+    }
+
+    /// The strain less its free part.
+    #[inline(always)]
+    pub fn elastic_part(&self, strain: &Strain<T>, free: T) -> Strain<T> {
+        match &self.free {
+            None => *strain,
+            Some(own) => Strain { gamma: strain.gamma - own.gamma * free, kappa: strain.kappa - own.kappa * free },
+        }
+    }
+
+    /// How the strain varies with the nodes.
+    #[inline(always)]
+    pub fn strain_variation(
+        &self,
+        at: &Point<T>,
+        du: impl Fn(usize) -> Vec3<T>,
+        dp: impl Fn(usize) -> Vec3<T>,
+    ) -> Strain<T> {
+        let slopes = (interpolate(&self.slope, du), interpolate(&self.slope, &dp));
+        at.strain_variation(slopes.0, slopes.1, interpolate(&self.shape, &dp))
+    }
+
+    /// The stress that a correction of the nodes is expected to lead to: C (strain + B dq).
+    #[inline(always)]
+    pub fn extrapolated_stress(
+        &self,
+        nodes: &[impl Placed<T>; N],
+        free: T,
+        du: impl Fn(usize) -> Vec3<T>,
+        dp: impl Fn(usize) -> Vec3<T>,
+    ) -> Stress<T> {
+        let at = self.configuration(nodes);
+        let strain = at.strain(self.tangent);
+        let change = self.strain_variation(&at, du, dp);
+        let next = Strain { gamma: strain.gamma + change.gamma, kappa: strain.kappa + change.kappa };
+        self.stress(&next, free)
+    }
+
+    /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the
+    /// stress of the geometric part, if it is not the present one.
+    #[inline(always)]
+    pub fn add_elastic(
+        &self,
+        nodes: &[impl Placed<T>; N],
+        free: T,
+        geometric: Option<&Stress<T>>,
+        weight: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        let at = self.configuration(nodes);
+        let stress = self.stress(&at.strain(self.tangent), free);
+        self.add_force(&at, &stress, out);
+        if weight != 0.0 {
+            self.add_tangent(&at, &self.stiffness, geometric.unwrap_or(&stress), weight, out);
+        }
+    }
+
+    /// Adds the force of a stress.
+    #[inline(always)]
+    pub fn add_force(&self, at: &Point<T>, stress: &Stress<T>, out: &mut ElementSystem<T>) {
+        let (force, w) = (at.force(stress), self.weight);
+        for i in 0..N {
+            let (n, s) = (self.shape[i] * w, self.slope[i] * w);
+            out.add_force(2 * i, force.x_slope * s);
+            out.add_force(2 * i + 1, force.p * n + force.p_slope * s);
+        }
+    }
+
+    /// Adds `weight` times the tangent of a stiffness and of the geometric part of a stress.
+    #[inline(always)]
+    pub fn add_tangent(
+        &self,
+        at: &Point<T>,
+        stiffness: &Stiffness<T>,
+        stress: &Stress<T>,
+        weight: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        self.add_stiffness(&at.tangent(stiffness, stress), self.weight * weight, out);
+    }
+
+    /// Adds w times the blocks of every pair of nodes, using the symmetry of the stiffness.
+    #[inline(always)]
+    fn add_stiffness(&self, k: &PointTangent<T>, w: T, out: &mut ElementSystem<T>) {
+        let (n, s) = (&self.shape, &self.slope);
+        for i in 0..N {
+            for j in 0..N {
+                let mut up = k.xp * (w * s[i] * n[j]);
+                if let Some(xs) = k.xs {
+                    up += xs * (w * s[i] * s[j]);
+                }
+                out.add_symmetric(2 * i, 2 * j + 1, &up);
+                if j < i {
+                    continue;
+                }
+                let uu = k.xx * (w * s[i] * s[j]);
+                let pp = k.ss * (w * s[i] * s[j])
+                    + k.sp * (w * s[i] * n[j])
+                    + k.sp.transpose() * (w * n[i] * s[j])
+                    + k.pp * (w * n[i] * n[j]);
+                match j > i {
+                    true => {
+                        out.add_symmetric(2 * i, 2 * j, &uu);
+                        out.add_symmetric(2 * i + 1, 2 * j + 1, &pp);
+                    }
+                    false => {
+                        out.add_tangent(2 * i, 2 * j, uu);
+                        out.add_tangent(2 * i + 1, 2 * j + 1, pp);
+                    }
+                }
+            }
+        }
+    }
+}

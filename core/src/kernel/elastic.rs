@@ -1,0 +1,181 @@
+//! Strains, stress resultants, internal force and stiffness at a point of the beam (section 3, equations (45)–(80)).
+//!
+//! All tensors are material, with global components: P is measured from the initial placement, so that
+//! K = T P' already is the change of curvature of an initially curved or twisted beam.
+
+use crate::rotation::Rotation;
+use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use crate::tensor::{Mat3, Vec3};
+
+/// The stiffness of a section in global components: N = Cn Gamma + Cc K, M = Cc^T Gamma + Cm K.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stiffness<T = f64> {
+    /// Cn = R0 diag(EA, GA2, GA3) R0^T, force
+    pub cn: Mat3<T>,
+    /// Cm = R0 diag(GJ, EI2, EI3) R0^T, force times length squared
+    pub cm: Mat3<T>,
+    /// Cc, the coupling of strain and curvature, where there is one; force times length
+    pub cc: Option<Mat3<T>>,
+}
+
+/// Gamma (translational strain, 1) and K (change of curvature, 1/length), both material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strain<T = f64> {
+    /// Gamma = R^T x' - E1
+    pub gamma: Vec3<T>,
+    /// K = T P'
+    pub kappa: Vec3<T>,
+}
+
+/// The stress resultants N (force) and M (moment), both material.
+#[derive(Clone, Copy, Debug)]
+pub struct Stress<T = f64> {
+    /// N
+    pub n: Vec3<T>,
+    /// M
+    pub m: Vec3<T>,
+}
+
+impl Pack for Stiffness {
+    type Packed = Stiffness<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        let (cn, cm) = (pack!(of.cn), pack!(of.cm));
+        Stiffness { cn, cm, cc: pack!(of.cc) }
+    }
+}
+
+impl Pack for Strain {
+    type Packed = Strain<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        Strain { gamma: pack!(of.gamma), kappa: pack!(of.kappa) }
+    }
+}
+
+impl Default for Strain {
+    fn default() -> Self {
+        Self { gamma: Vec3::ZERO, kappa: Vec3::ZERO }
+    }
+}
+
+impl<T: Real> Stiffness<T> {
+    /// The stress resultants of a strain.
+    #[inline(always)]
+    pub fn stress(&self, strain: &Strain<T>) -> Stress<T> {
+        let mut stress = Stress { n: self.cn * strain.gamma, m: self.cm * strain.kappa };
+        if let Some(cc) = self.cc {
+            stress.n += cc * strain.kappa;
+            stress.m += cc.transpose_mul(strain.gamma);
+        }
+        stress
+    }
+}
+
+/// The configuration at a point: the rotation, x' (spatial) and P', both derivatives over initial arc length.
+#[derive(Clone, Copy, Debug)]
+pub struct Point<T = f64> {
+    /// R, T and the derivative tensors of the interpolated rotation vector
+    pub rotation: Rotation<T>,
+    /// y = R^T x'
+    pub y: Vec3<T>,
+    /// P'
+    pub p_slope: Vec3<T>,
+    /// C1(P')
+    c1: Mat3<T>,
+}
+
+/// The generalised force at a point: conjugate to u', P' and P.
+#[derive(Clone, Copy, Debug)]
+pub struct PointForce<T = f64> {
+    /// f_x' = R N
+    pub x_slope: Vec3<T>,
+    /// f_P' = T^T M
+    pub p_slope: Vec3<T>,
+    /// f_P = T^T (N x y) + C1^T M
+    pub p: Vec3<T>,
+}
+
+/// The stiffness at a point: second derivatives over (x', P', P).
+#[derive(Clone, Copy, Debug)]
+pub struct PointTangent<T = f64> {
+    /// K_xx = R Cn R^T
+    pub xx: Mat3<T>,
+    /// K_xP = R (Cn A - N~ T) [+ R Cc C1], A = y~ T
+    pub xp: Mat3<T>,
+    /// K_xP' = R Cc T, where the section couples
+    pub xs: Option<Mat3<T>>,
+    /// K_P'P' = T^T Cm T
+    pub ss: Mat3<T>,
+    /// K_P'P = T^T Cm C1 + C2(M) [+ T^T Cc^T A]
+    pub sp: Mat3<T>,
+    /// K_PP = A^T Cn A + C1^T Cm C1 + C3(M, P') + C2(N x y) + T^T N~ y~ T [+ A^T Cc C1 + C1^T Cc^T A]
+    pub pp: Mat3<T>,
+}
+
+impl<T: Real> Point<T> {
+    /// The point with rotation vector `p`, slope `p_slope` = P' and `x_slope` = x'.
+    #[inline(always)]
+    pub fn new(p: Vec3<T>, p_slope: Vec3<T>, x_slope: Vec3<T>) -> Self {
+        let rotation = Rotation::new(p);
+        Self { y: rotation.r.transpose_mul(x_slope), c1: rotation.c1(p_slope), rotation, p_slope }
+    }
+
+    /// The strains; `e1` is the unit tangent of the initial centre line.
+    #[inline(always)]
+    pub fn strain(&self, e1: Vec3<T>) -> Strain<T> {
+        Strain { gamma: self.y - e1, kappa: self.rotation.t * self.p_slope }
+    }
+
+    /// Their variation: dGamma = R^T du' + y~ T dP, dK = T dP' + C1 dP.
+    #[inline(always)]
+    pub fn strain_variation(&self, du_slope: Vec3<T>, dp_slope: Vec3<T>, dp: Vec3<T>) -> Strain<T> {
+        let Rotation { r, t, .. } = self.rotation;
+        Strain { gamma: r.transpose_mul(du_slope) + self.y.cross(t * dp), kappa: t * dp_slope + self.c1 * dp }
+    }
+
+    /// The internal force, (77).
+    #[inline(always)]
+    pub fn force(&self, stress: &Stress<T>) -> PointForce<T> {
+        let Rotation { r, t, .. } = self.rotation;
+        PointForce {
+            x_slope: r * stress.n,
+            p_slope: t.transpose_mul(stress.m),
+            p: t.transpose_mul(stress.n.cross(self.y)) + self.c1.transpose_mul(stress.m),
+        }
+    }
+
+    /// The stiffness, (78)–(80). `stress` is what the geometric part is formed with: the stress of this configuration
+    /// for the exact tangent, the extrapolated one for the mixed-integration-point tangent.
+    #[inline(always)]
+    pub fn tangent(&self, stiffness: &Stiffness<T>, stress: &Stress<T>) -> PointTangent<T> {
+        let (rotation, c1) = (&self.rotation, self.c1);
+        let (r, t) = (rotation.r, rotation.t);
+        let (cn, cm) = (stiffness.cn, stiffness.cm);
+        let a = Mat3::skew_mul(self.y, t);
+        let (cn_a, cm_c1) = (cn * a, cm * c1);
+        let n_y_t = Mat3::skew_mul(stress.n, a);
+        let mut tangent = PointTangent {
+            xx: r * cn * r.transpose(),
+            xp: r * (cn_a - Mat3::skew_mul(stress.n, t)),
+            xs: None,
+            ss: t.transpose_matmul(cm * t),
+            sp: t.transpose_matmul(cm_c1) + rotation.c2(stress.m),
+            pp: a.transpose_matmul(cn_a)
+                + c1.transpose_matmul(cm_c1)
+                + rotation.c3(stress.m, self.p_slope)
+                + rotation.c2(stress.n.cross(self.y))
+                + t.transpose_matmul(n_y_t),
+        };
+        if let Some(cc) = stiffness.cc {
+            let mixed = a.transpose_matmul(cc * c1);
+            tangent.xs = Some(r * cc * t);
+            tangent.xp += r * (cc * c1);
+            tangent.sp += t.transpose_matmul(cc.transpose_matmul(a));
+            tangent.pp += mixed + mixed.transpose();
+        }
+        tangent
+    }
+}

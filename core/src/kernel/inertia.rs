@@ -1,0 +1,414 @@
+//! Inertia at a point: of a cross-section or of a rigid body (equations (51), (52), (68)–(71), and their form with an offset).
+
+use super::element::{NodeMotion, Weights};
+use super::volume::{Blocks, VolumeForce, VolumeKernel};
+use crate::rotation::Rotation;
+use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use crate::tensor::{Mat3, Vec3};
+
+/// Mass properties in global components of the initial placement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertia<T = f64> {
+    /// m: mass, or mass per length
+    pub mass: T,
+    /// d: the mass centre as seen from the node or the centre line
+    pub offset: Vec3<T>,
+    /// J0: the inertia about the node or the centre line (not about the mass centre)
+    pub about_node: Mat3<T>,
+}
+
+impl Pack for Inertia {
+    type Packed = Inertia<Lanes>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        Inertia { mass: pack!(of.mass), offset: pack!(of.offset), about_node: pack!(of.about_node) }
+    }
+}
+
+impl Inertia {
+    /// Of nothing.
+    pub const NONE: Self = Self { mass: 0.0, offset: Vec3::ZERO, about_node: Mat3::ZERO };
+
+    /// The same for another scalar.
+    pub fn lifted<T: Real>(&self) -> Inertia<T> {
+        let (offset, about_node) = (Vec3::constant(self.offset), Mat3::constant(self.about_node));
+        Inertia { mass: T::constant(self.mass), offset, about_node }
+    }
+
+    /// Together with another body at the same node.
+    pub fn with(&self, other: &Self) -> Self {
+        let mass = self.mass + other.mass;
+        let moment = self.offset * self.mass + other.offset * other.mass;
+        let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
+        Self { mass, offset, about_node: self.about_node + other.about_node }
+    }
+
+    /// The inertia about the mass centre (Steiner): J0 - m [(d.d) I - d(x)d]
+    pub fn about_centre(&self) -> Mat3 {
+        let d = self.offset;
+        self.about_node - (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * self.mass
+    }
+}
+
+/// The spin of a point: Omega = T Pd, Acc = T Pdd + Td Pd, both material.
+#[derive(Clone, Copy, Debug)]
+pub struct Spin<T = f64> {
+    /// R, T and the derivative tensors
+    pub rotation: Rotation<T>,
+    /// Omega, material angular velocity
+    pub omega: Vec3<T>,
+    /// Acc, material angular acceleration
+    pub acceleration: Vec3<T>,
+    rates: Rates<T>,
+}
+
+/// What a spin depends on.
+#[derive(Clone, Copy, Debug)]
+enum Rates<T> {
+    /// The rotation vector and its rates
+    OfVector(Vec3<T>, Vec3<T>),
+    /// One unknown alone
+    OfUnknown(Derivatives<T>),
+}
+
+/// The derivatives of a spin over the one unknown that it is a function of: the increment of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Derivatives<T = f64> {
+    /// dOmega
+    pub d_omega: Mat3<T>,
+    /// dAcc
+    pub d_acceleration: Mat3<T>,
+}
+
+impl<T: Real> Derivatives<T> {
+    /// Of a spin that depends on nothing.
+    pub fn none() -> Self {
+        Self { d_omega: Mat3::zero(), d_acceleration: Mat3::zero() }
+    }
+}
+
+impl<T: Real> Spin<T> {
+    /// The spin that belongs to a rotation vector and its rates.
+    #[inline(always)]
+    pub fn new(p: Vec3<T>, p_rate: Vec3<T>, p_rate2: Vec3<T>) -> Self {
+        let rotation = Rotation::new(p);
+        let omega = rotation.t * p_rate;
+        let acceleration = rotation.t * p_rate2 + rotation.t_rate(p_rate) * p_rate;
+        Self { rotation, omega, acceleration, rates: Rates::OfVector(p_rate, p_rate2) }
+    }
+
+    /// A spin that is a function of one unknown.
+    #[inline]
+    pub fn direct(rotation: Rotation<T>, omega: Vec3<T>, acceleration: Vec3<T>, over: Derivatives<T>) -> Self {
+        Self { rotation, omega, acceleration, rates: Rates::OfUnknown(over) }
+    }
+
+    /// The same spin, or one whose forces are those of its acceleration alone.
+    #[inline(always)]
+    pub fn with_gyroscopic_forces(mut self, they_count: bool) -> Self {
+        if !they_count {
+            // All of them are products of the spin with itself.
+            self.omega = Vec3::zero();
+        }
+        self
+    }
+
+    /// The derivatives over the one unknown, where there is but one.
+    pub fn over_unknown(&self) -> Option<&Derivatives<T>> {
+        match &self.rates {
+            Rates::OfVector(..) => None,
+            Rates::OfUnknown(over) => Some(over),
+        }
+    }
+
+    /// s dOmega/dP + d dOmega/drate: of the weighted derivatives of Omega with respect to the rotation unknowns.
+    pub fn omega_derivative(&self, weights: Weights) -> Mat3<T> {
+        self.derivatives(weights).1
+    }
+
+    /// The weighted derivatives of Acc and of Omega with respect to the rotation unknowns:
+    ///
+    /// ```text
+    /// dAcc   = s (C5 + C1(Pdd)) + d C4 + m T          dOmega = s C1(Pd) + d T
+    /// ```
+    ///
+    /// Of a function of one unknown, in which the weights are already: dAcc and dOmega themselves.
+    #[inline(always)]
+    fn derivatives(&self, w: Weights) -> (Mat3<T>, Mat3<T>) {
+        let rotation = &self.rotation;
+        let (p_rate, p_rate2) = match self.rates {
+            Rates::OfVector(p_rate, p_rate2) => (p_rate, p_rate2),
+            Rates::OfUnknown(over) => {
+                debug_assert!(
+                    w.stiffness == 1.0 || w == Weights::NONE,
+                    "the weights of a step stand in the derivatives"
+                );
+                return (over.d_acceleration, over.d_omega);
+            }
+        };
+        let mut acceleration = rotation.t.scale(w.mass);
+        let mut omega = Mat3::zero();
+        if w.damping != 0.0 {
+            acceleration += rotation.c4(p_rate).scale(w.damping);
+            omega += rotation.t.scale(w.damping);
+        }
+        if w.stiffness != 0.0 {
+            acceleration += (rotation.c5(p_rate) + rotation.c1(p_rate2)).scale(w.stiffness);
+            omega += rotation.c1(p_rate).scale(w.stiffness);
+        }
+        (acceleration, omega)
+    }
+}
+
+/// Force and tangent of rotary inertia without an offset, conjugate to P:
+///
+/// ```text
+/// h = J Acc + Omega x J Omega,  f = T^T h
+/// J_PP = T^T [J dAcc + G dOmega] + s C2(h),  G = Omega~ J - (J Omega)~
+/// ```
+#[inline(always)]
+pub fn rotary<T: Real>(j: Mat3<T>, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, Mat3<T>) {
+    let (rotation, omega) = (&spin.rotation, spin.omega);
+    let momentum = j * omega;
+    let h = j * spin.acceleration + omega.cross(momentum);
+    let force = rotation.t.transpose_mul(h);
+    if weights == Weights::NONE {
+        return (force, Mat3::zero());
+    }
+    let (d_acceleration, d_omega) = spin.derivatives(weights);
+    let gyroscopic = Mat3::skew_mul(omega, j) - momentum.skew();
+    let mut tangent = rotation.t.transpose_matmul(j * d_acceleration + gyroscopic * d_omega);
+    if weights.stiffness != 0.0 {
+        tangent += rotation.c2(h).scale(weights.stiffness);
+    }
+    (force, tangent)
+}
+
+/// With s = Acc x d + Omega x (Omega x d) and h = J0 Acc + Omega x J0 Omega + m d x R^T u'':
+///
+/// ```text
+/// f_u = m (u'' + R s),  f_P = T^T h
+/// ```
+#[inline(always)]
+pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, weights: Weights) -> VolumeForce<T> {
+    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
+    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
+    let momentum = j0 * omega;
+    let pull = r.transpose_mul(u_rate2);
+    let omega_d = omega.cross(d);
+    let s = spin.acceleration.cross(d) + omega.cross(omega_d);
+    let h = j0 * spin.acceleration + omega.cross(momentum) + d.cross(pull) * m;
+    let mut out = VolumeForce::zero();
+    out.u = (u_rate2 + r * s) * m;
+    out.p = t.transpose_mul(h);
+    if weights == Weights::NONE {
+        return out;
+    }
+    let (d_acceleration, d_omega) = spin.derivatives(weights);
+    let gyroscopic = Mat3::skew_mul(omega, j0) - momentum.skew();
+    let coriolis = omega_d.skew() + Mat3::skew_mul(omega, d.skew());
+    let mut up = -(Mat3::skew_mul(d, d_acceleration) + coriolis * d_omega);
+    let mut pp = j0 * d_acceleration + gyroscopic * d_omega;
+    if weights.stiffness != 0.0 {
+        up -= Mat3::skew_mul(s, t).scale(weights.stiffness);
+        pp += Mat3::skew_mul(d, Mat3::skew_mul(pull, t)) * (m * weights.stiffness);
+    }
+    out.uu = Mat3::identity() * (m * weights.mass);
+    out.up = (r * up) * m;
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())) * (m * weights.mass);
+    out.pp = t.transpose_matmul(pp);
+    if weights.stiffness != 0.0 {
+        out.pp += spin.rotation.c2(h).scale(weights.stiffness);
+    }
+    out
+}
+
+/// [`body`] for mass centres at the node.
+#[inline(always)]
+pub fn centred_body<T: Real>(
+    inertia: &Inertia<T>,
+    u_rate2: Vec3<T>,
+    spin: &Spin<T>,
+    weights: Weights,
+) -> VolumeForce<T> {
+    let mut out = VolumeForce::zero();
+    out.u = u_rate2 * inertia.mass;
+    out.uu = Mat3::identity() * (inertia.mass * weights.mass);
+    (out.p, out.pp) = rotary(inertia.about_node, spin, weights);
+    out
+}
+
+/// Forces proportional to velocities, as mass-proportional damping has them: with v = u' and h = J0 Omega + m d x R^T v
+///
+/// ```text
+/// f_u = alpha m (v + R (Omega x d)),  f_P = alpha T^T h
+/// ```
+#[inline(always)]
+pub fn drag<T: Real>(
+    inertia: &Inertia<T>,
+    velocity: Vec3<T>,
+    spin: &Spin<T>,
+    alpha: f64,
+    weights: Weights,
+) -> VolumeForce<T> {
+    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
+    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
+    let (carried, pull) = (omega.cross(d), r.transpose_mul(velocity));
+    let h = (j0 * omega + d.cross(pull) * m).scale(alpha);
+    let mut out = VolumeForce::zero();
+    out.u = (velocity + r * carried) * (m * alpha);
+    out.p = t.transpose_mul(h);
+    if weights.stiffness == 0.0 && weights.damping == 0.0 {
+        return out;
+    }
+    let (s, d_omega) = (weights.stiffness, spin.omega_derivative(weights));
+    let turned = Mat3::skew_mul(carried, t).scale(s);
+    out.uu = Mat3::identity() * (m * (alpha * weights.damping));
+    out.up = -(r * (Mat3::skew_mul(d, d_omega) + turned)) * (m * alpha);
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose())) * (m * (alpha * weights.damping));
+    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)) * (m * s);
+    out.pp = t.transpose_matmul((j0 * d_omega + pulled).scale(alpha)) + spin.rotation.c2(h).scale(s);
+    out
+}
+
+/// Mass-proportional damping per length, see [`drag`].
+pub struct Drag {
+    /// alpha
+    pub factor: f64,
+}
+
+impl VolumeKernel for Drag {
+    type Quantity = Inertia;
+    type Present<T: Real> = Inertia<T>;
+    const BLOCKS: Blocks = Blocks::Both;
+    const RATES: bool = true;
+
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, inertia: &Inertia<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2);
+        drag(inertia, motion.u_rate, &spin, self.factor, weights)
+    }
+}
+
+/// Inertia at rest in a frame that turns with the constant angular velocity w about x0, in components of that frame, and its
+/// derivatives for small motions. With W = R^T w and a = w x (w x (x - x0)) it is [`body`] for Omega = W, Acc = 0, u'' = a;
+///
+/// ```text
+/// dOmega = s W~ T + d T,   dAcc = d W~ T + m T,   da = s w~ w~ + 2 d w~ + m I
+/// ```
+#[inline(always)]
+pub fn steadily_turned<T: Real>(
+    inertia: &Inertia<T>,
+    (spin, from_axis): (Vec3<T>, Vec3<T>),
+    rotation: &Rotation<T>,
+    weights: Weights,
+) -> VolumeForce<T> {
+    let (r, t) = (rotation.r, rotation.t);
+    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
+    let (w, w_skew) = (r.transpose_mul(spin), spin.skew());
+    let a = spin.cross(spin.cross(from_axis));
+    let (pull, w_d, momentum) = (r.transpose_mul(a), w.cross(d), j0 * w);
+    let s = w.cross(w_d);
+    let h = w.cross(momentum) + d.cross(pull) * m;
+    let mut out = VolumeForce::zero();
+    out.u = (a + r * s) * m;
+    out.p = t.transpose_mul(h);
+    if weights == Weights::NONE {
+        return out;
+    }
+    let Weights { stiffness, damping, mass } = weights;
+    let w_t = Mat3::skew_mul(w, t);
+    let (d_omega, d_acc) = (w_t.scale(stiffness) + t.scale(damping), w_t.scale(damping) + t.scale(mass));
+    let da = (w_skew * w_skew).scale(stiffness) + w_skew.scale(2.0 * damping) + Mat3::identity().scale(mass);
+    let gyroscopic = Mat3::skew_mul(w, j0) - momentum.skew();
+    let coriolis = w_d.skew() + Mat3::skew_mul(w, d.skew());
+    let ds = -(Mat3::skew_mul(d, d_acc) + coriolis * d_omega + Mat3::skew_mul(s, t).scale(stiffness));
+    let pulled = Mat3::skew_mul(d, Mat3::skew_mul(pull, t)) * (m * stiffness);
+    out.uu = da * m;
+    out.up = (r * ds) * m;
+    out.pu = t.transpose_matmul(Mat3::skew_mul(d, r.transpose() * da)) * m;
+    out.pp = t.transpose_matmul(j0 * d_acc + gyroscopic * d_omega + pulled) + rotation.c2(h).scale(stiffness);
+    out
+}
+
+/// Mass per length with its initial place, see [`steadily_turned`].
+pub struct SteadilyTurned {
+    /// w
+    pub spin: Vec3,
+    /// x0
+    pub about: Vec3,
+}
+
+impl VolumeKernel for SteadilyTurned {
+    type Quantity = (Inertia, Vec3);
+    type Present<T: Real> = (Inertia<T>, Vec3<T>);
+    const BLOCKS: Blocks = Blocks::Both;
+    const RATES: bool = false;
+
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
+    #[inline(always)]
+    fn evaluate<T: Real>(
+        &self,
+        (inertia, place): &(Inertia<T>, Vec3<T>),
+        motion: &NodeMotion<T>,
+        weights: Weights,
+    ) -> VolumeForce<T> {
+        let from_axis = *place - Vec3::constant(self.about) + motion.u;
+        steadily_turned(inertia, (Vec3::constant(self.spin), from_axis), &Rotation::new(motion.p), weights)
+    }
+}
+
+/// Rotary inertia per length, see [`rotary`].
+pub struct Rotary {
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
+}
+
+impl VolumeKernel for Rotary {
+    type Quantity = Mat3;
+    type Present<T: Real> = Mat3<T>;
+    const BLOCKS: Blocks = Blocks::Rotations;
+    const RATES: bool = true;
+
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, j: &Mat3<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2).with_gyroscopic_forces(self.gyroscopic);
+        let (p, pp) = rotary(*j, &spin, weights);
+        VolumeForce { p, pp, ..VolumeForce::zero() }
+    }
+}
+
+/// Eccentric mass per length, see [`body`].
+pub struct Eccentric {
+    /// Whether forces that spins have without accelerations count
+    pub gyroscopic: bool,
+}
+
+impl VolumeKernel for Eccentric {
+    type Quantity = Inertia;
+    type Present<T: Real> = Inertia<T>;
+    const BLOCKS: Blocks = Blocks::Both;
+    const RATES: bool = true;
+
+    fn at_present(&self, quantity: &Self::Quantity) -> Self::Quantity {
+        *quantity
+    }
+
+    #[inline(always)]
+    fn evaluate<T: Real>(&self, inertia: &Inertia<T>, motion: &NodeMotion<T>, weights: Weights) -> VolumeForce<T> {
+        let spin = Spin::new(motion.p, motion.p_rate, motion.p_rate2).with_gyroscopic_forces(self.gyroscopic);
+        body(inertia, motion.u_rate2, &spin, weights)
+    }
+}

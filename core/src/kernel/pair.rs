@@ -1,0 +1,225 @@
+//! Elements of two nodes seen from half way between them: what [`Relative`] comes to where there is one integration point, in the
+//! middle. The frame itself stands there, so that nothing is interpolated:
+//!
+//! ```text
+//! Gamma = s (R_r^T dx - dX),   K = s phi,   phi = log(R_1^T R_2) = 2h,   s = 1/length
+//! ```
+//!
+//! With t_i the material spins of the nodes, A = T(phi)^-1 and a = s R_r^T dx
+//!
+//! ```text
+//! dGamma = s R_r^T d(dx) + a~ (F_1 t_1 + F_2 t_2),   dK = s (A t_2 - A^T t_1) = s (B_1 t_1 + B_2 t_2)
+//! f_x = w s R_r N,   f_t_i = w (F_i^T q + s B_i^T M),   q = N x a
+//! ```
+//!
+//! and the second variation, G = Cn a~ - N~ and S = G^T a~,
+//!
+//! ```text
+//! x,x:     w s^2 R_r Cn R_r^T
+//! x,t_j:   w s R_r (G F_j + s Cc B_j)
+//! t_i,t_j: w (F_i^T (S F_j - s a~ Cc B_j) + s B_i^T (Cc^T a~ F_j + s Cm B_j) + E_i B_j),   E_i dphi = d(F_i^T) q + s d(B_i^T) M
+//! ```
+//!
+//! T_i takes spins to rotation vectors, whose own second variation is C2. A third of the work of the general way.
+
+use super::beam::StiffnessPoint;
+use super::elastic::{Strain, Stress};
+use super::element::ElementSystem;
+use super::relative::Relative;
+use crate::rotation::{Rotation, Series};
+use crate::scalar::Real;
+use crate::tensor::{Mat3, Vec3};
+
+/// The vector phi from the one node to the other, and how it follows them.
+struct Between<T> {
+    phi: Vec3<T>,
+    /// A = T(phi)^-1
+    inverse: Mat3<T>,
+    /// A = I + phi~/2 + e phi~^2
+    e: T,
+    /// de/dz over z = phi.phi
+    e_slope: T,
+}
+
+impl<T: Real> Between<T> {
+    #[inline(always)]
+    fn new(h: Vec3<T>) -> Self {
+        let phi = h.scale(2.0);
+        let [_, f1, f2, f3, f4, f5, ..] = Series::at(h.squared()).0;
+        // 2 df_m/dz = m f_{m+2} - f_{m+1}
+        let (d1, d2, d3) = ((f3 - f2) * 0.5, (f4 * 2.0 - f3) * 0.5, (f5 * 3.0 - f4) * 0.5);
+        let e = (f2 - f3) / (f1 * 4.0);
+        let e_slope = ((d2 - d3) * f1 - (f2 - f3) * d1) / (f1 * f1 * 16.0);
+        let even = Mat3::diagonal([T::one() - e * phi.squared(); 3]) + phi.outer(phi) * e;
+        Self { phi, inverse: even + h.skew(), e, e_slope }
+    }
+
+    /// The part of the derivatives of A m and of A^T m over phi that both share: that of e phi~^2 m.
+    #[inline(always)]
+    fn bend(&self, m: Vec3<T>) -> Mat3<T> {
+        let phi = self.phi;
+        let along = phi.dot(m);
+        let twice = phi * along - m * phi.squared();
+        (phi.outer(m) + Mat3::diagonal([along; 3]) - m.outer(phi).scale(2.0)) * self.e
+            + twice.outer(phi) * (self.e_slope * 2.0)
+    }
+}
+
+/// Forces conjugate to the difference of displacements and to the spins of the nodes, over the weight.
+struct PairForces<T> {
+    /// R_r N
+    across: Vec3<T>,
+    /// q
+    frame: Vec3<T>,
+    spin: [Vec3<T>; 2],
+}
+
+impl<const N: usize, T: Real> Relative<N, T> {
+    /// s R_r^T dx
+    #[inline(always)]
+    fn arm(&self, slope: T) -> Vec3<T> {
+        (self.arms[1] - self.arms[0]) * slope
+    }
+
+    /// Puts the force and, where `weight` is not zero, `weight` times the stiffness of the point half way between two nodes in the place
+    /// of what stands in `out`; results as those of [`StiffnessPoint::add_elastic`], carried back.
+    #[inline(always)]
+    pub fn fill_half_way(
+        &self,
+        rotations: &[Rotation<T>; N],
+        point: &StiffnessPoint<N, T>,
+        free: T,
+        geometric: Option<&Stress<T>>,
+        weight: f64,
+        out: &mut ElementSystem<T>,
+    ) {
+        debug_assert!(N == 2, "the frame of other elements does not stand at their points");
+        let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
+        let arm = self.arm(slope);
+        let stress = point.stress(&self.pair_strain(slope, &between), free);
+        let follows = [self.half.follows(false), self.half.follows(true)];
+        let forces = self.pair_forces(&stress, arm, slope, &follows, &between);
+        let across = forces.across * (point.weight * slope);
+        out.set_force(0, -across);
+        out.set_force(2, across);
+        for i in 0..2 {
+            out.set_force(2 * i + 1, rotations[i].t.transpose_mul(forces.spin[i]) * point.weight);
+        }
+        if weight != 0.0 {
+            let stress = geometric.unwrap_or(&stress);
+            let forces = self.pair_forces(stress, arm, slope, &follows, &between);
+            self.fill_pair_tangent(rotations, point, stress, &forces, &follows, &between, point.weight * weight, out);
+        }
+    }
+
+    /// The stress that variations of displacements and rotation vectors are expected to lead to; results as those of
+    /// [`StiffnessPoint::extrapolated_stress`].
+    #[inline(always)]
+    pub fn extrapolated_half_way(
+        &self,
+        rotations: &[Rotation<T>; N],
+        point: &StiffnessPoint<N, T>,
+        free: T,
+        du: &[Vec3<T>; N],
+        dp: &[Vec3<T>; N],
+    ) -> Stress<T> {
+        let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
+        let spins = [rotations[0].t * dp[0], rotations[1].t * dp[1]];
+        let frame = self.half.follows(false) * spins[0] + self.half.follows(true) * spins[1];
+        let mut strain = self.pair_strain(slope, &between);
+        strain.gamma += self.frame.transpose_mul(du[1] - du[0]) * slope + self.arm(slope).cross(frame);
+        strain.kappa += (between.inverse * spins[1] - between.inverse.transpose_mul(spins[0])) * slope;
+        point.stress(&strain, free)
+    }
+
+    #[inline(always)]
+    fn pair_strain(&self, slope: T, between: &Between<T>) -> Strain<T> {
+        Strain { gamma: (self.nodes[1].u - self.nodes[0].u) * slope, kappa: between.phi * slope }
+    }
+
+    #[inline(always)]
+    fn pair_forces(
+        &self,
+        stress: &Stress<T>,
+        arm: Vec3<T>,
+        slope: T,
+        follows: &[Mat3<T>; 2],
+        between: &Between<T>,
+    ) -> PairForces<T> {
+        let (frame, moment) = (stress.n.cross(arm), stress.m * slope);
+        PairForces {
+            across: self.frame * stress.n,
+            frame,
+            spin: [
+                follows[0].transpose_mul(frame) - between.inverse * moment,
+                follows[1].transpose_mul(frame) + between.inverse.transpose_mul(moment),
+            ],
+        }
+    }
+
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn fill_pair_tangent(
+        &self,
+        rotations: &[Rotation<T>; N],
+        point: &StiffnessPoint<N, T>,
+        stress: &Stress<T>,
+        forces: &PairForces<T>,
+        follows: &[Mat3<T>; 2],
+        between: &Between<T>,
+        w: T,
+        out: &mut ElementSystem<T>,
+    ) {
+        let (slope, stiffness) = (point.slope[1], &point.stiffness);
+        let arm = self.arm(slope);
+        let ends = [&rotations[0].t, &rotations[1].t];
+        // The weight goes first to what it belongs to: stiff sections of short elements would overflow without it.
+        let (cn, cm, bent) = (stiffness.cn * w, stiffness.cm * (w * slope * slope), w * slope);
+        // F_i T_i and B_i T_i
+        let frame = [follows[0] * *ends[0], follows[1] * *ends[1]];
+        let bend = [-between.inverse.transpose_matmul(*ends[0]), between.inverse * *ends[1]];
+        let g = ((stress.n * w).skew() - Mat3::skew_mul(arm, cn)).transpose();
+        let s = -Mat3::skew_mul(arm, g).transpose();
+
+        let xx = self.frame * (cn * (slope * slope)) * self.frame.transpose();
+        let mut over_frame = [s * frame[0], s * frame[1]];
+        let mut over_bend = [cm * bend[0], cm * bend[1]];
+        let mut over_x = [g * frame[0], g * frame[1]];
+        if let Some(cc) = stiffness.cc {
+            let cc = cc * bent;
+            let across = Mat3::skew_mul(arm, cc);
+            for j in 0..2 {
+                over_frame[j] -= across * bend[j];
+                over_bend[j] += cc.transpose_matmul(Mat3::skew_mul(arm, frame[j]));
+                over_x[j] += cc * bend[j];
+            }
+        }
+        let m = stress.m * bent;
+        let (turned, twist) = (self.half.turned(forces.frame * w), between.bend(m));
+        let spun = [
+            ends[0].transpose_matmul(turned[0].scale(0.5) + m.skew().scale(0.5) - twist),
+            ends[1].transpose_matmul(turned[1].scale(0.5) + m.skew().scale(0.5) + twist),
+        ];
+        let apart = -xx;
+        for j in 0..2 {
+            let xp = self.frame * over_x[j] * slope;
+            let xp = [-xp, xp];
+            for i in 0..2 {
+                out.set_symmetric(2 * i, 2 * j + 1, &xp[i]);
+                out.set_tangent(2 * i, 2 * j, if i == j { &xx } else { &apart });
+            }
+            for i in 0..=j {
+                let mut pp = frame[i].transpose_matmul(over_frame[j])
+                    + bend[i].transpose_matmul(over_bend[j])
+                    + spun[i] * bend[j];
+                if i == j {
+                    pp += rotations[i].c2(forces.spin[i] * w);
+                }
+                match i < j {
+                    true => out.set_symmetric(2 * i + 1, 2 * j + 1, &pp),
+                    false => out.set_tangent(2 * i + 1, 2 * j + 1, &pp),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,388 @@
+//! Beams that stay in a plane: two displacements and an angle a node, in the axes of the plane.
+//!
+//! With T = 1 for rotations about one axis the strains of section 3 become
+//!
+//! ```text
+//! y = R(theta)^T x',   Gamma = y - E1,   K = theta',   N = Cn Gamma + cc K,   M = cc.Gamma + cm K
+//! ```
+//!
+//! and rotation vectors and angles are interpolated alike, so that `total` and `relative` elements are the same.
+
+use super::beam::StiffnessPoint;
+use super::elastic::Stress;
+use super::element::Weights;
+use super::inertia::Inertia;
+use super::relative::carriers;
+use crate::rotation::Series;
+use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use crate::tensor::{Mat3, Vec3};
+use std::f64::consts::PI;
+
+/// An integration point for internal forces, see [`StiffnessPoint`].
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarPoint<const N: usize, T = f64> {
+    /// Shape functions
+    pub shape: [T; N],
+    /// Their derivatives over initial arc length
+    pub slope: [T; N],
+    /// Gauss weight times ds/dxi
+    pub weight: T,
+    /// E1
+    pub tangent: [T; 2],
+    /// Cn: its diagonal, and the entry beside it
+    pub cn: [T; 3],
+    /// Bending stiffness
+    pub cm: T,
+    /// The coupling of strain and curvature, where there is one
+    pub cc: Option<[T; 2]>,
+    /// The strain that makes no stress, where there is one: Gamma and K
+    pub free: Option<[T; 3]>,
+}
+
+/// Displacement and angle of a node, or their increments.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarNode<T = f64> {
+    /// In the axes of the plane
+    pub u: [T; 2],
+    /// About its normal
+    pub angle: T,
+}
+
+/// Normal and shear force, and bending moment.
+pub type PlanarStress<T> = [T; 3];
+
+/// Force and tangent of an element in a plane.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarSystem<const N: usize, T = f64> {
+    /// Two forces and a moment for each node
+    pub force: [[T; 3]; N],
+    /// The tile of each pair of nodes, by columns
+    pub tangent: [[[T; 9]; N]; N],
+}
+
+impl<const N: usize, T: Real> PlanarSystem<N, T> {
+    /// No force, and no tangent.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self { force: [[T::zero(); 3]; N], tangent: [[[T::zero(); 9]; N]; N] }
+    }
+
+    /// Sets the force to zero, and the tangent where it is going to be added to.
+    #[inline(always)]
+    pub fn clear_for(&mut self, stiffness: f64) {
+        for force in &mut self.force {
+            *force = [T::zero(); 3];
+        }
+        if stiffness != 0.0 {
+            for tile in self.tangent.as_flattened_mut() {
+                *tile = [T::zero(); 9];
+            }
+        }
+    }
+
+    /// Forces and moments of the nodes (global components); the plane's axes are the columns of `axes`.
+    #[inline(always)]
+    pub fn forces_in_space(&self, axes: &Mat3) -> [[Vec3<T>; 2]; N] {
+        let [a, b, e] = [0, 1, 2].map(|k| axes.column(k));
+        let mut out = [[Vec3::zero(); 2]; N];
+        for i in 0..N {
+            let [x, y, moment] = self.force[i];
+            for k in 0..3 {
+                out[i][0].0[k] = x * a.0[k] + y * b.0[k];
+                out[i][1].0[k] = moment * e.0[k];
+            }
+        }
+        out
+    }
+}
+
+impl<const N: usize> PlanarPoint<N> {
+    /// What of a point matters in the plane with these axes (columns, the third one normal).
+    pub fn new(point: &StiffnessPoint<N>, axes: &Mat3) -> Self {
+        let normal = axes.column(2);
+        let inside = |v: Vec3| axes.transpose_mul(v).0;
+        let [cn1, cn2] = [0, 1].map(|k| inside(point.stiffness.cn * axes.column(k)));
+        let in_plane = |v: Vec3| [inside(v)[0], inside(v)[1]];
+        Self {
+            shape: point.shape,
+            slope: point.slope,
+            weight: point.weight,
+            tangent: in_plane(point.tangent),
+            cn: [cn1[0], cn2[1], cn2[0]],
+            cm: normal.dot(point.stiffness.cm * normal),
+            cc: point.stiffness.cc.map(|cc| in_plane(cc * normal)),
+            free: point.free.map(|free| {
+                let [x, y] = in_plane(free.gamma);
+                [x, y, normal.dot(free.kappa)]
+            }),
+        }
+    }
+}
+
+impl<const N: usize> Pack for PlanarPoint<N> {
+    type Packed = PlanarPoint<N, Lanes>;
+
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        PlanarPoint {
+            shape: pack!(of.shape),
+            slope: pack!(of.slope),
+            weight: pack!(of.weight),
+            tangent: pack!(of.tangent),
+            cn: pack!(of.cn),
+            cm: pack!(of.cm),
+            cc: pack!(of.cc),
+            free: pack!(of.free),
+        }
+    }
+}
+
+/// Angles without the whole turns that the charts of nodes differ by: each within pi of the frame that turns with the element, so that
+/// its ends may turn further against each other, as they may in space.
+#[inline(always)]
+pub fn in_one_turn<const N: usize, T: Real>(nodes: &mut [PlanarNode<T>; N]) {
+    let (first, last) = carriers(N);
+    nodes[last].angle = within_half_a_turn(nodes[last].angle, nodes[first].angle);
+    let frame = (nodes[first].angle + nodes[last].angle) * 0.5;
+    for i in 0..N {
+        if i != first && i != last {
+            nodes[i].angle = within_half_a_turn(nodes[i].angle, frame);
+        }
+    }
+}
+
+/// The angle, a turn more or less where that brings it within pi of another.
+#[inline(always)]
+fn within_half_a_turn<T: Real>(angle: T, of: T) -> T {
+    let (ahead, turn) = (angle - of, T::constant(2.0 * PI));
+    angle - (ahead.above(PI, turn, T::zero()) - (-ahead).above(PI, turn, T::zero()))
+}
+
+/// Strain, and what turns it.
+struct Configuration<T> {
+    /// cos and sin of the angle
+    turn: [T; 2],
+    y: [T; 2],
+    strain: [T; 3],
+}
+
+impl<const N: usize, T: Real> PlanarPoint<N, T> {
+    #[inline(always)]
+    fn sum(&self, of: &[T; N], value: impl Fn(usize) -> T) -> T {
+        let mut sum = of[0] * value(0);
+        for i in 1..N {
+            sum += of[i] * value(i);
+        }
+        sum
+    }
+
+    #[inline(always)]
+    fn configuration(&self, nodes: &[PlanarNode<T>; N], free: T) -> Configuration<T> {
+        let angle = self.sum(&self.shape, |i| nodes[i].angle);
+        let [cos, over_angle, ..] = Series::at(angle * angle).0;
+        let sin = over_angle * angle;
+        let x = self.tangent[0] + self.sum(&self.slope, |i| nodes[i].u[0]);
+        let z = self.tangent[1] + self.sum(&self.slope, |i| nodes[i].u[1]);
+        let y = [cos * x + sin * z, cos * z - sin * x];
+        let mut strain = [y[0] - self.tangent[0], y[1] - self.tangent[1], self.sum(&self.slope, |i| nodes[i].angle)];
+        if let Some(own) = &self.free {
+            for k in 0..3 {
+                strain[k] -= own[k] * free;
+            }
+        }
+        Configuration { turn: [cos, sin], y, strain }
+    }
+
+    #[inline(always)]
+    fn stress(&self, strain: &[T; 3]) -> PlanarStress<T> {
+        let ([x, y, kappa], [c1, c2, c12]) = (*strain, self.cn);
+        let mut stress = [c1 * x + c12 * y, c12 * x + c2 * y, self.cm * kappa];
+        if let Some([a, b]) = self.cc {
+            stress[0] += a * kappa;
+            stress[1] += b * kappa;
+            stress[2] += a * x + b * y;
+        }
+        stress
+    }
+
+    /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the stress of the
+    /// geometric part, if it is not the present one; `free` the amplitude of the free strain.
+    #[inline(always)]
+    pub fn add(
+        &self,
+        nodes: &[PlanarNode<T>; N],
+        free: T,
+        geometric: Option<&PlanarStress<T>>,
+        weight: f64,
+        out: &mut PlanarSystem<N, T>,
+    ) {
+        let at = self.configuration(nodes, free);
+        let stress = self.stress(&at.strain);
+        let ([cos, sin], [y1, y2], [n1, n2, m]) = (at.turn, at.y, stress);
+        // f_x' = R N, f_theta = (N x y).e, f_theta' = M
+        let (fx, fy) = (cos * n1 - sin * n2, sin * n1 + cos * n2);
+        let f_angle = n1 * y2 - n2 * y1;
+        for i in 0..N {
+            let (n, s) = (self.shape[i] * self.weight, self.slope[i] * self.weight);
+            let force = &mut out.force[i];
+            force[0] += fx * s;
+            force[1] += fy * s;
+            force[2] += f_angle * n + m * s;
+        }
+        if weight != 0.0 {
+            self.add_stiffness(&at, geometric.unwrap_or(&stress), weight, out);
+        }
+    }
+
+    /// With A = y x e: K_xx = R Cn R^T, K_x theta = R (Cn A - N x e), K_theta theta = A.Cn A - N.y, K_theta' theta' = cm, and where
+    /// the section couples K_x theta' = R cc, K_theta' theta = cc.A.
+    #[inline(always)]
+    fn add_stiffness(
+        &self,
+        at: &Configuration<T>,
+        stress: &PlanarStress<T>,
+        weight: f64,
+        out: &mut PlanarSystem<N, T>,
+    ) {
+        let ([cos, sin], [y1, y2], [n1, n2, _], [c1, c2, c12]) = (at.turn, at.y, *stress, self.cn);
+        let turned = |v: [T; 2]| [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1]];
+        let first = turned([c1 * cos - c12 * sin, c12 * cos - c2 * sin]);
+        let second = turned([c1 * sin + c12 * cos, c12 * sin + c2 * cos]);
+        let cn_a = [c1 * y2 - c12 * y1, c12 * y2 - c2 * y1];
+        let x_angle = turned([cn_a[0] - n2, cn_a[1] + n1]);
+        let angle_angle = y2 * cn_a[0] - y1 * cn_a[1] - (n1 * y1 + n2 * y2);
+        let coupled = self.cc.map(|[a, b]| (turned([a, b]), a * y2 - b * y1));
+        let w = self.weight * weight;
+        for i in 0..N {
+            for j in 0..N {
+                let (n, s) = ([self.shape[i], self.shape[j]], [self.slope[i] * w, self.slope[j]]);
+                let (ss, sn, ns, nn) = (s[0] * s[1], s[0] * n[1], n[0] * w * s[1], n[0] * w * n[1]);
+                let tile = &mut out.tangent[i][j];
+                tile[0] += first[0] * ss;
+                tile[1] += first[1] * ss;
+                tile[2] += x_angle[0] * ns;
+                tile[3] += first[1] * ss;
+                tile[4] += second[1] * ss;
+                tile[5] += x_angle[1] * ns;
+                tile[6] += x_angle[0] * sn;
+                tile[7] += x_angle[1] * sn;
+                tile[8] += self.cm * ss + angle_angle * nn;
+                if let Some(([x, y], bent)) = coupled {
+                    tile[2] += x * ss;
+                    tile[5] += y * ss;
+                    tile[6] += x * ss;
+                    tile[7] += y * ss;
+                    tile[8] += bent * (sn + ns);
+                }
+            }
+        }
+    }
+
+    /// The stress that a correction `change` of the nodes is expected to lead to: C (strain + B dq).
+    #[inline(always)]
+    pub fn extrapolated_stress(
+        &self,
+        nodes: &[PlanarNode<T>; N],
+        free: T,
+        change: &[PlanarNode<T>; N],
+    ) -> PlanarStress<T> {
+        let Configuration { turn: [cos, sin], y, strain: [x, z, kappa] } = self.configuration(nodes, free);
+        let along = [0, 1].map(|k| self.sum(&self.slope, |i| change[i].u[k]));
+        let turned = self.sum(&self.shape, |i| change[i].angle);
+        self.stress(&[
+            x + cos * along[0] + sin * along[1] + y[1] * turned,
+            z + cos * along[1] - sin * along[0] - y[0] * turned,
+            kappa + self.sum(&self.slope, |i| change[i].angle),
+        ])
+    }
+}
+
+/// The mass properties of a body at its node, in the axes of the plane.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarBody<T = f64> {
+    /// Mass
+    pub mass: T,
+    /// The mass centre from the node, in the initial placement
+    pub offset: [T; 2],
+    /// Inertia about the node, against rotation in the plane
+    pub about_node: T,
+}
+
+impl PlanarBody {
+    /// What of mass properties matters in the plane with these axes (columns, the third one normal).
+    pub fn new(inertia: &Inertia, axes: &Mat3) -> Self {
+        let [x, y, _] = axes.transpose_mul(inertia.offset).0;
+        let normal = axes.column(2);
+        Self { mass: inertia.mass, offset: [x, y], about_node: normal.dot(inertia.about_node * normal) }
+    }
+}
+
+impl Pack for PlanarBody {
+    type Packed = PlanarBody<Lanes>;
+
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        PlanarBody { mass: pack!(of.mass), offset: pack!(of.offset), about_node: pack!(of.about_node) }
+    }
+}
+
+impl<T: Real> PlanarBody<T> {
+    /// Force and tangent. With the spin w and its rate w', d the offset turned into its present place, and e the normal
+    ///
+    /// ```text
+    /// f_u = m (u'' + w' e x d - w^2 d),   f_theta = J0 w' + m (d x u'').e
+    /// ```
+    ///
+    /// `acceleration` is u'', and `spins` are w and w'.
+    #[inline(always)]
+    pub fn evaluate(&self, acceleration: [T; 2], angle: T, spins: [T; 2], weights: Weights) -> PlanarSystem<1, T> {
+        let ([ax, ay], [w, rate], m) = (acceleration, spins, self.mass);
+        let [cos, over_angle, ..] = Series::at(angle * angle).0;
+        let sin = over_angle * angle;
+        let [x, y] = self.offset;
+        let (dx, dy) = (cos * x - sin * y, sin * x + cos * y);
+        let (mut out, square) = (PlanarSystem::zero(), w * w);
+        out.force[0] = [
+            m * (ax - rate * dy - square * dx),
+            m * (ay + rate * dx - square * dy),
+            self.about_node * rate + m * (dx * ay - dy * ax),
+        ];
+        if weights == Weights::NONE {
+            return out;
+        }
+        let Weights { stiffness, damping, mass } = weights;
+        // d turns by dtheta e x d.
+        let twice = w * (2.0 * damping);
+        let over_x = (square * dy - rate * dx) * stiffness - twice * dx - dy * mass;
+        let over_y = -(rate * dy + square * dx) * stiffness - twice * dy + dx * mass;
+        let tile = &mut out.tangent[0][0];
+        tile[0] = m * mass;
+        tile[4] = m * mass;
+        tile[2] = -(m * dy) * mass;
+        tile[5] = m * dx * mass;
+        tile[6] = m * over_x;
+        tile[7] = m * over_y;
+        tile[8] = self.about_node * mass - m * (dx * ax + dy * ay) * stiffness;
+        out
+    }
+}
+
+/// The stress in the plane with these axes.
+#[inline(always)]
+pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
+    let along = |v: &Vec3<T>, k: usize| {
+        let axis = axes.column(k);
+        v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2]
+    };
+    [along(&stress.n, 0), along(&stress.n, 1), along(&stress.m, 2)]
+}
+
+/// The same in space.
+#[inline(always)]
+pub fn in_space<T: Real>([x, y, m]: PlanarStress<T>, axes: &Mat3) -> Stress<T> {
+    let [a, b, e] = [0, 1, 2].map(|k| axes.column(k));
+    let mut out = Stress { n: Vec3::zero(), m: Vec3::zero() };
+    for k in 0..3 {
+        out.n.0[k] = x * a.0[k] + y * b.0[k];
+        out.m.0[k] = m * e.0[k];
+    }
+    out
+}

@@ -1,0 +1,38 @@
+//! Runs: stages in sequence, each a loop over levels or steps, and what watches them.
+
+mod distance;
+mod failure;
+mod findings;
+mod issued;
+mod refusal;
+mod results;
+
+mod energy;
+mod observer;
+mod plan;
+
+mod hint;
+mod rehearsal;
+
+mod handover;
+mod naming;
+mod spatial;
+mod stage_run;
+mod warnings;
+
+mod buckling;
+mod dynamics;
+mod modal;
+mod statics;
+
+mod sequence;
+
+pub use energy::Ledger;
+pub use failure::{Failure, Moment, Place};
+pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
+pub use observer::{Counters, Observer, Snapshot};
+pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
+pub use refusal::{refusal, refusal_help};
+pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
+pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
+pub use sequence::Run;

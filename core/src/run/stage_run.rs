@@ -1,0 +1,322 @@
+//! One stage of a run: its state, its unknowns, Newton's iteration, and what all kinds of stages
+//! do.
+
+use super::energy::Bookkeeper;
+use super::failure::{Failure, Moment};
+use super::issued::IssuedWarnings;
+use super::observer::{Counters, Observer, Snapshot};
+use super::plan::{Plan, Stage};
+use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
+use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
+use crate::system::{Plane, Slot, State, System};
+use crate::tensor::Vec3;
+use crate::threads;
+use crate::warning::WarningKind;
+use std::f64::consts::PI;
+
+/// A kind of stage at work.
+pub(super) trait Analysis<'r> {
+    /// The stage.
+    fn stage(&mut self) -> &mut StageRun<'r>;
+
+    /// Runs it to its end, or as far as it comes.
+    fn run(&mut self) -> Result<(), Failure>;
+
+    /// Warns of what shows only behind it, however it ended.
+    fn judge(&mut self);
+}
+
+/// Facts that stages leave to later ones, beside the state and the account of the energy.
+#[derive(Default)]
+pub(super) struct Past {
+    /// The first row is written.
+    pub started: bool,
+    /// A dynamic stage has begun.
+    pub moving: bool,
+    /// The state in which the first linear stage began
+    pub origin: Option<State>,
+}
+
+/// Tells an observer how far a run has come, while the stage is in use.
+pub(super) struct Teller<'t> {
+    pub observer: &'t mut dyn Observer,
+    pub at: Moment,
+    /// The stage, from 0
+    pub number: usize,
+    /// The number of stages
+    pub stages: usize,
+}
+
+impl Teller<'_> {
+    /// `done`: the part of the stage that lies behind, from 0 to 1.
+    pub fn tell(&mut self, done: f64) -> Result<(), Failure> {
+        self.observer.progress(self.at, (self.number as f64 + done) / self.stages as f64)
+    }
+}
+
+/// A stage in progress.
+pub(super) struct StageRun<'r> {
+    pub plan: &'r Plan,
+    /// From 0
+    pub number: usize,
+    pub model: &'r Model,
+    /// The rotations and elements that have charts in the stage: none where it is linear
+    pub charted: &'r Charted,
+    /// The courses of loads and motions
+    pub schedule: &'r mut Schedule,
+    pub state: &'r mut State,
+    /// The last converged state, to go back to
+    pub good: &'r mut State,
+    pub observer: &'r mut dyn Observer,
+    pub counters: &'r mut Counters,
+    pub issued: &'r mut IssuedWarnings,
+    pub bookkeeper: &'r mut Bookkeeper,
+    pub past: &'r mut Past,
+    pub assembly: Assembly,
+    pub newton: Newton,
+    /// The plane that the stage is treated in
+    pub plane: Option<Plane>,
+    /// Loads act for the first time in this stage.
+    pub fresh: bool,
+    /// Round-off takes the stiffness of the softest motion.
+    pub soft: bool,
+    /// Energies are counted, since somebody asks for them or watches them.
+    pub keeps_account: bool,
+    /// Increments of prescribed directions in a load step, or over a unit of load; known where
+    /// there are any
+    pub prescribed_increment: Vec<Vec3>,
+    /// Attempts that earlier stages have taken back
+    pub cutbacks_before: u64,
+}
+
+/// Newton's iteration on the system of a stage.
+pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model) -> Result<Newton, Failure> {
+    let Some(solver) = LinearSolver::new(&assembly.system, &model.multipliers) else {
+        return Err(Failure::Limit("not enough memory for the factorisation of the tangent".into()));
+    };
+    let convergence = Convergence { tolerance: stage.tolerance };
+    Ok(Newton::new(convergence, stage.max_iterations, solver, &assembly.system))
+}
+
+impl StageRun<'_> {
+    /// The stage in the plan.
+    pub fn stage(&self) -> &Stage {
+        &self.plan.stages[self.number]
+    }
+
+    /// Where the stage is linear, it is so about the state in which the first such stage began, and
+    /// the springs and loads that act when it begins itself.
+    pub fn linearise(&mut self) -> Result<(), Failure> {
+        if !self.is_linear() {
+            return Ok(());
+        }
+        let mut origin = self.past.origin.get_or_insert_with(|| self.state.clone()).clone();
+        (origin.time, origin.load) = (self.state.time, self.state.load);
+        origin.amplitude.copy_from_slice(&self.state.amplitude);
+        origin.amplitude_rates.copy_from_slice(&self.state.amplitude_rates);
+        let linear = self.assembly.linearise(self.model, &origin);
+        linear.map_err(|conflict| self.describe(StageError::Conflict(conflict)))
+    }
+
+    /// True if the stage is linear.
+    pub fn is_linear(&self) -> bool {
+        self.model.is_linear(self.stage().work.kind())
+    }
+
+    /// The present moment.
+    pub fn moment(&self) -> Moment {
+        Moment { stage: self.number + 1, time: self.state.time, load: self.state.load }
+    }
+
+    /// Opens the energy account of the stage; at the start of the run also writes the first row.
+    pub fn open_account(&mut self) -> Result<(), Failure> {
+        if self.keeps_account {
+            self.bookkeeper.open(self.model, self.state, &self.assembly.system);
+        } else {
+            self.bookkeeper.close();
+        }
+        if std::mem::replace(&mut self.past.started, true) {
+            return Ok(());
+        }
+        self.show()
+    }
+
+    /// Accepts a converged state: turns are counted, the mesh is judged, work is booked.
+    pub fn accept(&mut self) -> Result<(), Failure> {
+        self.continue_to_state()?;
+        self.judge_mesh()?;
+        self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
+        if self.keeps_account {
+            self.bookkeeper.add_step(self.model, self.state, &self.assembly.system);
+        }
+        Ok(())
+    }
+
+    /// Continues from the last good state what goes on without jumps: turns of nodes and of joints.
+    fn continue_to_state(&mut self) -> Result<(), Failure> {
+        self.refuse_infinities()?;
+        if let Some(plane) = &self.plane {
+            self.model.flatten(plane, self.state);
+        }
+        self.wind()?;
+        self.model.remember(self.state);
+        Ok(())
+    }
+
+    /// Passes a state on the way to a balance: it becomes the good one, turns are counted, and the
+    /// work of its forces is booked. No row.
+    pub fn pass_through(&mut self, system: &System) -> Result<(), Failure> {
+        self.state.anchor = None;
+        self.continue_to_state()?;
+        if self.plan.energy {
+            self.bookkeeper.add_step(self.model, self.state, system);
+        }
+        self.good.copy_all_but_rates(self.state);
+        Ok(())
+    }
+
+    /// Takes an earlier state as the present one, and as the last good one.
+    pub fn go_back_to(&mut self, state: &State) {
+        self.state.copy_from(state);
+        self.good.copy_from(state);
+    }
+
+    /// Shows a row to the observer.
+    pub fn show(&mut self) -> Result<(), Failure> {
+        // The observer is borrowed beside what it looks at.
+        let Self { observer, state, model, counters, bookkeeper, number, assembly, .. } = self;
+        let ledger = bookkeeper.ledger();
+        observer.row(&Snapshot { stage: *number + 1, state, system: &assembly.system, model, ledger, counters })
+    }
+
+    fn snapshot(&self) -> Snapshot<'_> {
+        Snapshot {
+            stage: self.number + 1,
+            state: self.state,
+            system: &self.assembly.system,
+            model: self.model,
+            ledger: self.bookkeeper.ledger(),
+            counters: self.counters,
+        }
+    }
+
+    /// Tells the observer how much of the stage lies behind, from 0 to 1.
+    pub fn tell_progress(&mut self, done: f64) -> Result<(), Failure> {
+        let at = self.moment();
+        Teller { observer: self.observer, at, number: self.number, stages: self.plan.stages.len() }.tell(done)
+    }
+
+    /// True if the stage ends at the present row by its `until`.
+    pub fn is_over(&self) -> bool {
+        let Some(until) = &self.stage().until else { return false };
+        let value = (until.column)(&self.snapshot());
+        until.below.is_some_and(|bound| value < bound) || until.above.is_some_and(|bound| value > bound)
+    }
+
+    /// Motions that overflow leave no force behind that would tell.
+    fn refuse_infinities(&self) -> Result<(), Failure> {
+        let State { q, v, a, .. } = &self.state;
+        let is_wrong = |&slot: &usize| !(q[slot].is_finite() && v[slot].is_finite() && a[slot].is_finite());
+        let Some(slot) = threads::first(q.len(), |mut part| part.find(is_wrong)) else { return Ok(()) };
+        Err(Failure::NonFinite { at: self.moment(), effect: Some("the motion"), node: self.model.node_at(slot) })
+    }
+
+    /// Counts turns; a rotational spring whose node leaves its axis near a whole turn has no law
+    /// that would go on.
+    fn wind(&mut self) -> Result<(), Failure> {
+        if self.is_linear() {
+            // Rotations of any size, without charts.
+            self.state.unwrapped.clear();
+        }
+        let moves = |slot: Slot, (motion, timeline): (&Motion, Timeline)| motion.slot == slot && timeline.acts();
+        let is_prescribed = |slot: Slot| self.schedule.motions(self.model).any(|motion| moves(slot, motion));
+        charts::unwind(self.state, self.good, self.charted, is_prescribed);
+        let ambiguous = charts::wind(self.state, self.good, &self.charted.rotations);
+        if let Some(&slot) = ambiguous.first().filter(|_| self.plan.continued) {
+            self.warn_of_lost_axis(slot);
+        }
+        let Some(slot) = ambiguous.into_iter().find(|slot| self.model.sprung.contains(slot)) else { return Ok(()) };
+        let (at, node) = (self.moment(), self.model.node_at(slot as usize));
+        Err(Failure::Deck(format!(
+            "the rotational spring at node \"{node}\" has been wound by more than a turn and its node left the axis ({at}): how \
+             far it is wound is not defined there; hold the other rotations of the node, or use a joint"
+        )))
+    }
+
+    pub fn judge_mesh(&mut self) -> Result<(), Failure> {
+        let limit = if self.issued.coarse { charts::COARSE } else { charts::COARSE_WARNING };
+        let Some((element, angle)) = charts::coarsest(self.state, &self.charted.elements, limit) else {
+            return Ok(());
+        };
+        let failure = self.name_coarse(element, angle);
+        if angle > charts::COARSE {
+            return Err(failure);
+        }
+        self.issued.coarse = true;
+        self.warn(WarningKind::CoarseMesh, format!("{failure}: more elements would tell the shape better"));
+        Ok(())
+    }
+
+    /// Where a spring or the spring of a joint seems to have been wound by more than half a turn
+    /// since the last good state nobody knows whether that were the load or the corrections on
+    /// their way to the balance: smaller levels tell.
+    pub fn refuse_windings(&self) -> Result<(), NewtonFailure> {
+        let turned = |slot: Slot| self.state.unwrapped_at(slot) - self.good.unwrapped_at(slot);
+        let of_joint = |[a, b]: [Option<Slot>; 2]| {
+            let [start, end] = [a, b].map(|slot| slot.map_or(Vec3::ZERO, turned));
+            (a.or(b).unwrap_or_default(), (end - start).norm())
+        };
+        let springs = self.model.sprung.iter().map(|&slot| (slot, turned(slot).norm()));
+        let mut unwrapped = springs.chain(self.model.sprung_joints.iter().copied().map(of_joint));
+        match unwrapped.find(|&(_, angle)| angle > PI) {
+            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
+            None => Ok(()),
+        }
+    }
+
+    /// Between the last good state and this one neighbours may have turned past pi against each
+    /// other: smaller steps tell.
+    pub fn refuse_leaps(&self) -> Result<(), NewtonFailure> {
+        match charts::leapt(self.state, self.good, &self.charted.elements) {
+            Some((element, angle)) => Err(NewtonFailure::LeapsTooFar { element, angle }),
+            None => Ok(()),
+        }
+    }
+
+    /// Between steps, nodes beyond pi change their chart, and elements settle theirs; returns how
+    /// many did. `lag`: see [`charts::switch`].
+    pub fn change_charts(&mut self, lag: Option<f64>) -> usize {
+        let switched = charts::switch(self.state, &self.charted.rotations, charts::DYNAMIC_BAND, lag);
+        self.counters.work.chart_switches += switched as u64;
+        charts::freeze(self.state, &self.charted.elements);
+        switched
+    }
+
+    /// Counts what the effects of an assembly have evaluated.
+    pub fn count_evaluations(&mut self, assembly: &Assembly) {
+        count_evaluations(self.counters, assembly);
+    }
+
+    /// Sums up the work, and warns of what any kind of stage may leave behind.
+    pub fn close(&mut self) {
+        count_evaluations(self.counters, &self.assembly);
+        self.note_solver(self.newton.solver.name());
+        self.warn_of_round_off();
+        self.warn_of_frame();
+    }
+
+    fn note_solver(&mut self, name: &'static str) {
+        if !self.counters.linear_solvers.contains(&name) {
+            self.counters.linear_solvers.push(name);
+        }
+    }
+}
+
+fn count_evaluations(counters: &mut Counters, assembly: &Assembly) {
+    for &(name, count) in &assembly.evaluations {
+        match counters.evaluations.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += count,
+            None => counters.evaluations.push((name, count)),
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Warnings of any kind of stage, each given once.
+
+use super::energy::is_unbalanced;
+use super::failure::Moment;
+use super::findings::Warning;
+use super::stage_run::StageRun;
+use crate::kernel::Weights;
+use crate::model::charts;
+use crate::solve::{Convergence, Verdict};
+use crate::system::Slot;
+use crate::warning::WarningKind;
+
+/// The largest relative error of the curvature of two-node elements with total vectors, over the
+/// square of the relative rotation of their nodes: measured over 4000 orientations.
+const FRAME_ERROR: f64 = 0.0533;
+
+/// The tolerance, relative, of a balance that a stage before has found.
+const LOOSE_BALANCE: f64 = 1e-5;
+
+impl StageRun<'_> {
+    /// Warns of something at the present moment.
+    pub fn warn(&mut self, kind: WarningKind, message: impl Into<String>) {
+        self.warn_at(kind, self.moment(), message);
+    }
+
+    /// Warns of something that happened at some moment.
+    pub fn warn_at(&mut self, kind: WarningKind, at: Moment, message: impl Into<String>) {
+        let warning = Warning { kind, at: Some(at), message: message.into() };
+        self.observer.warn(&warning);
+        self.counters.findings.warnings.push(warning);
+    }
+
+    /// Says where the answer has fewer digits than it shows.
+    pub fn warn_of_round_off(&mut self) {
+        let uncertainty = self.counters.work.uncertainty;
+        if uncertainty > 10.0 * self.issued.uncertainty {
+            self.issued.uncertainty = uncertainty;
+            let message = format!(
+                "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
+                 largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
+                16.0 + uncertainty.log10()
+            );
+            self.warn(WarningKind::LostDigits, message);
+        }
+    }
+
+    /// The tangent has lost the stiffness of a motion that something holds.
+    pub fn warn_of_softness(&mut self) {
+        self.soft = true;
+        if !std::mem::replace(&mut self.issued.soft, true) {
+            self.warn(
+                WarningKind::LostStiffness,
+                "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
+                 all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
+            );
+        }
+    }
+
+    /// A modal or buckling stage about a state that is not in balance.
+    pub fn warn_out_of_balance(&mut self) {
+        self.assembly.forget();
+        let round_off = self.assembly.round_off(self.state);
+        self.assembly.evaluate(self.state, Weights::NONE, None);
+        let loose = Convergence { tolerance: LOOSE_BALANCE };
+        let (verdict, _) = loose.judge(self.model, &self.assembly.system, round_off, None);
+        if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
+            let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
+            self.warn(WarningKind::OutOfBalance, message);
+        }
+    }
+
+    /// A stage that ends at rest takes kinetic energy away from what moved before.
+    pub fn warn_of_standstill(&mut self) {
+        // The energy of the full theory is not that of the linear one.
+        if self.is_linear() {
+            return;
+        }
+        let (Some(first), true) = (self.bookkeeper.first(), self.plan.energy && self.past.moving) else { return };
+        let share = (self.bookkeeper.ledger().total() - first) / self.bookkeeper.scale();
+        if is_unbalanced(share) && !std::mem::replace(&mut self.issued.unbalanced, true) {
+            let stage = self.number + 1;
+            let percent = 100.0 * share.abs();
+            let message = format!(
+                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy: what moved stands still since the stage began, and \
+                 works are summed by the trapezoidal rule from load level to load level"
+            );
+            self.warn(WarningKind::EnergyBalance, message);
+        }
+    }
+
+    /// Total rotation vectors are interpolated in charts that do not turn with the element: the
+    /// strains of a turned scene differ.
+    pub fn warn_of_frame(&mut self) {
+        // Rotations about one axis are interpolated without any error.
+        if self.plane.is_some() {
+            return;
+        }
+        let angle = charts::widest_in_one_chart(self.state, &self.schedule.charted(self.model).elements);
+        let error = FRAME_ERROR * angle * angle;
+        if error > self.issued.frame {
+            self.issued.frame = 2.0 * error;
+            let message = format!(
+                "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
+                 two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
+                 the square of the element's length)",
+                100.0 * error
+            );
+            self.warn(WarningKind::FrameDependence, message);
+        }
+    }
+
+    /// A node passed a whole turn aside of its axis.
+    pub fn warn_of_lost_axis(&mut self, slot: Slot) {
+        if !std::mem::replace(&mut self.issued.axis, true) {
+            let (at, node) = (self.moment(), self.model.node_at(slot as usize));
+            let message = format!(
+                "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
+                 its increments from there on, and depends on the steps (`r` does not)"
+            );
+            self.warn(WarningKind::LostAxis, message);
+        }
+    }
+}

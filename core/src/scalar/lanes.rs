@@ -1,0 +1,254 @@
+//! Several elements side by side: one number of each in every operation.
+//!
+//! Lanes know nothing of each other, so that what an element gives does not depend on who stands beside it; and the same
+//! operations are done, in the same order, whatever instructions carry them out.
+
+use super::Real;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::sync::OnceLock;
+
+/// Elements side by side: what an AVX2 register holds.
+pub const LANES: usize = 4;
+
+/// One number of each element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(32))]
+pub struct Lanes(pub [f64; LANES]);
+
+/// What `f` is for each lane, written out: no closure that may stay outside of a kernel, no index that may be out of bounds.
+macro_rules! each_lane {
+    (|$k:ident| $f:expr) => {
+        [
+            {
+                let $k = 0;
+                $f
+            },
+            {
+                let $k = 1;
+                $f
+            },
+            {
+                let $k = 2;
+                $f
+            },
+            {
+                let $k = 3;
+                $f
+            },
+        ]
+    };
+}
+pub(crate) use each_lane;
+
+/// One field of several elements side by side.
+macro_rules! pack {
+    ($of:ident.$($field:tt)+) => {
+        $crate::scalar::Pack::pack($crate::scalar::each_lane!(|k| &$of[k].$($field)+))
+    };
+}
+pub(crate) use pack;
+
+impl Add for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Lanes(each_lane!(|k| self.0[k] + other.0[k]))
+    }
+}
+
+impl Sub for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Lanes(each_lane!(|k| self.0[k] - other.0[k]))
+    }
+}
+
+impl Mul for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Lanes(each_lane!(|k| self.0[k] * other.0[k]))
+    }
+}
+
+impl Div for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Lanes(each_lane!(|k| self.0[k] / other.0[k]))
+    }
+}
+
+impl Neg for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Lanes(each_lane!(|k| -self.0[k]))
+    }
+}
+
+impl Mul<f64> for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f64) -> Self {
+        Lanes(each_lane!(|k| self.0[k] * factor))
+    }
+}
+
+impl AddAssign for Lanes {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Lanes {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl Real for Lanes {
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Lanes(each_lane!(|k| self.0[k].sqrt()))
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        Self(each_lane!(|k| libm::atan2(self.0[k], x.0[k])))
+    }
+
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        self.0[0].max(self.0[1]).max(self.0[2].max(self.0[3]))
+    }
+
+    #[inline(always)]
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
+        Lanes(each_lane!(|k| if self.0[k] > limit { then.0[k] } else { otherwise.0[k] }))
+    }
+}
+
+/// What can be put side by side.
+pub trait Pack: Sized {
+    /// The same with lanes for numbers
+    type Packed: Copy;
+
+    /// One of each element.
+    fn pack(of: [&Self; LANES]) -> Self::Packed;
+}
+
+impl Pack for f64 {
+    type Packed = Lanes;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Lanes {
+        Lanes(each_lane!(|k| *of[k]))
+    }
+}
+
+impl<A: Pack, const N: usize> Pack for [A; N] {
+    type Packed = [A::Packed; N];
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        let mut out = [A::pack(each_lane!(|k| &of[k][0])); N];
+        for i in 1..N {
+            out[i] = A::pack(each_lane!(|k| &of[k][i]));
+        }
+        out
+    }
+}
+
+impl<A: Pack, B: Pack> Pack for (A, B) {
+    type Packed = (A::Packed, B::Packed);
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        (pack!(of.0), pack!(of.1))
+    }
+}
+
+/// Beside others that are there, an absent one is nothing.
+impl<A: Pack + Default> Pack for Option<A> {
+    type Packed = Option<A::Packed>;
+
+    #[inline(always)]
+    fn pack(of: [&Self; LANES]) -> Self::Packed {
+        if of.iter().all(|one| one.is_none()) {
+            return None;
+        }
+        let nothing = A::default();
+        Some(A::pack(each_lane!(|k| of[k].as_ref().unwrap_or(&nothing))))
+    }
+}
+
+/// The instructions that lanes run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// What every machine of its kind has
+    Baseline,
+    /// 256-bit registers
+    Avx2,
+}
+
+impl Instructions {
+    /// The most that this machine has, unless the environment variable `BEAMSIM_INSTRUCTIONS` asks for the `baseline`. Results
+    /// do not depend on it.
+    pub fn here() -> Self {
+        static HERE: OnceLock<Instructions> = OnceLock::new();
+        *HERE.get_or_init(|| match std::env::var("BEAMSIM_INSTRUCTIONS") {
+            Ok(wanted) if wanted == "baseline" => Self::Baseline,
+            _ => Self::widest(),
+        })
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Instructions {
+    fn widest() -> Self {
+        if pulp::x86::V3::is_available() { Self::Avx2 } else { Self::Baseline }
+    }
+
+    /// Runs `work`, compiled for these instructions; everything in it that is `#[inline(always)]` is too.
+    #[inline(always)]
+    pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
+        match pulp::x86::V3::try_new() {
+            Some(wide) if self == Self::Avx2 => wide.vectorize(work),
+            _ => work(),
+        }
+    }
+
+    /// The same for work on elements side by side; `None` where that is not worth it, since two numbers fill a register.
+    #[inline(always)]
+    pub fn run_side_by_side<R>(self, work: impl FnOnce() -> R) -> Option<R> {
+        match pulp::x86::V3::try_new() {
+            Some(wide) if self == Self::Avx2 => Some(wide.vectorize(work)),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+impl Instructions {
+    fn widest() -> Self {
+        Self::Baseline
+    }
+
+    /// Runs `work`.
+    pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
+        work()
+    }
+
+    /// Work on elements side by side is not worth it, as far as that has been measured.
+    pub fn run_side_by_side<R>(self, _work: impl FnOnce() -> R) -> Option<R> {
+        None
+    }
+}

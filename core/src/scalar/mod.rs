@@ -1,0 +1,81 @@
+//! The scalar of the kernels: `f64` in a run, dual numbers in the tests that hold every tangent
+//! against automatic differentiation, lanes of several elements where speed asks for it.
+
+mod compressed_field;
+mod jet;
+mod lanes;
+
+pub use compressed_field::CompressedField;
+pub use jet::Jet;
+pub use lanes::{Instructions, LANES, Lanes, Pack};
+pub(crate) use lanes::{each_lane, pack};
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// What a kernel may ask of a number. Only operations that IEEE 754 rounds exactly, so that a history does
+/// not depend on the machine: no fused multiply-add, no function of the platform's `libm`.
+pub trait Real:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + Mul<f64, Output = Self>
+{
+    /// The constant `value`.
+    fn constant(value: f64) -> Self;
+
+    /// The square root.
+    fn sqrt(self) -> Self;
+
+    /// The angle in (-pi, pi] whose tangent is `self` / `x`, by the sign of both.
+    fn atan2(self, x: Self) -> Self;
+
+    /// The value itself; of several lanes the largest. It may tell whether an algorithm is needed at all, never enter a result.
+    fn largest(self) -> f64;
+
+    /// `then` where the value is above `limit`, else `otherwise`; each lane for itself.
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self;
+
+    /// Zero.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::constant(0.0)
+    }
+
+    /// One.
+    #[inline(always)]
+    fn one() -> Self {
+        Self::constant(1.0)
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        libm::atan2(self, x)
+    }
+
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        self
+    }
+
+    #[inline(always)]
+    fn above(self, limit: f64, then: Self, otherwise: Self) -> Self {
+        if self > limit { then } else { otherwise }
+    }
+}

@@ -1,0 +1,173 @@
+//! L D L^T in blocks, of symmetric tangents.
+
+use super::diagonal::Diagonal;
+use super::elimination::Elimination;
+use super::pieces::{Look, Piece, Signs};
+use super::stretch::Stretch;
+use super::tile::{self, Block, Own, Part, Rows, Tile, Upper, Width};
+use crate::system::upper_entry;
+use std::ops::Range;
+
+/// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then:
+/// with Y = L^-1 A_kj a row takes Y^T D^-1 Y from what comes later.
+pub struct Ldl<const W: usize>
+where
+    Width<W>: Rows<W>,
+{
+    rows: Range<usize>,
+    /// The blocks above the diagonal that are not those of the tangent
+    changed: Stretch<Tile<W>>,
+    /// D^-1 Y of the row that is being eliminated
+    row: Vec<Tile<W>>,
+}
+
+impl<const W: usize> Piece<W> for Ldl<W>
+where
+    Width<W>: Rows<W>,
+{
+    const NAME: &'static str = "block LDL^T";
+    const SYMMETRIC: bool = true;
+
+    type Own = Upper<W>;
+    const NOTHING: Self::Own = <Width<W> as Rows<W>>::NOTHING;
+
+    fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self> {
+        Some(Self { rows, changed: Stretch::new(changed, tile::zero())?, row: Vec::new() })
+    }
+
+    fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+
+    fn within(numbers: &[f64]) -> &[Self::Own] {
+        Width::<W>::uppers(numbers)
+    }
+
+    fn within_mut(numbers: &mut [f64]) -> &mut [Self::Own] {
+        Width::<W>::uppers_mut(numbers)
+    }
+
+    #[inline(always)]
+    fn load(
+        &mut self,
+        rows: Range<usize>,
+        elimination: &Elimination,
+        own: Option<&Own<W>>,
+        beside: &[Tile<W>],
+        diagonal: &mut Diagonal<&mut [Self::Own]>,
+    ) {
+        if let Some(own) = own {
+            for row in rows.clone() {
+                own.copy_upper(elimination.order[row] as usize, diagonal[row].as_mut());
+            }
+        }
+        for number in elimination.changed(&rows) {
+            // By columns it is what its mirror image is by rows.
+            let ([_, below], none, block) = (elimination.begin(number), Stretch::nothing(), &mut self.changed[number]);
+            Block::find(below, beside, &none).with(|begin| tile::copy(block, begin));
+        }
+        for &(row, direction) in elimination.idle(&rows) {
+            diagonal[row as usize].as_mut()[upper_entry(W, direction as usize, direction as usize)] = 1.0;
+        }
+    }
+
+    fn add_own(sum: &mut Self::Own, other: &Self::Own) -> bool {
+        sum.as_mut().iter_mut().zip(other.as_ref()).for_each(|(sum, other)| *sum += other);
+        // Signs of pivots tell.
+        true
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.changed.add_tiles(&other.changed);
+    }
+
+    fn clear(&mut self) {
+        self.changed.fill(|_| tile::zero());
+    }
+
+    #[inline(always)]
+    fn eliminate(
+        &mut self,
+        rows: Range<usize>,
+        elimination: &Elimination,
+        beside: &[Tile<W>],
+        diagonal: &mut Diagonal<&mut [Self::Own]>,
+        (beyond, of_beyond): (&mut Self, &mut Diagonal<&mut [Self::Own]>),
+    ) -> Option<Signs> {
+        let Self { changed, row: before, .. } = self;
+        let (mut factor, mut y, mut w, mut negative) = (tile::zero(), tile::zero(), tile::zero(), 0);
+        for row in rows {
+            tile::spread(&diagonal[row], &mut factor);
+            negative += tile::factorise_symmetric(&mut factor)?;
+            let (neighbours, mut target) = (elimination.neighbours(row), elimination.first_target(row));
+            before.clear();
+            for k in neighbours.clone() {
+                let forward = |block: &Tile<W>| tile::forward_symmetric(&factor, block, &mut y);
+                Block::find(elimination.below(k), beside, changed).with(forward);
+                for w in &*before {
+                    let shared = elimination.targets[target] as usize;
+                    tile::subtract_product(changed.or(&mut beyond.changed, shared), w, &y);
+                    target += 1;
+                }
+                tile::over_pivots(&factor, &y, &mut w);
+                let later = diagonal.or(of_beyond, elimination.later[k] as usize);
+                tile::subtract_symmetric_product(later, &w, &y);
+                if k + 1 < neighbours.end {
+                    before.push(w);
+                }
+            }
+            tile::invert_symmetric(&factor, &mut diagonal[row]);
+        }
+        // Where all pivots are positive nothing is lost, as with Cholesky's factorisation.
+        Some(Signs { negative, doubtful: negative })
+    }
+
+    #[inline(always)]
+    fn forward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+        for row in self.rows() {
+            let part = tile::solve_symmetric(&look.diagonal[row], &x[row - self.rows.start]);
+            self.subtract_from_later(look, row, &part, x, beyond);
+            x[row - self.rows.start] = part;
+        }
+    }
+
+    #[inline(always)]
+    fn backward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
+        for row in self.rows().rev() {
+            let part = tile::solve_symmetric(&look.diagonal[row], &self.subtracted_by_later(look, row, x, beyond));
+            x[row - self.rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
+        }
+    }
+}
+
+impl<const W: usize> Ldl<W>
+where
+    Width<W>: Rows<W>,
+{
+    /// x_j -= A_jk part for all later rows j
+    #[inline(always)]
+    fn subtract_from_later(
+        &self,
+        look: &Look<Self, W>,
+        row: usize,
+        part: &Part<W>,
+        x: &mut [Part<W>],
+        beyond: &mut [Part<W>],
+    ) {
+        for k in look.elimination.neighbours(row) {
+            let later = look.elimination.place(&self.rows, k).of_mut(x, beyond);
+            Block::find(look.elimination.below(k), look.beside, &self.changed).transposed().subtract_times(later, part);
+        }
+    }
+
+    /// -sum A_kj x_j over all later rows j
+    #[inline(always)]
+    fn subtracted_by_later(&self, look: &Look<Self, W>, row: usize, x: &[Part<W>], beyond: &[Part<W>]) -> Part<W> {
+        let mut part = [0.0; W];
+        for k in look.elimination.neighbours(row) {
+            let later = look.elimination.place(&self.rows, k).of(x, beyond);
+            Block::find(look.elimination.below(k), look.beside, &self.changed).subtract_times(&mut part, later);
+        }
+        part
+    }
+}

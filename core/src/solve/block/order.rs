@@ -1,0 +1,352 @@
+//! In which order blocks are eliminated: that of least degree, and in large scenes from several
+//! ends to a middle, so that branches of the elimination tree can be eliminated at once.
+//!
+//! Least degree runs along a chain from one end to the other: its tree is a single branch. But
+//! whatever fills up under one order is a chordal graph, which can be eliminated without any more
+//! fill towards any of its cliques (Rose, Tarjan and Lueker 1976, doi:10.1137/0205021): here
+//! towards one in its middle.
+
+use crate::system::{Meetings, Pattern};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::amd;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::Range;
+
+/// Smaller scenes are eliminated as they come.
+const LEAST: usize = 1024;
+
+/// The rows of a trunk are looked for so long.
+const MOST_TRUNK: usize = 64;
+
+/// As many parts as branches are cut into where the tree has that many
+const PARTS: usize = 16;
+
+/// No row: the parent of a root
+const NONE: u32 = u32::MAX;
+
+/// An order of elimination.
+pub struct Order {
+    /// The group of each row
+    pub order: Vec<u32>,
+    /// Consecutive rows from the first on that meet others only after the last of them; empty where
+    /// it does not pay
+    pub branches: Vec<Range<usize>>,
+    /// What each row leaves behind
+    pub neighbours: Neighbours,
+}
+
+/// The rows that the elimination of each row changes.
+pub struct Neighbours {
+    /// Where those of each row begin
+    pub starts: Vec<u32>,
+    /// In their order
+    pub later: Vec<u32>,
+}
+
+impl Neighbours {
+    /// Neighbours in the pattern, and what the rows that were eliminated before leave behind.
+    /// `None` where these are more than `most`.
+    fn new(meetings: &Meetings, order: &[u32], most: usize) -> Option<Self> {
+        let (n, row_of) = (order.len(), inverse(order));
+        // Rows whose first later neighbour is this one
+        let mut children: Vec<Vec<u32>> = vec![Vec::new(); n];
+        let mut seen = vec![u32::MAX; n];
+        let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(meetings.pairs()));
+        starts.push(0);
+        for row in 0..n {
+            let start = later.len();
+            seen[row] = row as u32;
+            let mut visit = |other: u32, later: &mut Vec<u32>| {
+                if other > row as u32 && seen[other as usize] != row as u32 {
+                    seen[other as usize] = row as u32;
+                    later.push(other);
+                }
+            };
+            for group in meetings.of(order[row] as usize) {
+                visit(row_of[group as usize], &mut later);
+            }
+            for child in std::mem::take(&mut children[row]) {
+                for k in starts[child as usize] as usize..starts[child as usize + 1] as usize {
+                    visit(later[k], &mut later);
+                }
+            }
+            later[start..].sort_unstable();
+            if let Some(&parent) = later.get(start) {
+                children[parent as usize].push(row as u32);
+            }
+            if later.len() > most {
+                return None;
+            }
+            starts.push(later.len() as u32);
+        }
+        Some(Self { starts, later })
+    }
+
+    /// The same where rows come in another order, in which each still comes before those that it
+    /// changes, and these as they did.
+    fn permuted(&self, places: &[u32]) -> Self {
+        let row_of = inverse(places);
+        let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
+        starts.push(0);
+        for &place in places {
+            let start = later.len();
+            later.extend(self.of(place as usize).iter().map(|&row| row_of[row as usize]));
+            debug_assert!(later[start..].is_sorted(), "rows of a branch have changed places");
+            starts.push(later.len() as u32);
+        }
+        Self { starts, later }
+    }
+
+    fn of(&self, row: usize) -> &[u32] {
+        &self.later[self.starts[row] as usize..self.starts[row + 1] as usize]
+    }
+
+    fn count(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The elimination tree: the first row that each one changes.
+    fn parents(&self) -> Vec<u32> {
+        (0..self.count()).map(|row| self.of(row).first().copied().unwrap_or(NONE)).collect()
+    }
+
+    /// The rows that each row is changed by.
+    fn earlier(&self) -> Self {
+        let mut starts = vec![0; self.count() + 1];
+        self.later.iter().for_each(|&row| starts[row as usize + 1] += 1);
+        (0..self.count()).for_each(|row| starts[row + 1] += starts[row]);
+        let (mut ends, mut rows) = (starts.clone(), vec![0; self.later.len()]);
+        for row in 0..self.count() {
+            for &other in self.of(row) {
+                let end = &mut ends[other as usize];
+                rows[*end as usize] = row as u32;
+                *end += 1;
+            }
+        }
+        Self { starts, later: rows }
+    }
+}
+
+/// The order for a pattern, in which each group of `multipliers` stands behind the groups that it
+/// meets. `None` where it fills up to more blocks than `most`, or memory cannot be had.
+pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order> {
+    let meetings = &pattern.meetings();
+    let order = match multipliers {
+        [] => minimum_degree(pattern.node_blocks.count(), &pattern.column_starts, &pattern.rows)?,
+        _ => constrained(pattern.node_blocks.count(), meetings, multipliers)?,
+    };
+    let neighbours = Neighbours::new(meetings, &order, most)?;
+    if order.len() < LEAST || !multipliers.is_empty() {
+        return Some(Order { order, branches: Vec::new(), neighbours });
+    }
+    let order = permuted(&order, &towards_the_middle(&neighbours));
+    let neighbours = Neighbours::new(meetings, &order, most)?;
+    let (sorted, branches) = branches(&neighbours.parents());
+    if branches.is_empty() {
+        return Some(Order { order, branches, neighbours });
+    }
+    let order = permuted(&order, &sorted);
+    Some(Order { neighbours: neighbours.permuted(&sorted), order, branches })
+}
+
+/// Where each entry stands.
+pub fn inverse(order: &[u32]) -> Vec<u32> {
+    let mut out = vec![0; order.len()];
+    (0..).zip(order).for_each(|(place, &entry)| out[entry as usize] = place);
+    out
+}
+
+/// The entries at these places.
+fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
+    places.iter().map(|&place| order[place as usize]).collect()
+}
+
+/// That of least degree among all other groups, and each multiplier right behind the last group
+/// that it meets: with everything after it clamped, what it ties is there, so that its pivot has
+/// the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
+fn constrained(node_blocks: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
+    let mut is_multiplier = vec![false; node_blocks];
+    multipliers.iter().for_each(|&group| is_multiplier[group as usize] = true);
+    let others: Vec<u32> = (0..node_blocks as u32).filter(|&group| !is_multiplier[group as usize]).collect();
+    let mut number_of = vec![NONE; node_blocks];
+    (0..).zip(&others).for_each(|(number, &group)| number_of[group as usize] = number);
+    let (mut starts, mut rows) = (vec![0], Vec::new());
+    for &group in &others {
+        rows.extend(meetings.of(group as usize).map(|other| number_of[other as usize]).filter(|&row| row != NONE));
+        starts.push(rows.len() as u32);
+    }
+    let found = minimum_degree(others.len(), &starts, &rows)?;
+    let mut order = permuted(&others, &found);
+    let place_of = inverse(&found);
+    let last_met = |multiplier: u32| {
+        let met = meetings.of(multiplier as usize).map(|other| number_of[other as usize]).filter(|&row| row != NONE);
+        met.map(|number| place_of[number as usize]).max().unwrap_or(0)
+    };
+    let mut places: Vec<(u32, u32)> = (0..).zip(&order).map(|(place, &group)| (place, group)).collect();
+    places.extend(multipliers.iter().map(|&multiplier| (last_met(multiplier), multiplier)));
+    // Stable: at the same place a multiplier stays behind the group.
+    places.sort_by_key(|&(place, _)| place);
+    order.clear();
+    order.extend(places.iter().map(|&(_, group)| group));
+    Some(order)
+}
+
+fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>> {
+    let structure = SymbolicSparseColMatRef::new_checked(n, n, column_starts, None, rows);
+    let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, rows.len())).ok()?;
+    let (mut order, mut row_of) = (vec![0_u32; n], vec![0_u32; n]);
+    amd::order(&mut order, &mut row_of, structure, Default::default(), MemStack::new(&mut memory)).ok()?;
+    Some(order)
+}
+
+/// An order without more fill that ends in a clique in the middle: that of maximum cardinality
+/// search from it, backwards.
+fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
+    let (n, earlier) = (neighbours.count(), neighbours.earlier());
+    let start = middle(&neighbours.parents());
+    let mut known = vec![0_u32; n];
+    let mut is_done = vec![false; n];
+    // By the number of neighbours that are done, those found last on top
+    let mut waiting: Vec<Vec<u32>> = vec![(0..n as u32).rev().collect()];
+    waiting[0].extend(neighbours.of(start).iter().rev().copied().chain([start as u32]));
+    let mut order = Vec::with_capacity(n);
+    while let Some(rows) = waiting.last_mut() {
+        let Some(row) = rows.pop() else {
+            waiting.pop();
+            continue;
+        };
+        if is_done[row as usize] || known[row as usize] as usize != waiting.len() - 1 {
+            continue;
+        }
+        is_done[row as usize] = true;
+        order.push(row);
+        for &other in earlier.of(row as usize).iter().chain(neighbours.of(row as usize)) {
+            if !is_done[other as usize] {
+                known[other as usize] += 1;
+                let count = known[other as usize] as usize;
+                waiting.resize(waiting.len().max(count + 1), Vec::new());
+                waiting[count].push(other);
+            }
+        }
+    }
+    order.reverse();
+    order
+}
+
+/// The row below which, and beside whose later neighbours, no part of the tree has more than half
+/// of the rows.
+fn middle(parents: &[u32]) -> usize {
+    let sizes = sizes(parents);
+    // Children come before their parents.
+    (0..parents.len()).find(|&row| 2 * sizes[row] as usize > parents.len()).unwrap_or(parents.len() - 1)
+}
+
+/// The rows of the tree below each row, and itself.
+fn sizes(parents: &[u32]) -> Vec<u32> {
+    let mut sizes = vec![1; parents.len()];
+    for (row, &parent) in parents.iter().enumerate() {
+        if parent != NONE {
+            sizes[parent as usize] += sizes[row];
+        }
+    }
+    sizes
+}
+
+/// Rows branch by branch, those of the trunk last, and the branches; none where most rows are in
+/// one of them.
+fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
+    let n = parents.len();
+    let roots = branch_roots(parents);
+    let mut owner = vec![NONE; n];
+    for (number, rows) in (0..).zip(&roots) {
+        rows.iter().for_each(|&row| owner[row as usize] = number);
+    }
+    for row in (0..n).rev() {
+        if owner[row] == NONE && parents[row] != NONE {
+            owner[row] = owner[parents[row] as usize];
+        }
+    }
+    // The trunk, which nobody owns, sorts last.
+    let mut rows: Vec<u32> = (0..n as u32).collect();
+    rows.sort_by_key(|&row| owner[row as usize]);
+    let mut start = 0;
+    let branch = |number: u32| {
+        let end = rows.partition_point(|&row| owner[row as usize] <= number);
+        std::mem::replace(&mut start, end)..end
+    };
+    let branches: Vec<_> = (0..roots.len() as u32).map(branch).collect();
+    let largest = branches.iter().map(Range::len).max().unwrap_or(n);
+    if 4 * largest > 3 * n { ((0..n as u32).collect(), Vec::new()) } else { (rows, branches) }
+}
+
+/// The roots of the trees in each branch, where rows are taken for the trunk from the largest tree
+/// on, as long as that pays.
+fn branch_roots(parents: &[u32]) -> Vec<Vec<u32>> {
+    let sizes = sizes(parents);
+    let mut children: Vec<Vec<u32>> = vec![Vec::new(); parents.len()];
+    let mut trees = BinaryHeap::new();
+    for (row, &parent) in (0..).zip(parents) {
+        match children.get_mut(parent as usize) {
+            Some(children) => children.push(row),
+            None => trees.push((sizes[row as usize], Reverse(row))),
+        }
+    }
+    // A row of the trunk has to wait for all branches.
+    let cost = |trees: &BinaryHeap<(u32, Reverse<u32>)>, trunk: usize| {
+        trees.peek().map_or(0, |(size, _)| (*size as usize).max(parents.len() / PARTS)) + 2 * trunk
+    };
+    let mut best = (cost(&trees, 0), trees.clone());
+    for trunk in 1..=MOST_TRUNK {
+        let Some((_, Reverse(row))) = trees.pop() else { break };
+        trees.extend(children[row as usize].iter().map(|&child| (sizes[child as usize], Reverse(child))));
+        if cost(&trees, trunk) < best.0 {
+            best = (cost(&trees, trunk), trees.clone());
+        }
+    }
+    in_branches(best.1.into_vec(), parents.len() / PARTS)
+}
+
+/// Trees together until they have so many rows.
+fn in_branches(mut trees: Vec<(u32, Reverse<u32>)>, enough: usize) -> Vec<Vec<u32>> {
+    trees.sort_unstable_by_key(|&(_, Reverse(row))| row);
+    let (mut branches, mut rows) = (Vec::<Vec<u32>>::new(), enough);
+    for (size, Reverse(row)) in trees {
+        if rows >= enough {
+            branches.push(Vec::new());
+            rows = 0;
+        }
+        rows += size as usize;
+        branches.iter_mut().next_back().into_iter().for_each(|branch| branch.push(row));
+    }
+    branches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::system::{Connectivity, DofMap, Layout, NodeBlocks, Symmetry};
+
+    /// Three chains of nodes that meet in node 0, one of them in a ladder, which fills up.
+    fn star(length: u32) -> Pattern {
+        let node = |chain: u32, k: u32| if k == 0 { 0 } else { chain * length + k };
+        let rungs = (2..length).map(|k| [node(0, k - 2), node(0, k)]);
+        let steps = (0..3).flat_map(|chain| (1..=length).map(move |k| [node(chain, k - 1), node(chain, k)]));
+        let mut connectivity = Connectivity::default();
+        steps.chain(rungs).for_each(|[a, b]| connectivity.push([2 * a, 2 * a + 1, 2 * b, 2 * b + 1]));
+        let slots = 2 * (3 * length as usize + 1);
+        let node_blocks = NodeBlocks::new(slots, Layout::Spatial, |slot| slot % 2 == 1);
+        Pattern::new(DofMap::new(slots, &[]).unwrap(), node_blocks, vec![connectivity], Symmetry::Whole)
+    }
+
+    /// What is permuted is what would be found.
+    #[test]
+    fn neighbours_of_branches_are_those_of_their_order() {
+        let pattern = star(700);
+        let Order { order, branches, neighbours } = find(&pattern, &[], usize::MAX).unwrap();
+        let found = Neighbours::new(&pattern.meetings(), &order, usize::MAX).unwrap();
+        assert!(branches.len() > 1, "nothing was permuted");
+        assert_eq!((neighbours.starts, neighbours.later), (found.starts, found.later));
+    }
+}

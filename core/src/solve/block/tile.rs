@@ -1,0 +1,741 @@
+//! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 where a scene is planar.
+//! Every loop runs along rows, which lie next to each other.
+
+use super::elimination::{Source, Stands};
+use super::stretch::Stretch;
+use crate::scalar::{LANES, Lanes, each_lane};
+pub use crate::system::{Own, Tile, transposed};
+use crate::system::{upper_entry, upper_start};
+
+/// A part of a vector that belongs to one tile row.
+pub type Part<const W: usize> = [f64; W];
+
+/// Rows of a tile keep their order as long as no pivot takes so many times its size from the
+/// diagonal entry of a row below it: a measure without units, as entries of L have some. What it is
+/// does not matter much: tiles that take their rows in another order are doubtful.
+const GROWTH: f64 = 16.0;
+
+/// The terms that elimination takes from an entry on the diagonal may be so many times that entry:
+/// they cost as many times its round-off (Higham, Accuracy and Stability of Numerical Algorithms,
+/// 2nd ed., theorem 13.6).
+const MODERATE: f64 = 1e3;
+
+/// The order in which a tile takes its rows as pivots.
+pub type RowOrder<const W: usize> = [u8; W];
+
+/// Tiles so wide.
+pub struct Width<const W: usize>;
+
+/// How a row of a tile stands in registers; behind its numbers stand zeros.
+pub trait Rows<const W: usize> {
+    /// The registers
+    type Row: Copy;
+
+    /// The numbers of the upper half of a symmetric tile, row by row
+    type Upper: Copy + Send + Sync + AsRef<[f64]> + AsMut<[f64]>;
+
+    /// Nothing
+    const NOTHING: Self::Upper;
+
+    /// Numbers as upper halves
+    fn uppers(numbers: &[f64]) -> &[Self::Upper];
+
+    /// The same to change them
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper];
+
+    /// Into registers
+    fn row(part: &Part<W>) -> Self::Row;
+
+    /// And out of them
+    fn part(row: Self::Row) -> Part<W>;
+
+    /// row -= factor other
+    fn subtract(row: &mut Self::Row, factor: f64, other: &Self::Row);
+
+    /// row factor
+    fn scaled(row: Self::Row, factor: f64) -> Self::Row;
+
+    /// sums += |a b|, number by number
+    fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row);
+
+    /// a.b
+    fn dot(a: &Part<W>, b: &Part<W>) -> f64;
+
+    /// Row r of an upper half, with anything left of the diagonal
+    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row;
+
+    /// Puts it there, and anything where the rows before it end: later rows come first.
+    fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row);
+}
+
+/// The upper half of a symmetric tile.
+pub type Upper<const W: usize> = <Width<W> as Rows<W>>::Upper;
+
+impl Rows<6> for Width<6> {
+    type Row = [Lanes; 2];
+    type Upper = [f64; 21];
+
+    const NOTHING: Self::Upper = [0.0; 21];
+
+    fn uppers(numbers: &[f64]) -> &[Self::Upper] {
+        numbers.as_chunks().0
+    }
+
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper] {
+        numbers.as_chunks_mut().0
+    }
+
+    #[inline(always)]
+    fn row(part: &Part<6>) -> Self::Row {
+        let [a, b, c, d, e, f] = *part;
+        [Lanes([a, b, c, d]), Lanes([e, f, 0.0, 0.0])]
+    }
+
+    #[inline(always)]
+    fn part(row: Self::Row) -> Part<6> {
+        let [Lanes([a, b, c, d]), Lanes([e, f, ..])] = row;
+        [a, b, c, d, e, f]
+    }
+
+    #[inline(always)]
+    fn subtract(row: &mut Self::Row, factor: f64, other: &Self::Row) {
+        let factor = Lanes([factor; 4]);
+        row[0] -= other[0] * factor;
+        row[1] -= other[1] * factor;
+    }
+
+    #[inline(always)]
+    fn scaled(row: Self::Row, factor: f64) -> Self::Row {
+        let factor = Lanes([factor; 4]);
+        [row[0] * factor, row[1] * factor]
+    }
+
+    #[inline(always)]
+    fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row) {
+        for k in 0..2 {
+            let Lanes(product) = a[k] * b[k];
+            sums[k] += Lanes(each_lane!(|k| product[k].abs()));
+        }
+    }
+
+    /// Two sums of three: shorter chains than one of six.
+    #[inline(always)]
+    fn dot(a: &Part<6>, b: &Part<6>) -> f64 {
+        (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
+    }
+
+    #[inline(always)]
+    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row {
+        let row = &upper[upper_start(6, r)..][..6];
+        [Lanes([row[0], row[1], row[2], row[3]]), Lanes([row[4], row[5], 0.0, 0.0])]
+    }
+
+    #[inline(always)]
+    fn set_upper_row(upper: &mut Self::Upper, r: usize, [left, right]: Self::Row) {
+        let row = &mut upper[upper_start(6, r)..][..6];
+        if r < LANES {
+            row[..LANES].copy_from_slice(&left.0);
+        }
+        row[LANES..].copy_from_slice(&right.0[..2]);
+    }
+}
+
+impl Rows<3> for Width<3> {
+    type Row = [f64; 3];
+    type Upper = [f64; 6];
+
+    const NOTHING: Self::Upper = [0.0; 6];
+
+    fn uppers(numbers: &[f64]) -> &[Self::Upper] {
+        numbers.as_chunks().0
+    }
+
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper] {
+        numbers.as_chunks_mut().0
+    }
+
+    #[inline(always)]
+    fn row(part: &Part<3>) -> Self::Row {
+        *part
+    }
+
+    #[inline(always)]
+    fn part(row: Self::Row) -> Part<3> {
+        row
+    }
+
+    #[inline(always)]
+    fn subtract(row: &mut Self::Row, factor: f64, other: &Self::Row) {
+        row[0] -= other[0] * factor;
+        row[1] -= other[1] * factor;
+        row[2] -= other[2] * factor;
+    }
+
+    #[inline(always)]
+    fn scaled(row: Self::Row, factor: f64) -> Self::Row {
+        [row[0] * factor, row[1] * factor, row[2] * factor]
+    }
+
+    #[inline(always)]
+    fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row) {
+        (0..3).for_each(|k| sums[k] += (a[k] * b[k]).abs());
+    }
+
+    #[inline(always)]
+    fn dot(a: &Part<3>, b: &Part<3>) -> f64 {
+        (a[0] * b[0] + a[2] * b[2]) + a[1] * b[1]
+    }
+
+    #[inline(always)]
+    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row {
+        let row = &upper[upper_start(3, r)..][..3];
+        [row[0], row[1], row[2]]
+    }
+
+    #[inline(always)]
+    fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row) {
+        upper[upper_start(3, r)..][..3].copy_from_slice(&row);
+    }
+}
+
+/// Nothing.
+pub const fn zero<const W: usize>() -> Tile<W> {
+    [[0.0; W]; W]
+}
+
+#[inline(always)]
+fn row<const W: usize>(part: &Part<W>) -> <Width<W> as Rows<W>>::Row
+where
+    Width<W>: Rows<W>,
+{
+    Width::<W>::row(part)
+}
+
+#[inline(always)]
+fn part<const W: usize>(row: <Width<W> as Rows<W>>::Row) -> Part<W>
+where
+    Width<W>: Rows<W>,
+{
+    Width::<W>::part(row)
+}
+
+#[inline(always)]
+fn rows<const W: usize>(tile: &Tile<W>) -> [<Width<W> as Rows<W>>::Row; W]
+where
+    Width<W>: Rows<W>,
+{
+    let mut out = [row::<W>(&tile[0]); W];
+    for r in 1..W {
+        out[r] = row::<W>(&tile[r]);
+    }
+    out
+}
+
+#[inline(always)]
+fn store<const W: usize>(rows: &[<Width<W> as Rows<W>>::Row; W], out: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    for r in 0..W {
+        out[r] = part::<W>(rows[r]);
+    }
+}
+
+/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves
+/// loops keep numbers out of registers.
+macro_rules! each_row {
+    ($width:ident, |$row:ident| $work:expr) => {{
+        const { assert!($width <= 6) };
+        each_row!(@ $width, $row, $work, 0, 1, 2, 3, 4, 5);
+    }};
+    (@ $width:ident, $row:ident, $work:expr, $($number:literal),*) => {
+        $({
+            let $row = $number;
+            if $row < $width {
+                $work;
+            }
+        })*
+    };
+}
+
+/// The same from the last row on.
+macro_rules! each_row_backwards {
+    ($width:ident, |$row:ident| $work:expr) => {{
+        each_row!(@ $width, $row, $work, 5, 4, 3, 2, 1, 0);
+    }};
+}
+
+/// A block, wherever it stands.
+#[derive(Clone, Copy)]
+pub enum Block<'a, const W: usize> {
+    /// As it is
+    Tile(&'a Tile<W>),
+    /// Its transpose
+    Transpose(&'a Tile<W>),
+    /// Zero
+    Nothing,
+}
+
+impl<'a, const W: usize> Block<'a, W> {
+    /// In the tangent, or with its own.
+    #[inline(always)]
+    pub fn find(source: Source, beside: &'a [Tile<W>], own: &'a Stretch<Tile<W>>) -> Self {
+        match source.stands() {
+            Stands::Tile(number) => Self::Tile(&beside[number]),
+            Stands::Transpose(number) => Self::Transpose(&beside[number]),
+            Stands::Own(number) => Self::Tile(&own[number]),
+            Stands::Nowhere => Self::Nothing,
+        }
+    }
+
+    /// Its transpose.
+    #[inline(always)]
+    pub fn transposed(self) -> Self {
+        match self {
+            Self::Tile(tile) => Self::Transpose(tile),
+            Self::Transpose(tile) => Self::Tile(tile),
+            Self::Nothing => Self::Nothing,
+        }
+    }
+
+    /// Does something with it: it is not copied, which would cost as much as a solution with it.
+    #[inline(always)]
+    pub fn with(self, mut work: impl FnMut(&Tile<W>)) {
+        match self {
+            Self::Tile(tile) => work(tile),
+            Self::Transpose(tile) => work(&transposed(tile)),
+            Self::Nothing => work(&zero()),
+        }
+    }
+
+    /// part -= b x
+    #[inline(always)]
+    pub fn subtract_times(self, part: &mut Part<W>, x: &Part<W>)
+    where
+        Width<W>: Rows<W>,
+    {
+        match self {
+            Self::Tile(tile) => subtract_times(part, tile, x),
+            Self::Transpose(tile) => subtract_transposed(part, tile, x),
+            Self::Nothing => {}
+        }
+    }
+}
+
+/// Copies a tile row by row: a call for so few numbers costs more.
+#[inline(always)]
+pub fn copy<const W: usize>(to: &mut Tile<W>, from: &Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    each_row!(W, |r| to[r] = part::<W>(row::<W>(&from[r])));
+}
+
+/// target -= w^T y
+#[inline(always)]
+pub fn subtract_product<const W: usize>(target: &mut Tile<W>, w: &Tile<W>, y: &Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let y = rows::<W>(y);
+    each_row!(W, |r| {
+        let mut sum = row::<W>(&target[r]);
+        each_row!(W, |d| Width::<W>::subtract(&mut sum, w[d][r], &y[d]));
+        target[r] = part::<W>(sum);
+    });
+}
+
+/// True if w^T y is [`MODERATE`] beside the tile on the diagonal that it is taken from.
+#[inline(always)]
+pub fn is_moderate<const W: usize>(w: &Tile<W>, y: &Tile<W>, target: &Tile<W>) -> bool
+where
+    Width<W>: Rows<W>,
+{
+    let mut sums = row::<W>(&[0.0; W]);
+    each_row!(W, |d| Width::<W>::add_sizes(&mut sums, &row::<W>(&w[d]), &row::<W>(&y[d])));
+    let (sums, mut is_moderate) = (part::<W>(sums), true);
+    each_row!(W, |r| is_moderate &= sums[r] <= MODERATE * target[r][r].abs());
+    is_moderate
+}
+
+/// Adds to a tile on the diagonal; whether that is [`MODERATE`].
+pub fn add_moderate<const W: usize>(sum: &mut Tile<W>, other: &Tile<W>) -> bool {
+    let is_moderate = (0..W).all(|r| other[r][r].abs() <= MODERATE * sum[r][r].abs());
+    sum.as_flattened_mut().iter_mut().zip(other.as_flattened()).for_each(|(sum, other)| *sum += other);
+    is_moderate
+}
+
+/// The same as [`subtract_product`] for a product that is symmetric, of which one half is kept.
+#[inline(always)]
+pub fn subtract_symmetric_product<const W: usize>(target: &mut Upper<W>, w: &Tile<W>, y: &Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let y = rows::<W>(y);
+    let mut sums = upper_rows::<W>(target);
+    each_row!(W, |r| each_row!(W, |d| Width::<W>::subtract(&mut sums[r], w[d][r], &y[d])));
+    each_row_backwards!(W, |r| Width::<W>::set_upper_row(target, r, sums[r]));
+}
+
+/// The rows of an upper half, with anything left of the diagonal.
+#[inline(always)]
+fn upper_rows<const W: usize>(upper: &Upper<W>) -> [<Width<W> as Rows<W>>::Row; W]
+where
+    Width<W>: Rows<W>,
+{
+    let mut out = [Width::<W>::upper_row(upper, 0); W];
+    each_row!(W, |r| out[r] = Width::<W>::upper_row(upper, r));
+    out
+}
+
+/// A tile with these rows; left of the diagonal there is anything.
+#[inline(always)]
+pub fn spread<const W: usize>(upper: &Upper<W>, out: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    store::<W>(&upper_rows::<W>(upper), out);
+}
+
+/// part -= w^T x
+#[inline(always)]
+fn subtract_transposed<const W: usize>(part: &mut Part<W>, w: &Tile<W>, x: &Part<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut sum = row::<W>(part);
+    each_row!(W, |r| Width::<W>::subtract(&mut sum, x[r], &row::<W>(&w[r])));
+    *part = self::part::<W>(sum);
+}
+
+/// part -= y x
+#[inline(always)]
+fn subtract_times<const W: usize>(part: &mut Part<W>, y: &Tile<W>, x: &Part<W>)
+where
+    Width<W>: Rows<W>,
+{
+    each_row!(W, |r| part[r] -= Width::<W>::dot(&y[r], x));
+}
+
+/// L D L^T of a symmetric tile, whose upper triangle is read: L^T takes the place above the
+/// diagonal, 1/D that of the diagonal. The number of negative pivots; `None` where one is zero or
+/// no number.
+#[inline(always)]
+pub fn factorise_symmetric<const W: usize>(tile: &mut Tile<W>) -> Option<usize>
+where
+    Width<W>: Rows<W>,
+{
+    let (mut negative, mut poison) = (0, 0.0);
+    each_row!(W, |r| {
+        let inverse = 1.0 / tile[r][r];
+        poison += poison_of(tile[r][r], inverse);
+        let (pivot, lanes) = (tile[r], row::<W>(&tile[r]));
+        each_row!(W, |k| if k > r {
+            let mut below = row::<W>(&tile[k]);
+            Width::<W>::subtract(&mut below, pivot[k] * inverse, &lanes);
+            tile[k] = part::<W>(below);
+        });
+        tile[r] = part::<W>(Width::<W>::scaled(lanes, inverse));
+        tile[r][r] = inverse;
+        negative += usize::from(inverse < 0.0);
+    });
+    (poison == 0.0).then_some(negative)
+}
+
+/// Zero; NaN where a pivot or its inverse is infinite or no number. One look at a sum of these
+/// costs less than one at each.
+#[inline(always)]
+fn poison_of(pivot: f64, inverse: f64) -> f64 {
+    (pivot + inverse) * 0.0
+}
+
+/// y = L^-1 b, for all columns at once.
+#[inline(always)]
+pub fn forward_symmetric<const W: usize>(factor: &Tile<W>, b: &Tile<W>, y: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut lanes = rows::<W>(b);
+    each_row!(W, |r| {
+        let pivot = lanes[r];
+        each_row!(W, |k| if k > r {
+            Width::<W>::subtract(&mut lanes[k], factor[r][k], &pivot);
+        });
+    });
+    store::<W>(&lanes, y);
+}
+
+/// w = D^-1 y
+#[inline(always)]
+pub fn over_pivots<const W: usize>(factor: &Tile<W>, y: &Tile<W>, w: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    each_row!(W, |r| w[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r])));
+}
+
+/// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds
+/// inverses. Rows stay where they are if their pivots are large enough for what is below them; else
+/// those with the largest pivots come first. Tells, too, whether no digits are lost. `None` where a
+/// pivot is zero or no number.
+#[inline(always)]
+pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<(RowOrder<W>, bool)>
+where
+    Width<W>: Rows<W>,
+{
+    let mut in_order = *tile;
+    if factorise_in_order(&mut in_order) {
+        *tile = in_order;
+        return Some((std::array::from_fn(|r| r as u8), true));
+    }
+    let before = *tile;
+    let order = factorise_by_largest(tile)?;
+    Some((order, has_grown_moderately(tile, &order, &before)))
+}
+
+/// The same with rows where they are; `false` where a pivot takes too much ([`GROWTH`]), is zero or
+/// no number.
+#[inline(always)]
+fn factorise_in_order<const W: usize>(tile: &mut Tile<W>) -> bool
+where
+    Width<W>: Rows<W>,
+{
+    let (mut poison, mut fits) = (0.0, true);
+    each_row!(W, |r| {
+        let inverse = 1.0 / tile[r][r];
+        poison += poison_of(tile[r][r], inverse);
+        each_row!(W, |k| if k > r {
+            fits &= (tile[k][r] * tile[k][r] * inverse).abs() <= GROWTH * tile[k][k].abs();
+        });
+        take_pivot(tile, r, inverse);
+    });
+    fits && poison == 0.0
+}
+
+/// The same with the row that has the largest entry of its column as the next one.
+#[inline(never)]
+fn factorise_by_largest<const W: usize>(tile: &mut Tile<W>) -> Option<RowOrder<W>>
+where
+    Width<W>: Rows<W>,
+{
+    let mut order = std::array::from_fn(|r| r as u8);
+    for r in 0..W {
+        let mut pivot = r;
+        for k in r + 1..W {
+            if tile[k][r].abs() > tile[pivot][r].abs() {
+                pivot = k;
+            }
+        }
+        tile.swap(r, pivot);
+        order.swap(r, pivot);
+        let inverse = 1.0 / tile[r][r];
+        if poison_of(tile[r][r], inverse) != 0.0 {
+            return None;
+        }
+        take_pivot(tile, r, inverse);
+    }
+    Some(order)
+}
+
+/// True if |L| |U| is moderate beside the tile that was factorised with its rows in this order.
+#[inline(never)]
+fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, before: &Tile<W>) -> bool {
+    let lower = |i: usize, k: usize| if k < i { factor[i][k].abs() } else { 1.0 };
+    let upper = |k: usize, j: usize| if k < j { factor[k][j].abs() } else { 1.0 / factor[k][k].abs() };
+    (0..W).all(|i| {
+        (0..W).all(|j| {
+            let (row, sum) = (order[i] as usize, (0..=i.min(j)).map(|k| lower(i, k) * upper(k, j)).sum::<f64>());
+            sum * sum <= MODERATE * MODERATE * (before[row][row] * before[j][j]).abs()
+        })
+    })
+}
+
+/// True if the determinant of a tile that was factorised with its rows in this order is negative:
+/// negative pivots and exchanges of rows are odd in sum.
+#[inline(always)]
+pub fn has_negative_determinant<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>) -> bool {
+    let mut is_negative = false;
+    for r in 0..W {
+        is_negative ^= factor[r][r] < 0.0;
+        for k in 0..r {
+            is_negative ^= order[k] > order[r];
+        }
+    }
+    is_negative
+}
+
+/// Takes row r, whose pivot has this inverse, from those below.
+#[inline(always)]
+fn take_pivot<const W: usize>(tile: &mut Tile<W>, r: usize, inverse: f64)
+where
+    Width<W>: Rows<W>,
+{
+    // What stands left of the diagonal belongs to L.
+    let mut right = tile[r];
+    each_row!(W, |k| if k <= r {
+        right[k] = 0.0;
+    });
+    let right = row::<W>(&right);
+    each_row!(W, |k| if k > r {
+        let factor = tile[k][r] * inverse;
+        let mut below = row::<W>(&tile[k]);
+        Width::<W>::subtract(&mut below, factor, &right);
+        tile[k] = part::<W>(below);
+        tile[k][r] = factor;
+    });
+    tile[r][r] = inverse;
+}
+
+/// y = L^-1 P b, for all columns at once.
+#[inline(always)]
+pub fn forward<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b: &Tile<W>, y: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut lanes = [row::<W>(&b[order[0] as usize]); W];
+    each_row!(W, |r| lanes[r] = row::<W>(&b[order[r] as usize]));
+    each_row!(W, |r| {
+        let pivot = lanes[r];
+        each_row!(W, |k| if k > r {
+            Width::<W>::subtract(&mut lanes[k], factor[k][r], &pivot);
+        });
+    });
+    store::<W>(&lanes, y);
+}
+
+/// w = U^-T b, for all columns at once.
+#[inline(always)]
+pub fn forward_upper<const W: usize>(factor: &Tile<W>, b: &Tile<W>, w: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut lanes = rows::<W>(b);
+    each_row!(W, |r| {
+        lanes[r] = Width::<W>::scaled(lanes[r], factor[r][r]);
+        let pivot = lanes[r];
+        each_row!(W, |k| if k > r {
+            Width::<W>::subtract(&mut lanes[k], factor[r][k], &pivot);
+        });
+    });
+    store::<W>(&lanes, w);
+}
+
+/// Of a [`factorise_symmetric`]d tile what [`solve_symmetric`] takes: L^-T (its diagonal is one)
+/// above the diagonal, D^-1 on it.
+#[inline(always)]
+pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Upper<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut below = [row::<W>(&[0.0; W]); W];
+    let out = out.as_mut();
+    each_row!(W, |r| {
+        below[r] = unit::<W>(r);
+        each_row!(W, |k| if k < r {
+            let line = below[k];
+            Width::<W>::subtract(&mut below[r], factor[k][r], &line);
+        });
+        let column = part::<W>(below[r]);
+        each_row!(W, |k| if k < r {
+            out[upper_entry(W, k, r)] = column[k];
+        });
+        out[upper_entry(W, r, r)] = factor[r][r];
+    });
+}
+
+/// Of a [`factorise`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal,
+/// U^-1 from there on.
+#[inline(always)]
+pub fn invert<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
+where
+    Width<W>: Rows<W>,
+{
+    let mut lines = [row::<W>(&[0.0; W]); W];
+    each_row_backwards!(W, |r| {
+        lines[r] = unit::<W>(r);
+        each_row!(W, |k| if k > r {
+            let line = lines[k];
+            Width::<W>::subtract(&mut lines[r], factor[r][k], &line);
+        });
+        lines[r] = Width::<W>::scaled(lines[r], factor[r][r]);
+    });
+    store::<W>(&lines, out);
+    each_row!(W, |r| {
+        lines[r] = unit::<W>(r);
+        each_row!(W, |k| if k < r {
+            let line = lines[k];
+            Width::<W>::subtract(&mut lines[r], factor[r][k], &line);
+        });
+        let below = part::<W>(lines[r]);
+        each_row!(W, |k| if k < r {
+            out[r][k] = below[k];
+        });
+    });
+}
+
+/// A row of the unit matrix.
+#[inline(always)]
+fn unit<const W: usize>(r: usize) -> <Width<W> as Rows<W>>::Row
+where
+    Width<W>: Rows<W>,
+{
+    let mut out = [0.0; W];
+    out[r] = 1.0;
+    row::<W>(&out)
+}
+
+/// Solves with what a factorisation has left of a tile, its triangles inverted: two products take a
+/// half of the time of two substitutions, each of whose numbers waits for the one before.
+#[inline(always)]
+pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
+    let (mut y, mut z) = ([0.0; W], [0.0; W]);
+    each_row!(W, |r| {
+        let mut sums = [x[r], 0.0];
+        each_row!(W, |k| if k < r {
+            sums[k % 2] += inverses[r][k] * x[k];
+        });
+        y[r] = sums[0] + sums[1];
+    });
+    each_row!(W, |r| {
+        let mut sums = [0.0; 2];
+        each_row!(W, |k| if k >= r {
+            sums[k % 2] += inverses[r][k] * y[k];
+        });
+        z[r] = sums[0] + sums[1];
+    });
+    z
+}
+
+/// The same for a symmetric tile.
+#[inline(always)]
+pub fn solve_symmetric<const W: usize>(inverses: &Upper<W>, x: &Part<W>) -> Part<W>
+where
+    Width<W>: Rows<W>,
+{
+    let inverses = inverses.as_ref();
+    let (mut y, mut z) = ([0.0; W], [0.0; W]);
+    each_row!(W, |r| {
+        let mut sums = [x[r], 0.0];
+        each_row!(W, |k| if k < r {
+            sums[k % 2] += inverses[upper_entry(W, k, r)] * x[k];
+        });
+        y[r] = (sums[0] + sums[1]) * inverses[upper_entry(W, r, r)];
+    });
+    each_row!(W, |r| {
+        let mut sums = [0.0; 2];
+        sums[r % 2] = y[r];
+        each_row!(W, |k| if k > r {
+            sums[k % 2] += inverses[upper_entry(W, r, k)] * y[k];
+        });
+        z[r] = sums[0] + sums[1];
+    });
+    z
+}
+
+/// A part in another order.
+#[inline(always)]
+pub fn reordered<const W: usize>(order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
+    let mut out = [0.0; W];
+    each_row!(W, |r| out[r] = x[order[r] as usize]);
+    out
+}

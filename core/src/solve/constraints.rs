@@ -1,0 +1,163 @@
+//! Tangents with Lagrange multipliers, made ready for a factorisation without pivoting.
+//!
+//! With the rows B and columns C of the multipliers (C = B^T where the tangent is symmetric) and
+//! weights W,
+//!
+//! ```text
+//! | K  C | |u|   |f|                  | K + C W B  C | |u|   |f + C W g|
+//! | B  0 | |l| = |g|   is the same as |     B      0 | |l| = |    g    |
+//! ```
+//!
+//! C W B stands in for the stiffness that a part has only through its joints: its pivots are then
+//! those of a part that is held, and each multiplier, which is eliminated behind what it ties, has
+//! a negative one. The inertia on the space that the constraints leave is that of the tangent for
+//! any W (congruence with [I, C W/2; 0, I]), and so is the solution.
+
+use crate::system::{DofMap, Matrix, Pattern, Slot, System};
+use std::collections::BTreeMap;
+
+/// A multiplier gets so many times the stiffness beside it: what it ties is then held even where it
+/// has lost its own stiffness.
+const FACTOR: f64 = 8.0;
+
+/// The multipliers of a pattern, and the values of the last tangent that was made ready.
+pub struct Constraints {
+    rows: Vec<Multiplier>,
+    additions: Vec<Addition>,
+    /// NodeBlocks of multipliers
+    node_blocks: Vec<u32>,
+    /// Of each row
+    weights: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// The row of a multiplier.
+struct Multiplier {
+    equation: u32,
+    ties: Vec<Tie>,
+}
+
+/// An equation that a multiplier enters: where the entries of C, of B and of the diagonal stand.
+struct Tie {
+    equation: u32,
+    of_column: usize,
+    of_row: usize,
+    diagonal: usize,
+}
+
+/// An entry of C W B: the place that it is added to, the number of the multiplier, and where its
+/// two factors stand.
+struct Addition {
+    place: usize,
+    row: usize,
+    of_column: usize,
+    of_row: usize,
+}
+
+impl Constraints {
+    /// Of these multipliers; `None` where there are none.
+    pub fn new(pattern: &Pattern, multipliers: &[Slot]) -> Option<Self> {
+        let dof_map = multipliers.iter().flat_map(|&slot| pattern.dof_map.of(slot));
+        let dof_map: Vec<u32> = dof_map.filter(|&equation| equation != DofMap::HELD).collect();
+        if dof_map.is_empty() {
+            return None;
+        }
+        let mut is_multiplier = vec![false; pattern.dof_map.count()];
+        dof_map.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
+        let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
+        let mut place = |row: u32, column: u32| {
+            let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
+            columns.entry(column).or_insert_with(entries).get(&row).copied()
+        };
+        let (mut rows, mut additions) = (Vec::new(), Vec::new());
+        for (number, &equation) in dof_map.iter().enumerate() {
+            let met: Vec<u32> = pattern.entries(equation).map(|entry| entry.row).collect();
+            let others = met.into_iter().filter(|&other| !is_multiplier[other as usize]);
+            let tie = |other: u32| {
+                let (of_column, of_row) = (place(other, equation)?, place(equation, other)?);
+                Some(Tie { equation: other, of_column, of_row, diagonal: place(other, other)? })
+            };
+            let ties: Vec<Tie> = others.filter_map(tie).collect();
+            for (k, a) in ties.iter().enumerate() {
+                for b in &ties[k..] {
+                    let pair = [place(a.equation, b.equation), place(b.equation, a.equation)];
+                    let [Some(above), Some(below)] = pair else { continue };
+                    let add = |place, of_column, of_row| Addition { place, row: number, of_column, of_row };
+                    additions.push(add(above, a.of_column, b.of_row));
+                    // Where one half is kept both entries stand at one place.
+                    if below != above {
+                        additions.push(add(below, b.of_column, a.of_row));
+                    }
+                }
+            }
+            rows.push(Multiplier { equation, ties });
+        }
+        let mut node_blocks: Vec<u32> = multipliers.iter().map(|&slot| pattern.node_blocks.of(slot).0 as u32).collect();
+        node_blocks.sort_unstable();
+        node_blocks.dedup();
+        let weights = vec![0.0; rows.len()];
+        Some(Self { rows, additions, node_blocks, weights, values: Vec::new() })
+    }
+
+    /// The groups of multipliers.
+    pub fn node_blocks(&self) -> &[u32] {
+        &self.node_blocks
+    }
+
+    /// The equations of multipliers.
+    pub fn dof_map(&self) -> impl Iterator<Item = usize> {
+        self.rows.iter().map(|row| row.equation as usize)
+    }
+
+    /// The number of multipliers.
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Makes a tangent ready.
+    pub fn take(&mut self, system: &System) {
+        let Self { rows, additions, weights, values, .. } = self;
+        values.clear();
+        values.extend_from_slice(&system.values);
+        let largest = rows.iter().flat_map(|row| &row.ties).map(|tie| values[tie.diagonal].abs()).fold(0.0, f64::max);
+        weights.iter_mut().zip(&*rows).for_each(|(weight, row)| *weight = row.weight(values, largest));
+        for addition in additions {
+            let product = system.values[addition.of_column] * system.values[addition.of_row];
+            values[addition.place] += weights[addition.row] * product;
+        }
+    }
+
+    /// What was made ready last, on the pattern of its tangent.
+    pub fn matrix<'a>(&'a self, pattern: &'a Pattern) -> Matrix<'a> {
+        Matrix::new(pattern, &self.values)
+    }
+
+    /// The right-hand side that belongs to it: f + C W g.
+    pub fn change(&self, right_hand_side: &mut [f64]) {
+        for (row, weight) in self.rows.iter().zip(&self.weights) {
+            let gap = weight * right_hand_side[row.equation as usize];
+            if gap != 0.0 {
+                row.ties
+                    .iter()
+                    .for_each(|tie| right_hand_side[tie.equation as usize] += self.values[tie.of_column] * gap);
+            }
+        }
+    }
+}
+
+impl Multiplier {
+    /// From the stiffness beside a multiplier in its own unit, so that it does not depend on any:
+    /// FACTOR/w = sum B_k C_k/|K_kk|. Where nothing has stiffness that of others, `largest`, must
+    /// do.
+    fn weight(&self, values: &[f64], largest: f64) -> f64 {
+        let square = |tie: &Tie| (values[tie.of_column] * values[tie.of_row]).abs();
+        let stiff = self.ties.iter().filter(|tie| values[tie.diagonal] != 0.0);
+        let softness: f64 = stiff.map(|tie| square(tie) / values[tie.diagonal].abs()).sum();
+        let squares: f64 = self.ties.iter().map(square).sum();
+        match (softness > 0.0, squares > 0.0) {
+            (true, _) => FACTOR / softness,
+            (false, true) => largest / squares,
+            (false, false) => 0.0,
+        }
+    }
+}

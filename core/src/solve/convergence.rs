@@ -1,0 +1,224 @@
+//! The stop test of Newton's iteration, in terms that do not depend on units.
+
+use crate::effect::RoundOff;
+use crate::model::{Model, SlotKind};
+use crate::system::{DofMap, Plane, Region, Slot, System};
+use crate::tensor::Vec3;
+use crate::threads;
+
+/// The bounds of the test.
+///
+/// A state has converged when every translational residual is below `tolerance` F and every
+/// rotational one below `tolerance` F l, or at its round-off floor; F is the largest nodal force,
+/// or moment over l, among internal, external, inertia and support forces, and l the length of the
+/// scene. A last correction below 1e-12 in |du|/l and |dpsi| ends it too.
+#[derive(Clone, Copy, Debug)]
+pub struct Convergence {
+    /// Relative to the largest force
+    pub tolerance: f64,
+}
+
+/// Correction below which nothing more can be gained, relative to the length of the scene, and in
+/// radians.
+const SMALLEST_CORRECTION: f64 = 1e-12;
+
+/// Gaps of joints are closed more tightly than forces are balanced, relative to the scene's length
+/// and in radians.
+const GAP: f64 = 1e-2;
+
+/// Sums of a few products carry a few times the round-off of one.
+const NOISE_FACTOR: f64 = 4.0;
+
+/// The largest residual, as a multiple of what the test allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Its size over the allowed size
+    pub ratio: f64,
+    /// Its slot
+    pub slot: Slot,
+    /// The free part of the residual there: a force, or a moment conjugate to the rotation vector
+    pub value: Vec3,
+    /// The force F to which it is compared
+    pub force: f64,
+    /// True if some residual is allowed for its round-off alone.
+    pub noisy: bool,
+}
+
+/// The verdict of the stop test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// In balance
+    Converged,
+    /// The residual is not larger than what round-off may have made of it, but the last correction
+    /// was.
+    Noisy,
+    /// Not yet
+    Continue,
+    /// A force is not finite.
+    NotFinite,
+}
+
+impl Convergence {
+    /// Judges the forces of `system`, and the [`size`] of the last correction: `None` before the
+    /// first, infinite where charts have changed since.
+    pub fn judge(&self, model: &Model, system: &System, round_off: RoundOff, last: Option<f64>) -> (Verdict, Residual) {
+        let residual = self.residual(model, system, round_off);
+        if !(residual.ratio.is_finite() && residual.force.is_finite()) {
+            return (Verdict::NotFinite, residual);
+        }
+        let small = last.is_some_and(|size| size <= SMALLEST_CORRECTION);
+        let verdict = match residual.ratio {
+            _ if small => Verdict::Converged,
+            ratio if ratio > 1.0 => Verdict::Continue,
+            _ if residual.noisy => Verdict::Noisy,
+            _ => Verdict::Converged,
+        };
+        (verdict, residual)
+    }
+
+    fn residual(&self, model: &Model, system: &System, round_off: RoundOff) -> Residual {
+        let squares = Peaks::of(model, system, Vec3::squared);
+        let peaks = match squares.largest() {
+            // Neither has a square overflowed, nor has anything that counts been lost.
+            1e-280..=1e280 if squares.poison == 0.0 => squares.map(f64::sqrt),
+            _ => Peaks::of(model, system, Vec3::size),
+        };
+        let force = larger(peaks.force, peaks.moment / model.length);
+        let mut worst = Residual { ratio: 0.0, slot: 0, value: Vec3::ZERO, force, noisy: false };
+        if peaks.poison != 0.0 {
+            return Residual { ratio: f64::NAN, ..worst };
+        }
+        for (kind, peak) in SlotKind::ALL.into_iter().zip(peaks.residuals) {
+            let tolerated = match kind {
+                SlotKind::Force => GAP * self.tolerance * model.length,
+                SlotKind::Moment => GAP * self.tolerance,
+                SlotKind::Displacement => self.tolerance * force,
+                SlotKind::Rotation => self.tolerance * force * model.length,
+            };
+            let allowed = match kind {
+                SlotKind::Force | SlotKind::Moment => tolerated,
+                SlotKind::Displacement => tolerated.max(NOISE_FACTOR * round_off.force),
+                SlotKind::Rotation => tolerated.max(NOISE_FACTOR * round_off.moment),
+            };
+            worst.noisy |= peak.size > tolerated;
+            let ratio = if peak.size == 0.0 { 0.0 } else { peak.size / allowed };
+            if ratio > worst.ratio {
+                let value = free_part(&system.pattern.dof_map, peak.slot, system.total(peak.slot as usize));
+                worst = Residual { ratio, slot: peak.slot, value, ..worst };
+            }
+        }
+        worst
+    }
+}
+
+/// The largest of some vectors, and where it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Peak {
+    size: f64,
+    slot: Slot,
+}
+
+/// The largest forces and residuals.
+#[derive(Clone, Copy, Debug, Default)]
+struct Peaks {
+    /// The largest nodal force among all categories and what constraints hold, and the largest
+    /// moment
+    force: f64,
+    moment: f64,
+    /// By kind of slot
+    residuals: [Peak; 4],
+    /// Zero; NaN where a number is NaN or infinite, which the largest of numbers may leave out
+    poison: f64,
+}
+
+impl Peaks {
+    /// In this measure of vectors.
+    fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy + Send + Sync) -> Self {
+        let mut all: Option<Self> = None;
+        let of_region = |region| Self::among(region, model, system, measure);
+        let add = |own| all = Some(all.map_or(own, |all| all.or(own)));
+        threads::in_order(system.pattern.regions.iter(), of_region, add);
+        // There is at least one region.
+        all.unwrap_or_default()
+    }
+
+    /// The peaks in a region.
+    fn among(region: &Region, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
+        let slots = region.slots.clone();
+        let dof_map = &system.pattern.dof_map;
+        // Vectors in a tilted plane are rounded aside.
+        let tilted = dof_map.plane().is_some_and(Plane::is_tilted);
+        let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
+        for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
+            let (mut total, mut largest, mut sum) = (Vec3::ZERO, 0.0, 0.0);
+            for force in system.acting_in(region) {
+                let size = measure(force[slot]);
+                (total, largest, sum) = (total + force[slot], larger(size, largest), sum + size);
+            }
+            let whole = !tilted && dof_map.is_plain(slot as Slot);
+            let free = if whole { total } else { free_part(dof_map, slot as Slot, total) };
+            let held = if whole { 0.0 } else { measure(total - free) };
+            let free = measure(free);
+            poison += sum * 0.0;
+            let kind = kind as usize;
+            forces[kind] = larger(largest, larger(held, forces[kind]));
+            if free > residuals[kind].size {
+                residuals[kind] = Peak { size: free, slot: slot as Slot };
+            }
+        }
+        let [force, moment] = [SlotKind::Displacement, SlotKind::Rotation].map(|kind| forces[kind as usize]);
+        Self { force, moment, residuals, poison }
+    }
+
+    /// The larger ones of two, of equal ones the first.
+    fn or(self, other: Self) -> Self {
+        let mut residuals = self.residuals;
+        for (own, other) in residuals.iter_mut().zip(other.residuals) {
+            if other.size > own.size {
+                *own = other;
+            }
+        }
+        Self {
+            force: larger(other.force, self.force),
+            moment: larger(other.moment, self.moment),
+            residuals,
+            poison: self.poison + other.poison,
+        }
+    }
+
+    /// The largest of all.
+    fn largest(&self) -> f64 {
+        self.residuals.iter().fold(larger(self.force, self.moment), |largest, peak| larger(largest, peak.size))
+    }
+
+    fn map(self, change: impl Fn(f64) -> f64) -> Self {
+        let residuals = self.residuals.map(|peak| Peak { size: change(peak.size), ..peak });
+        Self { force: change(self.force), moment: change(self.moment), residuals, ..self }
+    }
+}
+
+/// The larger of two numbers, in one instruction, unlike `f64::max`: where one is NaN it is the
+/// second, and `poison` tells.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The part of a force in the free directions of its slot, global components.
+fn free_part(dof_map: &DofMap, slot: Slot, force: Vec3) -> Vec3 {
+    force - dof_map.held_part(slot, force)
+}
+
+/// The size of a correction, or of any other motion: its largest vector, displacements over the
+/// length of the scene. What is no number does not count.
+pub fn size(model: &Model, motion: &[Vec3]) -> f64 {
+    threads::largest(motion.len(), |slots| {
+        let mut squares = [0.0_f64; 4];
+        for (&kind, vector) in model.kinds[slots.clone()].iter().zip(&motion[slots]) {
+            let largest = &mut squares[kind as usize];
+            *largest = largest.max(vector.squared());
+        }
+        let [displacement, rotation] =
+            [SlotKind::Displacement, SlotKind::Rotation].map(|kind| squares[kind as usize].sqrt());
+        rotation.max(displacement / model.length)
+    })
+}

@@ -1,0 +1,250 @@
+//! Eigenvalues of largest magnitude of a linear operator, by projection onto a block Krylov space.
+//!
+//! Blocks find eigenvalues that occur several times, such as the bending modes of a round section.
+//! The basis is orthonormal in an inner product x . W y that makes the operator symmetric where
+//! there is one.
+
+use crate::scalar::{LANES, Lanes};
+use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
+use faer::{Mat, Side};
+use nalgebra::Complex;
+
+/// A linear operator on vectors.
+pub trait Operator {
+    /// The length of its vectors
+    fn size(&self) -> usize;
+    /// The image of a vector; `None` where it cannot be had.
+    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>>;
+    /// W x, of the inner product; W may be semidefinite.
+    fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
+    /// True if it is symmetric in that inner product
+    fn is_symmetric(&self) -> bool;
+}
+
+/// Eigenvalues of an operator, largest magnitude first, with their vectors.
+#[derive(Default)]
+pub struct Spectrum {
+    /// The eigenvalues
+    pub values: Vec<Complex<f64>>,
+    /// Each vector in the basis
+    coordinates: Vec<Vec<Complex<f64>>>,
+    space: Space,
+}
+
+/// Vectors that give a rough idea of the largest eigenvalue
+const ROUGH: usize = 12;
+/// Vectors a block
+const BLOCK: usize = 6;
+/// Relative change at which eigenvalues count as found
+const FOUND: f64 = 1e-11;
+/// Vectors that lose this part of themselves when the basis is taken out of them bring nothing new.
+const NOTHING_NEW: f64 = 1e-11;
+
+/// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer.
+/// `None` where an image cannot be had.
+pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
+    let most = operator.size().min(24 * wanted + 160);
+    eigenvalues_within(operator, wanted, most)
+}
+
+/// A rough idea of the eigenvalues of largest magnitude, from few images.
+pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
+    let most = operator.size().min(ROUGH);
+    eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
+}
+
+/// From a basis of at most so many vectors.
+fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
+    let size = operator.size();
+    if size == 0 {
+        return Some(Spectrum::default());
+    }
+    let mut space = Space::default();
+    let mut block: Vec<Vec<f64>> = Vec::new();
+    for k in 0..BLOCK.min(size) {
+        block.push(operator.apply(&start(size, k))?);
+    }
+    let mut last: Vec<Complex<f64>> = Vec::new();
+    // The projection is looked at when it has grown by a quarter.
+    let mut look = 0;
+    loop {
+        let first = space.basis.len();
+        block.drain(..).for_each(|vector| space.add(operator, vector, most));
+        if space.basis.len() == first {
+            return Some(space.into_spectrum(operator.is_symmetric(), wanted));
+        }
+        for k in first..space.basis.len() {
+            let image = operator.apply(&space.basis[k])?;
+            space.images.push(image.clone());
+            block.push(image);
+        }
+        space.project(first);
+        if space.basis.len() < look && space.basis.len() < most {
+            continue;
+        }
+        look = space.basis.len() + space.basis.len() / 4;
+        // A few more than wanted must stand still, lest the second of a pair is missed.
+        let guard = wanted + BLOCK;
+        let now = space.eigenvalues(operator.is_symmetric(), guard);
+        let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= FOUND * a.norm();
+        let still =
+            now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
+        if still || space.basis.len() >= most {
+            return Some(space.into_spectrum(operator.is_symmetric(), wanted));
+        }
+        last = now;
+    }
+}
+
+impl Spectrum {
+    /// Real and imaginary part of an eigenvector.
+    pub fn vector(&self, number: usize) -> [Vec<f64>; 2] {
+        self.combine(number, &self.space.basis)
+    }
+
+    /// The residual of an eigenvector, |A x - theta x| over |theta x|, in the norm of the inner
+    /// product.
+    pub fn residual(&self, operator: &mut dyn Operator, number: usize) -> f64 {
+        let (theta, [re, im]) = (self.values[number], self.vector(number));
+        let [mut left_re, mut left_im] = self.combine(number, &self.space.images);
+        for k in 0..re.len() {
+            left_re[k] -= theta.re * re[k] - theta.im * im[k];
+            left_im[k] -= theta.re * im[k] + theta.im * re[k];
+        }
+        let mut squared = |x: &[f64]| dot(x, &operator.weigh(x)).max(0.0);
+        let (left, all) = (squared(&left_re) + squared(&left_im), squared(&re) + squared(&im));
+        (left / all).sqrt() / theta.norm()
+    }
+
+    fn combine(&self, number: usize, vectors: &[Vec<f64>]) -> [Vec<f64>; 2] {
+        let length = vectors.first().map_or(0, Vec::len);
+        let mut out = [vec![0.0; length], vec![0.0; length]];
+        for (coordinate, vector) in self.coordinates[number].iter().zip(vectors) {
+            for (out, part) in out.iter_mut().zip([coordinate.re, coordinate.im]).filter(|(_, part)| *part != 0.0) {
+                out.iter_mut().zip(vector).for_each(|(out, v)| *out += part * v);
+            }
+        }
+        out
+    }
+}
+
+/// A vector without any pattern.
+fn start(size: usize, number: usize) -> Vec<f64> {
+    // splitmix64
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(number as u64 + 1);
+    let mut next = || {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    (0..size).map(|_| next()).collect()
+}
+
+#[derive(Default)]
+struct Space {
+    basis: Vec<Vec<f64>>,
+    /// W times the basis
+    weighed: Vec<Vec<f64>>,
+    /// The operator times the basis
+    images: Vec<Vec<f64>>,
+    /// By rows: basis . W images
+    projected: Vec<Vec<f64>>,
+}
+
+/// In lanes, whose sums do not wait for each other.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let sums = a.iter().zip(b).fold(Lanes([0.0; LANES]), |sums, (x, y)| sums + Lanes(*x) * Lanes(*y));
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    sums.0.iter().sum::<f64>() + rest
+}
+
+impl Space {
+    /// Adds the part of a vector that is new, normalised.
+    fn add(&mut self, operator: &mut dyn Operator, mut vector: Vec<f64>, most: usize) {
+        if self.basis.len() >= most {
+            return;
+        }
+        let size = |vector: &[f64], weighed: &[f64]| dot(vector, weighed).max(0.0).sqrt();
+        let mut weighed = operator.weigh(&vector);
+        let before = size(&vector, &weighed);
+        // Twice is enough (Kahan, Parlett).
+        for _ in 0..2 {
+            for (own, heavy) in self.basis.iter().zip(&self.weighed) {
+                let along = dot(heavy, &vector);
+                vector.iter_mut().zip(own).for_each(|(v, o)| *v -= along * o);
+            }
+        }
+        weighed = operator.weigh(&vector);
+        let length = size(&vector, &weighed);
+        if length.is_nan() || length <= NOTHING_NEW * before {
+            return;
+        }
+        vector.iter_mut().for_each(|v| *v /= length);
+        weighed.iter_mut().for_each(|v| *v /= length);
+        self.basis.push(vector);
+        self.weighed.push(weighed);
+    }
+
+    /// Adds the rows and columns of the projection that belong to new vectors.
+    fn project(&mut self, first: usize) {
+        for (i, heavy) in self.weighed.iter().enumerate() {
+            if i >= first {
+                self.projected.push(Vec::new());
+            }
+            let known = self.projected[i].len();
+            for image in &self.images[known..] {
+                self.projected[i].push(dot(heavy, image));
+            }
+        }
+    }
+
+    fn symmetric_part(&self) -> Mat<f64> {
+        let n = self.projected.len();
+        Mat::from_fn(n, n, |i, j| 0.5 * (self.projected[i][j] + self.projected[j][i]))
+    }
+
+    fn matrix(&self) -> Mat<f64> {
+        let n = self.projected.len();
+        Mat::from_fn(n, n, |i, j| self.projected[i][j])
+    }
+
+    fn eigenvalues(&self, is_symmetric: bool, wanted: usize) -> Vec<Complex<f64>> {
+        let mut values: Vec<Complex<f64>> = if is_symmetric {
+            let values = self.symmetric_part().self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
+            values.into_iter().map(|value| Complex::new(value, 0.0)).collect()
+        } else {
+            self.matrix().eigenvalues().unwrap_or_default()
+        };
+        values.sort_by(largest_first);
+        values.truncate(wanted);
+        values
+    }
+
+    fn into_spectrum(self, is_symmetric: bool, wanted: usize) -> Spectrum {
+        let n = self.projected.len();
+        let mut pairs: Vec<(Complex<f64>, Vec<Complex<f64>>)> = if is_symmetric {
+            match SelfAdjointEigen::new(self.symmetric_part().as_ref(), Side::Lower) {
+                Ok(eigen) => {
+                    let vector = |k: usize| eigen.U().col(k).iter().map(|&v| Complex::new(v, 0.0)).collect();
+                    (0..n).map(|k| (Complex::new(eigen.S()[k], 0.0), vector(k))).collect()
+                }
+                Err(_) => Vec::new(),
+            }
+        } else {
+            match Eigen::new_from_real(self.matrix().as_ref()) {
+                Ok(eigen) => (0..n).map(|k| (eigen.S()[k], eigen.U().col(k).iter().copied().collect())).collect(),
+                Err(_) => Vec::new(),
+            }
+        };
+        pairs.sort_by(|a, b| largest_first(&a.0, &b.0));
+        pairs.truncate(wanted);
+        let (values, coordinates) = pairs.into_iter().unzip();
+        Spectrum { values, coordinates, space: self }
+    }
+}
+
+fn largest_first(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {
+    b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im))
+}

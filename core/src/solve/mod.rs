@@ -1,0 +1,36 @@
+//! Newton's iteration: linear solver, stop test, and the failures it can end with.
+
+mod block;
+mod columns;
+mod constraints;
+mod convergence;
+mod general;
+mod krylov;
+mod linear;
+mod modes;
+mod newton;
+mod newton_failure;
+mod pivots;
+mod refinement;
+mod reuse;
+mod signature;
+mod soft_mode;
+mod softest;
+mod stress_predictor;
+mod tangent;
+mod work;
+
+pub use block::BlockSolver;
+pub use convergence::{Convergence, Residual, Verdict, size};
+pub use general::GeneralSolver;
+pub use krylov::{Operator, Spectrum, largest_eigenvalues};
+pub use linear::LinearSolver;
+pub use modes::{Matrices, ModeSearch, ModeShape, SmallMotion};
+pub use newton::Newton;
+pub use newton_failure::NewtonFailure;
+pub use pivots::is_symmetric;
+pub use signature::Signature;
+pub use soft_mode::{SoftMode, mechanism};
+pub use softest::NullVector;
+pub use tangent::Tangent;
+pub use work::{Work, timed};

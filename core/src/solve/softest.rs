@@ -1,0 +1,262 @@
+//! The softest motion of a tangent, by inverse iteration.
+
+use super::linear::LinearSolver;
+use super::tangent::Tangent;
+use crate::kernel::WIDTH;
+use crate::scalar::Instructions;
+use crate::system::{DofMap, System};
+use crate::tensor::Vec3;
+use crate::threads;
+use std::ops::Range;
+
+/// Unknowns that move without any force, as far as the tangent tells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NullVector {
+    /// One entry an equation, of sizes that compare; the largest tells what moves.
+    pub entries: Vec<f64>,
+    /// The unknowns themselves
+    pub motion: Vec<f64>,
+    /// True if the tangent has some stiffness against it after all
+    pub held: bool,
+    /// True if no factorisation of the tangent came to its end
+    pub broke_down: bool,
+}
+
+impl NullVector {
+    /// The decimal digits that round-off leaves of its stiffness in the tangent.
+    pub fn digits(&self, system: &System) -> f64 {
+        stiffness_of(system, &self.motion).max(1.0).log10()
+    }
+
+    /// The slot that moves most, told by entries that compare, and the motion of every slot.
+    pub fn by_slot(&self, dof_map: &DofMap, slots: usize) -> (usize, Vec<Vec3>) {
+        let field = |entries: &[f64]| {
+            let mut field = vec![Vec3::ZERO; slots];
+            dof_map.scatter(entries, None, &mut field);
+            field
+        };
+        let compared = field(&self.entries);
+        let larger = |best: usize, slot: usize| if compared[slot].norm() > compared[best].norm() { slot } else { best };
+        ((0..slots).fold(0, larger), field(&self.motion))
+    }
+}
+
+/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has
+/// no stiffness.
+const NO_STIFFNESS: f64 = 8.0;
+
+/// Decimal digits of the softest stiffness that factorisation in blocks must leave.
+const FEW_DIGITS: f64 = 4.0;
+
+/// Forces of multipliers that cancel to this part of themselves cancel.
+const SAID_TWICE: f64 = 1e-10;
+
+impl LinearSolver {
+    /// A direction in which the tangent has no stiffness.
+    pub fn null_vector(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
+        self.softest(tangent).filter(|vector| !vector.held)
+    }
+
+    /// The direction in which the tangent has the least stiffness, by inverse iteration; of a
+    /// tangent that stays with the last factorisation. Unknowns are scaled by their diagonal, so
+    /// that forces and moments compare.
+    pub fn softest(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
+        let system = tangent.look();
+        if system.pattern.dof_map.count() == 0 {
+            return None;
+        }
+        let diagonal = diagonal(system);
+        let empty = empty_column(system, &diagonal);
+        let scale = scales(system, diagonal);
+        let broke_down = !(if tangent.stays() { self.factored } else { self.factorise_new(tangent).0 });
+        if let Some(empty) = empty {
+            let mut entries = vec![0.0; tangent.system().pattern.dof_map.count()];
+            entries[empty] = 1.0;
+            return Some(NullVector { motion: entries.clone(), entries, held: false, broke_down });
+        }
+        let mut x = threads::list(scale.len(), |k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract());
+        let scaled = |x: &mut [f64], by: f64| {
+            threads::each_part(x, |start, x| x.iter_mut().zip(&scale[start..]).for_each(|(x, s)| *x *= s / by));
+        };
+        for _ in 0..3 {
+            scaled(&mut x, 1.0);
+            if !self.solve_once(tangent.system(), &mut x) {
+                return self.null_vector_of_shifted(tangent.look(), broke_down);
+            }
+            let largest = threads::largest(x.len(), |part| part.fold(0.0, |m: f64, k| m.max((x[k] * scale[k]).abs())));
+            scaled(&mut x, largest);
+        }
+        let mut motion = scale;
+        threads::each_part(&mut motion, |start, part| {
+            part.iter_mut().zip(&x[start..]).for_each(|(scale, x)| *scale = x / *scale)
+        });
+        let system = tangent.look();
+        let held = stiffness_of(system, &motion) > NO_STIFFNESS && !self.is_said_twice(system, &x, &motion);
+        Some(NullVector { entries: x, motion, held, broke_down: false })
+    }
+
+    /// After corrections that led nowhere: in general where few digits of the softest stiffness are
+    /// left, of which pivots save more; and in turns with blocks where that did not help either.
+    pub fn doubt(&mut self, tangent: &mut Tangent) {
+        if self.gives_way_to_blocks() {
+            return;
+        }
+        // The factorisation may be that of the iterate before; either may leave blocks itself.
+        let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
+        let is_doubtful = softest.is_some_and(|vector| vector.digits(tangent.look()) < FEW_DIGITS);
+        if is_doubtful && self.is_in_blocks() {
+            self.factored = self.leave_blocks(tangent.look());
+        }
+    }
+
+    /// True if what moves most, by entries that compare, are multipliers whose forces cancel:
+    /// conditions that hold what is held already. Their unknowns are round-off, of which the
+    /// stiffness tells nothing.
+    fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
+        let Some(constraints) = self.constraints() else { return false };
+        let mut multipliers = vec![0.0; motion.len()];
+        constraints.dof_map().for_each(|k| multipliers[k] = motion[k]);
+        let largest = |of_multipliers: bool| {
+            let kind = entries.iter().zip(&multipliers).filter(|(_, m)| (**m != 0.0) == of_multipliers);
+            kind.fold(0.0_f64, |largest, (entry, _)| largest.max(entry.abs()))
+        };
+        if largest(true) <= largest(false) {
+            return false;
+        }
+        let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+        let all: Vec<f64> = multipliers.iter().map(|v| v.abs()).collect();
+        let (left, all) = (system.multiply(&system.values, &multipliers), system.multiply(&sizes, &all));
+        left.iter().zip(&all).all(|(left, all)| left.abs() <= SAID_TWICE * all)
+    }
+
+    /// The direction of least stiffness where the factorisation broke down: the diagonal is raised
+    /// by a little first.
+    fn null_vector_of_shifted(&mut self, system: &System, broke_down: bool) -> Option<NullVector> {
+        let mut shifted = system.clone();
+        // Multipliers have no diagonal: they get a little compliance.
+        let shift = |value: f64| if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
+        system.pattern.each_diagonal(|_, place| shifted.values[place] = shift(shifted.values[place]));
+        if !self.factorise(&shifted) {
+            return None;
+        }
+        let mut x = vec![1.0; system.pattern.dof_map.count()];
+        for _ in 0..3 {
+            if !self.solve_once(&shifted, &mut x) {
+                return None;
+            }
+            let largest = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            x.iter_mut().for_each(|x| *x /= largest);
+        }
+        Some(NullVector { motion: x.clone(), entries: x, held: false, broke_down })
+    }
+}
+
+fn diagonal(system: &System) -> Vec<f64> {
+    let mut diagonal = vec![0.0; system.pattern.dof_map.count()];
+    system.pattern.each_region(&mut diagonal, |region, own| {
+        let (node_blocks, first) = (region.node_blocks.clone(), region.dof_map.start);
+        system.pattern.each_diagonal_of(node_blocks, |equation, place| own[equation - first] = system.values[place]);
+    });
+    diagonal
+}
+
+/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column
+/// comparable.
+fn scales(system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
+    threads::each_part(&mut diagonal, |_, part| part.iter_mut().for_each(|entry| *entry = entry.abs().sqrt()));
+    let roots = &diagonal;
+    let column = |c: usize| {
+        let compared = entries(system, c).map(|(row, value)| (value, roots[row]));
+        compared.filter(|&(_, root)| root > 0.0).fold(0.0_f64, |m, (value, root)| m.max(value.abs() / root))
+    };
+    let entry = |c: usize| entries(system, c).fold(0.0_f64, |m, (_, value)| m.max(value.abs()));
+    let scale = |c: usize| match column(c) {
+        compared if compared > 0.0 => compared,
+        // Unknowns and multipliers that only meet each other.
+        _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
+    };
+    let without: Vec<usize> = (0..roots.len()).filter(|&c| roots[c].is_nan() || roots[c] <= 0.0).collect();
+    let scales = threads::list(without.len(), |k| scale(without[k]));
+    without.into_iter().zip(scales).for_each(|(c, scale)| diagonal[c] = scale);
+    diagonal
+}
+
+/// Row and value of the entries of a column.
+fn entries(system: &System, column: usize) -> impl Iterator<Item = (usize, f64)> {
+    system.pattern.entries(column as u32).map(|entry| (entry.row as usize, system.values[entry.place]))
+}
+
+/// A column without any entry that is not zero.
+fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
+    let is_empty = |column: usize| entries(system, column).all(|(_, value)| value == 0.0);
+    threads::first(diagonal.len(), |mut part| part.find(|&column| diagonal[column] == 0.0 && is_empty(column)))
+}
+
+/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is
+/// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are not
+/// taken for mechanisms.
+fn stiffness_of(system: &System, x: &[f64]) -> f64 {
+    if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
+}
+
+/// The part of x.Jx that round-off in the entries of J may have taken.
+pub(super) fn lost_part(system: &System, x: &[f64]) -> f64 {
+    1.0 / stiffness_of(system, x).max(1.0)
+}
+
+fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
+    let (mut whole, mut squares) = (Compensated::default(), 0.0);
+    let add = |(sums, part): ([Compensated; W], [f64; W])| {
+        sums.iter().flat_map(|sum| [sum.sum, sum.lost]).for_each(|term| whole.add(term));
+        squares += part.iter().sum::<f64>();
+    };
+    let parts = threads::parts(system.pattern.node_blocks.count());
+    threads::in_order(parts, |columns| stiffness_of_columns(system, x, columns), add);
+    if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
+}
+
+/// The sums over some columns of tiles, of the terms and of their squares. A sum for each row of a
+/// tile: they do not wait for each other.
+fn stiffness_of_columns<const W: usize>(
+    system: &System,
+    x: &[f64],
+    columns: Range<usize>,
+) -> ([Compensated; W], [f64; W]) {
+    let (mut sums, mut squares) = ([Compensated::default(); W], [0.0; W]);
+    let pattern = &system.pattern;
+    Instructions::here().run(
+        #[inline(always)]
+        || {
+            system.each_tile::<W>(columns, |row, column, tile| {
+                // What is not kept counts as much.
+                let times = if pattern.symmetry.halves() && row != column { 2.0 } else { 1.0 };
+                let (of_row, of_column) = (pattern.part::<W>(row, x), pattern.part::<W>(column, x));
+                for (line, x) in tile.iter().zip(of_column) {
+                    for r in 0..W {
+                        let term = of_row[r] * line[r] * x;
+                        sums[r].add(times * term);
+                        squares[r] += times * term * term;
+                    }
+                }
+            });
+        },
+    );
+    (sums, squares)
+}
+
+/// A sum with what its roundings have lost (Knuth's two-sum, which needs no branch).
+#[derive(Clone, Copy, Default)]
+struct Compensated {
+    sum: f64,
+    lost: f64,
+}
+
+impl Compensated {
+    #[inline(always)]
+    fn add(&mut self, term: f64) {
+        let next = self.sum + term;
+        let came = next - self.sum;
+        self.lost += (self.sum - (next - came)) + (term - came);
+        self.sum = next;
+    }
+}

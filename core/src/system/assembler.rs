@@ -1,0 +1,468 @@
+//! Where effects add their forces and tangents: to the whole system, or to the part of it that belongs to a region.
+
+use super::category::Category;
+use super::dof_map::DofMap;
+use super::node_blocks::NodeBlocks;
+use super::pattern::{Pattern, ScatterMap, TILE, WIDTH};
+use super::plane::Plane;
+use super::state::Slot;
+use super::values::{BlockMut, Values};
+use crate::kernel::{ElementSystem, PlanarSystem};
+use crate::scalar::{LANES, Lanes, each_lane};
+use crate::tensor::{Mat3, Vec3};
+use std::ops::Range;
+
+/// A stretch of the system: that of a region, to which others add nothing meanwhile, or all of it.
+pub struct Part<'a> {
+    pub(super) pattern: &'a Pattern,
+    /// The categories that something may add to there
+    pub(super) acting: &'a [usize],
+    /// `None` for all of it
+    pub(super) region: Option<usize>,
+    /// Of its slots, by category
+    pub(super) force: [&'a mut [Vec3]; 4],
+    /// Of its tiles
+    pub(super) values: Values<'a>,
+    /// Of all slots, where increments are prescribed
+    pub(super) prescribed_increment: Option<&'a [Vec3]>,
+    /// Of its equations
+    pub(super) lifted: &'a mut [f64],
+    pub(super) room: &'a mut Vec<ElementSystem<Lanes>>,
+}
+
+impl<'a> Part<'a> {
+    /// Sets forces to zero, and the tangent where it is to be formed.
+    pub fn clear(&mut self, with_tangent: bool) {
+        self.acting.iter().for_each(|&category| self.force[category].fill(Vec3::ZERO));
+        if with_tangent {
+            self.values.clear();
+        }
+    }
+
+    /// The instances of an effect that lie in the region; of the whole those that lie in none.
+    pub fn instances(&self, effect: usize) -> &'a [Range<usize>] {
+        self.pattern.places[effect].shares.of(self.region)
+    }
+
+    /// The sink of these instances of effect number `effect`.
+    pub fn sink(
+        &mut self,
+        effect: usize,
+        category: Category,
+        with_tangent: bool,
+        instances: Range<usize>,
+    ) -> Assembler<'_> {
+        let Part { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
+        let force = force.each_mut().map(|force| &mut force[..]);
+        let values = values.reborrow();
+        let part = Part {
+            pattern,
+            acting,
+            region: *region,
+            force,
+            values,
+            prescribed_increment: *prescribed_increment,
+            lifted,
+            room,
+        };
+        part.into_sink(effect, category, with_tangent, instances)
+    }
+
+    /// The same, with what it borrows.
+    pub(super) fn into_sink(
+        self,
+        effect: usize,
+        category: Category,
+        with_tangent: bool,
+        instances: Range<usize>,
+    ) -> Assembler<'a> {
+        let Part { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
+        debug_assert!(acting.contains(&(category as usize)), "forces of a category that nothing clears");
+        let start = region.map(|region| &pattern.regions[region]);
+        let [internal, inertia, external, damping] = force;
+        let (force, damping) = match category {
+            Category::Internal => (internal, Some(damping)),
+            Category::Inertia => (inertia, Some(damping)),
+            Category::External => (external, Some(damping)),
+            Category::Damping => (damping, None),
+        };
+        Assembler {
+            places: &pattern.places[effect],
+            pattern,
+            instances,
+            first_slot: start.map_or(0, |region| region.slots.start),
+            first_equation: start.map_or(0, |region| region.dof_map.start),
+            force,
+            damping,
+            values,
+            prescribed_increment,
+            lifted,
+            room,
+            with_tangent,
+            may_damp: acting.contains(&(Category::Damping as usize)),
+        }
+    }
+}
+
+/// Adds one lane of a tile to its place: four numbers at once where they are next to each other.
+#[inline(always)]
+fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
+    match &mut place {
+        BlockMut::Whole(values) => {
+            for (sums, lanes) in values[..TILE].as_chunks_mut::<LANES>().0.iter_mut().zip(tile.as_chunks::<LANES>().0) {
+                *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
+            }
+        }
+        _ => place.add_tile::<WIDTH>(|entry| tile[entry].0[lane]),
+    }
+}
+
+/// Row and column that the block of two slots of an instance begins with in its tile.
+#[inline(always)]
+fn corner(node_blocks: &NodeBlocks, slots: &[Slot], pair: [usize; 2]) -> [usize; 2] {
+    pair.map(|number| node_blocks.row(slots[number]).1)
+}
+
+/// Through this an effect adds the force and tangent of its instances.
+pub struct Assembler<'a> {
+    places: &'a ScatterMap,
+    pattern: &'a Pattern,
+    instances: Range<usize>,
+    /// What stretches begin with
+    first_slot: usize,
+    first_equation: usize,
+    /// Forces of its own category
+    force: &'a mut [Vec3],
+    /// And those that damp, where these are not the same
+    damping: Option<&'a mut [Vec3]>,
+    values: Values<'a>,
+    prescribed_increment: Option<&'a [Vec3]>,
+    lifted: &'a mut [f64],
+    room: &'a mut Vec<ElementSystem<Lanes>>,
+    with_tangent: bool,
+    /// Whether damping forces are cleared
+    may_damp: bool,
+}
+
+impl Assembler<'_> {
+    /// The instances that it takes: all of them, unless the effect is [divisible](super::Connectivity::divisible).
+    pub fn instances(&self) -> Range<usize> {
+        self.instances.clone()
+    }
+
+    /// A system to compute with, of so many blocks, whose forces are those of who had it last; its tangent, where there is one, is zero, unless it is going to be formed anew.
+    pub fn lend(&mut self, blocks: usize, forms_tangent: bool) -> ElementSystem<Lanes> {
+        let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
+            return ElementSystem::new(blocks);
+        };
+        let mut system = self.room.swap_remove(fits);
+        if self.with_tangent && !forms_tangent {
+            system.clear();
+        }
+        system
+    }
+
+    /// Takes it back for the next evaluation.
+    pub fn take_back(&mut self, system: ElementSystem<Lanes>) {
+        self.room.push(system);
+    }
+
+    /// Adds instance `k`; the blocks of `element` are in the order of the slots of its clique.
+    #[inline]
+    pub fn add(&mut self, k: usize, element: &ElementSystem) {
+        let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        for (force, &slot) in element.forces().iter().zip(self.places.connectivity.get(k)) {
+            forces[slot as usize - first_slot] += Vec3(*force);
+        }
+        match () {
+            () if !self.with_tangent => {}
+            () if self.is_constrained(k) => self.add_constrained(k, element.tiles(), |value| *value),
+            () => self.add_tangent(k, element),
+        }
+    }
+
+    /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
+    /// beside whom. An instance that `is_apart` is left to `alone`.
+    #[inline(always)]
+    pub fn add_lanes(
+        &mut self,
+        first: usize,
+        count: usize,
+        elements: &ElementSystem<Lanes>,
+        is_apart: impl Fn(usize) -> bool,
+        mut alone: impl FnMut(usize, &mut Self),
+    ) {
+        if !(0..count).any(|lane| is_apart(lane) || self.is_constrained(first + lane)) {
+            return self.add_free(first, 0..count, elements);
+        }
+        for lane in 0..count {
+            if is_apart(lane) {
+                alone(lane, self);
+            } else if self.is_constrained(first + lane) {
+                self.add_forces(first + lane, elements, lane);
+                self.add_constrained(first + lane, elements.tiles(), |lanes| lanes.0[lane]);
+            } else {
+                self.add_free(first, lane..lane + 1, elements);
+            }
+        }
+    }
+
+    /// Whether the tangent of an instance has entries to leave out, or to turn. In a plane all have.
+    #[inline(always)]
+    fn is_constrained(&self, k: usize) -> bool {
+        self.with_tangent && (self.places.special[k] || self.pattern.dof_map.plane().is_some())
+    }
+
+    #[inline(always)]
+    fn add_forces(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
+        let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        for (force, &slot) in elements.forces().iter().zip(self.places.connectivity.get(k)) {
+            forces[slot as usize - first_slot] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
+        }
+    }
+
+    /// The same where none is constrained.
+    #[inline(always)]
+    fn add_free(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
+        for lane in lanes.clone() {
+            self.add_forces(first + lane, elements, lane);
+        }
+        match () {
+            () if !self.with_tangent => {}
+            () if self.places.whole => self.add_whole(first, lanes, elements),
+            () => {
+                for lane in lanes {
+                    self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
+                }
+            }
+        }
+    }
+
+    /// Adds the tangents of elements of whole nodes, one element after the other.
+    #[inline(always)]
+    fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
+        for lane in lanes {
+            for (tile, &place) in elements.tiles().iter().zip(self.places.of(first + lane)) {
+                add_lane(self.values.tile(place), tile, lane);
+            }
+        }
+    }
+
+    /// Adds instances that lie in the plane, as [`Assembler::add_lanes`] does those in space; each couples whole nodes.
+    #[inline(always)]
+    pub fn add_planar<const N: usize>(
+        &mut self,
+        plane: &Plane,
+        first: usize,
+        count: usize,
+        elements: &PlanarSystem<N, Lanes>,
+        is_apart: impl Fn(usize) -> bool,
+        mut alone: impl FnMut(usize, &mut Self),
+    ) {
+        let forces = elements.forces_in_space(plane.axes());
+        for lane in 0..count {
+            let special = self.with_tangent && self.places.special[first + lane];
+            if is_apart(lane) || (special && self.has_turned_axes(plane, first + lane)) {
+                alone(lane, self);
+                continue;
+            }
+            let (all, first_slot) = (&mut *self.force, self.first_slot);
+            for (force, &slot) in forces.as_flattened().iter().zip(self.places.connectivity.get(first + lane)) {
+                all[slot as usize - first_slot] += Vec3(force.0.map(|component| component.0[lane]));
+            }
+            if !self.with_tangent {
+                continue;
+            }
+            if special || !self.places.whole {
+                self.add_planar_entries(first + lane, elements, lane);
+                continue;
+            }
+            for (tile, &place) in elements.tangent.as_flattened().iter().zip(self.places.of(first + lane)) {
+                self.values.tile(place).add_tile::<3>(|entry| tile[entry].0[lane]);
+            }
+        }
+    }
+
+    /// Adds an instance that couples displacements alone, by a mass matrix that is the same in all directions: its forces (global
+    /// components), and `weight` times the matrix.
+    #[inline(always)]
+    pub fn add_mass<const N: usize>(&mut self, k: usize, forces: &[Vec3; N], mass: &[[f64; N]; N], weight: f64) {
+        let (all, first_slot) = (&mut *self.force, self.first_slot);
+        for (force, &slot) in forces.iter().zip(self.places.connectivity.get(k)) {
+            all[slot as usize - first_slot] += *force;
+        }
+        match self.pattern.dof_map.plane() {
+            _ if !self.with_tangent || weight == 0.0 => {}
+            _ if self.places.special[k] => self.add_constrained_mass(k, N, mass.as_flattened(), weight),
+            None => self.add_free_mass::<N, WIDTH, 3>(k, mass, weight),
+            Some(_) => self.add_free_mass::<N, 3, 2>(k, mass, weight),
+        }
+    }
+
+    /// The same where all directions are free, of tiles W wide.
+    #[inline(always)]
+    fn add_free_mass<const N: usize, const W: usize, const DIRECTIONS: usize>(
+        &mut self,
+        k: usize,
+        mass: &[[f64; N]; N],
+        weight: f64,
+    ) {
+        let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
+        for (number, (entry, &place)) in mass.as_flattened().iter().zip(self.places.of(k)).enumerate() {
+            let corner = || corner(node_blocks, slots, [number / N, number % N]);
+            self.values.block(place, corner).add_along_diagonal::<W, DIRECTIONS>(entry * weight);
+        }
+    }
+
+    /// The same where directions are held or moved: between slots with other axes it is their cosine that counts.
+    #[cold]
+    fn add_constrained_mass(&mut self, k: usize, nodes: usize, mass: &[f64], weight: f64) {
+        let slots = self.places.connectivity.get(k);
+        let (width, directions) = self.pattern.dof_map.plane().map_or((WIDTH, 3), |_| (3, 2));
+        let frame = |slot: Slot| self.pattern.dof_map.frame(slot).unwrap_or(Mat3::IDENTITY);
+        for (number, entry) in mass.iter().enumerate() {
+            let (i, j) = (slots[number / nodes], slots[number % nodes]);
+            let (rows, columns) = (self.pattern.dof_map.of(i), self.pattern.dof_map.of(j));
+            let cosines = frame(i).transpose_matmul(frame(j));
+            let prescribed_increment = self
+                .prescribed_increment
+                .map(|prescribed_increment| self.pattern.dof_map.to_local(j, prescribed_increment[j as usize]));
+            for c in 0..directions {
+                for r in (0..directions).filter(|&r| rows[r] != DofMap::HELD) {
+                    let value = cosines.0[r][c] * entry * weight;
+                    match (columns[c], prescribed_increment) {
+                        (DofMap::HELD, None) => {}
+                        (DofMap::HELD, Some(prescribed_increment)) => {
+                            self.lifted[rows[r] as usize - self.first_equation] += value * prescribed_increment.0[c];
+                        }
+                        _ => self.block(k, number / nodes, number % nodes).add(width, r, c, value),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether some slot of an instance has other axes than the plane.
+    fn has_turned_axes(&self, plane: &Plane, k: usize) -> bool {
+        let is_turned = |&slot: &Slot| self.pattern.dof_map.frame(slot).is_some_and(|frame| frame != *plane.axes());
+        self.places.connectivity.get(k).iter().any(is_turned)
+    }
+
+    /// Adds the tangent of one lane entry by entry, where directions are held or nodes may share displacements: each goes to where those
+    /// of its slots meet, or pushes with the increment that is prescribed.
+    fn add_planar_entries<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
+        let (slots, places) = (self.places.connectivity.get(k), self.places.of(k));
+        let unknown = |node: usize, direction: usize| {
+            let (number, slot) = (2 * node + direction / 2, slots[2 * node + direction / 2]);
+            (number, slot, self.pattern.dof_map.of(slot)[direction])
+        };
+        for (i, tiles) in elements.tangent.iter().enumerate() {
+            for (j, tile) in tiles.iter().enumerate() {
+                for (entry, value) in tile.iter().enumerate() {
+                    let ((row, _, to), (column, slot, from)) = (unknown(i, entry % 3), unknown(j, entry / 3));
+                    if to == DofMap::HELD {
+                        continue;
+                    }
+                    if from == DofMap::HELD {
+                        if let Some(prescribed_increment) = self.prescribed_increment {
+                            let increment =
+                                self.pattern.dof_map.to_local(slot, prescribed_increment[slot as usize]).0[entry / 3];
+                            self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
+                        }
+                        continue;
+                    }
+                    let place = if self.places.whole { places[N * i + j] } else { places[2 * N * row + column] };
+                    self.values.tile(place).add(3, entry % 3, entry / 3, value.0[lane]);
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn add_tangent(&mut self, k: usize, element: &ElementSystem) {
+        if !self.places.whole {
+            return self.add_blocks(k, element.blocks(), element.tiles(), |value| *value);
+        }
+        for (tile, &place) in element.tiles().iter().zip(self.places.of(k)) {
+            self.values.tile(place).add_tile::<WIDTH>(|entry| tile[entry]);
+        }
+    }
+
+    /// Adds the tangent of an instance in the axes of its slots, block by block; columns of held directions push with the increments
+    /// that are prescribed instead. `pick` takes the instance's number from each entry.
+    #[inline(always)]
+    fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
+        let (slots, width) = (self.places.connectivity.get(k), self.pattern.node_blocks.width());
+        let across = slots.len().div_ceil(2);
+        for (column, &j) in slots.iter().enumerate() {
+            let (columns, turn) = (self.pattern.dof_map.of(j), self.pattern.dof_map.frame(j));
+            let prescribed_increment = self
+                .prescribed_increment
+                .map(|prescribed_increment| self.pattern.dof_map.to_local(j, prescribed_increment[j as usize]));
+            for (row, &i) in slots.iter().enumerate() {
+                let tile = &tiles[row / 2 * across + column / 2];
+                let mut block = Mat3::ZERO;
+                for c in 0..3 {
+                    for r in 0..3 {
+                        block.0[r][c] = pick(&tile[(column % 2 * 3 + c) * WIDTH + row % 2 * 3 + r]);
+                    }
+                }
+                if let Some(frame) = self.pattern.dof_map.frame(i) {
+                    block = frame.transpose_matmul(block);
+                }
+                if let Some(frame) = turn {
+                    block = block * frame;
+                }
+                let rows = self.pattern.dof_map.of(i);
+                for c in 0..3 {
+                    for r in (0..3).filter(|&r| rows[r] != DofMap::HELD) {
+                        match (columns[c], prescribed_increment) {
+                            (DofMap::HELD, None) => {}
+                            (DofMap::HELD, Some(prescribed_increment)) => {
+                                self.lifted[rows[r] as usize - self.first_equation] +=
+                                    block.0[r][c] * prescribed_increment.0[c];
+                            }
+                            _ => self.block(k, row, column).add(width, r, c, block.0[r][c]),
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// What is kept of the block of two slots of an instance.
+    #[inline(always)]
+    fn block(&mut self, k: usize, row: usize, column: usize) -> BlockMut<'_> {
+        let (places, slots, node_blocks) =
+            (self.places.of(k), self.places.connectivity.get(k), &self.pattern.node_blocks);
+        let corner = || corner(node_blocks, slots, [row, column]);
+        match self.places.whole {
+            false => self.values.block(places[row * slots.len() + column], corner),
+            true => {
+                let place = places[row / 2 * slots.len().div_ceil(2) + column / 2];
+                self.values.tile(place).within(node_blocks.width(), corner())
+            }
+        }
+    }
+
+    /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
+    #[inline(always)]
+    fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
+        let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
+        for (number, &place) in self.places.of(k).iter().enumerate() {
+            let (row, column) = (number / blocks, number % blocks);
+            let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
+            let block = &tile[column % 2 * 3 * WIDTH + row % 2 * 3..][..2 * WIDTH + 3];
+            let corner = || corner(node_blocks, slots, [row, column]);
+            self.values.block(place, corner).add_block::<WIDTH>(|r, c| pick(&block[WIDTH * c + r]));
+        }
+    }
+
+    /// Adds forces of instance `k` that damp, block by block; their tangent goes with the others.
+    pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
+        debug_assert!(self.may_damp, "an effect that damps says so");
+        for (&slot, &force) in self.places.connectivity.get(k).iter().zip(force) {
+            self.damping.as_deref_mut().unwrap_or(self.force)[slot as usize - self.first_slot] += force;
+        }
+    }
+}

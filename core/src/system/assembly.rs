@@ -1,0 +1,498 @@
+//! Forces and tangent of the whole scene.
+
+use super::assembler::{Assembler, Part};
+use super::category::Category;
+use super::pattern::{Pattern, Symmetry, WIDTH};
+use super::regions::{self, Region};
+use super::state::Slot;
+use super::storage::{Tiles, as_tiles};
+use super::tile::{Tile, transposed};
+use super::values::Values;
+use crate::kernel::ElementSystem;
+use crate::scalar::{Instructions, Lanes};
+use crate::tensor::{Mat3, Vec3, zeros};
+use crate::threads;
+use std::ops::Range;
+
+/// Room to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for again and again.
+#[derive(Default)]
+pub struct Leftover {
+    residuals: Vec<f64>,
+}
+
+impl Leftover {
+    /// Of each row of a group's tile what is left, and the size that it is compared with.
+    fn take<const W: usize>(&mut self, pattern: &Pattern) -> &mut [[[f64; W]; 2]] {
+        let length = 2 * W * pattern.node_blocks.count();
+        self.residuals.resize(self.residuals.len().max(length), 0.0);
+        self.residuals[..length].as_chunks_mut::<W>().0.as_chunks_mut::<2>().0
+    }
+}
+
+/// The values of a tangent on its pattern; factors may have taken the place of its tiles on the diagonal.
+#[derive(Clone, Copy)]
+pub struct Matrix<'a> {
+    /// The pattern
+    pub pattern: &'a Pattern,
+    values: &'a [f64],
+    holds_factors: bool,
+}
+
+impl<'a> Matrix<'a> {
+    /// A matrix with these values, tile by tile.
+    pub fn new(pattern: &'a Pattern, values: &'a [f64]) -> Self {
+        Self { pattern, values, holds_factors: false }
+    }
+
+    /// The matrix tile by tile, each by its columns. `W` is the width of the pattern.
+    pub fn tiles<const W: usize>(self) -> Tiles<'a, W> {
+        debug_assert!(!self.holds_factors, "there is no tangent");
+        self.pattern.storage.tiles(self.values)
+    }
+
+    /// The numbers on the diagonal, of the tangent or of factors in its place, and the tiles beside it.
+    pub fn numbers<const W: usize>(self) -> (&'a [f64], &'a [Tile<W>]) {
+        let (own, beside) = self.values.split_at(self.pattern.storage.boundary());
+        (own, as_tiles(beside))
+    }
+
+    /// Whether factors stand in the place of the tiles on the diagonal.
+    pub fn holds_factors(self) -> bool {
+        self.holds_factors
+    }
+}
+
+/// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
+///
+/// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).
+#[derive(Clone, Debug)]
+pub struct System {
+    /// The pattern of the tangent
+    pub pattern: Pattern,
+    /// By category and slot; nothing where nothing may add to a category
+    pub force: [Vec<Vec3>; 4],
+    /// The numbers of those that something may add to, in all and region by region
+    acting: Vec<usize>,
+    acting_in: Vec<Vec<usize>>,
+    /// The values of the tangent, tile by tile: that of the last evaluation with weights, unless [factors](System::holds_factors) have taken
+    /// its place
+    pub values: Vec<f64>,
+    /// Counts how often the tangent has become another one
+    pub revision: u64,
+    /// Whether factors have taken the place of its tiles on the diagonal
+    holds_factors: bool,
+    /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
+    prescribed_increment: Vec<Vec3>,
+    lifts: bool,
+    lifted: Vec<f64>,
+    /// Systems of elements that stand side by side, kept between evaluations; the first of all regions, the others of each
+    rooms: Vec<Vec<ElementSystem<Lanes>>>,
+}
+
+impl System {
+    /// A system of zeros, for internal forces and those of some categories everywhere, and for those of each effect where it acts.
+    pub fn new(pattern: Pattern, slots: usize, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Self {
+        let acting_in = acting_in(&pattern, everywhere, of_effects);
+        let acts = |category: &usize| acting_in.iter().any(|acting| acting.contains(category));
+        let acting: Vec<usize> = (0..Category::ALL.len()).filter(acts).collect();
+        let force = |category: Category| match acting.contains(&(category as usize)) {
+            true => zeros(slots),
+            false => Vec::new(),
+        };
+        let values = pattern.values();
+        Self {
+            rooms: vec![Vec::new(); 1 + pattern.regions.len()],
+            pattern,
+            force: Category::ALL.map(force),
+            acting,
+            acting_in,
+            values: vec![0.0; values],
+            revision: 0,
+            holds_factors: false,
+            prescribed_increment: Vec::new(),
+            lifts: false,
+            lifted: Vec::new(),
+        }
+    }
+
+    /// Sets forces and tangent to zero. `prescribed_increment` holds increments of the held directions that the next correction
+    /// shall take with it.
+    pub fn clear(&mut self, prescribed_increment: Option<&[Vec3]>) {
+        self.begin(true, prescribed_increment);
+        self.each_part(|part| part.clear(true));
+    }
+
+    /// Does something with what each region adds to, at once, or with all of the system where it is not cut.
+    pub fn each_part(&mut self, work: impl Fn(&mut Part) + Send + Sync) {
+        match self.is_cut() {
+            true => threads::each(self.parts().into_iter(), |mut part| work(&mut part)),
+            false => work(&mut self.whole()),
+        }
+    }
+
+    /// Begins an evaluation for which each part is still to be [cleared](Part::clear).
+    pub fn begin(&mut self, with_tangent: bool, prescribed_increment: Option<&[Vec3]>) {
+        self.revision += u64::from(with_tangent);
+        self.holds_factors &= !with_tangent;
+        if self.lifts || prescribed_increment.is_some() {
+            self.lifted.clear();
+            self.lifted.resize(self.pattern.dof_map.count(), 0.0);
+        }
+        self.lifts = prescribed_increment.is_some();
+        if let Some(prescribed_increment) = prescribed_increment {
+            threads::copy(&mut self.prescribed_increment, prescribed_increment);
+        }
+    }
+
+    /// The force of a category at a slot.
+    #[inline]
+    pub fn part_of(&self, category: Category, slot: usize) -> Vec3 {
+        self.force[category as usize].get(slot).copied().unwrap_or(Vec3::ZERO)
+    }
+
+    /// The sum of the forces at a slot.
+    #[inline]
+    pub fn total(&self, slot: usize) -> Vec3 {
+        self.acting.iter().fold(Vec3::ZERO, |sum, &category| sum + self.force[category][slot])
+    }
+
+    /// Forces of the categories that something may add to in a region.
+    #[inline]
+    pub fn acting_in(&self, region: &Region) -> impl Iterator<Item = &[Vec3]> {
+        self.acting_in[region.number].iter().map(|&category| &self.force[category][..])
+    }
+
+    /// Sets forces to zero for a new evaluation, without prescribed increments; the tangent is left as it is.
+    pub fn clear_forces(&mut self) {
+        self.begin(false, None);
+        self.each_part(|part| part.clear(false));
+    }
+
+    /// Drops all forces and keeps the tangent.
+    pub fn forget_forces(&mut self) {
+        self.force.iter_mut().for_each(|f| f.fill(Vec3::ZERO));
+    }
+
+    /// Puts a force in the place of all that stand at a slot.
+    pub fn replace_force(&mut self, slot: Slot, force: Vec3) {
+        self.acting.iter().for_each(|&category| self.force[category][slot as usize] = Vec3::ZERO);
+        self.force[Category::Internal as usize][slot as usize] = force;
+    }
+
+    /// The tangent, or what has taken its place.
+    pub fn matrix(&self) -> Matrix<'_> {
+        Matrix { pattern: &self.pattern, values: &self.values, holds_factors: self.holds_factors }
+    }
+
+    /// Whether factors stand in the place of the tiles on the diagonal. Until the next evaluation with weights there is no tangent then.
+    pub fn holds_factors(&self) -> bool {
+        self.holds_factors
+    }
+
+    /// Gives the numbers of the tiles on the diagonal away: their place is that of factors from here on. Beside them, the tiles beside the
+    /// diagonal.
+    pub fn give_to_factors<const W: usize>(&mut self) -> (&mut [f64], &[Tile<W>]) {
+        self.holds_factors = true;
+        let (own, beside) = self.values.split_at_mut(self.pattern.storage.boundary());
+        (own, as_tiles(beside))
+    }
+
+    /// What a slot has of the tangent on its diagonal, in its own directions; zero where one is held.
+    pub fn own_block(&self, slot: Slot) -> Mat3 {
+        debug_assert!(!self.holds_factors, "there is no tangent");
+        let mut block = Mat3::ZERO;
+        self.pattern.own_entries(slot).for_each(|([r, c], place)| block.0[r][c] = self.values[place]);
+        block
+    }
+
+    /// Adds a symmetric block to that, in the directions that are not held.
+    pub fn add_to_own_block(&mut self, slot: Slot, block: &Mat3) {
+        debug_assert!(!self.holds_factors, "there is no tangent");
+        // Where one half is kept, entries share their place with their mirror images.
+        let once = self.pattern.symmetry == Symmetry::Whole;
+        for ([r, c], place) in self.pattern.own_entries(slot).filter(|([r, c], _)| r <= c || !once) {
+            self.values[place] += block.0[r][c];
+        }
+        self.revision += 1;
+    }
+
+    /// A x, for a matrix with these values on the pattern of the tangent.
+    pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut out = x.to_vec();
+        match self.pattern.width() {
+            WIDTH => self.product::<WIDTH>(values, &mut out),
+            _ => self.product::<3>(values, &mut out),
+        }
+        out
+    }
+
+    fn product<const W: usize>(&self, values: &[f64], x: &mut [f64]) {
+        let mut sums = vec![[0.0; W]; self.pattern.node_blocks.count()];
+        self.each_product::<W, _>(
+            values,
+            x,
+            &mut sums,
+            #[inline(always)]
+            |sum: &mut [f64; W], tile: &Tile<W>, x: &[f64; W]| {
+                for (line, x) in tile.iter().zip(x) {
+                    sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += value * x);
+                }
+            },
+        );
+        self.pattern.join(|group| &sums[group], x);
+    }
+
+    /// Shows each tile with what belongs to the group of its rows, and the part of x that its columns take: regions at once. Tiles that
+    /// are not kept are shown, too.
+    fn each_product<const W: usize, K: Send>(
+        &self,
+        values: &[f64],
+        x: &[f64],
+        of_rows: &mut [K],
+        show: impl Fn(&mut K, &Tile<W>, &[f64; W]) + Send + Sync,
+    ) {
+        let Pattern { regions, storage, symmetry, .. } = &self.pattern;
+        let (tiles, halves) = (storage.tiles::<W>(values), symmetry.halves());
+        regions::each(
+            regions,
+            of_rows,
+            |region| region.node_blocks.end,
+            |region, part| {
+                Instructions::here().run(
+                    #[inline(always)]
+                    || {
+                        for column in region.node_blocks.clone() {
+                            let (own, x_own) = (column - region.node_blocks.start, self.pattern.part::<W>(column, x));
+                            tiles.own.with(
+                                column,
+                                #[inline(always)]
+                                |tile| show(&mut part[own], tile, &x_own),
+                            );
+                            for tile in self.pattern.tiles_of(column) {
+                                let row = self.pattern.rows[tile] as usize;
+                                let Some(of_row) = part.get_mut(row.wrapping_sub(region.node_blocks.start)) else {
+                                    continue;
+                                };
+                                show(of_row, &tiles.beside[tile], &x_own);
+                                if halves {
+                                    let x_row = self.pattern.part::<W>(row, x);
+                                    show(&mut part[own], &transposed(&tiles.beside[tile]), &x_row);
+                                }
+                            }
+                        }
+                    },
+                );
+            },
+        );
+        for &(column, tile) in &self.pattern.between {
+            let row = self.pattern.rows[tile] as usize;
+            show(&mut of_rows[row], &tiles.beside[tile], &self.pattern.part::<W>(column, x));
+            if halves {
+                show(&mut of_rows[column], &transposed(&tiles.beside[tile]), &self.pattern.part::<W>(row, x));
+            }
+        }
+    }
+
+    /// Shows each tile that is kept in some columns with the groups of its rows and of its columns.
+    #[inline(always)]
+    pub fn each_tile<const W: usize>(&self, columns: Range<usize>, mut show: impl FnMut(usize, usize, &Tile<W>)) {
+        let tiles = self.matrix().tiles();
+        for column in columns {
+            tiles.own.with(
+                column,
+                #[inline(always)]
+                |tile| show(column, column, tile),
+            );
+            let beside = &tiles.beside[self.pattern.tiles_of(column)];
+            for (&row, tile) in self.pattern.rows_of(column).iter().zip(beside) {
+                show(row as usize, column, tile);
+            }
+        }
+    }
+
+    /// The largest component of b - A x over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
+    pub fn residual(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+        if self.pattern.width() == WIDTH {
+            self.residual_of::<WIDTH>(b, x, room)
+        } else {
+            self.residual_of::<3>(b, x, room)
+        }
+    }
+
+    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+        debug_assert!(!self.holds_factors, "there is no tangent");
+        let pattern = &self.pattern;
+        let residuals = room.take::<W>(pattern);
+        threads::each_part(residuals, |start, residuals| {
+            for (group, [residual, size]) in (start..).zip(residuals) {
+                *residual = pattern.part(group, b);
+                *size = residual.map(f64::abs);
+            }
+        });
+        self.each_product::<W, _>(
+            &self.values,
+            x,
+            residuals,
+            #[inline(always)]
+            |[residual, size]: &mut [[f64; W]; 2], tile: &Tile<W>, x: &[f64; W]| {
+                for (line, x) in tile.iter().zip(x) {
+                    for r in 0..W {
+                        let term = line[r] * x;
+                        residual[r] -= term;
+                        size[r] += term.abs();
+                    }
+                }
+            },
+        );
+        // Numbers that small have lost digits of their own.
+        let ratio = |(r, size): (&f64, &f64)| r.abs() / size.max(1e-280);
+        let of_part = |[part, sizes]: &[[f64; W]; 2]| part.iter().zip(sizes).map(ratio).fold(0.0, f64::max);
+        threads::largest(residuals.len(), |own| residuals[own].iter().map(of_part).fold(0.0, f64::max))
+    }
+
+    /// The b - A x that was looked at last.
+    pub fn last_residual(&self, room: &Leftover, out: &mut [f64]) {
+        if self.pattern.width() == WIDTH { self.join::<WIDTH>(room, out) } else { self.join::<3>(room, out) }
+    }
+
+    fn join<const W: usize>(&self, room: &Leftover, out: &mut [f64]) {
+        let residuals = room.residuals.as_chunks::<W>().0;
+        self.pattern.join(|group| &residuals[2 * group], out);
+    }
+
+    /// The right-hand side of the correction: -g - J du on the free equations.
+    pub fn right_hand_side(&self, out: &mut [f64]) {
+        let total =
+            |region: &Region, slot: usize| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot]);
+        self.fill_right_hand_side(total, out);
+    }
+
+    /// The part of a group of that, row by row.
+    #[inline(always)]
+    pub fn right_hand_side_at<const W: usize>(&self, group: usize) -> [f64; W] {
+        let Pattern { dof_map, node_blocks, .. } = &self.pattern;
+        let (region, own_equations, mut own) =
+            (self.pattern.region_of(group), self.pattern.equations_of(group), [0.0; W]);
+        let force = |slot: u32| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot as usize]);
+        let slots = node_blocks.members(group);
+        if !self.lifts && dof_map.are_components(slots.clone()) && 3 * slots.len() == W {
+            slots.zip(own.as_chunks_mut().0).for_each(|(slot, own)| *own = (-force(slot)).0);
+            return own;
+        }
+        if W == 3 && !self.lifts && dof_map.are_planar(slots.clone()) {
+            let (u, p) = (slots.start, slots.start + 1);
+            let (across, about) = (dof_map.to_local(u, -force(u)), dof_map.to_local(p, -force(p)));
+            own.copy_from_slice(&[across.0[0], across.0[1], about.0[2]]);
+            return own;
+        }
+        for slot in slots {
+            let force = force(slot);
+            let (local, own) = (dof_map.to_local(slot, force), &mut own[..own_equations.len()]);
+            dof_map.each_of(slot as usize, local, own_equations.start, own, |own, entry| *own = -entry);
+        }
+        if self.lifts {
+            own.iter_mut().zip(&self.lifted[own_equations]).for_each(|(own, lifted)| *own -= lifted);
+        }
+        self.pattern.spread(group, own)
+    }
+
+    /// The increments of held directions that the next correction takes with it.
+    pub fn prescribed_increment(&self) -> Option<&[Vec3]> {
+        self.lifts.then_some(&self.prescribed_increment)
+    }
+
+    /// The same for other forces than those that were assembled.
+    pub fn right_hand_side_of(&self, force: &[Vec3], out: &mut [f64]) {
+        self.fill_right_hand_side(|_, slot| force[slot], out);
+    }
+
+    /// The same again, without what prescribed increments bring.
+    pub fn right_hand_side_without_lift(&self, force: &[Vec3], out: &mut [f64]) {
+        self.right_hand_side_of(force, out);
+        out.iter_mut().zip(&self.lifted).for_each(|(out, lifted)| *out += lifted);
+    }
+
+    fn fill_right_hand_side(&self, force: impl Fn(&Region, usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
+        let dof_map = &self.pattern.dof_map;
+        self.pattern.each_region(out, |region, out| {
+            for slot in region.slots.clone() {
+                let local = dof_map.to_local(slot as Slot, force(region, slot));
+                dof_map.each_of(slot, local, region.dof_map.start, out, |out, entry| *out = -entry);
+            }
+            if self.lifts {
+                let lifted = &self.lifted[region.dof_map.clone()];
+                out.iter_mut().zip(lifted).for_each(|(out, lifted)| *out -= lifted);
+            }
+        });
+    }
+
+    /// Whether it has regions that can be evaluated at once.
+    pub fn is_cut(&self) -> bool {
+        self.pattern.regions.len() > 1
+    }
+
+    /// What each region adds to.
+    fn parts(&mut self) -> Vec<Part<'_>> {
+        let Self { pattern, acting_in, force, values, prescribed_increment, lifts, lifted, rooms, .. } = self;
+        let regions = &pattern.regions;
+        let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
+        let storage = &pattern.storage;
+        let places = |region: &Region| [storage.on_diagonal(&region.node_blocks), storage.beside(&region.tiles)];
+        let mut forces = force.each_mut().map(|force| threads::split(force, ends(|r| r.slots.end)).into_iter());
+        let (own, beside) = values.split_at_mut(storage.boundary());
+        let own = threads::split(own, regions.iter().map(|region| places(region)[0].end));
+        let beside = threads::split(beside, regions.iter().map(|region| places(region)[1].end - storage.boundary()));
+        // Where nothing connects nodes nothing stands beside the diagonal.
+        let (mut own, mut beside) = (own.into_iter(), beside.into_iter());
+        let values = regions.iter().map(|region| {
+            let lists = [&mut own, &mut beside].map(|list| list.next().unwrap_or_default());
+            Values::part(storage, lists, places(region).map(|range| range.start))
+        });
+        let mut lifted = threads::split(lifted, ends(|r| r.dof_map.end)).into_iter();
+        let stretches = values.zip(&mut rooms[1..]).enumerate();
+        let part = |(region, (values, room)): (usize, _)| Part {
+            pattern,
+            acting: &acting_in[region],
+            region: Some(region),
+            force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
+            values,
+            prescribed_increment: lifts.then_some(&prescribed_increment[..]),
+            lifted: lifted.next().unwrap_or_default(),
+            room,
+        };
+        stretches.map(part).collect()
+    }
+
+    /// What everything between regions adds to.
+    pub fn whole(&mut self) -> Part<'_> {
+        Part {
+            pattern: &self.pattern,
+            acting: &self.acting,
+            region: None,
+            force: self.force.each_mut().map(|force| &mut force[..]),
+            values: Values::all(&self.pattern.storage, &mut self.values),
+            prescribed_increment: self.lifts.then_some(&self.prescribed_increment[..]),
+            lifted: &mut self.lifted,
+            room: &mut self.rooms[0],
+        }
+    }
+
+    /// The sink of all instances of effect number `effect`.
+    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool) -> Assembler<'_> {
+        let all = 0..self.pattern.places[effect].connectivity.len();
+        self.whole().into_sink(effect, category, with_tangent, all)
+    }
+}
+
+/// The categories of force in each region.
+fn acting_in(pattern: &Pattern, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Vec<Vec<usize>> {
+    let first = Category::ALL.map(|category| category == Category::Internal || everywhere.contains(&category));
+    let mut acts = vec![first; pattern.regions.len()];
+    for (categories, places) in of_effects.iter().zip(&pattern.places) {
+        let touched = regions::touched(&places.connectivity, &pattern.node_blocks, &pattern.regions);
+        for (acts, _) in acts.iter_mut().zip(touched).filter(|(_, touched)| *touched) {
+            categories.iter().for_each(|&category| acts[category as usize] = true);
+        }
+    }
+    acts.iter().map(|acts| (0..acts.len()).filter(|&category| acts[category]).collect()).collect()
+}

@@ -1,0 +1,582 @@
+//! The sparsity pattern of the tangent in tiles, and for each element the places its blocks go to, worked out once.
+
+use super::connectivity::Connectivity;
+use super::dof_map::DofMap;
+use super::node_blocks::{NodeBlocks, SLOTS};
+use super::regions::{self, Region, Shares};
+use super::runs::Runs;
+use super::state::Slot;
+use super::storage::{NOT_KEPT, Storage};
+pub use crate::kernel::{TILE, WIDTH};
+use crate::tensor::Vec3;
+use crate::threads;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// A tile of the tangent is one of an element's tangent, but in a plane.
+const _: () = assert!(WIDTH == 3 * SLOTS);
+
+/// Where the blocks of one effect's instances go.
+#[derive(Clone, Debug)]
+pub(super) struct ScatterMap {
+    pub connectivity: Connectivity,
+    /// Whether each instance couples whole nodes, whose tiles it adds to in one go
+    pub whole: bool,
+    /// By instance and then by rows of blocks: where a block is added to, or [`NOT_KEPT`]. Blocks are those of whole nodes, or else
+    /// those of slots.
+    pub values: Vec<u32>,
+    of_instances: Runs,
+    /// Instances that touch a held direction or turned axes.
+    pub special: Vec<bool>,
+    pub shares: Shares,
+}
+
+impl ScatterMap {
+    #[inline]
+    pub fn of(&self, k: usize) -> &[u32] {
+        &self.values[self.of_instances.get(k)]
+    }
+}
+
+/// How much of each tangent is the transpose of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Symmetry {
+    /// Perhaps nothing
+    None,
+    /// Tiles of two groups, not those of a group and itself: what sits at single nodes turns as it likes, bodies and moments.
+    BetweenGroups,
+    /// All of it
+    Whole,
+}
+
+impl Symmetry {
+    /// Of what effects add with this connectivity, each with whether it is symmetric.
+    pub fn of<'a>(effects: impl IntoIterator<Item = (&'a Connectivity, bool)>, node_blocks: &NodeBlocks) -> Self {
+        let one = |slots: &[Slot]| slots.windows(2).all(|pair| node_blocks.of(pair[0]).0 == node_blocks.of(pair[1]).0);
+        let of_effect = |(connectivity, symmetric): (&Connectivity, bool)| match symmetric {
+            true => Self::Whole,
+            false if connectivity.iter().all(one) => Self::BetweenGroups,
+            false => Self::None,
+        };
+        effects.into_iter().map(of_effect).min().unwrap_or(Self::Whole)
+    }
+
+    /// Whether of two tiles one tells the other.
+    #[inline]
+    pub fn halves(self) -> bool {
+        self != Self::None
+    }
+}
+
+/// The tangent without its values: a tile for each group and itself, and those beside the diagonal in compressed columns.
+///
+/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero. Where tiles of two groups
+/// are each other's transposes, those above the diagonal are not kept.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    /// The equations that the rows and columns stand for.
+    pub dof_map: DofMap,
+    /// The slots of tiles
+    pub node_blocks: NodeBlocks,
+    /// How symmetric each tangent is
+    pub symmetry: Symmetry,
+    /// Where the values stand
+    pub storage: Storage,
+    /// Where the tiles of each column start that stand beside the diagonal.
+    pub column_starts: Vec<u32>,
+    /// The group of the rows of each of these.
+    pub rows: Vec<u32>,
+    /// The tiles that are not kept, once somebody has asked for entries of theirs
+    mirrors: OnceLock<Mirrors>,
+    /// Rows without an equation: group, and row of its tile
+    pub idle: Vec<(u32, u8)>,
+    /// What is evaluated at once
+    pub regions: Vec<Region>,
+    /// Tiles whose rows lie in another region than their columns: column and number
+    pub between: Vec<(usize, usize)>,
+    pub(super) places: Vec<ScatterMap>,
+}
+
+/// A tile above the diagonal that is not kept.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mirror {
+    /// The group of its rows
+    row: u32,
+    /// The number of its transpose
+    tile: u32,
+}
+
+/// An entry of the tangent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its equation
+    pub row: u32,
+    /// The index of its value
+    pub place: usize,
+}
+
+impl Pattern {
+    /// The pattern of several effects, given by the connectivity of each.
+    pub fn new(dof_map: DofMap, node_blocks: NodeBlocks, effects: Vec<Connectivity>, symmetry: Symmetry) -> Self {
+        let (column_starts, rows) = compressed_columns(&node_blocks, &effects, symmetry.halves());
+        let regions = regions::cut(&node_blocks, &dof_map, &column_starts);
+        let storage = Storage::new(node_blocks.width(), node_blocks.count(), symmetry == Symmetry::Whole);
+        let (idle, between, places) = (Vec::new(), Vec::new(), Vec::new());
+        let mut pattern = Self {
+            dof_map,
+            node_blocks,
+            symmetry,
+            storage,
+            column_starts,
+            rows,
+            mirrors: OnceLock::new(),
+            idle,
+            regions,
+            between,
+            places,
+        };
+        debug_assert!((0..pattern.node_blocks.count()).all(|group| pattern.is_ascending(group)), "rows out of order");
+        pattern.idle = pattern.idle();
+        pattern.between = pattern.between();
+        pattern.places = threads::map(effects.into_iter(), |connectivity| pattern.places_of(connectivity));
+        pattern
+    }
+
+    /// The number of pairs of groups that meet.
+    pub fn pairs(&self) -> usize {
+        if self.symmetry.halves() { self.rows.len() } else { self.rows.len() / 2 }
+    }
+
+    /// The rows of a tile.
+    #[inline]
+    pub fn width(&self) -> usize {
+        self.node_blocks.width()
+    }
+
+    /// The number of values: those of all tiles that are kept.
+    pub fn values(&self) -> usize {
+        self.storage.other(self.rows.len())
+    }
+
+    /// The tiles in a column that are kept beside the diagonal.
+    #[inline]
+    pub fn tiles_of(&self, column: usize) -> Range<usize> {
+        self.column_starts[column] as usize..self.column_starts[column + 1] as usize
+    }
+
+    /// The groups of the rows of these tiles.
+    #[inline]
+    pub fn rows_of(&self, column: usize) -> &[u32] {
+        &self.rows[self.tiles_of(column)]
+    }
+
+    /// Who meets whom.
+    pub fn meetings(&self) -> Meetings<'_> {
+        Meetings { pattern: self, mirrors: self.find_mirrors() }
+    }
+
+    fn find_mirrors(&self) -> Mirrors {
+        if self.symmetry.halves() { Mirrors::new(&self.column_starts, &self.rows) } else { Mirrors::default() }
+    }
+
+    /// The equations of a group's rows, [`DofMap::HELD`] for those without.
+    #[inline]
+    pub fn numbers(&self, group: usize) -> impl Iterator<Item = u32> {
+        let mut numbers = [DofMap::HELD; WIDTH];
+        for slot in self.node_blocks.members(group) {
+            let (_, first) = self.node_blocks.row(slot);
+            // In a plane slots share rows, each of which is free in one of them at most.
+            for (row, number) in numbers[first..].iter_mut().zip(self.dof_map.of(slot)) {
+                *row = number.min(*row);
+            }
+        }
+        numbers.into_iter().take(self.width())
+    }
+
+    /// The part of a group of what has one number an equation; zero where a row has none.
+    #[inline(always)]
+    pub fn part<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
+        let own = x.get(self.equations_of(group)).and_then(|own| own.first_chunk::<W>());
+        match own {
+            Some(own) => *own,
+            None => self.part_by_rows(group, x),
+        }
+    }
+
+    /// The same of numbers of the group's own equations.
+    #[inline(always)]
+    pub fn spread<const W: usize>(&self, group: usize, own: [f64; W]) -> [f64; W] {
+        let dof_map = self.equations_of(group);
+        if dof_map.len() == W {
+            return own;
+        }
+        let mut numbers = self.numbers(group);
+        let of_row = |number: u32| own.get((number as usize).wrapping_sub(dof_map.start)).copied();
+        std::array::from_fn(|_| numbers.next().and_then(of_row).unwrap_or(0.0))
+    }
+
+    /// The reverse of that.
+    #[inline(always)]
+    fn gathered<const W: usize>(&self, group: usize, part: &[f64; W]) -> [f64; W] {
+        let mut own = *part;
+        if self.equations_of(group).len() != W {
+            let free = self.numbers(group).zip(part).filter(|(number, _)| *number != DofMap::HELD);
+            own.iter_mut().zip(free).for_each(|(own, (_, &value))| *own = value);
+        }
+        own
+    }
+
+    /// The same row by row.
+    #[cold]
+    fn part_by_rows<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
+        let mut numbers = self.numbers(group);
+        std::array::from_fn(|_| numbers.next().and_then(|k| x.get(k as usize)).copied().unwrap_or(0.0))
+    }
+
+    /// Whether the equations of a group are in the order of its rows.
+    fn is_ascending(&self, group: usize) -> bool {
+        self.numbers(group).filter(|&number| number != DofMap::HELD).is_sorted()
+    }
+
+    /// The equations of a group; where they are as many as a tile is wide, those of its rows in their order.
+    #[inline(always)]
+    pub fn equations_of(&self, group: usize) -> Range<usize> {
+        self.dof_map.before(self.node_blocks.first_slot(group))
+            ..self.dof_map.before(self.node_blocks.first_slot(group + 1))
+    }
+
+    /// The reverse of [`Pattern::part`], for parts that are found by their groups.
+    pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
+        self.each_region(out, |region, out| {
+            for group in region.node_blocks.clone() {
+                let (dof_map, part, start) = (self.equations_of(group), part(group), region.dof_map.start);
+                let out = &mut out[dof_map.start - start..dof_map.end - start];
+                match out.first_chunk_mut::<W>() {
+                    Some(out) => *out = *part,
+                    None => {
+                        let length = out.len();
+                        out.copy_from_slice(&self.gathered(group, part)[..length]);
+                    }
+                }
+            }
+        });
+    }
+
+    /// Writes parts, found by their groups, into a field of slots; held directions take their part of `held`.
+    pub fn scatter<'a, const W: usize>(
+        &self,
+        part: impl Fn(usize) -> &'a [f64; W] + Send + Sync,
+        held: Option<&[Vec3]>,
+        out: &mut [Vec3],
+    ) {
+        regions::each(
+            &self.regions,
+            out,
+            |region| region.slots.end,
+            |region, out| {
+                for group in region.node_blocks.clone() {
+                    let (slots, part) = (self.node_blocks.members(group), part(group));
+                    let first = slots.start as usize - region.slots.start;
+                    let out = &mut out[first..first + slots.len()];
+                    if 3 * slots.len() == W && self.dof_map.are_components(slots.clone()) {
+                        out.iter_mut().zip(part.as_chunks().0).for_each(|(out, part)| *out = Vec3(*part));
+                        continue;
+                    }
+                    if let ([x, y, angle], [across, about], None) = (&part[..], &mut *out, held)
+                        && self.dof_map.are_planar(slots.clone())
+                    {
+                        *across = self.dof_map.to_global(slots.start, Vec3([*x, *y, 0.0]));
+                        *about = self.dof_map.to_global(slots.start + 1, Vec3([0.0, 0.0, *angle]));
+                        continue;
+                    }
+                    let (own, dof_map) = (self.gathered(group, part), self.equations_of(group));
+                    for (slot, out) in slots.zip(out) {
+                        *out = self.dof_map.at(slot as usize, &own[..dof_map.len()], dof_map.start, held);
+                    }
+                }
+            },
+        );
+    }
+
+    /// The region of a group.
+    #[inline(always)]
+    pub fn region_of(&self, group: usize) -> &Region {
+        match &self.regions[..] {
+            [all] => all,
+            // All but the last are as long as the first.
+            regions => &regions[group / regions[0].node_blocks.len()],
+        }
+    }
+
+    /// Does something for each region with what belongs to its equations, one number each.
+    pub fn each_region(&self, out: &mut [f64], work: impl Fn(&Region, &mut [f64]) + Send + Sync) {
+        regions::each(&self.regions, out, |region| region.dof_map.end, work);
+    }
+
+    /// The entries of an equation's column, tile by tile.
+    pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
+        let ((group, c), storage) = (self.row_of(column), &self.storage);
+        let free = |group: usize| {
+            let numbers = self.numbers(group).enumerate();
+            numbers.filter(|&(_, row)| row != DofMap::HELD).map(|(r, row)| (row, r))
+        };
+        let in_tile = move |row: usize, tile: usize| {
+            free(row).map(move |(row, r)| Entry { row, place: storage.entry(tile, r, c) })
+        };
+        let mirrored = move |mirror: &Mirror| {
+            let tile = storage.other(mirror.tile as usize);
+            free(mirror.row as usize).map(move |(row, r)| Entry { row, place: storage.entry(tile, c, r) })
+        };
+        let kept = self.tiles_of(group).flat_map(move |tile| in_tile(self.rows[tile] as usize, storage.other(tile)));
+        let mirrors = self.mirrors.get_or_init(|| self.find_mirrors());
+        mirrors.of(group).iter().flat_map(mirrored).chain(in_tile(group, storage.own(group))).chain(kept)
+    }
+
+    /// The number of entries between equations.
+    pub fn nonzeros(&self) -> usize {
+        let meetings = self.meetings();
+        let free = |group: usize| self.numbers(group).filter(|&n| n != DofMap::HELD).count();
+        let column = |c: usize| free(c) * (free(c) + meetings.of(c).map(|row| free(row as usize)).sum::<usize>());
+        (0..self.node_blocks.count()).map(column).sum()
+    }
+
+    /// The entries of a slot and itself in the directions that are not held: row and column in its own directions, and where they are.
+    pub fn own_entries(&self, slot: Slot) -> impl Iterator<Item = ([usize; 2], usize)> {
+        let ((group, first), storage) = (self.node_blocks.row(slot), &self.storage);
+        let numbers = self.dof_map.of(slot);
+        let free = move || (0..3).filter(move |&k| numbers[k] != DofMap::HELD);
+        let column =
+            move |c: usize| free().map(move |r| ([r, c], storage.entry(storage.own(group), first + r, first + c)));
+        free().flat_map(column)
+    }
+
+    /// Where an entry is stored, perhaps with its mirror image: `None` for held directions, and for pairs
+    /// that no effect couples.
+    pub fn find(&self, row: u32, column: u32) -> Option<usize> {
+        if row == DofMap::HELD || column == DofMap::HELD {
+            return None;
+        }
+        let (row, column) = (self.row_of(row), self.row_of(column));
+        let kept = self.keeps(row.0, column.0);
+        let ((i, r), (j, c)) = if kept { (row, column) } else { (column, row) };
+        Some(self.storage.entry(self.tile(i, j)?, r, c))
+    }
+
+    /// Whether the same groups meet as in another pattern, as they do in space and in a plane of it, whatever halves are kept.
+    pub fn is_like(&self, other: &Self) -> bool {
+        // Who meets a group that does not come after it.
+        let lower = |pattern: &Self, column: usize| {
+            let rows = pattern.rows_of(column);
+            pattern.tiles_of(column).start + rows.partition_point(|&row| (row as usize) < column)
+                ..pattern.tiles_of(column).end
+        };
+        let count = self.node_blocks.count();
+        let meet = |column: usize| self.rows[lower(self, column)] == other.rows[lower(other, column)];
+        count == other.node_blocks.count() && (0..count).all(meet)
+    }
+
+    /// Shows each equation and where its entry of the diagonal is stored.
+    pub fn each_diagonal(&self, show: impl FnMut(usize, usize)) {
+        self.each_diagonal_of(0..self.node_blocks.count(), show);
+    }
+
+    /// The same of some groups.
+    pub fn each_diagonal_of(&self, node_blocks: Range<usize>, mut show: impl FnMut(usize, usize)) {
+        for group in node_blocks {
+            for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != DofMap::HELD) {
+                show(number as usize, self.storage.entry(self.storage.own(group), r, r));
+            }
+        }
+    }
+
+    /// The group and the row of the tile of an equation.
+    fn row_of(&self, equation: u32) -> (usize, usize) {
+        let (slot, k) = self.dof_map.origin(equation as usize);
+        let (group, first) = self.node_blocks.row(slot);
+        (group, first + k as usize)
+    }
+
+    /// Whether the tile of two groups is kept where they meet.
+    #[inline]
+    fn keeps(&self, row: usize, column: usize) -> bool {
+        row >= column || !self.symmetry.halves()
+    }
+
+    /// The index of the first value of a tile; `None` where the groups do not meet, or it is not kept.
+    pub fn tile(&self, row: usize, column: usize) -> Option<usize> {
+        if row == column {
+            return Some(self.storage.own(row));
+        }
+        let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
+        Some(self.storage.other(self.column_starts[column] as usize + found))
+    }
+
+    fn idle(&self) -> Vec<(u32, u8)> {
+        let rows = |group: usize| (0..).zip(self.numbers(group)).map(move |(r, number)| (group as u32, r, number));
+        let held = (0..self.node_blocks.count()).flat_map(rows).filter(|&(.., number)| number == DofMap::HELD);
+        held.map(|(group, r, _)| (group, r)).collect()
+    }
+
+    fn between(&self) -> Vec<(usize, usize)> {
+        let mut between = Vec::new();
+        for region in &self.regions {
+            for column in region.node_blocks.clone() {
+                let elsewhere = |tile: &usize| !region.node_blocks.contains(&(self.rows[*tile] as usize));
+                between.extend(self.tiles_of(column).filter(elsewhere).map(|tile| (column, tile)));
+            }
+        }
+        between
+    }
+
+    fn places_of(&self, connectivity: Connectivity) -> ScatterMap {
+        let whole = connectivity.iter().all(|slots| self.is_whole(slots));
+        let step = if whole { SLOTS } else { 1 };
+        let mut places = ScatterMap {
+            whole,
+            values: Vec::with_capacity(connectivity.iter().map(|slots| (slots.len() / step).pow(2)).sum()),
+            of_instances: Runs::default(),
+            special: Vec::with_capacity(connectivity.len()),
+            shares: Shares::new(&connectivity, &self.node_blocks, &self.regions),
+            connectivity: Connectivity::default(),
+        };
+        for slots in connectivity.iter() {
+            let before = places.values.len();
+            let corners = || slots.iter().step_by(step).map(|&slot| self.node_blocks.row(slot));
+            for (i, r) in corners() {
+                let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
+                    // Connectivity are what the pattern was made of.
+                    true => self.tile(i, j).map(|tile| self.storage.target(tile, r, c) as u32),
+                    false => Some(NOT_KEPT),
+                };
+                places.values.extend(corners().filter_map(place));
+            }
+            places.of_instances.push(places.values.len() - before);
+            places.special.push(!slots.iter().all(|&slot| self.dof_map.is_plain(slot)));
+        }
+        places.of_instances.shrink_to_fit();
+        places.connectivity = connectivity;
+        places.connectivity.shrink();
+        places
+    }
+
+    /// Whether these slots are those of nodes, each after the other.
+    fn is_whole(&self, slots: &[Slot]) -> bool {
+        let pair = |pair: &[Slot]| match *pair {
+            [u, p] => self.node_blocks.members(self.node_blocks.of(u).0).eq([u, p]),
+            _ => false,
+        };
+        slots.chunks(SLOTS).all(pair)
+    }
+}
+
+/// Column by column the other groups that a group meets; where `halves` do those that come after it.
+fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves: bool) -> (Vec<u32>, Vec<u32>) {
+    let is_kept = |column: u32, row: u32| row > column || (row != column && !halves);
+    let kept = |met: &[u32], column: u32| met.iter().filter(|&&row| is_kept(column, row)).count() as u32;
+    // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
+    let mut column_starts = vec![0_u32; node_blocks.count() + 1];
+    let ends = &mut column_starts[1..];
+    each_meeting(node_blocks, effects, &mut |met| {
+        met.iter().for_each(|&column| ends[column as usize] += kept(met, column))
+    });
+    let mut room = 0;
+    ends.iter_mut().for_each(|end| room += std::mem::replace(end, room));
+    let mut rows = vec![0_u32; room as usize];
+    each_meeting(node_blocks, effects, &mut |met| {
+        for &column in met {
+            let end = &mut ends[column as usize];
+            for &row in met.iter().filter(|&&row| is_kept(column, row)) {
+                rows[*end as usize] = row;
+                *end += 1;
+            }
+        }
+    });
+    // In place: a column has no more rows than meetings.
+    let (mut start, mut count) = (0, 0);
+    for end in ends {
+        let first = count;
+        rows[start..*end as usize].sort_unstable();
+        for k in start..*end as usize {
+            if first == count || rows[count - 1] != rows[k] {
+                rows[count] = rows[k];
+                count += 1;
+            }
+        }
+        start = std::mem::replace(end, count as u32) as usize;
+    }
+    rows.truncate(count);
+    rows.shrink_to_fit();
+    (column_starts, rows)
+}
+
+/// The transposes of all tiles below the diagonal, column by column.
+#[derive(Clone, Debug, Default)]
+struct Mirrors {
+    starts: Vec<u32>,
+    all: Vec<Mirror>,
+}
+
+impl Mirrors {
+    fn new(column_starts: &[u32], rows: &[u32]) -> Self {
+        let (starts, all) = mirrors(column_starts, rows);
+        Self { starts, all }
+    }
+
+    /// Those in a column.
+    #[inline]
+    fn of(&self, column: usize) -> &[Mirror] {
+        match self.starts.get(column..column + 2) {
+            Some(&[start, end]) => &self.all[start as usize..end as usize],
+            _ => &[],
+        }
+    }
+}
+
+/// Who meets whom.
+pub struct Meetings<'a> {
+    pattern: &'a Pattern,
+    mirrors: Mirrors,
+}
+
+impl Meetings<'_> {
+    /// The number of pairs that meet.
+    pub fn pairs(&self) -> usize {
+        self.pattern.pairs()
+    }
+
+    /// The other groups that a group meets, in their order.
+    pub fn of(&self, group: usize) -> impl Iterator<Item = u32> {
+        let kept = self.pattern.rows_of(group).iter().copied();
+        self.mirrors.of(group).iter().map(|mirror| mirror.row).chain(kept)
+    }
+}
+
+fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
+    let columns = column_starts.len() - 1;
+    let below = || {
+        let of = |column: usize| column_starts[column] as usize..column_starts[column + 1] as usize;
+        (0..columns).flat_map(move |column| of(column).map(move |tile| (column, tile)))
+    };
+    let mut starts = vec![0_u32; columns + 1];
+    below().for_each(|(_, tile)| starts[rows[tile] as usize + 1] += 1);
+    (0..columns).for_each(|column| starts[column + 1] += starts[column]);
+    let mut ends = starts.clone();
+    let mut mirrors = vec![Mirror::default(); starts[columns] as usize];
+    for (column, tile) in below() {
+        let end = &mut ends[rows[tile] as usize];
+        mirrors[*end as usize] = Mirror { row: column as u32, tile: tile as u32 };
+        *end += 1;
+    }
+    (starts, mirrors)
+}
+
+/// Shows the groups that meet in each instance.
+fn each_meeting(node_blocks: &NodeBlocks, effects: &[Connectivity], show: &mut dyn FnMut(&[u32])) {
+    let mut met = Vec::new();
+    for clique in effects.iter().flat_map(Connectivity::iter) {
+        met.clear();
+        met.extend(clique.iter().map(|&slot| node_blocks.of(slot).0 as u32));
+        met.dedup();
+        show(&met);
+    }
+}

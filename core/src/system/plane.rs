@@ -1,0 +1,351 @@
+//! Scenes that stay in one plane: their own mirror images in it.
+//!
+//! What lies in the plane and is loaded in it moves in it, since a motion out of it would have to choose a side. Then displacements keep
+//! to two directions, and rotation vectors to the normal of the plane.
+
+use crate::tensor::{Mat3, Vec3};
+use std::fmt;
+
+/// What lies less far out of a plane, relative to its size, lies in it but for round-off: some hundreds of units in the last place, what
+/// sines, cosines and a few sums in a deck leave.
+const ROUND_OFF: f64 = 1e-13;
+
+/// A normal that is so near to an axis is this axis: in coordinate planes nothing is rounded aside. Whether the scene lies in the plane
+/// is asked afterwards, so that nothing is let in by this.
+const SNAP: f64 = 1e-12;
+
+/// Directions that differ by less do not tell a plane: the normal of their cross product would be known to fewer than ten digits, and
+/// what lies in the plane would not be found to.
+const NO_PLANE: f64 = 1e-6;
+
+/// Something that a scene is made of, as a mirror sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MirrorData {
+    /// A place
+    Place(Vec3),
+    /// A displacement, velocity or force
+    Vector(Vec3),
+    /// A rotation, spin or moment
+    Axial(Vec3),
+    /// An axis whose sense does not matter
+    Line(Vec3),
+    /// What maps vectors to vectors, or axial ones to axial ones
+    Tensor(Mat3),
+    /// What maps axial vectors to vectors
+    Coupling(Mat3),
+    /// What is never treated in a plane
+    Spatial,
+}
+
+impl fmt::Display for MirrorData {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (what, v) = match self {
+            Self::Place(v) => ("the place", v),
+            Self::Vector(v) => ("the vector", v),
+            Self::Axial(v) => ("what turns about", v),
+            Self::Line(v) => ("the axis", v),
+            Self::Tensor(_) => return f.write_str("a stiffness, an inertia or a support with axes aside of the plane"),
+            Self::Coupling(_) => {
+                return f.write_str("a coupling of strain in the plane with torsion or with bending out of it");
+            }
+            Self::Spatial => return f.write_str("what has no kernel for planes"),
+        };
+        write!(f, "{what} {}", rounded(*v))
+    }
+}
+
+/// A vector in six digits, for messages; nought has no sign.
+pub fn rounded(v: Vec3) -> String {
+    let rounded = |component: f64| format!("{component:.5e}").parse().unwrap_or(component) + 0.0;
+    format!("{:?}", v.0.map(rounded))
+}
+
+/// Shows the parts of a scene, each with whose it is.
+pub type Shown<'a> = dyn Fn(&mut dyn FnMut(&'static str, MirrorData)) + 'a;
+
+/// A plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    axes: Mat3,
+}
+
+impl Plane {
+    /// The plane with this normal; `None` for zero.
+    pub fn normal_to(normal: Vec3) -> Option<Self> {
+        let mut e = normal.normalized()?;
+        let nearest = (0..3).fold(0, |best, k| if e.0[k].abs() > e.0[best].abs() { k } else { best });
+        if e.0[nearest] < 0.0 {
+            e = -e;
+        }
+        if (e - Vec3::UNIT[nearest]).norm() < SNAP {
+            let [x, y, z] = Vec3::UNIT;
+            let [a, b] = [[y, z], [z, x], [x, y]][nearest];
+            return Some(Self { axes: Mat3::from_columns(a, b, Vec3::UNIT[nearest]) });
+        }
+        let aside = Vec3::UNIT[(nearest + 1) % 3];
+        let a = (aside - e * e.dot(aside)).normalized()?;
+        Some(Self { axes: Mat3::from_columns(a, e.cross(a), e) })
+    }
+
+    /// Two axes in the plane and its normal, as columns.
+    #[inline]
+    pub fn axes(&self) -> &Mat3 {
+        &self.axes
+    }
+
+    /// The normal, a unit vector.
+    pub fn normal(&self) -> Vec3 {
+        self.axes.column(2)
+    }
+
+    /// Whether these axes are the global ones.
+    pub fn is_global(&self) -> bool {
+        self.axes == Mat3::IDENTITY
+    }
+
+    /// Whether it is no coordinate plane, so that vectors in it are rounded aside.
+    pub fn is_tilted(&self) -> bool {
+        !Vec3::UNIT.contains(&self.normal())
+    }
+
+    /// Whether a vector is normal to the plane.
+    pub fn is_normal(&self, v: Vec3) -> bool {
+        let e = self.normal();
+        (v - e * v.dot(e)).norm() <= ROUND_OFF * v.norm()
+    }
+
+    /// Whether a vector lies in the plane.
+    pub fn is_along(&self, v: Vec3) -> bool {
+        v.dot(self.normal()).abs() <= ROUND_OFF * v.norm()
+    }
+
+    /// Whether something is its own mirror image; places are compared with `origin`, a point of the plane, in a scene so long.
+    fn mirrors(&self, aspect: &MirrorData, origin: Vec3, length: f64) -> bool {
+        let e = self.normal();
+        // Its own image where it maps the normal to the normal, and the plane to itself.
+        let across = |m: Mat3| {
+            let (left, right) = (m.transpose_mul(e), m * e);
+            let along = e * e.dot(right);
+            (left - along).norm().max((right - along).norm())
+        };
+        match *aspect {
+            MirrorData::Place(x) => (x - origin).dot(e).abs() <= ROUND_OFF * length.max(x.norm()),
+            MirrorData::Vector(v) => self.is_along(v),
+            MirrorData::Axial(v) => self.is_normal(v),
+            MirrorData::Line(v) => self.is_along(v) || self.is_normal(v),
+            MirrorData::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
+            // What turns in the plane strains aside, and the other way about.
+            MirrorData::Coupling(m) => {
+                let (right, left) = (m * e, m.transpose_mul(e));
+                let along = right.dot(e);
+                let rest = m - right.outer(e) - e.outer(left) + e.outer(e).scale(along);
+                rest.max_abs().max(along.abs()) <= ROUND_OFF * m.max_abs()
+            }
+            MirrorData::Spatial => false,
+        }
+    }
+
+    /// The plane of a scene with this length, whose parts are `shown`, each with whose it is. `Err`: why there is none.
+    pub fn of(length: f64, shown: &Shown) -> Result<Self, String> {
+        let search = Search::through(length, shown);
+        if let Some(name) = search.spatial {
+            return Err(format!("{name}: no kernel for planes"));
+        }
+        let mut apart = None;
+        for plane in search.normals().filter_map(Self::normal_to) {
+            match search.first_apart(&plane, shown) {
+                None => return Ok(plane),
+                // Told of the last.
+                found => apart = found,
+            }
+        }
+        match apart {
+            None => Err("nothing tells a plane: all lies in one line".into()),
+            Some((name, aspect)) => {
+                Err(format!("{name}: {aspect} is not its own image in a plane that all else shares"))
+            }
+        }
+    }
+}
+
+/// What is known of a plane while it is looked for.
+#[derive(Default)]
+struct Search {
+    origin: Option<Vec3>,
+    /// Of places, measured from the origin
+    places: Span,
+    /// Of these and of vectors, each as long as the scene
+    vectors: Span,
+    axial: Option<Vec3>,
+    spatial: Option<&'static str>,
+    length: f64,
+}
+
+/// What some vectors span.
+#[derive(Default)]
+struct Span {
+    longest: Vec3,
+    /// The largest product of it and another
+    product: Vec3,
+}
+
+impl Span {
+    fn measure(&mut self, v: Vec3) {
+        if v.norm() > self.longest.norm() {
+            self.longest = v;
+        }
+    }
+
+    fn turn(&mut self, v: Vec3) {
+        let product = self.longest.cross(v);
+        if product.norm() > self.product.norm() {
+            self.product = product;
+        }
+    }
+
+    /// A normal of it, where it is a plane.
+    fn normal(&self) -> Option<Vec3> {
+        let tells = self.product.norm() > NO_PLANE * self.longest.squared().max(f64::MIN_POSITIVE);
+        tells.then_some(self.product)
+    }
+}
+
+impl Search {
+    fn through(length: f64, shown: &Shown) -> Self {
+        let mut search = Self { length, ..Self::default() };
+        shown(&mut |name, aspect| search.look(name, &aspect));
+        shown(&mut |_, aspect| search.each_span(&aspect, Span::turn));
+        search
+    }
+
+    fn each_span(&mut self, aspect: &MirrorData, show: impl Fn(&mut Span, Vec3)) {
+        let Some(v) = self.vector(aspect) else { return };
+        if matches!(aspect, MirrorData::Place(_)) {
+            show(&mut self.places, v);
+        }
+        show(&mut self.vectors, v);
+    }
+
+    fn look(&mut self, name: &'static str, aspect: &MirrorData) {
+        match *aspect {
+            MirrorData::Place(x) => _ = self.origin.get_or_insert(x),
+            MirrorData::Axial(v) if v != Vec3::ZERO && self.axial.is_none() => self.axial = Some(v),
+            MirrorData::Spatial if self.spatial.is_none() => self.spatial = Some(name),
+            _ => {}
+        }
+        self.each_span(aspect, Span::measure);
+    }
+
+    fn vector(&self, aspect: &MirrorData) -> Option<Vec3> {
+        match *aspect {
+            MirrorData::Place(x) => self.origin.map(|origin| x - origin),
+            MirrorData::Vector(v) => v.normalized().map(|v| v * self.length),
+            _ => None,
+        }
+    }
+
+    /// Normals of planes that the scene may lie in: that of an axial vector, which has no round-off, that of all vectors, where shallow
+    /// arches have as few digits as their loads leave them, and that of places, which tell what is the structure's and what a load's.
+    fn normals(&self) -> impl Iterator<Item = Vec3> {
+        [self.axial, self.vectors.normal(), self.places.normal()].into_iter().flatten()
+    }
+
+    /// The first that is not its own image in a plane, with whose it is.
+    fn first_apart(&self, plane: &Plane, shown: &Shown) -> Option<(&'static str, MirrorData)> {
+        let mut apart = None;
+        shown(&mut |name, aspect| {
+            if apart.is_none() && !plane.mirrors(&aspect, self.origin.unwrap_or(Vec3::ZERO), self.length) {
+                apart = Some((name, aspect));
+            }
+        });
+        apart
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TILTED: Vec3 = Vec3([0.36, 0.48, 0.8]);
+
+    fn plane_of(parts: &[MirrorData]) -> Result<Plane, String> {
+        Plane::of(1.0, &|show| parts.iter().for_each(|&aspect| show("part", aspect)))
+    }
+
+    #[test]
+    fn axes_are_right_handed_and_coordinate_planes_exact() {
+        for normal in [Vec3::UNIT[0], Vec3::UNIT[1], Vec3::UNIT[2] * -3.0, TILTED, Vec3([1.0, 1e-9, 0.0])] {
+            let plane = Plane::normal_to(normal).unwrap();
+            let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+            assert!((a.cross(b) - e).norm() < 1e-15 && plane.is_normal(normal));
+        }
+        assert!(Plane::normal_to(Vec3([1e-14, 0.0, -2.0])).unwrap().is_global());
+    }
+
+    #[test]
+    fn loads_turn_a_line_into_a_plane() {
+        let line = [MirrorData::Place(Vec3::ZERO), MirrorData::Place(Vec3::UNIT[0])];
+        assert!(plane_of(&line).unwrap_err().contains("one line"));
+        let with = |aspect| plane_of(&[line[0], line[1], aspect]);
+        assert_eq!(with(MirrorData::Vector(Vec3::UNIT[1])).unwrap().normal(), Vec3::UNIT[2]);
+        assert_eq!(with(MirrorData::Axial(Vec3::UNIT[1] * -1.0)).unwrap().normal(), Vec3::UNIT[1]);
+        assert!(with(MirrorData::Axial(Vec3::UNIT[0])).is_err(), "torsion leaves every plane");
+        let apart = plane_of(&[
+            line[0],
+            line[1],
+            MirrorData::Vector(Vec3::UNIT[1]),
+            MirrorData::Vector(Vec3([0.0, 1.0, -0.5])),
+        ]);
+        assert_eq!(
+            apart.unwrap_err(),
+            "part: the vector [0.0, 1.0, -0.5] is not its own image in a plane that all else shares"
+        );
+    }
+
+    /// ScatterMap alone would tell the normal of a shallow arch to a few digits only.
+    #[test]
+    fn shallow_scenes_lie_in_the_plane_of_their_loads() {
+        let plane = Plane::normal_to(TILTED).unwrap();
+        let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+        let arch = |k: i32| {
+            let x = f64::from(k) / 20.0;
+            MirrorData::Place(a * x + b * (1e-4 * x * (1.0 - x)) + e * (1e-16 * f64::from(k % 3 - 1)))
+        };
+        let places: Vec<MirrorData> = (0..=20).map(arch).collect();
+        for load in [MirrorData::Vector(b * -3.0), MirrorData::Vector(a + b), MirrorData::Axial(e * 2.0)] {
+            let found = plane_of(&[&places[..], &[load]].concat()).unwrap();
+            assert!((found.normal() - e).norm() < 1e-13 || (found.normal() + e).norm() < 1e-13);
+        }
+    }
+
+    /// A load out of the plane of the structure is what does not fit, not the structure.
+    #[test]
+    fn what_leaves_the_plane_of_places_is_named() {
+        let places = [Vec3::ZERO, Vec3::UNIT[0], Vec3([1.0, 1.0, 0.0])];
+        let aside = Plane::of(1.0, &|show| {
+            places.iter().for_each(|&place| show("beams", MirrorData::Place(place)));
+            show("load", MirrorData::Vector(Vec3([3.0, -8.0, 1.0])));
+        });
+        assert!(aside.unwrap_err().starts_with("load:"));
+    }
+
+    #[test]
+    fn what_stands_aside_by_more_than_round_off_makes_a_scene_spatial() {
+        let plane = Plane::normal_to(TILTED).unwrap();
+        let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+        let base = [MirrorData::Place(a), MirrorData::Place(b * 0.5), MirrorData::Vector(a + b)];
+        let with = |aspect| plane_of(&[&base[..], &[aspect]].concat());
+        let fits = |aspect| with(aspect).is_ok_and(|found| (found.normal() - e).norm() < 1e-13);
+        assert!(fits(MirrorData::Place(a * 3.0 + e * 1e-16)) && !fits(MirrorData::Place(a * 3.0 + e * 1e-11)));
+        assert!(fits(MirrorData::Line(e)) && fits(MirrorData::Line(a)) && !fits(MirrorData::Line(a + e)));
+        assert!(fits(MirrorData::Axial(e)) && !fits(MirrorData::Axial(e + a * 1e-9)));
+        let section = a.outer(a) + b.outer(b).scale(3.0) + a.outer(b) + b.outer(a) + e.outer(e).scale(7.0);
+        assert!(fits(MirrorData::Tensor(section)) && !fits(MirrorData::Tensor(section + a.outer(e).scale(1e-9))));
+        assert!(fits(MirrorData::Coupling(a.outer(e))) && fits(MirrorData::Coupling(e.outer(a) + b.outer(e))));
+        assert!(
+            !fits(MirrorData::Coupling(e.outer(e)))
+                && !fits(MirrorData::Coupling(a.outer(b)))
+                && !fits(MirrorData::Spatial)
+        );
+    }
+}
