@@ -3,9 +3,10 @@
 use super::load::Loaded;
 use super::run::status_of;
 use super::{Status, Verdict, json, load, on_threads, say, threads_of};
-use crate::scene::{Mesh, Rule, Scene};
+use crate::scene::{Mesh, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use beamsim_core::model::{Assembly, EffectSize, Schedule};
+use beamsim_core::model::beam_element::{ElementGeometry, Rule};
+use beamsim_core::model::{Assembly, EffectSize, Schedule, SectionMatrices};
 use beamsim_core::run::{Failure, Moment, refusal};
 use beamsim_core::system::StageKind;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -129,7 +130,7 @@ fn tell_beams(mesh: &Mesh) {
     }
 }
 
-fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
+fn tell_section(section: &SectionMatrices, place: &str) {
     let k = section.stiffness;
     say::line(&format!(
         "  section{place}: EA {} GA [{}, {}] GJ {} EI [{}, {}]",

@@ -4,49 +4,12 @@ use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
 use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use beamsim_core::kernel::{MAX_NODES, shape};
 use beamsim_core::model::Names;
+use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
-
-/// A node of the mesh.
-#[derive(Clone, Debug)]
-pub struct MeshNode {
-    /// Its slots
-    pub node: Node,
-    /// Its initial place
-    pub place: Vec3,
-}
-
-/// An integration point of an element.
-#[derive(Clone, Debug)]
-pub struct Station {
-    /// Shape functions, as many as the element has nodes
-    pub shape: [f64; MAX_NODES],
-    /// Their derivatives over arc length
-    pub slope: [f64; MAX_NODES],
-    /// Gauss weight times ds/dxi
-    pub weight: f64,
-    /// Fraction of the beam's length
-    pub fraction: f64,
-    /// The section axes of the interpolated line as columns; the first is its tangent
-    pub axes: Mat3,
-    /// How far along its piece of the curve, from 0 to 1
-    along: f64,
-}
-
-/// Which points of an element are summed over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// For internal forces
-    Inner,
-    /// For mass and line loads
-    Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
-    Nodal,
-}
 
 /// An element and the beam that it belongs to.
 #[derive(Clone, Copy)]
@@ -62,19 +25,10 @@ pub struct BeamElement<'m> {
 }
 
 impl BeamElement<'_> {
-    /// Its integration points.
-    pub fn stations(&self, rule: Rule) -> Vec<Station> {
-        let points = match rule {
-            Rule::Inner => shape::gauss(self.nodes.len() - 1),
-            Rule::Volume => shape::gauss(self.nodes.len()),
-            Rule::Nodal => shape::newton_cotes(self.nodes.len()),
-        };
-        points.iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
-    }
-
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
         let Part { piece, number, count } = self.beam.part_of_line(self.number);
-        let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
+        let line = &self.beam.line;
+        let (shape, slope) = shape_at(self.nodes.len(), xi);
         let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), count);
         let t = (number as f64 + 0.5 * (xi + 1.0)) / count as f64;
         let fraction = line.fraction(piece, t);
@@ -90,37 +44,38 @@ impl BeamElement<'_> {
 
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
-        let (Part { piece, .. }, line) = (self.beam.part_of_line(self.number), &self.beam.line);
+        let Part { piece, .. } = self.beam.part_of_line(self.number);
+        let line = &self.beam.line;
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
+}
 
-    /// The initial place of its first node.
-    pub fn place(&self) -> Vec3 {
-        self.mesh.nodes[self.nodes[0]].place
+impl ElementGeometry for BeamElement<'_> {
+    fn number(&self) -> usize {
+        self.number
     }
 
-    /// The initial places of its nodes.
-    fn places<const N: usize>(&self) -> [Vec3; N] {
-        std::array::from_fn(|i| self.mesh.nodes[self.nodes[i]].place)
+    fn count(&self) -> usize {
+        self.nodes.len()
     }
 
-    /// The initial places of its nodes as seen from the first.
-    pub fn arms<const N: usize>(&self) -> [Vec3; N] {
+    fn node(&self, i: usize) -> PlacedNode {
+        self.mesh.nodes[self.nodes[i]]
+    }
+
+    fn arms<const N: usize>(&self) -> [Vec3; N] {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        self.beam.line.pieces[piece].arms(self.places(), count)
+        self.beam.line.pieces[piece].arms(std::array::from_fn(|i| self.node(i).place), count)
     }
 
-    /// How much longer it is than others on its piece, by round-off.
-    pub fn rounding(&self) -> f64 {
+    fn rounding(&self) -> f64 {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        let place = |node: usize| self.mesh.nodes[node].place;
-        self.beam.line.pieces[piece].rounding(place(self.nodes[self.nodes.len() - 1]) - place(self.nodes[0]), count)
+        let chord = self.node(self.count() - 1).place - self.node(0).place;
+        self.beam.line.pieces[piece].rounding(chord, count)
     }
 
-    /// The places of its nodes, weighed.
-    pub fn between(&self, weights: &[f64; MAX_NODES]) -> Vec3 {
-        let places = self.nodes.iter().map(|&node| self.mesh.nodes[node].place);
-        places.zip(weights).fold(Vec3::ZERO, |sum, (x, &n)| sum + x * n)
+    fn stations(&self, rule: Rule) -> Vec<Station> {
+        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
     }
 }
 
@@ -186,7 +141,7 @@ struct Part {
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// The nodes
-    pub nodes: Vec<MeshNode>,
+    pub nodes: Vec<PlacedNode>,
     /// The beams
     pub beams: Vec<MeshBeam>,
     /// The number of elements, beam after beam
@@ -244,7 +199,7 @@ impl Mesh {
         };
         let u = shares.map_or_else(&mut slot, |other| self.nodes[other].node.u);
         let node = Node { u, p: slot() };
-        self.nodes.push(MeshNode { node, place });
+        self.nodes.push(PlacedNode { node, place });
         self.nodes.len() - 1
     }
 
@@ -445,18 +400,6 @@ impl Mesh {
     pub fn elements_of<'m>(&'m self, beam: &'m MeshBeam) -> impl Iterator<Item = BeamElement<'m>> {
         let element = |number: usize| BeamElement { number, beam, nodes: beam.nodes_of(number), mesh: self };
         beam.elements.clone().map(element)
-    }
-}
-
-/// Shape functions and their derivatives over xi, for 2, 3 or 4 nodes.
-pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
-    fn padded<const N: usize>(values: [f64; N]) -> [f64; MAX_NODES] {
-        std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
-    }
-    match nodes {
-        2 => (padded(shape::values::<2>(xi)), padded(shape::derivatives::<2>(xi))),
-        3 => (padded(shape::values::<3>(xi)), padded(shape::derivatives::<3>(xi))),
-        _ => (shape::values::<4>(xi), shape::derivatives::<4>(xi)),
     }
 }
 

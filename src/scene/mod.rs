@@ -15,9 +15,8 @@ mod rehearsal;
 mod section;
 
 pub use compose::Reason;
-pub use mesh::{Mesh, MeshBeam, Rule};
+pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
-pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
@@ -26,7 +25,7 @@ use beamsim_core::effect::beam_elasticity::StressField;
 use beamsim_core::effect::link;
 use beamsim_core::effect::rigid_body::Body;
 use beamsim_core::integrate::Scheme;
-use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
+use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind, diagonal};
 use beamsim_core::probe::{Figure, Probe, Quantity};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use beamsim_core::system::Node;
@@ -252,7 +251,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
         motions,
         plane: None,
         linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
-        length: check::diagonal(&mesh),
+        length: diagonal(mesh.nodes.iter().map(|node| node.place)),
     };
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);

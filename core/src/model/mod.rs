@@ -1,6 +1,8 @@
 //! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
 
 mod assembly;
+pub mod beam_element;
+mod builder;
 pub mod charts;
 mod constraint;
 mod course;
@@ -9,16 +11,19 @@ mod history;
 mod linear;
 mod names;
 mod schedule;
+mod section;
 mod stage_error;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
 pub use assembly::Assembly;
+pub use builder::{BuildError, ModelBuilder, NodeId, StraightBeam, diagonal};
 pub use constraint::{Motion, MotionKind, Support};
 pub use course::{Amplitude, Course, Progress, Ramp, Timeline};
 pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
 pub use schedule::Schedule;
+pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
