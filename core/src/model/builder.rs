@@ -4,7 +4,8 @@ use super::beam_element::{
     ElasticPoint, ElementGeometry, NodalInertia, PlacedNode, Rule, Station, body_inertia, push_elastic, push_volume,
     shape_at,
 };
-use super::{Amplitude, Charted, ElementInfo, Model, Motion, MotionKind, Names, SectionMatrices, SlotKind, Support};
+use super::parts::ModelParts;
+use super::{Amplitude, ElementInfo, Model, Motion, MotionKind, Names, SectionMatrices, Support};
 use crate::effect::beam_elasticity::{BeamElasticity, ElasticElements};
 use crate::effect::beam_mass::BeamMass;
 use crate::effect::gravity::{BeamGravity, BodyGravity};
@@ -108,6 +109,15 @@ struct BuiltBeam {
     /// Section axes as columns
     axes: Mat3,
     length: f64,
+}
+
+impl BuiltBeam {
+    /// Its elements as changes of chart see them.
+    fn elements(&self, nodes: &[PlacedNode]) -> impl Iterator<Item = ElementInfo> {
+        let of_element = |k: usize| &self.nodes[k * self.order..=(k + 1) * self.order];
+        let rotations = move |k: usize| of_element(k).iter().map(|&node| nodes[node].node.p);
+        (0..self.elements).map(move |k| ElementInfo::new(rotations(k), false))
+    }
 }
 
 /// One element of a straight beam.
@@ -414,31 +424,17 @@ impl ModelBuilder {
             effects.push(!loads.is_empty(), NodeLoad { kind, loads, tangent: true });
         }
         effects.0.append(&mut self.own_effects);
-        let rotations: Vec<Slot> = self.nodes.iter().map(|node| node.node.p).collect();
-        let of_beam = |beam: &BuiltBeam| {
-            let chunk = |k: usize| &beam.nodes[k * beam.order..=(k + 1) * beam.order];
-            let info = |k: usize| ElementInfo::new(chunk(k).iter().map(|&node| rotations[node]), false);
-            (0..beam.elements).map(info).collect::<Vec<_>>()
-        };
-        let elements = self.beams.iter().flat_map(of_beam).collect();
-        let is_sprung = |spring: &&spring::Instance| spring.rotation != Mat3::ZERO;
-        Ok(Model {
-            kinds: Arc::new([SlotKind::Displacement, SlotKind::Rotation].repeat(self.nodes.len())),
-            names: Arc::new(self.names),
-            multipliers: Vec::new(),
-            angles: 0,
-            sprung: self.springs.iter().filter(is_sprung).map(|spring| spring.node.p).collect(),
-            sprung_joints: Vec::new(),
-            elements: self.elements,
-            rotating: Charted { rotations, elements },
+        let parts = ModelParts {
+            names: self.names,
+            elements: self.beams.iter().flat_map(|beam| beam.elements(&self.nodes)).collect(),
+            sprung: self.springs.iter().filter(|spring| spring.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
             effects: effects.0,
             amplitudes: self.amplitudes,
             supports: self.supports,
             motions: self.motions,
-            plane: None,
-            linear: false,
-            length: diagonal(self.nodes.iter().map(|node| node.place)),
-        })
+            ..ModelParts::default()
+        };
+        Ok(parts.assemble(&self.nodes))
     }
 
     /// Elasticity, inertia and weight of beams, and the weight of bodies.
@@ -492,20 +488,6 @@ impl Effects {
             self.0.push(Arc::new(effect));
         }
     }
-}
-
-/// The diagonal of the box around some places, or 1 where it has none: the length to which displacements are compared.
-pub fn diagonal(places: impl Iterator<Item = Vec3>) -> f64 {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for place in places {
-        for k in 0..3 {
-            low[k] = low[k].min(place.0[k]);
-            high[k] = high[k].max(place.0[k]);
-        }
-    }
-    let diagonal = Vec3([0, 1, 2].map(|k| high[k] - low[k])).norm();
-    if diagonal.is_finite() && diagonal > 0.0 { diagonal } else { 1.0 }
 }
 
 #[cfg(test)]
