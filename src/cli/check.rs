@@ -6,9 +6,10 @@ use super::status::Status;
 use super::thread_count::{on_threads, threads_of};
 use super::verdict::Verdict;
 use super::{console, json, load};
-use crate::scene::{Mesh, Rule, Scene};
+use crate::scene::{Mesh, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use beamsim_core::model::{Assembly, EffectSize, Schedule};
+use beamsim_core::model::beam_element::{ElementGeometry, Rule};
+use beamsim_core::model::{Assembly, EffectSize, Schedule, SectionMatrices};
 use beamsim_core::run::{Failure, Moment, refusal};
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::threads;
@@ -143,7 +144,7 @@ fn print_beams(mesh: &Mesh) {
     }
 }
 
-fn print_section(section: &crate::scene::SectionMatrices, place: &str) {
+fn print_section(section: &SectionMatrices, place: &str) {
     let k = section.stiffness;
     console::line(&format!(
         "  section{place}: EA {} GA [{}, {}] GJ {} EI [{}, {}]",

@@ -267,17 +267,3 @@ fn untouched(m: Mat3) -> Vec<Vec3> {
     let empty = (0..3).filter(|&k| eigen.eigenvalues[k].abs() < 1e-12);
     empty.map(|k| Vec3([0, 1, 2].map(|i| eigen.eigenvectors[(i, k)]))).collect()
 }
-
-/// The diagonal of the box around the scene, or 1.
-pub fn diagonal(mesh: &Mesh) -> f64 {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for node in &mesh.nodes {
-        for k in 0..3 {
-            low[k] = low[k].min(node.place.0[k]);
-            high[k] = high[k].max(node.place.0[k]);
-        }
-    }
-    let diagonal = Vec3([0, 1, 2].map(|k| high[k] - low[k])).norm();
-    if diagonal.is_finite() && diagonal > 0.0 { diagonal } else { 1.0 }
-}

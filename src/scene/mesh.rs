@@ -4,50 +4,12 @@ use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
 use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
-use beamsim_core::kernel::{MAX_NODES, shape};
 use beamsim_core::model::Names;
+use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
-
-/// A node of the mesh.
-#[derive(Clone, Debug)]
-pub struct MeshNode {
-    /// Its slots
-    pub node: Node,
-    /// Its initial place
-    pub place: Vec3,
-}
-
-/// An integration point of an element.
-#[derive(Clone, Debug)]
-pub struct Station {
-    /// Shape functions, as many as the element has nodes
-    pub shape: [f64; MAX_NODES],
-    /// Their derivatives over arc length
-    pub slope: [f64; MAX_NODES],
-    /// Gauss weight times ds/dxi
-    pub weight: f64,
-    /// Fraction of the beam's length
-    pub fraction: f64,
-    /// The section axes of the interpolated line as columns; the first is its tangent
-    pub axes: Mat3,
-    /// Fraction of the nodes of its piece that lie before it, from 0 to 1
-    along: f64,
-}
-
-/// Which points of an element are summed over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// For internal forces
-    Inner,
-    /// For mass and line loads
-    Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated
-    /// as vectors
-    Nodal,
-}
 
 /// An element and the beam that it belongs to.
 #[derive(Clone, Copy)]
@@ -63,16 +25,6 @@ pub struct BeamElement<'m> {
 }
 
 impl BeamElement<'_> {
-    /// Its integration points.
-    pub fn stations(&self, rule: Rule) -> Vec<Station> {
-        let points = match rule {
-            Rule::Inner => shape::gauss(self.nodes.len() - 1),
-            Rule::Volume => shape::gauss(self.nodes.len()),
-            Rule::Nodal => shape::newton_cotes(self.nodes.len()),
-        };
-        points.iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
-    }
-
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
         let Part { piece, number, count } = self.beam.part_of_line(self.number);
         let line = &self.beam.line;
@@ -96,34 +48,34 @@ impl BeamElement<'_> {
         let line = &self.beam.line;
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
+}
 
-    /// The initial place of its first node.
-    pub fn place(&self) -> Vec3 {
-        self.mesh.nodes[self.nodes[0]].place
+impl ElementGeometry for BeamElement<'_> {
+    fn number(&self) -> usize {
+        self.number
     }
 
-    /// The initial places of its nodes.
-    fn places<const N: usize>(&self) -> [Vec3; N] {
-        std::array::from_fn(|i| self.mesh.nodes[self.nodes[i]].place)
+    fn count(&self) -> usize {
+        self.nodes.len()
     }
 
-    /// The initial places of its nodes as seen from the first.
-    pub fn arms<const N: usize>(&self) -> [Vec3; N] {
+    fn node(&self, i: usize) -> PlacedNode {
+        self.mesh.nodes[self.nodes[i]]
+    }
+
+    fn arms<const N: usize>(&self) -> [Vec3; N] {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        self.beam.line.pieces[piece].arms(self.places(), count)
+        self.beam.line.pieces[piece].arms(std::array::from_fn(|i| self.node(i).place), count)
     }
 
-    /// Its chord relative to the equal part of a straight piece: 1 but for round-off.
-    pub fn rounding(&self) -> f64 {
+    fn rounding(&self) -> f64 {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        let place = |node: usize| self.mesh.nodes[node].place;
-        self.beam.line.pieces[piece].rounding(place(self.nodes[self.nodes.len() - 1]) - place(self.nodes[0]), count)
+        let chord = self.node(self.count() - 1).place - self.node(0).place;
+        self.beam.line.pieces[piece].rounding(chord, count)
     }
 
-    /// The places of its nodes, weighed.
-    pub fn between(&self, weights: &[f64; MAX_NODES]) -> Vec3 {
-        let places = self.nodes.iter().map(|&node| self.mesh.nodes[node].place);
-        places.zip(weights).fold(Vec3::ZERO, |sum, (x, &n)| sum + x * n)
+    fn stations(&self, rule: Rule) -> Vec<Station> {
+        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
     }
 }
 
@@ -192,7 +144,7 @@ struct Part {
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// The nodes
-    pub nodes: Vec<MeshNode>,
+    pub nodes: Vec<PlacedNode>,
     /// The beams
     pub beams: Vec<MeshBeam>,
     /// The number of elements, beam after beam
@@ -252,7 +204,7 @@ impl Mesh {
         };
         let u = shares.map_or_else(&mut slot, |other| self.nodes[other].node.u);
         let node = Node { u, p: slot() };
-        self.nodes.push(MeshNode { node, place });
+        self.nodes.push(PlacedNode { node, place });
         self.nodes.len() - 1
     }
 
@@ -458,20 +410,7 @@ impl Mesh {
     }
 }
 
-/// Shape functions and their derivatives over xi, for 2, 3 or 4 nodes.
-pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
-    fn padded<const N: usize>(values: [f64; N]) -> [f64; MAX_NODES] {
-        std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
-    }
-    match nodes {
-        2 => (padded(shape::values::<2>(xi)), padded(shape::derivatives::<2>(xi))),
-        3 => (padded(shape::values::<3>(xi)), padded(shape::derivatives::<3>(xi))),
-        _ => (shape::values::<4>(xi), shape::derivatives::<4>(xi)),
-    }
-}
-
-/// Fractions of the length at which the pieces of a line are divided into equal parts, from start
-/// to end.
+/// The fractions of the length where the pieces of a line are cut into so many equal parts, from start to end.
 fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
     let inner = (0..line.pieces.len()).flat_map(|piece| {
         let count = parts[piece.min(parts.len() - 1)];

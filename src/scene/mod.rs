@@ -15,9 +15,8 @@ mod section;
 mod switches;
 
 pub use compose::Reason;
-pub use mesh::{Mesh, MeshBeam, Rule};
+pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
-pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{
     self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,
@@ -25,9 +24,9 @@ use crate::deck::{
 };
 use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::effect::inertia::Body;
-use beamsim_core::effect::spring::Link;
+use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
-use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
+use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
 use beamsim_core::probe::{Figure, Probe, Quantity};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use beamsim_core::system::Node;
@@ -248,31 +247,20 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
-    let first_multiplier = mesh.slots() as u32;
-    let multipliers = composition.multipliers.len();
-    let mut kinds = kinds(&mesh);
-    let mut names = mesh.names.clone();
-    for (kind, name) in composition.multipliers {
-        names.give(kinds.len() as u32, &name);
-        kinds.push(kind);
-    }
-    let mut model = Model {
-        kinds: Arc::new(kinds),
-        names: Arc::new(names),
-        multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
-        angles: composition.angles,
-        sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
+    let is_sprung = |spring: &&GroundSpring| spring.rotation != Mat3::ZERO;
+    let parts = ModelParts {
+        names: mesh.names.clone(),
+        multipliers: composition.multipliers,
+        elements: mesh.beams.iter().flat_map(|beam| element_infos(&mesh, beam)).collect(),
+        sprung: composition.springs.iter().filter(is_sprung).map(|spring| spring.node.p).collect(),
         sprung_joints: composition.sprung_joints,
-        elements: mesh.element_count,
-        rotating: charted(&mesh),
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
-        plane: None,
         linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
-        length: check::diagonal(&mesh),
     };
+    let mut model = parts.assemble(&mesh.nodes);
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
@@ -318,24 +306,11 @@ fn places(mesh: &Mesh, stages: &[Stage]) -> Vec<(Node, Vec3)> {
     mesh.nodes.iter().filter(|_| wanted).map(|node| (node.node, node.place)).collect()
 }
 
-/// The rotations of all nodes, and the elements beam by beam.
-fn charted(mesh: &Mesh) -> Charted {
-    let info = |beam: &MeshBeam, number: usize| {
-        let rotations = beam.nodes_of(number).iter().map(|&n| mesh.nodes[n].node.p);
-        ElementInfo::new(rotations, beam.interpolation == deck::InterpolationWord::Total)
-    };
-    let of = |beam: &MeshBeam| beam.elements.clone().map(|number| info(beam, number)).collect::<Vec<_>>();
-    Charted {
-        rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
-        elements: mesh.beams.iter().flat_map(of).collect(),
-    }
-}
-
-/// The kind of each slot of the mesh.
-fn kinds(mesh: &Mesh) -> Vec<SlotKind> {
-    let mut kinds = vec![SlotKind::Displacement; mesh.slots()];
-    mesh.nodes.iter().for_each(|node| kinds[node.node.p as usize] = SlotKind::Rotation);
-    kinds
+/// The elements of a beam as changes of chart see them.
+fn element_infos(mesh: &Mesh, beam: &MeshBeam) -> impl Iterator<Item = ElementInfo> {
+    let in_one_chart = beam.interpolation == deck::InterpolationWord::Total;
+    let rotations = |number: usize| beam.nodes_of(number).iter().map(|&node| mesh.nodes[node].node.p);
+    beam.elements.clone().map(move |number| ElementInfo::new(rotations(number), in_one_chart))
 }
 
 fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Stage> {

@@ -1,7 +1,8 @@
 //! From names in the deck to nodes and places of the mesh.
 
-use super::mesh::{Mesh, MeshBeam, shape_at};
+use super::mesh::{Mesh, MeshBeam};
 use crate::deck::{Deck, Diagnostic, InterpolationWord, PointRef, Spanned, nearest, one_of};
+use beamsim_core::model::beam_element::shape_at;
 use beamsim_core::probe::Place;
 use beamsim_core::tensor::{Mat3, Vec3};
 

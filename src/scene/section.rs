@@ -1,31 +1,10 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
 use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned};
-use beamsim_core::kernel::elastic::Stiffness;
-use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::model::{MassPerLength, SectionMatrices};
 use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
 use std::f64::consts::PI;
-
-/// Stiffness and mass of a section, local axes, order Gamma1 Gamma2 Gamma3 K1 K2 K3.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SectionMatrices {
-    /// Stiffness
-    pub stiffness: [[f64; 6]; 6],
-    /// Mass per length, where given
-    pub mass: Option<MassPerLength>,
-}
-
-/// Mass properties per length, local axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassPerLength {
-    /// Mass
-    pub mass: f64,
-    /// Mass centre in the section
-    pub offset: Vec3,
-    /// Inertia about the centre line
-    pub about_line: Mat3,
-}
 
 /// The section of a beam from its start to its end.
 #[derive(Clone, Debug)]
@@ -158,8 +137,7 @@ pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result
                     Some(MassPerLength { mass: mass.unwrap_or(0.0), offset: Vec3::ZERO, about_line: diagonal })
                 }
             };
-            let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { stiffness[i] } else { 0.0 }));
-            Ok(SectionMatrices { stiffness, mass })
+            Ok(SectionMatrices { mass, ..SectionMatrices::diagonal(*stiffness) })
         }
         SectionBody::Full { stiffness, mass } => full(section, stiffness, mass.as_ref(), span),
         SectionBody::Shaped { shape, material, shear_factor } => {
@@ -263,13 +241,12 @@ fn shaped(shape: Shape, material: &deck::Material, shear_factor: Option<[f64; 2]
     let e = material.young;
     let g = material.shear;
     let diagonal = [e * area, g * area * k2, g * area * k3, g * torsion, e * bending[0], e * bending[1]];
-    let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { diagonal[i] } else { 0.0 }));
     let mass = material.density.map(|rho| MassPerLength {
         mass: rho * area,
         offset: Vec3::ZERO,
         about_line: Mat3::diagonal([bending[0] + bending[1], bending[0], bending[1]].map(|i| rho * i)),
     });
-    SectionMatrices { stiffness, mass }
+    SectionMatrices { mass, ..SectionMatrices::diagonal(diagonal) }
 }
 
 fn cube(x: f64) -> f64 {
@@ -329,29 +306,6 @@ fn rectangle_torsion(width: f64, height: f64) -> f64 {
     let term = |n: f64| libm::tanh(n * PI * a / (2.0 * b)) / (n * fourth(n));
     let sum: f64 = (0..200).map(|k| term(2.0 * f64::from(k) + 1.0)).sum();
     a * cube(b) * (1.0 / 3.0 - 64.0 / (PI * fourth(PI)) * (b / a) * sum)
-}
-
-impl SectionMatrices {
-    /// The stiffness in global components, for section axes R0.
-    pub fn stiffness_in(&self, r0: Mat3) -> Stiffness {
-        let block = |row: usize, column: usize| {
-            Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.stiffness[3 * row + i][3 * column + j])))
-        };
-        let turned = |m: Mat3| r0 * m * r0.transpose();
-        let coupling = block(0, 1);
-        Stiffness {
-            cn: turned(block(0, 0)),
-            cm: turned(block(1, 1)),
-            cc: (coupling != Mat3::ZERO).then(|| turned(coupling)),
-        }
-    }
-}
-
-impl MassPerLength {
-    /// The mass properties in global components.
-    pub fn turned(&self, r0: Mat3) -> Inertia {
-        Inertia { mass: self.mass, offset: r0 * self.offset, about_node: r0 * self.about_line * r0.transpose() }
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use crate::decks::decks;
 use crate::random::Random;
 use beamsim::deck::{self, Axes, Deck, Diagnostic, Frame, Load, MotionWhat, Path, PointRef, SectionBody, SpringBody};
 use beamsim::scene;
+use beamsim_core::model::StageKind;
 use beamsim_core::rotation::Rotation;
 use beamsim_core::run::{Failure, Observer, Run, Snapshot};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -25,7 +26,7 @@ struct Rows(Outcome);
 
 impl Observer for Rows {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
-        let slots = if at.model.linear { &[] } else { &at.model.rotating.rotations[..] };
+        let slots = &at.model.charted(StageKind::Static).rotations;
         // The rotation of a node follows its displacement.
         let node = |&p: &u32| (at.state.q[p as usize - 1], Rotation::new(at.state.q[p as usize]).r);
         let nodes: Vec<(Vec3, Mat3)> = slots.iter().map(node).collect();

@@ -1,6 +1,8 @@
 //! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
 
 mod assembly;
+pub mod beam_element;
+mod builder;
 pub mod charts;
 mod constraint;
 mod course;
@@ -8,17 +10,22 @@ mod effect_size;
 mod history;
 mod linear;
 mod names;
+mod parts;
 mod schedule;
+mod section;
 mod stage_error;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
 pub use assembly::Assembly;
+pub use builder::{BuildError, ModelBuilder, NodeId, StraightBeam};
 pub use constraint::{Motion, MotionKind, Support};
 pub use course::{Amplitude, Course, Progress, Ramp, Timeline};
 pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
+pub use parts::ModelParts;
 pub use schedule::Schedule;
+pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
@@ -33,7 +40,7 @@ use std::sync::Arc;
 /// a few thousand steps. What is left aside is dropped, a hundredth of what planar and spatial answers may differ by.
 const OUT_OF_PLANE: f64 = 1e-12;
 
-/// What a slot holds.
+/// The kind of vector that a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotKind {
     /// A displacement
@@ -101,30 +108,30 @@ pub struct Charted {
 
 /// A scene. Nothing of it changes in a run: what does is [`State`] and [`Schedule`].
 pub struct Model {
-    /// What each slot holds
+    /// The kind of vector that each slot holds
     pub kinds: Arc<Vec<SlotKind>>,
-    /// And the node that it is named after
-    pub names: Arc<Names>,
+    /// The names of nodes, by their slots
+    pub(crate) names: Arc<Names>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
-    pub angles: usize,
+    pub(crate) angles: usize,
     /// The slots on which rotational springs act: their unwrapped rotation vectors must be known
-    pub sprung: Vec<Slot>,
-    /// Those of the two sides of each joint that remembers its angle
-    pub sprung_joints: Vec<[Option<Slot>; 2]>,
+    pub(crate) sprung: Vec<Slot>,
+    /// The rotations on the two sides of each joint that remembers its angle
+    pub(crate) sprung_joints: Vec<[Option<Slot>; 2]>,
     /// How many beam elements there are
-    pub elements: usize,
+    pub(crate) elements: usize,
     /// Rotations and elements that large rotations change the charts of; see [`Self::charted`]
-    pub rotating: Charted,
-    /// What acts
+    pub(crate) rotating: Charted,
+    /// The effects, in the order in which their forces are added
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs
-    pub amplitudes: Vec<Amplitude>,
+    pub(crate) amplitudes: Vec<Amplitude>,
     /// Supports
     pub supports: Vec<Support>,
     /// Prescribed motions
-    pub motions: Vec<Motion>,
+    pub(crate) motions: Vec<Motion>,
     /// The plane that the scene lies in, where it is treated in one
     pub plane: Option<Plane>,
     /// Whether static and dynamic stages are linear in the displacements

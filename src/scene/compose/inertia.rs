@@ -1,17 +1,20 @@
 //! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional
 //! damping.
 
-use super::{Composer, SWITCHED_OFF, push_volume};
+use super::{Composer, SWITCHED_OFF};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
-use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
+use crate::scene::mesh::{BeamElement, MeshBeam};
 use crate::scene::names;
-use crate::scene::section::MassPerLength;
 use beamsim_core::effect::inertia::{
     BeamMass, BeamMassDamping, Body, BodyMassDamping, RigidBody, RotaryInertia, RotatingFrame, SectionInertia,
 };
 use beamsim_core::effect::load::{BeamGravity, BodyGravity};
 use beamsim_core::effect::{ByOrder, VolumeElements};
 use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::model::MassPerLength;
+use beamsim_core::model::beam_element::{
+    ElementGeometry, NodalInertia, PlacedNode, Rule, Station, body_inertia, push_volume,
+};
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -96,11 +99,9 @@ impl Composer<'_> {
             self.diagnostics.push(Diagnostic::error(message, body.span.clone()));
             return None;
         }
-        let d = Vec3(body.offset);
-        let steiner = (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.mass;
-        let inertia = Arc::new(Inertia { mass: body.mass, offset: d, about_node: centre + steiner });
-        let node = &self.mesh.nodes[node];
-        Some(Body { node: node.node, place: node.place, inertia })
+        let inertia = Arc::new(body_inertia(body.mass, Vec3(body.offset), centre));
+        let PlacedNode { node, place } = self.mesh.nodes[node];
+        Some(Body { node, place, inertia })
     }
 
     pub(super) fn body_inertia(&mut self) {
@@ -156,17 +157,17 @@ impl Composer<'_> {
     /// relative all that turns with the section, because no chart matters there.
     fn each_inertia(&self, mut visit: impl FnMut(&BeamElement, &[Station], &[Inertia])) -> Vec<Body> {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
-        let mut nodal = NodalInertia::new(self.mesh);
+        let mut nodal = NodalInertia::new(self.mesh.nodes.len());
         self.each_element(|element| {
             let beam = element.beam;
             let stations = element.stations(Rule::Volume);
             let relative = beam.interpolation == InterpolationWord::Relative;
             let eccentric = stations.iter().any(|station| mass_at(beam, station).offset != Vec3::ZERO);
             if relative && eccentric {
-                return nodal.add(element, |whole| whole);
+                return add_at_nodes(&mut nodal, element, |whole| whole);
             }
             if relative && rotary {
-                nodal.add(element, |whole| Inertia { mass: 0.0, ..whole });
+                add_at_nodes(&mut nodal, element, |whole| Inertia { mass: 0.0, ..whole });
             }
             let turns = eccentric || (rotary && !relative);
             let at = |station: &Station| {
@@ -176,7 +177,7 @@ impl Composer<'_> {
             let found: Vec<Inertia> = stations.iter().map(at).collect();
             visit(element, &stations, &found);
         });
-        nodal.bodies(self.mesh)
+        nodal.bodies(|node| self.mesh.nodes[node])
     }
 
     /// All mass of beams: elements with a quantity of each of their points, and the bodies that sit
@@ -255,51 +256,16 @@ impl Composer<'_> {
     }
 }
 
-/// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the
-/// node.
-struct NodalInertia {
-    /// By node; none where no element of these beams ends
-    nodes: Vec<(f64, Vec3, Mat3)>,
-}
-
-impl NodalInertia {
-    fn new(mesh: &Mesh) -> Self {
-        Self { nodes: vec![(0.0, Vec3::ZERO, Mat3::ZERO); mesh.nodes.len()] }
-    }
-
-    /// Adds what an element brings to its nodes; `pick` may leave parts out.
-    fn add(&mut self, element: &BeamElement, pick: impl Fn(Inertia) -> Inertia) {
-        for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
-            let own = pick(mass_at(element.beam, station).turned(station.axes));
-            let (mass, moment, about) = &mut self.nodes[node];
-            *mass += own.mass * station.weight;
-            *moment += own.offset * (own.mass * station.weight);
-            *about += own.about_node * station.weight;
-        }
-    }
-
-    /// The bodies at nodes that have any.
-    fn bodies(self, mesh: &Mesh) -> Vec<Body> {
-        let mut last: Option<Arc<Inertia>> = None;
-        let body = |(node, (mass, moment, about_node)): (usize, (f64, Vec3, Mat3))| {
-            let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
-            let node = &mesh.nodes[node];
-            let inertia = Inertia { mass, offset, about_node };
-            let known = last.take().filter(|known| **known == inertia);
-            let inertia = known.unwrap_or_else(|| Arc::new(inertia));
-            last = Some(inertia.clone());
-            Body { node: node.node, place: node.place, inertia }
-        };
-        let there = |(_, (mass, _, about)): &(usize, (f64, Vec3, Mat3))| *mass != 0.0 || *about != Mat3::ZERO;
-        let mut bodies: Vec<Body> = self.nodes.into_iter().enumerate().filter(there).map(body).collect();
-        bodies.shrink_to_fit();
-        bodies
+/// Adds the sections of an element to its nodes, each with the part of its mass properties that `pick` leaves.
+fn add_at_nodes(nodal: &mut NodalInertia, element: &BeamElement, pick: impl Fn(Inertia) -> Inertia) {
+    for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
+        let own = pick(mass_at(element.beam, station).turned(station.axes));
+        nodal.add(node, &own, station.weight);
     }
 }
 
 fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {
-    let none = MassPerLength { mass: 0.0, offset: Vec3::ZERO, about_line: Mat3::ZERO };
-    beam.section.at(station.fraction).mass.unwrap_or(none)
+    beam.section.at(station.fraction).mass_per_length()
 }
 
 /// True if a matrix can be the inertia of a body: no principal value negative, none larger than the

@@ -1,12 +1,13 @@
 //! Loads at nodes and along beams.
 
-use super::{Composer, push_volume};
+use super::Composer;
 use crate::deck::{self, Diagnostic, EffectWord, Frame, InterpolationWord, LoadTarget, LoadVector};
-use crate::scene::mesh::{BeamElement, Rule, Station};
+use crate::scene::mesh::BeamElement;
 use crate::scene::names;
 use beamsim_core::effect::load::{LineLoad, LineLoadKind, NodeForce, NodeLoad, NodeLoadKind};
 use beamsim_core::effect::{ByOrder, Effect};
 use beamsim_core::kernel::load::Intensity;
+use beamsim_core::model::beam_element::{ElementGeometry, Rule, Station, push_volume};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 impl Composer<'_> {

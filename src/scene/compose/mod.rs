@@ -8,18 +8,16 @@ mod spins;
 
 use super::constraints::find_history;
 use super::joints::FoundJoint;
-use super::mesh::{BeamElement, Mesh, Rule, Station};
+use super::mesh::{BeamElement, Mesh};
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
+use beamsim_core::effect::Effect;
 use beamsim_core::effect::elasticity::{
-    BeamElasticity, ElasticElement, ElasticElements, Interpolation, RelativeVectors, StrainRateDamping, StressField,
-    TotalVectors,
+    BeamElasticity, ElasticElements, Interpolation, RelativeVectors, StrainRateDamping, StressField, TotalVectors,
 };
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
-use beamsim_core::effect::{Connection, Effect, VolumeElement, VolumeElements};
-use beamsim_core::kernel::beam::StiffnessPoint;
 use beamsim_core::kernel::elastic::Strain;
-use beamsim_core::kernel::volume::VolumePoint;
+use beamsim_core::model::beam_element::{ElasticPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::run::Driven;
 use beamsim_core::system::Slot;
@@ -228,12 +226,11 @@ impl Composer<'_> {
             if element.beam.interpolation != way {
                 return;
             }
-            let free = free.get(&element.beam.name).copied();
-            match element.nodes.len() {
-                2 => elements.two.push(elastic(element, free, elements.two.last())),
-                3 => elements.three.push(elastic(element, free, elements.three.last())),
-                _ => elements.four.push(elastic(element, free, elements.four.last())),
-            }
+            let beam = element.beam;
+            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| ElasticPoint {
+                stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+                free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
+            });
         });
         elements.shrink_to_fit();
         if elements.is_empty() {
@@ -338,62 +335,6 @@ fn may_flutter(deck: &Deck) -> bool {
 /// The stages of the deck count from 1, those of a run from 0.
 pub fn stage_set(stages: Option<&Vec<usize>>) -> StageSet {
     StageSet(stages.map(|stages| stages.iter().map(|s| s - 1).collect()))
-}
-
-fn connect<const N: usize>(element: &BeamElement) -> Connection<N> {
-    let node = |i: usize| &element.mesh.nodes[element.nodes[i]];
-    Connection { element: element.number as u32, nodes: std::array::from_fn(|i| node(i).node) }
-}
-
-/// Pushes an element with these volume points into the batch of its order.
-fn push_volume<Q: Copy + PartialEq>(
-    batches: &mut VolumeElements<Q>,
-    element: &BeamElement,
-    stations: &[Station],
-    quantity: impl Fn(usize) -> Q,
-) {
-    match element.nodes.len() {
-        2 => batches.two.push(volume(element, stations, quantity, batches.two.last())),
-        3 => batches.three.push(volume(element, stations, quantity, batches.three.last())),
-        _ => batches.four.push(volume(element, stations, quantity, batches.four.last())),
-    }
-}
-
-fn volume<const N: usize, Q: Copy + PartialEq>(
-    element: &BeamElement,
-    stations: &[Station],
-    quantity: impl Fn(usize) -> Q,
-    neighbour: Option<&VolumeElement<N, Q>>,
-) -> VolumeElement<N, Q> {
-    let point = |k: usize| {
-        let Station { shape, weight, .. } = &stations[k];
-        VolumePoint { shape: std::array::from_fn(|i| shape[i]), weight: *weight, quantity: quantity(k) }
-    };
-    let points = std::array::from_fn(point);
-    VolumeElement::new(connect(element), element.place(), element.arms(), points, neighbour)
-}
-
-fn elastic<const N: usize, const G: usize>(
-    element: &BeamElement,
-    free: Option<usize>,
-    neighbour: Option<&ElasticElement<N, G>>,
-) -> ElasticElement<N, G> {
-    let beam = element.beam;
-    let stations = element.stations(Rule::Inner);
-    let point = |k: usize| {
-        let station = &stations[k];
-        StiffnessPoint {
-            shape: std::array::from_fn(|i| station.shape[i]),
-            slope: std::array::from_fn(|i| station.slope[i]),
-            weight: station.weight,
-            tangent: station.axes.column(0),
-            stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
-            free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
-        }
-    };
-    let arms = element.arms();
-    let points = std::array::from_fn(point);
-    ElasticElement::new(connect(element), element.rounding(), arms, points, free, neighbour)
 }
 
 /// From section axes to global components.

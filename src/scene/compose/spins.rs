@@ -4,9 +4,10 @@ use super::Composer;
 use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
-use crate::scene::section::SectionMatrices;
+
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::spin_hold::{HeldIn, SpinHold, SpinningPart};
+use beamsim_core::model::SectionMatrices;
 use beamsim_core::system::Slot;
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
