@@ -1,8 +1,9 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
 use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned};
-use beamsim_core::kernel::elastic::Stiffness;
+use beamsim_core::effect::elasticity::BeamLaw;
 use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::kernel::law::{Linear, Stiffness};
 use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
 use std::f64::consts::PI;
@@ -332,18 +333,19 @@ fn rectangle_torsion(width: f64, height: f64) -> f64 {
 }
 
 impl SectionMatrices {
-    /// The stiffness in global components, for section axes R0.
-    pub fn stiffness_in(&self, r0: Mat3) -> Stiffness {
+    /// The law in global components, for section axes R0.
+    pub fn law_in(&self, r0: Mat3) -> BeamLaw {
         let block = |row: usize, column: usize| {
             Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.stiffness[3 * row + i][3 * column + j])))
         };
         let turned = |m: Mat3| r0 * m * r0.transpose();
         let coupling = block(0, 1);
-        Stiffness {
+        let stiffness = Stiffness {
             cn: turned(block(0, 0)),
             cm: turned(block(1, 1)),
             cc: (coupling != Mat3::ZERO).then(|| turned(coupling)),
-        }
+        };
+        Linear { stiffness }
     }
 }
 

@@ -11,14 +11,13 @@ use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh, Rule, Station};
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
 use beamsim_core::effect::elasticity::{
-    BeamElasticity, ElasticElement, ElasticElements, Interpolation, RelativeVectors, StrainRateDamping, StressField,
-    TotalVectors,
+    BeamElasticity, ElasticElement, ElasticElements, ElasticPoint, Interpolation, RelativeVectors, StrainRateDamping,
+    StressField, TotalVectors,
 };
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::effect::{Connection, Effect, VolumeElement, VolumeElements};
-use beamsim_core::kernel::beam::StiffnessPoint;
-use beamsim_core::kernel::elastic::Strain;
+use beamsim_core::kernel::law::Strain;
 use beamsim_core::kernel::volume::VolumePoint;
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::run::Driven;
@@ -388,12 +387,12 @@ fn elastic<const N: usize, const G: usize>(
     let stations = element.stations(Rule::Inner);
     let point = |k: usize| {
         let station = &stations[k];
-        StiffnessPoint {
+        ElasticPoint {
             shape: std::array::from_fn(|i| station.shape[i]),
             slope: std::array::from_fn(|i| station.slope[i]),
             weight: station.weight,
             tangent: station.axes.column(0),
-            stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+            law: beam.section.at(station.fraction).law_in(station.axes),
             free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
         }
     };
