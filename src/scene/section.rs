@@ -62,6 +62,9 @@ const RIGID: f64 = 1e2;
 /// Relative difference of lengths in tables and of beams that is taken for rounding.
 const SAME_LENGTH: f64 = 1e-3;
 
+/// Largest relative difference of stiffnesses, or of inertias, about two axes that a section does not tell apart.
+const ALIKE: f64 = 1e-9;
+
 impl SectionCourse {
     /// The section at the fraction `s` of the arc length.
     pub fn at(&self, s: f64) -> SectionMatrices {
@@ -333,6 +336,17 @@ fn rectangle_torsion(width: f64, height: f64) -> f64 {
 }
 
 impl SectionMatrices {
+    /// True if the section bends, shears and has inertia about all axes across the beam alike, and couples nothing.
+    pub fn is_round(&self) -> bool {
+        let Self { stiffness: k, mass } = self;
+        let j = mass.map_or(Mat3::ZERO, |mass| mass.about_line).0;
+        let turns_alike = (j[1][1] - j[2][2]).abs() <= ALIKE * j[1][1].abs() && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
+        let size = |i: usize| k[i][i].abs();
+        let alike = |i: usize, j: usize| (k[i][i] - k[j][j]).abs() <= ALIKE * size(i).max(size(j));
+        let apart = |i: usize, j: usize| i == j || k[i][j].abs() <= ALIKE * (size(i) * size(j)).sqrt();
+        turns_alike && alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
+    }
+
     /// The law in global components, for section axes R0.
     pub fn law_in(&self, r0: Mat3) -> BeamLaw {
         let block = |row: usize, column: usize| {
