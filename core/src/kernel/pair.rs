@@ -1,5 +1,5 @@
-//! Elements of two nodes seen from half way between them: what [`Relative`] comes to where there is one integration point, in the
-//! middle. The frame itself stands there, so that nothing is interpolated:
+//! Elements of two nodes seen from half way between them: [`Relative`] elements whose only integration point is in the middle,
+//! where the frame itself stands, so that nothing is interpolated:
 //!
 //! ```text
 //! Gamma = s (R_r^T dx - dX),   K = s phi,   phi = log(R_1^T R_2) = 2h,   s = 1/length
@@ -20,7 +20,8 @@
 //! t_i,t_j: w (F_i^T (S F_j - s a~ Cc B_j) + s B_i^T (Cc^T a~ F_j + s Cm B_j) + E_i B_j),   E_i dphi = d(F_i^T) q + s d(B_i^T) M
 //! ```
 //!
-//! T_i takes spins to rotation vectors, whose own second variation is C2. A third of the work of the general way.
+//! Cn, Cc and Cm are the blocks of the law's tangent. T_i takes spins to rotation vectors, whose own second variation is C2. A third of the work
+//! of the general way.
 
 use super::beam::StiffnessPoint;
 use super::element::ElementSystem;

@@ -290,7 +290,7 @@ pub struct PlanarBody<T = f64> {
 }
 
 impl PlanarBody {
-    /// What of mass properties matters in the plane with these axes (columns, the third one normal).
+    /// The in-plane part of mass properties, for the plane with these axes (columns, the third one normal).
     pub fn new(inertia: &Inertia, axes: &Mat3) -> Self {
         let [x, y, _] = axes.transpose_mul(inertia.offset).0;
         let normal = axes.column(2);
@@ -347,7 +347,7 @@ impl<T: Real> PlanarBody<T> {
     }
 }
 
-/// The stress in the plane with these axes.
+/// The in-plane part of a stress in space, for the plane with these axes.
 #[inline(always)]
 pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
     let along = |v: &Vec3<T>, k: usize| {
@@ -357,7 +357,7 @@ pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
     [along(&stress.n, 0), along(&stress.n, 1), along(&stress.m, 2)]
 }
 
-/// The same in space.
+/// The stress in space, in global components, of a stress in the plane with these axes.
 #[inline(always)]
 pub fn in_space<T: Real>([x, y, m]: PlanarStress<T>, axes: &Mat3) -> Stress<T> {
     let [a, b, e] = [0, 1, 2].map(|k| axes.column(k));

@@ -124,7 +124,7 @@ impl<const N: usize> Motion<N> {
         }
     }
 
-    /// See [`RotationRate::pull_back`].
+    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the derivative over the rate of the state.
     fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
         if block.is_multiple_of(2) { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }
