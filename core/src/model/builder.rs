@@ -1,7 +1,7 @@
 //! Builds a [`Model`] from nodes, straight beams, supports and loads, without a deck.
 
 use super::beam_element::{
-    ElasticPoint, ElementGeometry, NodalInertia, PlacedNode, Rule, Station, body_inertia, push_elastic, push_volume,
+    ElementGeometry, NodalInertia, PlacedNode, Rule, SectionPoint, Station, body_inertia, push_elastic, push_volume,
     shape_at,
 };
 use super::parts::ModelParts;
@@ -444,10 +444,10 @@ impl ModelBuilder {
             let is_eccentric = turned.offset != Vec3::ZERO;
             let at_nodes = if is_eccentric { turned } else { Inertia { mass: 0.0, ..turned } };
             let on_line = Inertia { about_node: Mat3::ZERO, ..turned };
-            let stiffness = beam.section.stiffness_in(beam.axes);
+            let law = beam.section.law_in(beam.axes);
             for number in 0..beam.elements {
                 let element = StraightElement { nodes: &self.nodes, beam, number };
-                push_elastic(&mut elastic, &element, None, |_| ElasticPoint { stiffness, free: None });
+                push_elastic(&mut elastic, &element, None, |_| SectionPoint { law, free: None });
                 for (i, station) in element.stations(Rule::Nodal).iter().enumerate() {
                     nodal.add(element.node_number(i), &at_nodes, station.weight);
                 }

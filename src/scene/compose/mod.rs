@@ -16,8 +16,8 @@ use beamsim_core::effect::elasticity::{
 };
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
-use beamsim_core::kernel::elastic::Strain;
-use beamsim_core::model::beam_element::{ElasticPoint, push_elastic};
+use beamsim_core::kernel::law::Strain;
+use beamsim_core::model::beam_element::{SectionPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::run::Driven;
 use beamsim_core::system::Slot;
@@ -227,8 +227,8 @@ impl Composer<'_> {
                 return;
             }
             let beam = element.beam;
-            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| ElasticPoint {
-                stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| SectionPoint {
+                law: beam.section.at(station.fraction).law_in(station.axes),
                 free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
             });
         });
