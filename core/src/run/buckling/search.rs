@@ -25,13 +25,13 @@ impl Sight {
 /// A critical load between a state that lies before it and a load that lies beyond.
 pub struct CriticalSearch {
     pub here: State,
-    pub beyond: Option<f64>,
+    beyond: Option<f64>,
     /// The state at the load that lies beyond, where load control comes to it
     pub behind: Option<State>,
     /// The estimate from here
     pub estimate: f64,
     /// How much farther than the estimate the next look goes: it may fall short again and again
-    pub stretch: f64,
+    stretch: f64,
     pub way: f64,
     /// The estimate from the last point before it
     seen: f64,
