@@ -29,14 +29,16 @@ const PARALLEL: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeId(usize);
 
-/// A straight beam of equal elements with one section, whose rotations are interpolated relative to each element.
+/// A straight beam of equal elements with one section, whose rotations are interpolated relative to
+/// each element.
 #[derive(Clone, Debug)]
 pub struct StraightBeam {
     /// Start and end
     pub ends: [NodeId; 2],
     /// Its section
     pub section: SectionMatrices,
-    /// The third section axis is the part of it normal to the beam; EI2 bends about the second, EI3 about the third.
+    /// The third section axis is the part of it normal to the beam; EI2 bends about the second, EI3
+    /// about the third.
     pub axis3: Vec3,
     /// The number of elements
     pub elements: usize,
@@ -44,14 +46,14 @@ pub struct StraightBeam {
     pub order: usize,
 }
 
-/// What a builder was given and cannot use.
+/// The reason why a part cannot be built.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BuildError {
     /// A node of another builder
     UnknownNode(usize),
     /// Two nodes at one place
     NoLength {
-        /// What lies between them
+        /// The part that lies between them
         what: &'static str,
         /// The names of both
         nodes: [String; 2],
@@ -178,8 +180,9 @@ impl ElementGeometry for StraightElement<'_> {
 
 /// Collects the parts of a scene.
 ///
-/// Loads and motions come with an [`Amplitude`], which says when they act: `Amplitude::default()` ramps a load up in the first
-/// static stage, and applies it in full from the start of a dynamic one.
+/// Loads and motions come with an [`Amplitude`], which says when they act: `Amplitude::default()`
+/// ramps a load up in the first static stage, and applies it in full from the start of a dynamic
+/// one.
 #[derive(Default)]
 pub struct ModelBuilder {
     nodes: Vec<PlacedNode>,
@@ -328,8 +331,8 @@ impl ModelBuilder {
         self.load(node, NodeLoadKind::SpatialMoment, moment, Amplitude::default())
     }
 
-    /// A rigid body at a node: its mass, the place of its mass centre as seen from the node, and its inertia about the mass centre
-    /// along the global axes.
+    /// A rigid body at a node: its mass, the place of its mass centre as seen from the node, and
+    /// its inertia about the mass centre along the global axes.
     pub fn body(&mut self, node: NodeId, mass: f64, offset: Vec3, inertia: [f64; 3]) -> Result<(), BuildError> {
         let PlacedNode { node, place } = self.find(node)?;
         if let Some(&wrong) = [mass].iter().chain(&inertia).find(|value| !value.is_finite() || **value < 0.0) {
@@ -340,7 +343,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// A spring from a node to ground: stiffness against displacement and rotation, along the global axes.
+    /// A spring from a node to ground: stiffness against displacement and rotation, along the
+    /// global axes.
     pub fn ground_spring(&mut self, node: NodeId, stiffness: [f64; 6]) -> Result<(), BuildError> {
         let node = self.slots(node)?;
         let [x, y, z, rx, ry, rz] = stiffness;
@@ -373,8 +377,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Prescribes the displacement of a node along an axis, or its rotation about one; the amplitude is one
-    /// [of a motion](Amplitude::of_motion).
+    /// Prescribes the displacement of a node along an axis, or its rotation about one; the
+    /// amplitude is one [of a motion](Amplitude::of_motion).
     pub fn motion(
         &mut self,
         node: NodeId,
