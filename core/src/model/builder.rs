@@ -255,6 +255,10 @@ impl ModelBuilder {
                 return Err(BuildError::Stiffness(place, row[place]));
             }
         }
+        let mass = beam.section.mass_per_length().mass;
+        if mass.is_nan() || mass < 0.0 {
+            return Err(BuildError::Mass(mass));
+        }
         let length = way.norm();
         let tangent = way * (1.0 / length);
         let normal = beam.axis3 - tangent * beam.axis3.dot(tangent);
@@ -462,10 +466,14 @@ impl ModelBuilder {
                 if !is_eccentric && on_line.mass != 0.0 {
                     let stations = element.stations(Rule::Volume);
                     push_volume(&mut mass, &element, &stations, |_| on_line.mass);
-                    push_volume(&mut heavy, &element, &stations, |_| on_line);
+                    if self.gravity != Vec3::ZERO {
+                        push_volume(&mut heavy, &element, &stations, |_| on_line);
+                    }
                 }
             }
         }
+        elastic.shrink_to_fit();
+        heavy.shrink_to_fit();
         let sections = nodal.bodies(|node| self.nodes[node]);
         effects.push(!elastic.is_empty(), BeamElasticity::<RelativeVectors>::new(elastic));
         let mass = BeamMass::new(&mass);
@@ -475,7 +483,8 @@ impl ModelBuilder {
         let sections = RigidBody { name: "section inertia at nodes", bodies: sections, gyroscopic: true };
         effects.push(!sections.bodies.is_empty(), sections);
         if self.gravity != Vec3::ZERO {
-            let (acceleration, amplitude) = (self.gravity, self.amplitude(Amplitude::default()));
+            let acceleration = self.gravity;
+            let amplitude = self.amplitude(Amplitude::default());
             effects.push(!heavy.is_empty(), BeamGravity { acceleration, amplitude, elements: heavy });
             effects.push(!massive.is_empty(), BodyGravity { acceleration, amplitude, bodies: massive });
         }
