@@ -4,7 +4,7 @@
 //! stiffness F/r exp(-d/r). A wall beside the tip of a cantilever takes a part of the load; the balance of both at the tip is one
 //! equation for one unknown, which is solved here by itself.
 
-use beamsim_core::effect::{Effect, Energy};
+use beamsim_core::effect::{Effect, Energy, Roles, TangentForm};
 use beamsim_core::kernel::{ElementSystem, Weights};
 use beamsim_core::model::{ModelBuilder, SectionMatrices, StraightBeam};
 use beamsim_core::run::{Plan, Run, Snapshot, Stage};
@@ -54,8 +54,8 @@ impl Effect for SoftWall {
         connectivity
     }
 
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
@@ -78,6 +78,11 @@ impl Effect for SoftWall {
 
     fn strain_of(&self, _at: &State, field: &[Vec3], length: f64) -> f64 {
         field[self.slot as usize].dot(self.normal).abs() / length
+    }
+
+    /// It constrains nothing, has no stresses and no mass, and nothing drives it.
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
     }
 }
 

@@ -38,6 +38,7 @@
 //!
 //! The modules stand in the order of their layers: each imports only those above it.
 
+pub mod failure;
 pub mod warning;
 
 pub mod threads;

@@ -1,7 +1,9 @@
 //! `beamsim plot`
 
-use super::load::Refusal;
-use super::{Status, Verdict, json, load, say};
+use super::error::CommandError;
+use super::status::Status;
+use super::verdict::Verdict;
+use super::{console, json, load};
 use crate::deck::nearest;
 use crate::output::{Curve, Curves, HistoryReader, PartFile};
 use std::path::{Path, PathBuf};
@@ -41,13 +43,13 @@ struct Named {
 /// Draws histories.
 pub fn plot(wanted: &Wanted) -> Status {
     let mut verdict = Verdict::default();
-    if let Err(refusal) = draw(wanted) {
-        verdict.refuse(refusal);
+    if let Err(error) = draw(wanted) {
+        verdict.fail(error);
     }
     verdict.finish(1)
 }
 
-fn draw(wanted: &Wanted) -> Result<(), Refusal> {
+fn draw(wanted: &Wanted) -> Result<(), CommandError> {
     let mut runs = wanted.results.iter().map(|path| read(path, false)).collect::<Result<Vec<_>, _>>()?;
     runs.extend(wanted.reference.as_ref().map(|path| read(path, true)).transpose()?);
     let columns = columns(wanted, &runs[0].history)?;
@@ -75,41 +77,41 @@ fn draw(wanted: &Wanted) -> Result<(), Refusal> {
     let y = if let [column] = &columns[..] { column.clone() } else { String::new() };
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
     let picture = picture(&Curves { title, x, y, curves }, &path)?;
-    PartFile::write_to(&path, &picture).map_err(Refusal::io)?;
-    say::line(&format!("{}", path.display()));
+    PartFile::write_to(&path, &picture)?;
+    console::line(&format!("{}", path.display()));
     json::wrote("plot", &path);
     Ok(())
 }
 
 /// In the format that the name of the file asks for.
-fn picture(curves: &Curves, path: &Path) -> Result<Vec<u8>, Refusal> {
+fn picture(curves: &Curves, path: &Path) -> Result<Vec<u8>, CommandError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         None | Some("svg") => Ok(curves.to_svg().into_bytes()),
         Some("png") => png(curves),
         Some(other) => {
             let message = format!("`.{other}`: pictures are written as .svg or .png");
-            Err(Refusal::of(Status::Wrong, "usage", message))
+            Err(CommandError::Usage(message))
         }
     }
 }
 
 #[cfg(feature = "png")]
-fn png(curves: &Curves) -> Result<Vec<u8>, Refusal> {
-    curves.to_png().map_err(|why| Refusal::of(Status::Wrong, "usage", format!("the picture cannot be drawn: {why}")))
+fn png(curves: &Curves) -> Result<Vec<u8>, CommandError> {
+    curves.to_png().map_err(|why| CommandError::Usage(format!("the picture cannot be drawn: {why}")))
 }
 
 #[cfg(not(feature = "png"))]
-fn png(_curves: &Curves) -> Result<Vec<u8>, Refusal> {
+fn png(_curves: &Curves) -> Result<Vec<u8>, CommandError> {
     let message =
         "this build draws .svg only: `cargo install --path . --locked --features png` makes one that draws .png";
-    Err(Refusal::of(Status::Wrong, "usage", message.into()))
+    Err(CommandError::Usage(message.into()))
 }
 
 /// The history in a folder, or the file itself.
-fn read(path: &Path, stored: bool) -> Result<Named, Refusal> {
+fn read(path: &Path, stored: bool) -> Result<Named, CommandError> {
     let file = HistoryReader::of_results(path).unwrap_or_else(|| path.to_path_buf());
-    let history = HistoryReader::read(&file).map_err(Refusal::io)?;
+    let history = HistoryReader::read(&file)?;
     // `results/arm/history.csv` is `arm`.
     let place = if file.file_stem().is_some_and(|stem| stem.to_string_lossy().starts_with("history")) {
         file.parent()
@@ -121,18 +123,18 @@ fn read(path: &Path, stored: bool) -> Result<Named, Refusal> {
 }
 
 /// The place of a column.
-fn find(history: &HistoryReader, name: &str) -> Result<usize, Refusal> {
+fn find(history: &HistoryReader, name: &str) -> Result<usize, CommandError> {
     history.names.iter().position(|known| known == name).ok_or_else(|| {
         let help = match nearest(name, history.names.iter().map(String::as_str)) {
             Some(meant) => format!("did you mean `{meant}`?"),
             None => format!("there are {}", history.names.join(", ")),
         };
-        Refusal::of(Status::Wrong, "usage", format!("the history has no column `{name}`: {help}"))
+        CommandError::Usage(format!("the history has no column `{name}`: {help}"))
     })
 }
 
 /// The columns that are named; or the displacements, or the first.
-fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refusal> {
+fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, CommandError> {
     if !wanted.columns.is_empty() {
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
@@ -144,7 +146,7 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
     let some: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
     let usual = if some.is_empty() { all } else { some };
     if usual.is_empty() {
-        return Err(Refusal::of(Status::Wrong, "usage", "the history has no columns to draw".into()));
+        return Err(CommandError::Usage("the history has no columns to draw".into()));
     }
     Ok(usual.into_iter().take(USUAL).collect())
 }
@@ -159,15 +161,15 @@ fn clock(runs: &[Named]) -> &'static str {
     if (has("time") && runs.iter().any(passes)) || !has("load") { "time" } else { "load" }
 }
 
-fn curve(run: &Named, x: &str, column: &str, empty: Curve) -> Result<Curve, Refusal> {
+fn curve(run: &Named, x: &str, column: &str, empty: Curve) -> Result<Curve, CommandError> {
     let place = |column: &str| {
-        find(&run.history, column).map_err(|why| Refusal { message: format!("{}: {}", run.name, why.message), ..why })
+        find(&run.history, column).map_err(|error| CommandError::Usage(format!("{}: {error}", run.name)))
     };
     let (x, y) = (place(x)?, place(column)?);
     let points: Vec<(f64, f64)> = run.history.rows.iter().map(|row| (row[x], row[y])).collect();
     if let Some(row) = points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
         let message = format!("{}: row {} of `{column}` is not finite", run.name, row + 1);
-        return Err(Refusal::of(Status::Wrong, "usage", message));
+        return Err(CommandError::Usage(message));
     }
     let bars = run.history.names.iter().position(|name| *name == format!("{column}.err"));
     let bars = bars.map(|k| run.history.rows.iter().map(|row| row[k]).collect::<Vec<f64>>());

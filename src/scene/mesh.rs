@@ -3,7 +3,7 @@
 use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
+use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
 use beamsim_core::model::Names;
 use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
@@ -92,11 +92,12 @@ pub struct MeshBeam {
     pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
     pub elements: Range<usize>,
-    /// Where those on each piece of its centre line begin, counted from its first, and at last their number
+    /// First element of each piece of its centre line, counted from that of the beam, and at last
+    /// their number
     piece_starts: Vec<usize>,
     /// Nodes of an element, less one
     pub order: usize,
-    /// How rotations are interpolated
+    /// Interpolation of rotations
     pub interpolation: deck::InterpolationWord,
     /// Strain without stress
     pub free_strain: Option<deck::FreeStrain>,
@@ -113,18 +114,20 @@ impl MeshBeam {
         &self.nodes[first..=first + self.order]
     }
 
-    /// The piece of the centre line at a fraction of the length, and the part of its elements before that.
+    /// The piece of the centre line at a fraction of the length, and the part of its elements
+    /// before that.
     pub fn along(&self, fraction: f64) -> (usize, f64) {
         let (element, xi) = self.element_at(fraction);
         let Part { piece, number, count } = self.part_of_line(element);
         (piece, (number as f64 + 0.5 * (xi + 1.0)) / count as f64)
     }
 
-    /// Where on the centre line an element lies.
+    /// The part of the centre line on which an element lies.
     fn part_of_line(&self, element: usize) -> Part {
         let number = element - self.elements.start;
         let piece = self.piece_starts.partition_point(|&start| start <= number) - 1;
-        let (start, end) = (self.piece_starts[piece], self.piece_starts[piece + 1]);
+        let start = self.piece_starts[piece];
+        let end = self.piece_starts[piece + 1];
         Part { piece, number: number - start, count: end - start }
     }
 }
@@ -150,13 +153,14 @@ pub struct Mesh {
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
     pub parted: HashMap<(String, String), usize>,
-    /// What nodes are called: after their points, or by beam and number
+    /// Names of nodes: those of their points, or beam and number
     pub names: Names,
     slots: u32,
 }
 
 impl Mesh {
-    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to `diagnostics`.
+    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to
+    /// `diagnostics`.
     pub fn new(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let mut mesh = Self::default();
         mesh.part_joints(deck, diagnostics);
@@ -191,7 +195,8 @@ impl Mesh {
         self.names.of(self.nodes[node].node.p)
     }
 
-    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name is that of its first slot.
+    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name
+    /// is that of its first slot.
     fn add_node(&mut self, place: Vec3, shares: Option<usize>) -> usize {
         let mut slot = || {
             self.slots += 1;
@@ -238,7 +243,7 @@ impl Mesh {
                 }
                 // The first beam may have been parted from the point before.
                 let first = beams.first().and_then(|first| self.parted.get(&(first.value.clone(), point.clone())));
-                let shares = (joint.kind != JointKind::Prismatic).then_some(first.copied().unwrap_or(main));
+                let shares = joint.kind.shares_displacement().then_some(first.copied().unwrap_or(main));
                 self.names.give(self.slots, &format!("{point} ({})", second.value));
                 let node = self.add_node(place, shares);
                 self.parted.insert(key, node);
@@ -338,7 +343,8 @@ impl Mesh {
             named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
         let first_element = self.element_count;
         let all = (0..line.pieces.len()).map(count).sum::<usize>() * beam.order + 1;
-        let (mut nodes, mut fractions) = (Vec::with_capacity(all), Vec::with_capacity(all));
+        let mut nodes = Vec::with_capacity(all);
+        let mut fractions = Vec::with_capacity(all);
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
             for step in usize::from(piece > 0)..=steps {
@@ -353,7 +359,8 @@ impl Mesh {
                 fractions.push(line.fraction(piece, t));
             }
         }
-        let (mut first_node, mut piece_starts) = (0, vec![0]);
+        let mut first_node = 0;
+        let mut piece_starts = vec![0];
         for piece in 0..line.pieces.len() {
             piece_starts.push(piece_starts[piece] + count(piece));
             for _ in 0..count(piece) {
@@ -403,7 +410,8 @@ impl Mesh {
     }
 }
 
-/// The fractions of the length where the pieces of a line are cut into so many equal parts, from start to end.
+/// Fractions of the length at which the pieces of a line are divided into equal parts, from start
+/// to end.
 fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
     let inner = (0..line.pieces.len()).flat_map(|piece| {
         let count = parts[piece.min(parts.len() - 1)];
@@ -438,7 +446,7 @@ fn named_between<'a>(
     ((at - at.round()).abs() < 1e-9).then(|| (name.as_str(), at.round() as usize))
 }
 
-/// Whether the path of a beam names a point.
+/// True if the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     let found = deck.beams.iter().find(|b| b.name.value == beam);
     found.is_some_and(|b| match &b.path {

@@ -24,7 +24,7 @@ pub enum SectionCourse {
     Blended([SectionMatrices; 2]),
     /// From station to station
     Stations {
-        /// Where these are, from 0 to 1
+        /// Places of the stations, from 0 to 1
         fractions: Vec<f64>,
         /// Between each two
         courses: Vec<SectionCourse>,
@@ -33,11 +33,11 @@ pub enum SectionCourse {
     Rigid(Box<SectionCourse>, [bool; 6]),
 }
 
-/// How much stiffer a strain is made that shall vanish: a hundredth of it is left. Much stiffer, and time steps that resolve everything else
-/// would not resolve it.
+/// Factor on the stiffness of strains that are switched off, of which a hundredth is left. A much
+/// larger one would need shorter time steps than all else.
 const RIGID: f64 = 1e2;
 
-/// Lengths of tables and of beams agree to this part: both are measured, and rounded.
+/// Relative difference of lengths in tables and of beams that is taken for rounding.
 const SAME_LENGTH: f64 = 1e-3;
 
 impl SectionCourse {
@@ -56,12 +56,14 @@ impl SectionCourse {
             Self::Blended([a, b]) => blend(a, b, s),
             Self::Stations { fractions, courses } => {
                 let next = fractions.partition_point(|&station| station <= s).clamp(1, courses.len());
-                let (from, to) = (fractions[next - 1], fractions[next]);
+                let from = fractions[next - 1];
+                let to = fractions[next];
                 courses[next - 1].at(((s - from) / (to - from)).clamp(0.0, 1.0))
             }
             Self::Rigid(course, strains) => {
                 let section = course.at(s);
-                // D C D scales what the flexibility C^-1 has of these strains, and what it couples them with.
+                // D C D scales what the flexibility C^-1 has of these strains, and what it couples
+                // them with.
                 let scale = strains.map(|rigid| if rigid { RIGID.sqrt() } else { 1.0 });
                 let entry = |i: usize, j: usize| section.stiffness[i][j] * scale[i] * scale[j];
                 let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
@@ -70,7 +72,8 @@ impl SectionCourse {
         }
     }
 
-    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the length.
+    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the
+    /// length.
     pub fn along(self, length: f64) -> Result<Self, f64> {
         let Self::Stations { fractions, courses } = self else { return Ok(self) };
         let last = fractions.last().copied().unwrap_or(1.0);
@@ -82,7 +85,8 @@ impl SectionCourse {
 
     /// The course as `[effects]` wants it.
     pub fn forced(self, effects: &Effects) -> Self {
-        let (shear, extension) = (effects.allow(EffectWord::Shear), effects.allow(EffectWord::Extension));
+        let shear = effects.allow(EffectWord::Shear);
+        let extension = effects.allow(EffectWord::Extension);
         if shear && extension {
             return self;
         }
@@ -234,7 +238,8 @@ fn mass_properties(matrix: &[[f64; 6]; 6]) -> Result<MassPerLength, String> {
 fn shaped(shape: Shape, material: &deck::Material, shear_factor: Option<[f64; 2]>) -> SectionMatrices {
     let Geometry { area, bending, torsion, shear } = geometry(shape, material.poisson);
     let [k2, k3] = shear_factor.unwrap_or(shear);
-    let (e, g) = (material.young, material.shear);
+    let e = material.young;
+    let g = material.shear;
     let diagonal = [e * area, g * area * k2, g * area * k3, g * torsion, e * bending[0], e * bending[1]];
     let mass = material.density.map(|rho| MassPerLength {
         mass: rho * area,
@@ -293,10 +298,11 @@ fn geometry(shape: Shape, nu: f64) -> Geometry {
     }
 }
 
-/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art. 109):
-/// a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
+/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art.
+/// 109): a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
 fn rectangle_torsion(width: f64, height: f64) -> f64 {
-    let (a, b) = (width.max(height), width.min(height));
+    let a = width.max(height);
+    let b = width.min(height);
     let term = |n: f64| libm::tanh(n * PI * a / (2.0 * b)) / (n * fourth(n));
     let sum: f64 = (0..200).map(|k| term(2.0 * f64::from(k) + 1.0)).sum();
     a * cube(b) * (1.0 / 3.0 - 64.0 / (PI * fourth(PI)) * (b / a) * sum)
@@ -323,7 +329,9 @@ mod tests {
 
     #[test]
     fn mass_matrices_of_rigid_sections_are_understood() {
-        let (m, d, j) = (2.0, Vec3([0.0, 0.1, -0.2]), Mat3::diagonal([3.0, 2.0, 1.5]));
+        let m = 2.0;
+        let d = Vec3([0.0, 0.1, -0.2]);
+        let j = Mat3::diagonal([3.0, 2.0, 1.5]);
         let coupling = d.skew() * m;
         let mut matrix = [[0.0; 6]; 6];
         for i in 0..3 {

@@ -256,7 +256,7 @@ const SENSITIVE: [Sensitive; 13] = [
     // Axial stiffness 1e10 on a mass of 20: the round-off of forces alone is 3e-6.
     Sensitive { name: "d08_stiff_pendulum", until: 20.0, then: Some(1e-7) },
     Sensitive { name: "d08_stiff_pendulum_h01", until: 3.0, then: Some(1e-6) },
-    // Beyond the cliff of the trapezoidal rule
+    // RunExtras the cliff of the trapezoidal rule
     Sensitive { name: "d10_spin_up_newmark", until: 10.0, then: None },
     Sensitive { name: "d10_spin_up_rho_09", until: 15.0, then: None },
     // A double pendulum, in effect

@@ -1,9 +1,8 @@
 //! From the geometry of beam elements to the elements of effects: integration points, elasticity,
 //! volume points, mass at nodes.
 
-use crate::effect::beam_elasticity::ElasticElements;
-use crate::effect::elastic_element::ElasticElement;
-use crate::effect::rigid_body::Body;
+use crate::effect::elasticity::{ElasticElement, ElasticElements};
+use crate::effect::inertia::Body;
 use crate::effect::{Connection, VolumeElement, VolumeElements};
 use crate::kernel::beam::StiffnessPoint;
 use crate::kernel::elastic::{Stiffness, Strain};

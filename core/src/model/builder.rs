@@ -6,14 +6,10 @@ use super::beam_element::{
 };
 use super::parts::ModelParts;
 use super::{Amplitude, ElementInfo, Model, Motion, MotionKind, Names, SectionMatrices, Support};
-use crate::effect::beam_elasticity::{BeamElasticity, ElasticElements};
-use crate::effect::beam_mass::BeamMass;
-use crate::effect::gravity::{BeamGravity, BodyGravity};
-use crate::effect::interpolation::RelativeVectors;
-use crate::effect::link::{self, Links};
-use crate::effect::node_load::{self, NodeLoad, NodeLoadKind};
-use crate::effect::rigid_body::{Body, RigidBody};
-use crate::effect::spring::{self, Spring};
+use crate::effect::elasticity::{BeamElasticity, ElasticElements, RelativeVectors};
+use crate::effect::inertia::{BeamMass, Body, RigidBody};
+use crate::effect::load::{BeamGravity, BodyGravity, NodeForce, NodeLoad, NodeLoadKind};
+use crate::effect::spring::{GroundSpring, GroundSprings, Link, Links};
 use crate::effect::{Effect, VolumeElements};
 use crate::kernel::MAX_NODES;
 use crate::kernel::inertia::Inertia;
@@ -190,9 +186,9 @@ pub struct ModelBuilder {
     beams: Vec<BuiltBeam>,
     elements: usize,
     bodies: Vec<Body>,
-    loads: Vec<(NodeLoadKind, node_load::Instance)>,
-    springs: Vec<spring::Instance>,
-    links: Vec<link::Instance>,
+    loads: Vec<(NodeLoadKind, NodeForce)>,
+    springs: Vec<GroundSpring>,
+    links: Vec<Link>,
     supports: Vec<Support>,
     motions: Vec<Motion>,
     amplitudes: Vec<Amplitude>,
@@ -321,7 +317,7 @@ impl ModelBuilder {
     ) -> Result<(), BuildError> {
         let node = self.slots(node)?;
         let amplitude = self.amplitude(amplitude);
-        self.loads.push((kind, node_load::Instance { node, vector, amplitude }));
+        self.loads.push((kind, NodeForce { node, vector, amplitude }));
         Ok(())
     }
 
@@ -353,7 +349,7 @@ impl ModelBuilder {
         let node = self.slots(node)?;
         let [x, y, z, rx, ry, rz] = stiffness;
         let amplitude = self.amplitude(Amplitude::of_switch(StageSet::default()));
-        self.springs.push(spring::Instance {
+        self.springs.push(GroundSpring {
             node,
             translation: Mat3::diagonal([x, y, z]),
             rotation: Mat3::diagonal([rx, ry, rz]),
@@ -369,7 +365,7 @@ impl ModelBuilder {
         let length = self.way(ends, "spring")?.norm();
         let [a, b] = [self.find(ends[0])?, self.find(ends[1])?];
         let amplitude = self.amplitude(Amplitude::of_switch(StageSet::default()));
-        self.links.push(link::Instance {
+        self.links.push(Link {
             nodes: [a.node, b.node],
             places: [a.place, b.place],
             stiffness,
@@ -417,7 +413,7 @@ impl ModelBuilder {
         }
         let mut effects = Effects::default();
         self.add_beams(&mut effects);
-        effects.push(!self.springs.is_empty(), Spring { springs: self.springs.clone() });
+        effects.push(!self.springs.is_empty(), GroundSprings { springs: self.springs.clone() });
         effects.push(!self.links.is_empty(), Links { links: self.links });
         let bodies = RigidBody { name: "rigid body inertia", bodies: self.bodies, gyroscopic: true };
         effects.push(!bodies.bodies.is_empty(), bodies);
@@ -428,7 +424,7 @@ impl ModelBuilder {
             NodeLoadKind::MaterialMoment,
         ] {
             let of_kind = self.loads.iter().filter(|(own, _)| *own == kind);
-            let loads: Vec<node_load::Instance> = of_kind.map(|(_, load)| *load).collect();
+            let loads: Vec<NodeForce> = of_kind.map(|(_, load)| *load).collect();
             effects.push(!loads.is_empty(), NodeLoad { kind, loads, tangent: true });
         }
         effects.0.append(&mut self.own_effects);

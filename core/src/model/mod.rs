@@ -29,7 +29,7 @@ pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Effect, Energy, Momentum, MotorState};
+use crate::effect::{Constraint, Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
@@ -205,9 +205,14 @@ impl Model {
         jumps
     }
 
+    /// The effects that close gaps by multipliers.
+    pub(super) fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
+        self.effects.iter().filter_map(|effect| effect.roles().constraint)
+    }
+
     /// Shows the motors of joints.
     pub fn each_motor(&self, state: &State, show: &mut dyn FnMut(MotorState)) {
-        self.effects.iter().for_each(|effect| effect.motors(state, show));
+        self.constraints().for_each(|constraint| constraint.motors(state, show));
     }
 
     /// The rotations and elements that have charts in stages of a kind: none where these are linear.
@@ -218,7 +223,7 @@ impl Model {
 
     /// Tells whether stages of a kind are linear in the displacements.
     pub fn is_linear(&self, kind: StageKind) -> bool {
-        self.linear && matches!(kind, StageKind::Static | StageKind::Dynamic)
+        self.linear && kind.advances_state()
     }
 
     /// Shows what decides whether the scene lies in a plane, each with a name.
@@ -311,27 +316,28 @@ impl Model {
         sum
     }
 
-    /// Force and moment of joints to ground on a node, see [`Effect::held_by_ground`].
+    /// Force and moment of joints to ground on a node, see [`Constraint::held_by_ground`].
     pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
-        let parts = self.effects.iter().map(|effect| effect.held_by_ground(state, node));
+        let parts = self.constraints().map(|constraint| constraint.held_by_ground(state, node));
         parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
     }
 
     /// Coordinates that are driven from outside, each with the derivative of the energy over it.
     pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
-        self.effects.iter().for_each(|effect| effect.drives(state, &mut |x, force| all.push((x, force))));
+        let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);
+        driven.for_each(|driven| driven.drives(state, &mut |x, force| all.push((x, force))));
         all
     }
 
-    /// Before a step is predicted, see [`Effect::steady`].
+    /// Before a step is predicted, see [`FreeSpins::steady`].
     pub fn steady(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.steady(state));
+        self.effects.iter().filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
     }
 
     /// After a converged state: turns of joints are counted, multipliers have no rates.
     pub fn remember(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.remember(state));
+        self.constraints().for_each(|constraint| constraint.remember(state));
         for &slot in &self.multipliers {
             let slot = slot as usize;
             [&mut state.v, &mut state.a, &mut state.algorithmic]
@@ -344,7 +350,7 @@ impl Model {
     /// Mass and momenta.
     pub fn momentum(&self, state: &State) -> Momentum {
         let mut sum = Momentum::default();
-        self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
+        self.effects.iter().filter_map(|effect| effect.roles().masses).for_each(|mass| sum.add(mass.momentum(state)));
         sum
     }
 }

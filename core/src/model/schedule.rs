@@ -60,8 +60,7 @@ impl Schedule {
             return Err(StageError::Jump(jump));
         }
         self.refuse_turned_hinges(model, state)?;
-        let moves_in_plane = matches!(kind, StageKind::Static | StageKind::Dynamic);
-        let plane = model.plane.filter(|plane| moves_in_plane && model.keeps(state, plane));
+        let plane = model.plane.filter(|plane| kind.advances_state() && model.keeps(state, plane));
         self.dof_map(model, plane)
     }
 
@@ -172,7 +171,7 @@ impl Schedule {
             state.amplitude_rates[k] = [rate, rate2];
         }
         let mut too_far = None;
-        for turned in model.effects.iter().filter_map(|effect| effect.turned(&before, &state.amplitude)) {
+        for turned in model.constraints().filter_map(|constraint| constraint.turned(&before, &state.amplitude)) {
             if turned.1 > LARGEST_TURN {
                 too_far = Some(turned);
             }

@@ -1,14 +1,14 @@
 //! The plan of a run: the scene, and the stages in their order.
 
-use super::levels::Approach;
 use super::observer::Snapshot;
 use crate::integrate::Scheme;
 use crate::model::{Model, StageContext, StageKind};
-use crate::system::Node;
+use crate::rotation::Rotation;
+use crate::system::{Node, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
-/// What is to be done.
+/// The scene and its stages.
 #[derive(Clone)]
 pub struct Plan {
     /// The scene
@@ -19,9 +19,9 @@ pub struct Plan {
     pub stages: Vec<Stage>,
     /// Rows of dynamic stages are wanted at multiples of this time.
     pub interval: Option<f64>,
-    /// Whether the energy account is asked for
+    /// The energy account is asked for.
     pub energy: bool,
-    /// Whether somebody looks at continued rotation vectors
+    /// Somebody looks at continued rotation vectors.
     pub continued: bool,
     /// The initial places of all nodes, where a modal stage asks for them
     pub places: Vec<(Node, Vec3)>,
@@ -55,10 +55,23 @@ pub struct InitialMotion {
     pub about: Vec3,
 }
 
+impl InitialMotion {
+    /// Gives a state these velocities: v = velocity + spin x (x - about), and the rate of P from
+    /// the spin, Pd = T^-T w.
+    pub(super) fn give_to(&self, state: &mut State) {
+        for &(node, place) in &self.nodes {
+            let (u, p) = (node.u as usize, node.p as usize);
+            let x = place + state.q[u];
+            state.v[u] = self.velocity + self.spin.cross(x - self.about);
+            state.v[p] = Rotation::new(state.q[p]).t_inverse().transpose_mul(self.spin);
+        }
+    }
+}
+
 /// One stage.
 #[derive(Clone)]
 pub struct Stage {
-    /// What is done
+    /// The analysis
     pub work: StageWork,
     /// Newton's tolerance
     pub tolerance: f64,
@@ -66,7 +79,7 @@ pub struct Stage {
     pub max_iterations: usize,
     /// Ends the stage early
     pub until: Option<Until>,
-    /// Whether it is seen from a rotating frame
+    /// It is seen from a rotating frame.
     pub rotating: bool,
 }
 
@@ -101,14 +114,14 @@ impl Stage {
     }
 }
 
-/// What a stage does.
+/// The analysis of a stage, with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StageWork {
     /// Equal load levels
     Static {
         /// Their number
         steps: usize,
-        /// What it may do where one is not reached at once
+        /// The means where one is not reached at once
         approach: Approach,
     },
     /// A path that may pass limit points
@@ -143,8 +156,14 @@ pub enum StageWork {
     },
 }
 
+/// Newton iterations that a load level, a time step, a mode and a critical load usually take.
+const ITERATIONS_OF_A_LEVEL: f64 = 6.0;
+const ITERATIONS_OF_A_STEP: f64 = 3.0;
+const ITERATIONS_OF_A_MODE: f64 = 10.0;
+const ITERATIONS_OF_A_CRITICAL_LOAD: f64 = 60.0;
+
 impl StageWork {
-    /// Its kind.
+    /// Its kind, as loads, motions and effects see it.
     pub fn kind(&self) -> StageKind {
         match self {
             Self::Static { .. } | Self::Path { .. } => StageKind::Static,
@@ -153,6 +172,88 @@ impl StageWork {
             Self::Dynamic { .. } => StageKind::Dynamic,
         }
     }
+
+    /// The load levels that it is divided into, or whose length its first increment has.
+    pub fn load_levels(&self) -> Option<usize> {
+        match *self {
+            Self::Static { steps, .. } | Self::Path { steps, .. } => Some(steps),
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+        }
+    }
+
+    /// How it approaches load levels.
+    pub fn approach(&self) -> Option<Approach> {
+        match *self {
+            Self::Static { approach, .. } => Some(approach),
+            Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+        }
+    }
+
+    /// Its time scheme.
+    pub fn scheme(&self) -> Option<Scheme> {
+        match *self {
+            Self::Dynamic { scheme, .. } => Some(scheme),
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => None,
+        }
+    }
+
+    /// The time on the run's clock at which it ends.
+    pub fn end(&self) -> Option<f64> {
+        match *self {
+            Self::Dynamic { end, .. } => Some(end),
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => None,
+        }
+    }
+
+    /// Follows an equilibrium path in the load factor, so that a load or a motion must grow with
+    /// it.
+    pub fn follows_path(&self) -> bool {
+        match self {
+            Self::Path { .. } | Self::Buckling { .. } => true,
+            Self::Static { .. } | Self::Modal { .. } | Self::Dynamic { .. } => false,
+        }
+    }
+
+    /// Its progress is slow at first and fast at the end: a search that closes in.
+    pub fn speeds_up(&self) -> bool {
+        match self {
+            Self::Buckling { .. } => true,
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Dynamic { .. } => false,
+        }
+    }
+
+    /// Newton iterations that it usually takes, where the clock stands at `start` before it.
+    pub fn usual_iterations(&self, start: f64) -> f64 {
+        match *self {
+            Self::Static { steps, .. } => steps as f64 * ITERATIONS_OF_A_LEVEL,
+            Self::Path { max_steps, .. } => max_steps as f64 * ITERATIONS_OF_A_LEVEL,
+            Self::Dynamic { end, step, .. } => (end - start) / step * ITERATIONS_OF_A_STEP,
+            Self::Modal { modes } => modes as f64 * ITERATIONS_OF_A_MODE,
+            Self::Buckling { modes } => modes as f64 * ITERATIONS_OF_A_CRITICAL_LOAD,
+        }
+    }
+
+    /// The names of the numbers that it finds beside its rows, such as `mode1.omega`.
+    pub fn results(&self) -> Vec<String> {
+        let mode = |mode: usize| ["omega", "growth"].map(|quantity| format!("mode{mode}.{quantity}"));
+        match *self {
+            Self::Modal { modes } => (1..=modes).flat_map(mode).collect(),
+            Self::Buckling { modes } => (1..=modes).map(|mode| format!("buckling{mode}.load")).collect(),
+            Self::Static { .. } | Self::Path { .. } | Self::Dynamic { .. } => Vec::new(),
+        }
+    }
+}
+
+/// The means of a stage where Newton does not reach a level at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// Nothing
+    Straight,
+    /// Smaller steps
+    Parts,
+    /// Smaller steps, then arc length along the path; only where everything is linear in the load
+    /// factor
+    Path,
 }
 
 /// A condition that ends a stage at the first row beyond it.

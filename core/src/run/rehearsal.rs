@@ -1,9 +1,10 @@
-//! What can be told of the stages of a plan before anything is computed: which of them cannot begin, and where histories jump.
+//! Faults of a plan that show before anything is computed: stages that cannot begin, and histories
+//! that jump.
 //!
-//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
+//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but
+//! prescribed motions moves.
 
-use super::plan::{InitialMotion, Plan, Stage, StageWork};
-use super::start::set_in_motion;
+use super::plan::{InitialMotion, Plan, Stage};
 use crate::model::{Model, Motion, MotionKind, NOTICED, Schedule, StageError, StageKind, Timeline};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
@@ -12,13 +13,14 @@ use std::collections::HashMap;
 /// Values of a history that agree to this part of the larger one are the same.
 const SAME_VALUE: f64 = 1e-9;
 
-/// Velocities that agree to this part of the larger one are the same: those of initial motions come from other numbers.
+/// Velocities that agree to this part of the larger one are the same: those of initial motions come
+/// from other numbers.
 const SAME_VELOCITY: f64 = 1e-6;
 
 /// Axes with this cosine are the same.
 const SAME_AXIS: f64 = 1.0 - 1e-9;
 
-/// What is known of a plan beforehand.
+/// Faults of a plan.
 #[derive(Debug, Default)]
 pub struct Rehearsal {
     /// Stages, from 0, that cannot begin
@@ -32,16 +34,16 @@ pub struct Rehearsal {
 pub struct HistoryJump {
     /// The stage, from 0
     pub stage: usize,
-    /// What jumps
+    /// The load, motion or motor that jumps
     pub what: Driven,
     /// How
     pub how: JumpKind,
 }
 
-/// What a history drives.
+/// A load, motion or motor that a history drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driven {
-    /// What has the amplitude with this number
+    /// The loads with the amplitude of this number
     Amplitude(usize),
     /// The motion with this number
     Motion(usize),
@@ -61,9 +63,9 @@ pub enum JumpKind {
     },
     /// From one velocity to another where a dynamic stage begins
     Velocity {
-        /// What its nodes have
+        /// The velocity of its nodes
         from: f64,
-        /// What it begins with
+        /// The velocity that it begins with
         to: f64,
     },
     /// In its velocity, within a stage
@@ -85,8 +87,8 @@ pub fn rehearse(plan: &Plan) -> Rehearsal {
     rehearser.found
 }
 
-/// What a stage lacks to begin with, whatever the state: a load that grows, or mass. `fading`: whether what a motion left may fade
-/// with the load factor.
+/// The condition that a stage lacks to begin, whatever the state: a load that grows, or mass.
+/// `fading`: forces that a motion left may fade with the load factor.
 pub(super) fn lacking(
     model: &Model,
     schedule: &Schedule,
@@ -96,12 +98,10 @@ pub(super) fn lacking(
     dof_map: impl FnOnce() -> Option<DofMap>,
 ) -> Option<StageError> {
     let kind = stage.work.kind();
-    let grows = matches!(stage.work, StageWork::Path { .. } | StageWork::Buckling { .. });
-    if grows && !fading && !stage.rotating && schedule.is_idle() {
+    if stage.work.follows_path() && !fading && !stage.rotating && schedule.is_idle() {
         return Some(StageError::NothingGrows(kind));
     }
-    let is_modal = kind == StageKind::Modal;
-    let lacks_mass = is_modal && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
+    let lacks_mass = kind.needs_mass() && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
     lacks_mass.then_some(StageError::NoMass)
 }
 
@@ -113,14 +113,14 @@ struct Rehearser<'p> {
     found: Rehearsal,
     /// For each motion whether where its node is depends on nothing but motions and supports
     determined: Vec<bool>,
-    /// Whether the stages so far end where they say, and not at an `until`
+    /// True if the stages so far end where they say, and not at an `until`
     sure: bool,
-    /// What computed the state before this one
+    /// The stage that led to the present state
     before: Option<Before>,
     has_moved: bool,
 }
 
-/// What is known of the last static or dynamic stage.
+/// The last static or dynamic stage.
 struct Before {
     number: usize,
     /// For each amplitude its rate at the end
@@ -129,11 +129,11 @@ struct Before {
     velocities: Vec<Option<f64>>,
 }
 
-/// What motions and supports hold of a slot.
+/// The axes of a slot that motions and supports hold.
 #[derive(Default)]
 struct HeldAxes {
     axes: Vec<Vec3>,
-    /// Whether it is a rotation that is prescribed as a whole
+    /// True if it is a rotation that is prescribed as a whole
     turned: bool,
 }
 
@@ -165,18 +165,13 @@ impl<'p> Rehearser<'p> {
             self.look_at_amplitudes(number, kind);
             self.look_at_static_motions(number, kind);
         }
-        let fading = self.has_moved && kind == StageKind::Static;
+        let fading = self.has_moved && kind.ramps_load();
         let lacks =
             lacking(self.model, &self.schedule, stage, number, fading, || self.schedule.dof_map(self.model, None).ok());
         self.found.refusals.extend(lacks.map(|error| (number, error)));
         let amplitude = self.state.amplitude.clone();
-        self.state.load = match kind {
-            StageKind::Static => 0.0,
-            StageKind::Dynamic => 1.0,
-            StageKind::Buckling if fresh => 0.0,
-            StageKind::Modal | StageKind::Buckling => self.state.load,
-        };
-        if kind != StageKind::Dynamic {
+        self.state.load = kind.first_load(self.state.load, fresh);
+        if !kind.advances_time() {
             let load = self.state.load;
             self.schedule.set_clock(self.model, &mut self.state, clock, load);
             return;
@@ -184,7 +179,7 @@ impl<'p> Rehearser<'p> {
         let begins = !std::mem::replace(&mut self.has_moved, true);
         if begins {
             self.state.stand_still();
-            self.initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
+            self.initial.iter().for_each(|motion| motion.give_to(&mut self.state));
         }
         let given = self.state.v.clone();
         self.schedule.set_clock(self.model, &mut self.state, clock, 1.0);
@@ -196,7 +191,7 @@ impl<'p> Rehearser<'p> {
         let given = begins.then_some(&given[..]);
         self.look_at_velocities(number, given);
         self.look_at_motors(number, begins);
-        if let StageWork::Dynamic { end, .. } = stage.work {
+        if let Some(end) = stage.work.end() {
             self.look_at_kinks(number, end);
         }
     }
@@ -209,10 +204,11 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in the one before.
+    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in
+    /// the one before.
     fn look_at_amplitudes(&mut self, number: usize, kind: StageKind) {
         let Some(before) = &self.before else { return };
-        let load = if kind == StageKind::Static { 0.0 } else { 1.0 };
+        let load = if kind.ramps_load() { 0.0 } else { 1.0 };
         for (k, timeline) in self.schedule.loads(self.model).enumerate() {
             let from = timeline.reached();
             let [to, ..] = timeline.at(self.state.time, load);
@@ -226,7 +222,7 @@ impl<'p> Rehearser<'p> {
 
     /// In dynamic stages they are refused.
     fn look_at_static_motions(&mut self, number: usize, kind: StageKind) {
-        if self.before.is_none() || kind != StageKind::Static {
+        if self.before.is_none() || !kind.ramps_load() {
             return;
         }
         for (k, (motion, timeline)) in self.schedule.motions(self.model).enumerate() {
@@ -240,7 +236,8 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give, where they do.
+    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give,
+    /// where they do.
     fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>) {
         let motions = self.schedule.motions(self.model).enumerate();
         for (k, (motion, timeline)) in motions.filter(|(_, (_, timeline))| timeline.acts()) {
@@ -259,7 +256,7 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// The same of motors. `begins`: initial motions set the scene in motion.
+    /// Motors at the start of a dynamic stage. `begins`: initial motions set the scene in motion.
     fn look_at_motors(&mut self, number: usize, begins: bool) {
         // How fast a joint turns that a static stage has turned before is known to nobody yet.
         if begins && self.before.is_some() && !self.initial.is_empty() {
@@ -296,15 +293,12 @@ impl<'p> Rehearser<'p> {
 
     fn end(&mut self, number: usize, stage: &Stage) {
         let kind = stage.work.kind();
-        let (time, load) = match stage.work {
-            StageWork::Dynamic { end, .. } => (end, 1.0),
-            StageWork::Static { .. } | StageWork::Path { .. } => (self.state.time, 1.0),
-            StageWork::Modal { .. } | StageWork::Buckling { .. } => (self.state.time, self.state.load),
-        };
+        let time = stage.work.end().unwrap_or(self.state.time);
+        let load = kind.last_load(self.state.load);
         self.schedule.set_clock(self.model, &mut self.state, time, load);
         self.schedule.end_stage(self.model, &self.state);
         self.sure &= stage.until.is_none();
-        if !matches!(kind, StageKind::Static | StageKind::Dynamic) {
+        if !kind.advances_state() {
             return;
         }
         let velocity = |timeline: Timeline| timeline.acts().then(|| timeline.rate_before(time));
@@ -342,7 +336,8 @@ impl<'p> Rehearser<'p> {
     }
 }
 
-/// The velocity that a motion's node has along it; that of a rotation about another axis is none that it could go on with.
+/// The velocity that a motion's node has along it; that of a rotation about another axis is none
+/// that it could go on with.
 fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     let own = given[motion.slot as usize];
     let along = own.dot(motion.axis);
@@ -351,7 +346,8 @@ fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     if fits { along } else { 0.0 }
 }
 
-/// What initial motions give a motion that begins at rest is none of its business: the scene begins with the velocity of the motion.
+/// A jump of a velocity; none where initial motions move the node of a motion that begins at rest:
+/// the scene begins with the velocity of the motion.
 fn velocity_jump(from: f64, to: f64, fastest: Option<f64>, begins: bool) -> Option<JumpKind> {
     let noticed = fastest.is_none_or(|fastest| (to - from).abs() > NOTICED * fastest);
     let jumps = noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);

@@ -5,10 +5,9 @@ mod film;
 
 pub use film::Film;
 
-use super::{HistoryReader, PartFile, Record};
+use super::{HistoryReader, OutputError, PartFile, Record};
 use encode::base64;
 use serde_json::{Value, json};
-use std::io;
 use std::path::Path;
 
 /// The page, which has places for a title and for data.
@@ -27,11 +26,11 @@ pub struct Report<'a> {
 
 impl Report<'_> {
     /// Writes the page of results in a folder.
-    pub fn write(&self, results: &Path, film: Film, path: &Path) -> io::Result<()> {
+    pub fn write(&self, results: &Path, film: Film, path: &Path) -> Result<(), OutputError> {
         PartFile::write_to(path, self.page(results, film)?.as_bytes())
     }
 
-    fn page(&self, results: &Path, mut film: Film) -> io::Result<String> {
+    fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
         let history = HistoryReader::of_results(results).map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
         // The last row of a run that was stopped is the one of that moment, which the film passes over.
@@ -60,7 +59,7 @@ impl Report<'_> {
 }
 
 /// A small table of the results, where they have it.
-fn numbers(path: &Path) -> io::Result<Value> {
+fn numbers(path: &Path) -> Result<Value, OutputError> {
     if !path.exists() {
         return Ok(Value::Null);
     }

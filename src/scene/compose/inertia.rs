@@ -1,16 +1,14 @@
-//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional damping.
+//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional
+//! damping.
 
 use super::{Composer, SWITCHED_OFF};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
 use crate::scene::mesh::{BeamElement, MeshBeam};
 use crate::scene::names;
-use beamsim_core::effect::beam_mass::BeamMass;
-use beamsim_core::effect::gravity::{BeamGravity, BodyGravity};
-use beamsim_core::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
-use beamsim_core::effect::rigid_body::{Body, RigidBody};
-use beamsim_core::effect::rotary_inertia::RotaryInertia;
-use beamsim_core::effect::rotating_frame::RotatingFrame;
-use beamsim_core::effect::section_inertia::SectionInertia;
+use beamsim_core::effect::inertia::{
+    BeamMass, BeamMassDamping, Body, BodyMassDamping, RigidBody, RotaryInertia, RotatingFrame, SectionInertia,
+};
+use beamsim_core::effect::load::{BeamGravity, BodyGravity};
 use beamsim_core::effect::{ByOrder, VolumeElements};
 use beamsim_core::kernel::inertia::Inertia;
 use beamsim_core::model::MassPerLength;
@@ -21,7 +19,8 @@ use beamsim_core::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
 impl Composer<'_> {
-    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
+    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section
+    /// has it.
     pub(super) fn beam_inertia(&mut self) {
         let names = ["beam mass", "rotary inertia", "eccentric section inertia", "section inertia at nodes"];
         if !self.dynamic || self.mesh.element_count == 0 {
@@ -30,7 +29,9 @@ impl Composer<'_> {
         }
         let wanted = self.deck.effects.allow(EffectWord::RotaryInertia);
         let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
-        let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
+        let mut mass = ByOrder::default();
+        let mut rotary = ByOrder::default();
+        let mut eccentric = ByOrder::default();
         let bodies = self.each_inertia(|element, stations, found| {
             if found.iter().any(|m| m.offset != Vec3::ZERO) {
                 return push_volume(&mut eccentric, element, stations, |k| found[k]);
@@ -56,7 +57,9 @@ impl Composer<'_> {
             (_, false) => self.reason(names[1], false, SWITCHED_OFF),
             (true, _) if !bodies.is_empty() => self.reason(names[1], false, "what sections have is at the nodes"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
-            _ => self.push(rotary, "sections have rotary inertia, and something moves or may vibrate".into()),
+            (false, true) => {
+                self.push(rotary, "sections have rotary inertia, and something moves or may vibrate".into())
+            }
         }
         if bodies.is_empty() {
             self.reason(
@@ -105,8 +108,8 @@ impl Composer<'_> {
         let bodies = self.out.bodies.clone();
         match (bodies.is_empty(), self.dynamic) {
             (true, _) => self.reason("rigid body inertia", false, "no [[body]]"),
-            (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
-            _ => {
+            (false, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
+            (false, true) => {
                 let reason = format!("{} [[body]] table(s), and something moves or may vibrate", bodies.len());
                 let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
                 self.push(RigidBody { name: "rigid body inertia", bodies, gyroscopic }, reason);
@@ -121,10 +124,9 @@ impl Composer<'_> {
         if framed.is_empty() {
             return self.reason("rotating frame", false, "no stage has a `frame`");
         }
-        let is_static =
-            |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Static { .. } | deck::StageBody::Path { .. });
         // One amplitude for all static stages: what one has brought in stays for the next.
-        let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
+        let ramped: Vec<usize> =
+            framed.iter().filter(|(_, stage)| stage.body.finds_balance()).map(|(k, _)| k + 1).collect();
         let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
         let (elements, nodal) =
             self.inertia_elements(|element, station, inertia| (inertia, element.between(&station.shape)));
@@ -142,7 +144,7 @@ impl Composer<'_> {
                 stage: *number,
                 spin: Vec3(frame.spin),
                 about,
-                amplitude: amplitude.filter(|_| is_static(stage)),
+                amplitude: amplitude.filter(|_| stage.body.finds_balance()),
                 elements: elements.clone(),
                 bodies: bodies.clone(),
             }));
@@ -150,14 +152,15 @@ impl Composer<'_> {
         self.reason("rotating frame", true, format!("{} stage(s) with a `frame`", framed.len()));
     }
 
-    /// Visits the elements with the mass properties of their volume points, about the centre line and in global axes, and
-    /// returns what sits at nodes instead: on beams whose rotations are relative all that turns with the section, because no
-    /// chart matters there.
+    /// Visits the elements with the mass properties of their volume points, about the centre line
+    /// and in global axes, and returns what sits at nodes instead: on beams whose rotations are
+    /// relative all that turns with the section, because no chart matters there.
     fn each_inertia(&self, mut visit: impl FnMut(&BeamElement, &[Station], &[Inertia])) -> Vec<Body> {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let mut nodal = NodalInertia::new(self.mesh.nodes.len());
         self.each_element(|element| {
-            let (beam, stations) = (element.beam, element.stations(Rule::Volume));
+            let beam = element.beam;
+            let stations = element.stations(Rule::Volume);
             let relative = beam.interpolation == InterpolationWord::Relative;
             let eccentric = stations.iter().any(|station| mass_at(beam, station).offset != Vec3::ZERO);
             if relative && eccentric {
@@ -177,7 +180,8 @@ impl Composer<'_> {
         nodal.bodies(|node| self.mesh.nodes[node])
     }
 
-    /// What acts on all mass of beams: elements with a quantity of each of their points, and what sits at nodes instead.
+    /// All mass of beams: elements with a quantity of each of their points, and the bodies that sit
+    /// at nodes instead.
     fn inertia_elements<Q: Copy + PartialEq>(
         &self,
         quantity: impl Fn(&BeamElement, &Station, Inertia) -> Q,
@@ -194,10 +198,12 @@ impl Composer<'_> {
         let mut bodies = self.out.bodies.clone();
         let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
         let Some(acceleration) = acceleration else {
-            let why = match &self.deck.gravity {
-                _ if !self.deck.effects.allow(EffectWord::Gravity) => SWITCHED_OFF,
-                Some(_) => "`gravity` is zero",
-                None => "no `gravity`",
+            let why = if !self.deck.effects.allow(EffectWord::Gravity) {
+                SWITCHED_OFF
+            } else if self.deck.gravity.is_some() {
+                "`gravity` is zero"
+            } else {
+                "no `gravity`"
             };
             self.reason("gravity on beams", false, why);
             return self.reason("gravity on bodies", false, why);
@@ -226,10 +232,12 @@ impl Composer<'_> {
         let names = ["mass-proportional damping of beams", "mass-proportional damping of bodies"];
         let [mass, _] = self.deck.damping.unwrap_or_default();
         if mass == 0.0 || !self.dynamic {
-            let why = match mass {
-                _ if !self.deck.effects.allow(EffectWord::Damping) => SWITCHED_OFF,
-                0.0 => "no `mass` in [damping]",
-                _ => "nothing moves in time",
+            let why = if !self.deck.effects.allow(EffectWord::Damping) {
+                SWITCHED_OFF
+            } else if mass == 0.0 {
+                "no `mass` in [damping]"
+            } else {
+                "nothing moves in time"
             };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
@@ -260,7 +268,8 @@ fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {
     beam.section.at(station.fraction).mass_per_length()
 }
 
-/// Whether a matrix can be the inertia of a body: principal values not negative, none beyond the sum of the others.
+/// True if a matrix can be the inertia of a body: no principal value negative, none larger than the
+/// sum of the others.
 fn is_inertia(matrix: [[f64; 3]; 3]) -> bool {
     let eigen = nalgebra::SymmetricEigen::new(nalgebra::Matrix3::from_fn(|i, j| matrix[i][j])).eigenvalues;
     let slack = 1e-9 * eigen.amax();
