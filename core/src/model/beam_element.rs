@@ -1,4 +1,5 @@
-//! From the geometry of beam elements to the elements of effects: integration points, elasticity, volume points, mass at nodes.
+//! From the geometry of beam elements to the elements of effects: integration points, elasticity,
+//! volume points, mass at nodes.
 
 use crate::effect::elasticity::{BeamLaw, ElasticElement, ElasticElements, ElasticPoint};
 use crate::effect::inertia::Body;
@@ -44,7 +45,8 @@ pub enum Rule {
     Inner,
     /// For mass and line loads
     Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
+    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated
+    /// as vectors
     Nodal,
 }
 
@@ -137,7 +139,8 @@ pub struct SectionPoint {
     pub free: Option<Strain>,
 }
 
-/// Pushes an elastic element into the batch of its order; `free`: the number of the amplitude of its free strain.
+/// Pushes an elastic element into the batch of its order; `free`: the number of the amplitude of
+/// its free strain.
 pub fn push_elastic(
     batches: &mut ElasticElements,
     element: &impl ElementGeometry,

@@ -35,7 +35,8 @@ impl SectionMatrices {
         Self { stiffness: std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))), mass: None }
     }
 
-    /// The section with a mass per length on the centre line, and inertia per length about the section axes.
+    /// The section with a mass per length on the centre line, and inertia per length about the
+    /// section axes.
     pub fn with_mass(self, mass: f64, about_axes: [f64; 3]) -> Self {
         let mass = MassPerLength { mass, offset: Vec3::ZERO, about_line: Mat3::diagonal(about_axes) };
         Self { mass: Some(mass), ..self }

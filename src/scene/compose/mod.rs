@@ -73,8 +73,6 @@ pub struct Composition {
     pub jointed: Vec<usize>,
     /// Tables that histories drive, but for motions
     pub driven: Vec<DrivenTable>,
-    /// Number of joints that remember their angle
-    pub angles: usize,
     /// The slots of the rotations on both sides of each of them
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
@@ -122,7 +120,6 @@ pub fn compose(
         idle_multipliers: Vec::new(),
         jointed: Vec::new(),
         driven: Vec::new(),
-        angles: 0,
         sprung_joints: Vec::new(),
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
