@@ -94,12 +94,17 @@ fn tangent<const N: usize>(system: &PlanarSystem<N>) -> Vec<f64> {
 fn kernel_is_that_of_space<const N: usize>() {
     let plane = Plane::normal_to(TILTED).unwrap();
     let points = points::<N>(&plane);
-    points_are_those_of_space(&plane, &points);
+    points_are_those_of_space(&plane, &points, 1e-14);
     let stiffening: Vec<_> = points.iter().map(stiffening).collect();
-    points_are_those_of_space(&plane, &stiffening);
+    // Its factor amplifies the round-off of strains.
+    points_are_those_of_space(&plane, &stiffening, 1e-13);
 }
 
-fn points_are_those_of_space<L: StoredLaw, const N: usize>(plane: &Plane, points: &[StiffnessPoint<N, f64, L>]) {
+fn points_are_those_of_space<L: StoredLaw, const N: usize>(
+    plane: &Plane,
+    points: &[StiffnessPoint<N, f64, L>],
+    tolerance: f64,
+) {
     let mut random = Random::new(11);
     for base in [0.0, 1.3, 3.0, 5.5] {
         let (unknowns, motions) = nodes::<N>(&mut random, plane, base);
@@ -119,8 +124,8 @@ fn points_are_those_of_space<L: StoredLaw, const N: usize>(plane: &Plane, points
             .map(|k| (k / (3 * N), k % (3 * N)))
             .map(|(row, column)| axis(row).dot(in_space.tangent_block(block(row), block(column)) * axis(column)))
             .collect();
-        agree("force", planar.force.as_flattened(), &force, 1e-14);
-        agree("tangent", &tangent(&planar), &exact, 1e-14);
+        agree("force", planar.force.as_flattened(), &force, tolerance);
+        agree("tangent", &tangent(&planar), &exact, tolerance);
         symmetric("tangent", &tangent(&planar), 1e-15);
         let change: [[f64; 3]; N] = from_fn(|_| random.cube(0.1).0);
         let (du, dp) = (change.map(|[x, y, _]| axes * Vec3([x, y, 0.0])), change.map(|c| plane.normal() * c[2]));
@@ -131,7 +136,7 @@ fn points_are_those_of_space<L: StoredLaw, const N: usize>(plane: &Plane, points
                 0.7,
                 &change.map(|[x, y, angle]| PlanarNode { u: [x, y], angle }),
             );
-            agree("foreseen stress", &here, &flattened(&exact, &axes), 1e-14);
+            agree("foreseen stress", &here, &flattened(&exact, &axes), tolerance);
         }
     }
 }
