@@ -54,7 +54,7 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
         let start = Instant::now();
         for (number, (effect, connectivity)) in effects.iter().zip(&shapes).enumerate() {
             let element = ElementSystem::new(connectivity.iter().next().map_or(1, <[u32]>::len));
-            let mut sink = assembly.system.sink(number, effect.category(), effect.has_tangent());
+            let mut sink = assembly.system.sink(number, effect.category(), effect.tangent().exists());
             for k in 0..connectivity.len() {
                 sink.add(k, black_box(&element));
             }

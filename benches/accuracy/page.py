@@ -54,7 +54,7 @@ def frontier(runs):
 
 def as_they_stand(store):
     """What the settings of the decks themselves, which are the paper's in its scenes, cost and are worth."""
-    lines = ["| scene | as the deck stands | error | CPU | as accurate, and cheapest | CPU | | for the same time | error |",
+    lines = ["| scene | settings of the deck | error | CPU | cheapest with the same accuracy | CPU | | most accurate in the same time | error |",
              "| --- | --- | ---: | ---: | --- | ---: | ---: | --- | ---: |"]
     for name in scenes.STUDIES:
         if not (store / f"{name}.csv").exists():
@@ -150,13 +150,13 @@ def targets_in_short(rows):
     own = sorted(float(row["seconds"]) / float(row["cheapest"]) for row in timed)
     searched = sorted(float(row["searched"]) / float(row["cheapest"]) for row in timed)
     return [
-        f"Of {len(rows)} searches in {len({row['deck'] for row in rows})} scenes {len(rows) - len(refused)} came to an end within {scenes.BUDGET} s and {len(refused)} were refused. "
-        f"Of the {len(judged)} whose true error is known {len(met)} are below what was wanted ({100 * len(met) / max(len(judged), 1):.0f} %), the worst is at {worst:.2g} times it. "
+        f"Of {len(rows)} searches in {len({row['deck'] for row in rows})} scenes {len(rows) - len(refused)} finished within {scenes.BUDGET} s and {len(refused)} ended with an error. "
+        f"Of the {len(judged)} whose true error is known {len(met)} are below the target ({100 * len(met) / max(len(judged), 1):.0f} %), the worst is {worst:.2g} times it. "
         f"Estimates over true errors: median {statistics.median(effect):.2g}, from {effect[0]:.2g} to {effect[-1]:.2g}.",
         "",
-        f"In the {len(timed)} for which a study without options has a variant that is as accurate, the run that was chosen takes {statistics.median(own):.2g} times the CPU time "
-        f"of the cheapest such variant (median; nine in ten below {tenth(own):.2g}, the worst {own[-1]:.2g}), and with the search {statistics.median(searched):.2g} times "
-        f"(nine in ten below {tenth(searched):.2g}, the worst {searched[-1]:.2g}): whole processes, which take turns.",
+        f"In the {len(timed)} for which a study without options has an equally accurate variant, the chosen run takes {statistics.median(own):.2g} times the CPU time "
+        f"of the cheapest such variant (median; 90 % below {tenth(own):.2g}, the worst {own[-1]:.2g}), and including the search {statistics.median(searched):.2g} times "
+        f"(90 % below {tenth(searched):.2g}, the worst {searched[-1]:.2g}): whole processes, in alternating runs.",
     ]
 
 
@@ -183,8 +183,8 @@ def bars_in_short(rows):
     widths = sorted(float(row["width"]) for row in rows)
     share = lambda key: 100 * count(rows, key) / len(rows)
     return [
-        f"Of {len(rows)} outputs of {len({row['deck'] for row in rows})} scenes {share('inside_at_the_end'):.0f} % have their largest error inside the bar at the last row, and {share('inside'):.0f} % theirs at every single row. "
-        f"Bars are {statistics.median(widths):.2g} times as wide as the error (median; nine in ten below {tenth(widths):.2g}, the widest {widths[-1]:.2g}).",
+        f"Of {len(rows)} outputs of {len({row['deck'] for row in rows})} scenes {share('inside_at_the_end'):.0f} % have their largest error inside the bar at the last row, and for {share('inside'):.0f} % this is true at every row. "
+        f"Bars are {statistics.median(widths):.2g} times as wide as the error (median; 90 % below {tenth(widths):.2g}, the widest {widths[-1]:.2g}).",
     ]
 
 
@@ -193,6 +193,6 @@ def forecasts_in_short(rows):
     right = sum(0.5 <= ratio <= 2.0 for ratio in ratios)
     longest = max(float(row["seconds"]) for row in rows)
     return [
-        f"Of the {len(rows)} decks of `decks/` (without `hard/long`) that take 0.1 s and more, up to {longest:.0f} s, {right} took between half and twice of what was foretold; "
-        f"over what they took it is from {ratios[0]:.2f} to {ratios[-1]:.2f}, the median {statistics.median(ratios):.2f}.",
+        f"Of the {len(rows)} decks of `decks/` (without `hard/long`) that take 0.1 s and more, up to {longest:.0f} s, {right} took between half and twice the estimated time; "
+        f"the ratio of estimated to actual time is from {ratios[0]:.2f} to {ratios[-1]:.2f}, median {statistics.median(ratios):.2f}.",
     ]

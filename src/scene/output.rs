@@ -1,9 +1,9 @@
-//! Which columns are written, and how a column is found by its name.
+//! Written columns, and columns by their names.
 
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
-use crate::deck::{Deck, Diagnostic, Spanned, nearest};
-use beamsim_core::effect::beam_elasticity::StressField;
+use crate::deck::{Deck, Diagnostic, Spanned, hint, nearest, one_of};
+use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{BeamPoint, NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ impl Columns<'_> {
         let mut known: Vec<&Spanned<String>> = Vec::new();
         for group in &groups {
             if suffixes(&group.value).is_none() {
-                diagnostics.push(unknown("group of columns", group, group_names()));
+                diagnostics.push(unknown_group(group));
             } else if known.iter().any(|k| k.value == group.value) {
                 diagnostics.push(Diagnostic::error(format!("`{}` stands twice", group.value), group.span.clone()));
             } else {
@@ -82,7 +82,8 @@ impl Columns<'_> {
                 Diagnostic::error(message, node.span.clone())
             })?),
             "resultant" => Quantity::Resultant(self.beam_point(node, &found)?),
-            _ => Quantity::Strain(self.beam_point(node, &found)?),
+            "strain" => Quantity::Strain(self.beam_point(node, &found)?),
+            _ => return Err(unknown_group(&Spanned { value: group.to_string(), span: node.span.clone() })),
         };
         let names = suffixes(group).unwrap_or_default().iter().map(|suffix| format!("{}.{suffix}", node.value));
         Ok(Probe { names: names.collect(), quantity })
@@ -113,12 +114,9 @@ impl Columns<'_> {
 
     /// Any column by its name: the probe and the component.
     pub fn find(&self, name: &Spanned<String>) -> Result<(Probe, usize), Diagnostic> {
-        let single = |quantity| Ok((Probe { names: vec![name.value.clone()], quantity }, 0));
-        match name.value.as_str() {
-            "stage" => return single(Quantity::Stage),
-            "time" => return single(Quantity::Time),
-            "load" => return single(Quantity::Load),
-            _ => {}
+        let single = [("stage", Quantity::Stage), ("time", Quantity::Time), ("load", Quantity::Load)];
+        if let Some((_, quantity)) = single.into_iter().find(|(column, _)| *column == name.value) {
+            return Ok((Probe { names: vec![name.value.clone()], quantity }, 0));
         }
         let Some((node, suffix)) = name.value.rsplit_once('.') else {
             return Err(self.no_column(name));
@@ -136,7 +134,7 @@ impl Columns<'_> {
         }
     }
 
-    /// Whether the columns rx ry rz are continued from row to row.
+    /// True if the columns rx ry rz are continued from row to row.
     fn continues_rotations(&self) -> bool {
         self.deck.output.columns.as_ref().is_some_and(|columns| columns.iter().any(|c| c.value == "rc"))
     }
@@ -147,7 +145,7 @@ impl Columns<'_> {
         let known = NODE_GROUPS.iter().chain(&WHOLE_GROUPS).flat_map(|(_, suffixes)| suffixes.iter().copied());
         match nearest(suffix, known) {
             Some(meant) if name.value.contains('.') => diagnostic.help(format!("did you mean `.{meant}`?")),
-            _ => diagnostic
+            Some(_) | None => diagnostic
                 .help("a column is a node and a component, such as `tip.ux`, or `energy.total`, `momentum.px`"),
         }
     }
@@ -158,6 +156,11 @@ fn whole_probe(group: &str) -> Probe {
     Probe { names, quantity: if group == "energy" { Quantity::Energy } else { Quantity::Momentum } }
 }
 
-fn group_names() -> impl Iterator<Item = &'static str> {
-    NODE_GROUPS.iter().chain(&WHOLE_GROUPS).map(|(name, _)| *name)
+fn unknown_group(group: &Spanned<String>) -> Diagnostic {
+    let known: Vec<&'static str> = NODE_GROUPS.iter().chain(&WHOLE_GROUPS).map(|(name, _)| *name).collect();
+    let diagnostic = unknown("group of columns", group, known.iter().copied());
+    match hint("columns", &group.value, &known) {
+        Some(help) => diagnostic.help(help),
+        None => diagnostic.help(format!("groups are {}", one_of(known))),
+    }
 }

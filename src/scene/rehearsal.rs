@@ -1,4 +1,5 @@
-//! What can be told of a deck's stages before anything is computed, with the places in its text.
+//! Errors and warnings about stages that are found before anything is computed, with their places
+//! in the deck.
 
 use super::compose::DrivenTable;
 use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
@@ -44,7 +45,9 @@ fn place<'t>(error: &StageError, tables: &'t [DrivenTable]) -> Option<&'t Span> 
     let driven = match error {
         StageError::Jump(jump) => Driven::Motion(jump.motion),
         StageError::MotorJump(jump) => Driven::Motor(jump.slot),
-        _ => return None,
+        StageError::Conflict(_) | StageError::TurnedHinge(_) | StageError::NothingGrows(_) | StageError::NoMass => {
+            return None;
+        }
     };
     tables.iter().find(|table| table.drives == driven).map(|table| &table.span)
 }
@@ -85,7 +88,8 @@ impl Teller<'_> {
 
     fn diagnostic(&self, told: &Warned) -> Diagnostic {
         let Warned { jump: HistoryJump { stage, how, .. }, table, history, others } = told;
-        let (number, what) = (stage + 1, table.what);
+        let number = stage + 1;
+        let what = table.what;
         let name = history.map_or(String::new(), |name| format!(" `{name}`"));
         let more = match others {
             0 => String::new(),
@@ -128,7 +132,7 @@ impl Teller<'_> {
         }
     }
 
-    /// What takes the kinks out of a history.
+    /// Advice on histories with kinks.
     fn help_of_kinks(&self, history: Option<&str>) -> &'static str {
         let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
         let Some(HistoryBody::Table { values, .. }) = self.deck.histories.iter().find(named).map(|table| &table.body)
@@ -139,7 +143,7 @@ impl Teller<'_> {
         if values.windows(3).any(goes_on) { SAMPLED } else { SMOOTH }
     }
 
-    /// What makes a history go on where the stage before has left it.
+    /// Advice on histories that jump from one stage to the next.
     fn help(&self, told: &Warned) -> String {
         let Warned { jump: HistoryJump { stage, .. }, table, history, .. } = told;
         let own_stages = table.history.as_ref().is_some_and(|history| history.stages.is_some());

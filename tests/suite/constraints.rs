@@ -58,7 +58,7 @@ fn count(assembly: &mut Assembly, model: &Model, state: &State) -> (Option<usize
 fn negative_pivots_are_negative_eigenvalues_between_constraints() {
     let mut random = Random::new(17);
     let (mut judged, mut unstable) = (0, 0);
-    for kind in ["rigid", "revolute", "universal", "prismatic"] {
+    for kind in ["rigid", "revolute", "universal", "prismatic", "cylindrical"] {
         for unit in [1e-3, 1.0, 1e3] {
             for _ in 0..4 {
                 let (deck, length) = (bars(kind, unit, &mut random), 3.0 * unit);

@@ -4,18 +4,23 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of failures and warnings.
+/// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of failures and
+/// warnings, and [`DECK_ROWS`].
 #[rustfmt::skip]
 const ORDER: [&str; 19] = [
     "failure", "warning", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "run", "probe",
     "deck", "scene", "output", "study", "cli",
 ];
 
+/// Tables of data whose rows carry the deck's words: `deck` reads these words from the one table that the mechanics use, so that a new row
+/// is a new word.
+const DECK_ROWS: [&str; 1] = ["beamsim_core::effect::joint::JointKind"];
+
 /// Names that decks and runs share; all may import them.
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 17] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
@@ -31,19 +36,32 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("annotate_snippets", &["src/deck/"]),
     ("strsim", &["src/deck/"]),
     ("csv", &["src/output/", "src/study/", "src/deck/import.rs"]),
-    ("kuva", &["src/output/plot.rs", "src/output/curves.rs"]),
+    ("resvg", &["src/output/plot/png.rs"]),
+    ("notosans", &["src/output/plot/png.rs"]),
     ("cpu_time", &["src/study/cost/trial.rs"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),
     ("ctrlc", &["src/cli/"]),
     ("signal_hook", &["src/cli/"]),
     // The scene hands the resolved deck through to run.json.
-    ("serde_json", &["src/deck/", "src/scene/mod.rs", "src/output/", "src/study/sweep/store.rs", "src/cli/json.rs"]),
+    (
+        "serde_json",
+        &[
+            "src/deck/",
+            "src/scene/mod.rs",
+            "src/output/",
+            "src/study/sweep/store.rs",
+            "src/study/cost/journal.rs",
+            "src/cli/json.rs",
+        ],
+    ),
+    ("serde", &["src/output/", "src/study/", "src/cli/json.rs"]),
+    ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
 ];
 
 /// Files that may import one another, and why.
 #[rustfmt::skip]
-const ONE_THING: [(&str, &[&str]); 12] = [
+const ONE_THING: &[(&str, &[&str])] = &[
     ("an effect builds its form in a plane, which reads its elements", &[
         "core/src/effect/beam_elasticity.rs", "core/src/effect/planar_elasticity.rs",
     ]),
@@ -52,21 +70,6 @@ const ONE_THING: [(&str, &[&str]); 12] = [
     ]),
     ("the error of a step, and what steps carry along of it", &[
         "core/src/integrate/carried_error.rs", "core/src/integrate/time_error.rs",
-    ]),
-    ("one search: runs, the points that it tries, its samples", &[
-        "src/study/accuracy/candidates.rs", "src/study/accuracy/mod.rs", "src/study/accuracy/round.rs", "src/study/accuracy/search.rs",
-    ]),
-    ("the frontier is measured again by those that ran it", &["src/study/cost/crew.rs", "src/study/cost/frontier.rs"]),
-    ("a grid of trials, and what is sampled of each", &[
-        "src/study/cost/grid.rs", "src/study/cost/sample.rs", "src/study/cost/trial.rs",
-    ]),
-    ("a report films a run, and a run may end with a report", &["src/cli/report.rs", "src/cli/run.rs"]),
-    ("a sweep, here or on a cluster", &["src/cli/sweep/mod.rs", "src/cli/sweep/plan.rs", "src/cli/sweep/slurm.rs"]),
-    ("free strains have histories, and loads stand at points", &["src/deck/action.rs", "src/deck/geometry.rs"]),
-    ("a study of cost varies schemes", &["src/deck/cost.rs", "src/deck/procedure.rs"]),
-    ("parameters are read before what may name them", &["src/deck/parameters.rs", "src/deck/reader.rs"]),
-    ("motions and loads share histories; names are those of the mesh and its sections", &[
-        "src/scene/compose/mod.rs", "src/scene/constraints.rs", "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
     ]),
 ];
 
@@ -375,7 +378,10 @@ fn no_files_import_one_another_in_a_circle() {
 #[test]
 fn imports_run_only_downward() {
     let mut faults = Vec::new();
-    for (file, code) in library() {
+    for (file, mut code) in library() {
+        if module_of(&file) == "deck" {
+            DECK_ROWS.iter().for_each(|row| code = code.replace(row, ""));
+        }
         for (line, to) in imported_modules(&code) {
             match may_import(module_of(&file), &to) {
                 Ok(true) => {}

@@ -604,7 +604,7 @@ fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state
     let connectivity = effects.iter().map(|effect| effect.connectivity()).collect();
     let pattern = Pattern::new(dof_map.clone(), model.node_blocks(dof_map.layout()), connectivity, Symmetry::None);
     let mut system = System::new(pattern, model.slots(), &Category::ALL, &[]);
-    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
+    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.tangent().exists()) {
         let mut sink = system.sink(number, effect.category(), true);
         match plane.and_then(|plane| effect.clone().in_plane(&plane)) {
             Some(planar) => planar.add(state, &Memory::default(), weights, &mut sink),

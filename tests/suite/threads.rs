@@ -134,7 +134,7 @@ fn regions_change_nothing_but_the_order_of_sums() {
         let cut = (forces(&assembly), assembly.system.values.clone());
         assembly.system.clear(None);
         for (number, effect) in model.acting(&stage).iter().enumerate() {
-            let with_tangent = effect.has_tangent();
+            let with_tangent = effect.tangent().exists();
             let weights = if with_tangent { weights } else { Weights::NONE };
             let mut sink = assembly.system.sink(number, effect.category(), with_tangent);
             effect.add(&state, &Memory::default(), weights, &mut sink);

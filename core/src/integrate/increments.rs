@@ -141,8 +141,8 @@ pub struct Accelerations {
 /// What sits at each rotation, taken together, with the slot of its displacement.
 fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     let mut sums: BTreeMap<Slot, (Slot, Inertia)> = BTreeMap::new();
-    for effect in &model.effects {
-        effect.bodies(&mut |node, body| {
+    for masses in model.effects.iter().filter_map(|effect| effect.roles().masses) {
+        masses.bodies(&mut |node, body| {
             let sum = sums.entry(node.p).or_insert((node.u, Inertia::NONE));
             sum.1 = sum.1.with(body);
         });

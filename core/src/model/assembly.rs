@@ -2,7 +2,7 @@
 
 use super::linear::Linear;
 use super::{Model, StageContext};
-use crate::effect::{Effect, PlanarForm, RoundOff};
+use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
 use crate::kernel::Weights;
 use crate::system::{
     Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Part, Pattern, Plane, State, Symmetry, System,
@@ -36,13 +36,17 @@ struct Acting {
 
 impl Acting {
     fn new(effect: Arc<dyn Effect>, plane: Option<&Plane>, instances: usize) -> Self {
-        let memory = Memory { points: vec![[0.0; 6]; effect.memory_points()], valid: false };
+        let points = effect.roles().stresses.map_or(0, |stresses| stresses.memory_points());
+        let memory = Memory { points: vec![[0.0; 6]; points], valid: false };
         let planar = plane.and_then(|plane| effect.clone().in_plane(plane));
-        Self { has_tangent: effect.has_tangent(), effect, planar, memory, instances: instances as u64 }
+        Self { has_tangent: effect.tangent().exists(), effect, planar, memory, instances: instances as u64 }
     }
 
     fn is_symmetric(&self) -> bool {
-        self.planar.as_ref().map_or_else(|| self.effect.is_symmetric(), |planar| planar.is_symmetric())
+        match &self.planar {
+            None => self.effect.tangent() != TangentForm::General,
+            Some(planar) => planar.is_symmetric(),
+        }
     }
 
     /// Of its forces.
@@ -59,7 +63,11 @@ impl Acting {
 
     fn extrapolate(&mut self, at: &State, dq: &[Vec3]) {
         match &self.planar {
-            None => self.effect.extrapolate(at, dq, &mut self.memory),
+            None => {
+                if let Some(stresses) = self.effect.roles().stresses {
+                    stresses.extrapolate(at, dq, &mut self.memory);
+                }
+            }
             Some(planar) => planar.extrapolate(at, dq, &mut self.memory),
         }
     }
@@ -215,7 +223,7 @@ impl Assembly {
         self.linear.is_none() && self.effects.iter().any(|acting| !acting.memory.points.is_empty())
     }
 
-    /// Lets effects remember what the next tangent is formed with, see [`Effect::extrapolate`].
+    /// Lets effects remember what the next tangent is formed with, see [`StressPoints::extrapolate`](crate::effect::StressPoints::extrapolate).
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
         if !self.foresees() {
             return;
@@ -230,16 +238,18 @@ impl Assembly {
         self.effects.iter_mut().for_each(|acting| acting.memory.valid = false);
     }
 
-    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Effect::drift`].
+    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Constraint::drift`](crate::effect::Constraint::drift).
     pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
         let [mut rates, mut rates2] = [state.q.len(); 2].map(zeros);
-        self.effects.iter().for_each(|acting| acting.effect.drift(state, &mut rates, &mut rates2));
+        let constraints = self.effects.iter().filter_map(|acting| acting.effect.roles().constraint);
+        constraints.for_each(|constraint| constraint.drift(state, &mut rates, &mut rates2));
         [rates, rates2]
     }
 
     /// The largest round-off among the effects.
     pub fn round_off(&self, state: &State) -> RoundOff {
-        self.effects.iter().map(|acting| acting.effect.round_off(state)).fold(RoundOff::default(), RoundOff::or)
+        let stresses = self.effects.iter().filter_map(|acting| acting.effect.roles().stresses);
+        stresses.map(|stresses| stresses.round_off(state)).fold(RoundOff::default(), RoundOff::or)
     }
 
     /// The largest strain that a field makes, see [`Effect::strain_of`].
@@ -250,8 +260,8 @@ impl Assembly {
     /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of the others; `None` where no effect does.
     /// The tangent is used up.
     pub fn stiffness_along(&mut self, state: &State, field: &[Vec3]) -> Option<f64> {
-        let told: Vec<Option<f64>> =
-            self.effects.iter().map(|acting| acting.effect.stiffness_along(state, field)).collect();
+        let told_by = |acting: &Acting| acting.effect.roles().stresses?.stiffness_along(state, field);
+        let told: Vec<Option<f64>> = self.effects.iter().map(told_by).collect();
         if told.iter().all(Option::is_none) || self.linear.is_some() {
             return None;
         }

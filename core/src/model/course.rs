@@ -69,6 +69,13 @@ pub struct Amplitude {
     full: f64,
 }
 
+impl Default for Amplitude {
+    /// That of a load without a history, in all stages.
+    fn default() -> Self {
+        Self::of_load(None, StageSet::default())
+    }
+}
+
 impl Amplitude {
     /// The factor of a load with this history, or with the default one: up with the load factor of the first static stage in
     /// which it acts, then in full; in full from the start of a dynamic stage.

@@ -47,7 +47,7 @@ impl Linear {
         let mut matrix = |weights: Weights| {
             whole.clear(None);
             let forget = Memory::default();
-            for (number, effect) in effects.iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
+            for (number, effect) in effects.iter().enumerate().filter(|(_, effect)| effect.tangent().exists()) {
                 effect.add(&origin, &forget, weights, &mut whole.sink(number, effect.category(), true));
             }
             whole.values.clone()

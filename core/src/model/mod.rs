@@ -1,6 +1,8 @@
 //! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
 
 mod assembly;
+pub mod beam_element;
+mod builder;
 pub mod charts;
 mod constraint;
 mod course;
@@ -8,21 +10,26 @@ mod effect_size;
 mod history;
 mod linear;
 mod names;
+mod parts;
 mod schedule;
+mod section;
 mod stage_error;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
 pub use assembly::Assembly;
+pub use builder::{BuildError, ModelBuilder, NodeId, StraightBeam};
 pub use constraint::{Motion, MotionKind, Support};
 pub use course::{Amplitude, Course, Progress, Ramp, Timeline};
 pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
+pub use parts::ModelParts;
 pub use schedule::Schedule;
+pub use section::{MassPerLength, SectionMatrices};
 pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Effect, Energy, Momentum, MotorState};
+use crate::effect::{Constraint, Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
 use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
@@ -33,7 +40,7 @@ use std::sync::Arc;
 /// a few thousand steps. What is left aside is dropped, a hundredth of what planar and spatial answers may differ by.
 const OUT_OF_PLANE: f64 = 1e-12;
 
-/// What a slot holds.
+/// The kind of vector that a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotKind {
     /// A displacement
@@ -101,30 +108,30 @@ pub struct Charted {
 
 /// A scene. Nothing of it changes in a run: what does is [`State`] and [`Schedule`].
 pub struct Model {
-    /// What each slot holds
+    /// The kind of vector that each slot holds
     pub kinds: Arc<Vec<SlotKind>>,
-    /// And the node that it is named after
-    pub names: Arc<Names>,
+    /// The names of nodes, by their slots
+    pub(crate) names: Arc<Names>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
-    pub angles: usize,
+    pub(crate) angles: usize,
     /// The slots on which rotational springs act: their unwrapped rotation vectors must be known
-    pub sprung: Vec<Slot>,
-    /// Those of the two sides of each joint that remembers its angle
-    pub sprung_joints: Vec<[Option<Slot>; 2]>,
+    pub(crate) sprung: Vec<Slot>,
+    /// The rotations on the two sides of each joint that remembers its angle
+    pub(crate) sprung_joints: Vec<[Option<Slot>; 2]>,
     /// How many beam elements there are
-    pub elements: usize,
+    pub(crate) elements: usize,
     /// Rotations and elements that large rotations change the charts of; see [`Self::charted`]
-    pub rotating: Charted,
-    /// What acts
+    pub(crate) rotating: Charted,
+    /// The effects, in the order in which their forces are added
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs
-    pub amplitudes: Vec<Amplitude>,
+    pub(crate) amplitudes: Vec<Amplitude>,
     /// Supports
     pub supports: Vec<Support>,
     /// Prescribed motions
-    pub motions: Vec<Motion>,
+    pub(crate) motions: Vec<Motion>,
     /// The plane that the scene lies in, where it is treated in one
     pub plane: Option<Plane>,
     /// Whether static and dynamic stages are linear in the displacements
@@ -195,9 +202,14 @@ impl Model {
         jumps
     }
 
+    /// The effects that close gaps by multipliers.
+    pub(super) fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
+        self.effects.iter().filter_map(|effect| effect.roles().constraint)
+    }
+
     /// Shows the motors of joints.
     pub fn each_motor(&self, state: &State, show: &mut dyn FnMut(MotorState)) {
-        self.effects.iter().for_each(|effect| effect.motors(state, show));
+        self.constraints().for_each(|constraint| constraint.motors(state, show));
     }
 
     /// The rotations and elements that have charts in stages of a kind: none where these are linear.
@@ -300,27 +312,28 @@ impl Model {
         sum
     }
 
-    /// What joints to ground do to a node, see [`Effect::held_by_ground`].
+    /// What joints to ground do to a node, see [`Constraint::held_by_ground`].
     pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
-        let parts = self.effects.iter().map(|effect| effect.held_by_ground(state, node));
+        let parts = self.constraints().map(|constraint| constraint.held_by_ground(state, node));
         parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
     }
 
     /// What is driven from outside: each coordinate with the derivative of the energy over it.
     pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
-        self.effects.iter().for_each(|effect| effect.drives(state, &mut |x, force| all.push((x, force))));
+        let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);
+        driven.for_each(|driven| driven.drives(state, &mut |x, force| all.push((x, force))));
         all
     }
 
-    /// Before a step is predicted, see [`Effect::steady`].
+    /// Before a step is predicted, see [`FreeSpins::steady`].
     pub fn steady(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.steady(state));
+        self.effects.iter().filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
     }
 
     /// After a converged state: turns of joints are counted, multipliers have no rates.
     pub fn remember(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.remember(state));
+        self.constraints().for_each(|constraint| constraint.remember(state));
         for &slot in &self.multipliers {
             let slot = slot as usize;
             [&mut state.v, &mut state.a, &mut state.algorithmic]
@@ -333,7 +346,7 @@ impl Model {
     /// Mass and momenta.
     pub fn momentum(&self, state: &State) -> Momentum {
         let mut sum = Momentum::default();
-        self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
+        self.effects.iter().filter_map(|effect| effect.roles().masses).for_each(|mass| sum.add(mass.momentum(state)));
         sum
     }
 }

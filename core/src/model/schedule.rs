@@ -166,7 +166,7 @@ impl Schedule {
             state.amplitude_rates[k] = [rate, rate2];
         }
         let mut too_far = None;
-        for turned in model.effects.iter().filter_map(|effect| effect.turned(&before, &state.amplitude)) {
+        for turned in model.constraints().filter_map(|constraint| constraint.turned(&before, &state.amplitude)) {
             if turned.1 > LARGEST_TURN {
                 too_far = Some(turned);
             }

@@ -1,7 +1,7 @@
-//! From a motion to a static stage, see [`crate::effect::fading_inertia`].
+//! From a motion to a static stage, see [`crate::effect::inertia::FadingInertia`].
 
 use super::stage_run::StageRun;
-use crate::effect::fading_inertia;
+use crate::effect::inertia::fading_force;
 use crate::kernel::Weights;
 use crate::model::{SlotKind, StageKind};
 use crate::system::{Category, Fading, System};
@@ -47,7 +47,7 @@ impl StageRun<'_> {
         let system = &assembly.system;
         let rest = |slot: usize| {
             let (kind, at) = (model.kinds[slot], state.q[slot]);
-            let (force, _) = fading_inertia::present(&state.fading[slot], kind == SlotKind::Rotation, at);
+            let (force, _) = fading_force(&state.fading[slot], kind == SlotKind::Rotation, at);
             Fading { force: force - carried(kind, system, slot), at }
         };
         let fading = threads::list(state.q.len(), rest);

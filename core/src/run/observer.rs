@@ -50,6 +50,13 @@ pub trait Observer {
     }
 }
 
+/// A function sees the rows.
+impl<F: FnMut(&Snapshot) -> Result<(), Failure>> Observer for F {
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
+        self(snapshot)
+    }
+}
+
 /// Work done in a run, and what it found out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counters {

@@ -27,6 +27,21 @@ pub struct Plan {
     pub places: Vec<(Node, Vec3)>,
 }
 
+impl Plan {
+    /// These stages of a model that begins at rest.
+    pub fn new(model: Model, stages: Vec<Stage>) -> Self {
+        Self {
+            model: Arc::new(model),
+            initial: Vec::new(),
+            stages,
+            interval: None,
+            energy: false,
+            continued: false,
+            places: Vec::new(),
+        }
+    }
+}
+
 /// Velocities given to nodes: velocity + spin x (place - about).
 #[derive(Clone, Debug)]
 pub struct InitialMotion {
@@ -68,7 +83,29 @@ pub struct Stage {
     pub rotating: bool,
 }
 
+/// The tolerance of stages that name none: the part of the largest forces that may be out of balance.
+const TOLERANCE: f64 = 1e-8;
+
+/// The limit of Newton's iterations of stages that name none
+const MAX_ITERATIONS: usize = 25;
+
 impl Stage {
+    /// A stage seen from a frame at rest, with the usual tolerance.
+    pub fn new(work: StageWork) -> Self {
+        Self { work, tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS, until: None, rotating: false }
+    }
+
+    /// So many equal load levels, with smaller steps where one is not reached at once.
+    pub fn statics(steps: usize) -> Self {
+        Self::new(StageWork::Static { steps, approach: Approach::Parts })
+    }
+
+    /// Equal time steps to a time on the run's clock.
+    pub fn dynamics(end: f64, step: f64, scheme: Scheme) -> Self {
+        let energy_limit = f64::INFINITY;
+        Self::new(StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: None, energy_limit }))
+    }
+
     /// As effects see it, at this place among the stages.
     pub fn context(&self, number: usize) -> StageContext {
         StageContext { number, kind: self.work.kind(), rotating: self.rotating }

@@ -54,7 +54,8 @@ pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>
             found.push(motion);
         }
     };
-    model.effects.iter().for_each(|effect| effect.free_motions(state, &mut look));
+    let spins = model.effects.iter().filter_map(|effect| effect.roles().spins);
+    spins.for_each(|spins| spins.free_motions(state, &mut look));
     found
 }
 
