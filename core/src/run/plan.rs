@@ -84,10 +84,13 @@ pub struct Stage {
 }
 
 /// The tolerance of stages that name none: the part of the largest forces that may be out of balance.
-const TOLERANCE: f64 = 1e-8;
+const TOLERANCE: f64 = 1e-9;
 
 /// The limit of Newton's iterations of stages that name none
 const MAX_ITERATIONS: usize = 25;
+
+/// The part of the largest energies so far by which the total may grow, in dynamic stages that name none
+const ENERGY_LIMIT: f64 = 0.2;
 
 impl Stage {
     /// A stage seen from a frame at rest, with the usual tolerance.
@@ -102,8 +105,8 @@ impl Stage {
 
     /// Equal time steps to a time on the run's clock.
     pub fn dynamics(end: f64, step: f64, scheme: Scheme) -> Self {
-        let energy_limit = f64::INFINITY;
-        Self::new(StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: None, energy_limit }))
+        let steps = TimeStepping { end, step, scheme, adaptive: None, energy_limit: ENERGY_LIMIT };
+        Self::new(StageWork::Dynamic(steps))
     }
 
     /// As effects see it, at this place among the stages.
