@@ -105,8 +105,7 @@ impl Stage {
 
     /// Equal time steps to a time on the run's clock.
     pub fn dynamics(end: f64, step: f64, scheme: Scheme) -> Self {
-        let steps = TimeStepping { end, step, scheme, adaptive: None, energy_limit: ENERGY_LIMIT };
-        Self::new(StageWork::Dynamic(steps))
+        Self::new(StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: None, energy_limit: ENERGY_LIMIT }))
     }
 
     /// As effects see it, at this place among the stages.
