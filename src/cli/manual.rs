@@ -2,6 +2,7 @@
 
 use super::console;
 use super::status::Status;
+use beamsim_core::failure::FailureKind;
 use std::path::Path;
 
 /// Prints the manual page, or writes one page per command into a folder.
@@ -17,7 +18,7 @@ pub fn manual(command: clap::Command, folder: Option<&Path>) -> Status {
     match done {
         Ok(()) => Status::Fine,
         Err(error) => {
-            console::error("io", &error.to_string());
+            console::error(FailureKind::Io.name(), &error.to_string());
             Status::Io
         }
     }

@@ -3,6 +3,7 @@
 use super::console;
 use super::status::Status;
 use crate::deck::SCHEMA;
+use beamsim_core::failure::FailureKind;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -52,13 +53,13 @@ pub fn new(template: Template, out: Option<&Path>) -> Status {
         }
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             console::error(
-                "io",
+                FailureKind::Io.name(),
                 &format!("{}: already exists and is not overwritten (use --out for another name)", path.display()),
             );
             Status::Io
         }
         Err(error) => {
-            console::error("io", &format!("{}: {error}", path.display()));
+            console::error(FailureKind::Io.name(), &format!("{}: {error}", path.display()));
             Status::Io
         }
     }

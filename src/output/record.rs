@@ -3,6 +3,7 @@
 use super::json::{Entries, Number};
 use super::{OutputError, Units};
 use crate::scene::{Reason, Scene};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -274,7 +275,7 @@ impl Record {
 
     /// True if a signal ended the run.
     pub fn is_interrupted(&self) -> bool {
-        self.status == "interrupted"
+        self.status == FailureKind::Interrupted.name()
     }
 
     /// The record without the text of the deck.

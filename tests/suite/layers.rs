@@ -63,14 +63,25 @@ const CRATES: [(&str, &[&str]); 17] = [
 #[rustfmt::skip]
 const ONE_THING: &[(&str, &[&str])] = &[
     ("an effect builds its form in a plane, which reads its elements", &[
-        "core/src/effect/beam_elasticity.rs", "core/src/effect/planar_elasticity.rs",
+        "core/src/effect/elasticity/beam.rs", "core/src/effect/elasticity/planar.rs",
     ]),
     ("an effect builds its form in a plane, which reads its bodies", &[
-        "core/src/effect/planar_inertia.rs", "core/src/effect/rigid_body.rs",
+        "core/src/effect/inertia/planar.rs", "core/src/effect/inertia/rigid_body.rs",
     ]),
     ("the error of a step, and what steps carry along of it", &[
         "core/src/integrate/carried_error.rs", "core/src/integrate/time_error.rs",
     ]),
+    ("parameters are read before what may name them", &["src/deck/parameters.rs", "src/deck/reader.rs"]),
+    ("motions and loads share histories", &["src/scene/compose/mod.rs", "src/scene/constraints.rs"]),
+    ("names are those of the mesh and its sections", &[
+        "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
+    ]),
+    ("a plot and its drawing", &["src/output/plot/layout.rs", "src/output/plot/mod.rs", "src/output/plot/ticks.rs"]),
+    ("one search: the points that it tries, and its rounds", &[
+        "src/study/accuracy/candidates.rs", "src/study/accuracy/mod.rs", "src/study/accuracy/round.rs",
+        "src/study/accuracy/search.rs",
+    ]),
+    ("a sweep, here or on a cluster", &["src/cli/sweep/mod.rs", "src/cli/sweep/plan.rs", "src/cli/sweep/slurm.rs"]),
 ];
 
 /// Whether a module may import another one; `Err` for a module that nobody has given a place.
@@ -272,7 +283,7 @@ impl SourceFile {
         let mut file = Self { name: name.to_string(), module, uses: Vec::new(), exports: Vec::new() };
         for root in ["crate", "super", "beamsim_core"] {
             for (_, before, after) in occurrences(code, root) {
-                if after.starts_with("::") && !before.ends_with("::") {
+                if after.starts_with("::") && !before.ends_with("::") && !before.ends_with("(in ") {
                     let line = before.rsplit([';', '}', ']']).next().unwrap_or_default().trim_start();
                     file.take(root, after.trim_start_matches("::"), line.starts_with("pub"));
                 }
@@ -364,15 +375,17 @@ fn circles() -> Vec<Vec<String>> {
 
 #[test]
 fn no_files_import_one_another_in_a_circle() {
-    let mut faults = Vec::new();
-    for circle in circles() {
-        let is_in =
-            |group: &[&str]| circle.iter().all(|line| group.iter().any(|file| line.starts_with(&format!("{file} "))));
-        if !ONE_THING.iter().any(|(_, group)| is_in(group)) {
-            faults.push(circle.join("\n"));
-        }
-    }
+    let circles = circles();
+    let is_in = |circle: &[String], group: &[&str]| {
+        circle.iter().all(|line| group.iter().any(|file| line.starts_with(&format!("{file} "))))
+    };
+    let is_one_thing = |circle: &[String]| ONE_THING.iter().any(|(_, group)| is_in(circle, group));
+    let faults: Vec<String> =
+        circles.iter().filter(|circle| !is_one_thing(circle)).map(|circle| circle.join("\n")).collect();
     assert!(faults.is_empty(), "{} circles of imports:\n{}", faults.len(), faults.join("\n\n"));
+    let idle = ONE_THING.iter().filter(|(_, group)| !circles.iter().any(|circle| is_in(circle, group)));
+    let idle: Vec<&str> = idle.map(|(reason, _)| *reason).collect();
+    assert!(idle.is_empty(), "no circles any more, to be taken out of the list: {}", idle.join("; "));
 }
 
 #[test]

@@ -180,19 +180,19 @@ pub(super) fn shared<T: PartialEq>(own: T, neighbours: Option<&Arc<T>>) -> Arc<T
 /// instances, the part of each batch that is in it.
 macro_rules! for_each_batch {
     ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {
-        crate::effect::for_each_batch!($batches, 0..usize::MAX, |$first, $batch| $body)
+        crate::effect::batch::for_each_batch!($batches, 0..usize::MAX, |$first, $batch| $body)
     };
     ($batches:expr, $instances:expr, |$first:ident, $batch:ident| $body:expr) => {{
         let (batches, instances) = (&$batches, $instances);
         let mut before = 0;
-        crate::effect::for_each_batch!(@one batches.two, instances, before, $first, $batch, $body);
-        crate::effect::for_each_batch!(@one batches.three, instances, before, $first, $batch, $body);
-        crate::effect::for_each_batch!(@one batches.four, instances, before, $first, $batch, $body);
+        crate::effect::batch::for_each_batch!(@one batches.two, instances, before, $first, $batch, $body);
+        crate::effect::batch::for_each_batch!(@one batches.three, instances, before, $first, $batch, $body);
+        crate::effect::batch::for_each_batch!(@one batches.four, instances, before, $first, $batch, $body);
         let _ = before;
     }};
     // Room to work in is not made for nothing.
     (@one $own:expr, $instances:ident, $before:ident, $first:ident, $batch:ident, $body:expr) => {
-        let own = crate::effect::own_part($before, $own.len(), &$instances);
+        let own = crate::effect::batch::own_part($before, $own.len(), &$instances);
         let ($first, $batch) = ($before + own.start, &$own[own]);
         if !$batch.is_empty() {
             $body;

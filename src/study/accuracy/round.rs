@@ -3,6 +3,7 @@
 use super::has_long_steps;
 use crate::study::StudyError;
 use crate::study::cost::{Pool, Trial, Variant};
+use beamsim_core::failure::FailureKind;
 
 /// A variant, and those that it is compared with.
 pub struct Round {
@@ -55,7 +56,7 @@ impl Round {
         let alone = if has_long_steps(&self.own) { 1 } else { variants.len() };
         pool.expect(alone);
         let mut trials = pool.run(&variants[..alone])?;
-        if alone < variants.len() && trials[0].as_ref().is_some_and(|own| own.status != "limit") {
+        if alone < variants.len() && trials[0].as_ref().is_some_and(|own| !own.failed_as(FailureKind::Limit)) {
             pool.expect(variants.len() - alone);
             trials.extend(pool.run(&variants[alone..])?);
         }

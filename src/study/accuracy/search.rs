@@ -7,6 +7,7 @@ use super::{CUBIC, Found, coarser, has_long_steps, scaled};
 use crate::deck::{Accuracy, StageBody};
 use crate::study::StudyError;
 use crate::study::cost::{Companion, Family, Mesher, Pace, Pool, Trial, Variant};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 
 /// The nodes of the first mesh over those of the deck.
@@ -161,7 +162,7 @@ impl<'a> Search<'a> {
                 Next::Another => continue,
                 Next::Nothing => break,
             }
-            if trials.longer.as_ref().is_some_and(|longer| longer.status == "limit") {
+            if trials.longer.as_ref().is_some_and(|longer| longer.failed_as(FailureKind::Limit)) {
                 // Estimates need a pace with twice the step.
                 self.longest = scaled(self.pace, 0.5);
             }
@@ -191,25 +192,34 @@ impl<'a> Search<'a> {
 
     /// Decides by the end of the own run of a round; `first` is true while no error is known.
     fn after_own_run(&mut self, round: &Round, own: &Trial, first: bool, pool: &Pool) -> Result<Next, StudyError> {
-        match own.status.as_str() {
+        match FailureKind::of(&own.status) {
             // This fails on every mesh.
-            "singular" if first => {
+            Some(FailureKind::Singular) if first => {
                 let again = || Failure::Limit("the first run of the search ended with `singular`".into());
                 Err(StudyError::Failure(pool.own_failure().unwrap_or_else(again)))
             }
-            "singular" | "deck" => Ok(Next::Nothing),
-            "finished" => {
+            Some(FailureKind::Singular | FailureKind::Deck) => Ok(Next::Nothing),
+            None if own.finished() => {
                 let scales = self.mesher.sampler.scales(&own.samples);
                 self.mesher.sampler.refuse_nothing(&scales)?;
                 Ok(Next::Estimates)
             }
             // The longer step would fail too. After two halvings there is one to compare with.
-            "limit" if has_long_steps(&round.own) => {
+            Some(FailureKind::Limit) if has_long_steps(&round.own) => {
                 self.pace = scaled(self.pace, 0.25);
                 self.longest = self.pace;
                 Ok(Next::Another)
             }
-            _ => Ok(Next::Estimates),
+            Some(
+                FailureKind::MeshTooCoarse
+                | FailureKind::NotConverged
+                | FailureKind::NonFinite
+                | FailureKind::EnergyGrowth
+                | FailureKind::Limit
+                | FailureKind::Io
+                | FailureKind::Interrupted,
+            )
+            | None => Ok(Next::Estimates),
         }
     }
 

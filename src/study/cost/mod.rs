@@ -34,6 +34,7 @@ use crate::output::HistoryReader;
 use crate::scene::Scene;
 use crate::study::StudyError;
 use crate::study::outcome::{Outcome, StageClock, columns, find_column};
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use grid::Grid;
 use run::Errors;
@@ -140,17 +141,17 @@ fn finest(mesher: &Mesher, grid: &Grid, sampler: &Sampler, pool: &mut Pool) -> R
     pool.expect(variants.len());
     let trials = pool.run_needed(&variants)?;
     if let Some(failed) = trials.iter().find(|trial| !trial.finished()) {
-        let own = if failed.status == "singular" { pool.own_failure() } else { None };
+        let own = if failed.failed_as(FailureKind::Singular) { pool.own_failure() } else { None };
         return Err(StudyError::Failure(own.unwrap_or(Failure::Limit(no_reference(&failed.status)))));
     }
     Ok(reference::establish(sampler, &variants, &trials))
 }
 
 fn no_reference(status: &str) -> String {
-    match status {
-        "interrupted" => "the budget is too small for the reference run".into(),
-        status => format!("the reference run, which is finer than all others, ended with `{status}`"),
+    if FailureKind::of(status) == Some(FailureKind::Interrupted) {
+        return "the budget is too small for the reference run".into();
     }
+    format!("the reference run, which is finer than all others, ended with `{status}`")
 }
 
 /// The compared outputs, and the reference where one is given.

@@ -9,6 +9,7 @@ use crate::study::StudyError;
 use crate::study::change::Change;
 use crate::study::outcome::Outcome;
 use crate::study::parallel::in_parallel;
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::{Failure, Moment};
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -105,7 +106,7 @@ impl<'a, 'o> Pool<'a, 'o> {
 
     /// Runs variants that the study needs; those that the budget skips are `interrupted`.
     pub fn run_needed(&mut self, variants: &[Variant]) -> Result<Vec<Trial>, StudyError> {
-        let lost = || Trial::ended("interrupted");
+        let lost = || Trial::ended(FailureKind::Interrupted.name());
         Ok(self.run(variants)?.into_iter().map(|trial| trial.unwrap_or_else(lost)).collect())
     }
 
@@ -131,7 +132,7 @@ impl<'a, 'o> Pool<'a, 'o> {
         let run = |k: usize| {
             let (trial, outcome) = trial::run(deck, &changes[k], sampler, patience(&variants[k]), &stopped);
             let outcome = outcome.filter(|outcome| keeps && trial.finished() && outcome.size() < KEPT_NUMBERS);
-            (trial.status != "interrupted").then_some((trial, outcome))
+            (!trial.failed_as(FailureKind::Interrupted)).then_some((trial, outcome))
         };
         let broken = |_| (Trial::ended("broke off"), None);
         in_parallel(self.options.threads, open, &|| stopped().is_some(), &run, &broken, |k, (trial, outcome)| {

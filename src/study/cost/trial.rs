@@ -7,6 +7,7 @@ use crate::study::StudyError;
 use crate::study::built::BuiltDeck;
 use crate::study::change::Change;
 use crate::study::outcome::Outcome;
+use beamsim_core::failure::FailureKind;
 use beamsim_core::run::Failure;
 use cpu_time::ThreadTime;
 use serde::{Deserialize, Serialize};
@@ -68,6 +69,11 @@ impl Trial {
     /// True if the run finished: then there are numbers to compare.
     pub fn finished(&self) -> bool {
         self.status == "finished"
+    }
+
+    /// True if the run ended with a failure of a kind.
+    pub fn failed_as(&self, kind: FailureKind) -> bool {
+        FailureKind::of(&self.status) == Some(kind)
     }
 }
 

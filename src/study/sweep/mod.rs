@@ -17,6 +17,7 @@ use super::{StudyError, SweepError};
 use crate::deck::{self, Deck, Looked, looking_at, nearest};
 use crate::output::OutputError;
 use crate::scene::Scene;
+use beamsim_core::failure::FailureKind;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A sweep.
@@ -109,7 +110,7 @@ impl Sweep {
         let open = points.iter().rev().copied().collect();
         let work = |k: usize| {
             let done = point::run(&self.text, &self.settings(k), self.error_bars, &interrupted);
-            (done.status != "interrupted").then_some(done)
+            (done.status != FailureKind::Interrupted.name()).then_some(done)
         };
         let broken = |_| PointResult::failed("broke_off", "a fault of the program: please report it".into());
         let mut kept = Ok(());
