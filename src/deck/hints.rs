@@ -91,7 +91,7 @@ const EXPLAINED: [Explained; 44] = [
     Explained { table: "material", written: &["viscosity", "damping", "relaxation"], help: "use [damping] for Rayleigh damping; materials are elastic" },
     Explained { table: "material", written: &["alpha", "cte", "expansion", "thermal_expansion"], help: "use `free_strain` of [[beam]], such as [\"alpha*dT\", 0, 0, 0, 0, 0]" },
     Explained { table: "section", written: &["diameter", "d", "r"], help: "use `radius`, half the diameter" },
-    Explained { table: "section", written: &["e", "nu", "g", "rho", "density", "young", "poisson"], help: "these belong to a [material.NAME], which `material` of the section names" },
+    Explained { table: "section", written: &["e", "nu", "g", "rho", "density", "young", "poisson"], help: "give this in a [material.NAME], and name it by `material` of the section" },
     Explained { table: "section", written: &["a", "area", "i", "iy", "iz", "i2", "i3", "j", "inertia"], help: "give \
                                                                                                                the \
                                                                                                                stiffnesses \
@@ -106,7 +106,7 @@ const EXPLAINED: [Explained; 44] = [
                                                                                                                `material` \
                                                                                                                and \
                                                                                                                `shape`" },
-    Explained { table: "beam", written: &["radius", "diameter", "material", "shape", "e", "young"], help: "these belong to a [section.NAME], which `section` of the beam names" },
+    Explained { table: "beam", written: &["radius", "diameter", "material", "shape", "e", "young"], help: "give this in a [section.NAME], and name it by `section` of the beam" },
     Explained { table: "beam", written: &["start", "from", "to", "begin", "end"], help: "use `through`, such as [\"root\", \"tip\"]" },
     Explained { table: "beam", written: &["length"], help: "the length follows from the points of `through`" },
     Explained { table: "beam", written: &["damping"], help: "use [damping]" },

@@ -94,8 +94,8 @@ impl Teller<'_> {
         let name = history.map_or(String::new(), |name| format!(" `{name}`"));
         let more = match others {
             0 => String::new(),
-            1 => format!(" (and so does another {what})"),
-            _ => format!(" (and so do {others} other {what}s)"),
+            1 => format!(" (likewise another {what})"),
+            _ => format!(" (likewise {others} other {what}s)"),
         };
         let begins_there = self.deck.stages[*stage].span.clone();
         match how {
