@@ -297,10 +297,10 @@ mod tests {
     fn what_is_wrong_is_told_at_the_name_of_the_file() {
         let through = "[[beam]]\nthrough = { csv = \"a.csv\" }\n";
         for (file, told) in [
-            ("x,y,z\n0,0,zero\n", "a.csv: line 2: `zero` is no number"),
+            ("x,y,z\n0,0,zero\n", "a.csv: line 2: `zero` is not a number"),
             ("x,y\n0,0\n", "columns `x`, `y`, `z`"),
             ("s,x,y\n0,0,0\n", "columns `x`, `y`, `z`"),
-            ("O,0,0\n1,0,0\n", "line 1: `O` is no number"),
+            ("O,0,0\n1,0,0\n", "line 1: `O` is not a number"),
             ("x,y,z\n", "no numbers"),
         ] {
             let found = with(through, file).unwrap_err();

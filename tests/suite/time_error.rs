@@ -314,7 +314,7 @@ fn error_bars_say_where_a_polyline_may_stand_for_a_curve() {
         let output = folder.beamsim(&[&["run", "deck.toml", "--out", "out"][..], words].concat());
         assert_eq!(status(&output), 0, "{}", last_line(&output));
         let said = [output.stdout, output.stderr].concat();
-        String::from_utf8_lossy(&said).contains("straight pieces turn by up to")
+        String::from_utf8_lossy(&said).contains("straight pieces meet at angles of up to")
     };
     let pieces = "through = [[0, 0, 0], [1, 0, 0], [1.98, 0.2, 0], [2.9, 0.6, 0]]\nelements = 2";
     let corner = "through = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]\nelements = 2";

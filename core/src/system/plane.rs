@@ -302,7 +302,7 @@ mod tests {
         ]);
         assert_eq!(
             apart.unwrap_err(),
-            "part: the vector [0.0, 1.0, -0.5] is not its own image in a plane that all else shares"
+            "part: the vector [0.0, 1.0, -0.5] does not fit the plane of the rest of the scene"
         );
     }
 
