@@ -304,7 +304,7 @@ def slender():
             continue
         for n, node, _ in meshes:
             exact = 1e-6 * ((1 - 1 / (4 * n * n)) / 3 + 1 / (5 * slenderness ** 2))
-            found[n].append((slenderness, max(abs(a[f"{node}.uz"][-1] / exact - 1), 1e-16), "round-off has taken" in a.told))
+            found[n].append((slenderness, max(abs(a[f"{node}.uz"][-1] / exact - 1), 1e-16), "lost to round-off" in a.told))
     for n, _, color in meshes:
         plot.line([p[0] for p in cholesky[n]], [p[1] for p in cholesky[n]], color, 1.0, "4 3")
         plot.dots([p[0] for p in cholesky[n]], [p[1] for p in cholesky[n]], color, 2.4, True)

@@ -150,7 +150,7 @@ fn reached(found: &Found, wanted: &Accuracy, time: Duration) -> ReachedAccuracy 
 fn missed(found: &Found, wanted: &Accuracy) -> String {
     let (column, estimate) = found.worst(wanted);
     format!(
-        "an error of {:e} of `{column}` is not reached, the best estimate is {estimate:.1e}, with {}",
+        "an error of {:e} of `{column}` was not reached; the best estimate is {estimate:.1e}, with {}",
         wanted.of(column),
         describe(&found.variant)
     )

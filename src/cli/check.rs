@@ -67,7 +67,7 @@ fn describe_share(share: &EffectSize) -> String {
     let EffectSize { instances, unknowns, entries, .. } = share;
     let mut text = format!(" ({instances} in the first stage");
     if *unknowns > 0 || *entries > 0 {
-        text += &format!("; without it {unknowns} unknowns and {entries} matrix entries fewer");
+        text += &format!("; adds {unknowns} unknowns and {entries} matrix entries");
     }
     text + ")"
 }
@@ -82,15 +82,17 @@ fn print_time(loaded: &Loaded, reading: Duration) -> Result<f64, Failure> {
     let how = match ended {
         Some(Err(failure)) if !computed || failure.is_of_start() => return Err(failure),
         Some(Err(failure)) => {
-            console::note(&format!("warning: a run ends as `{}`: {failure}", failure.name()));
+            console::note(&format!("warning: the run will fail with `{}`: {failure}", failure.name()));
             print_hint(&failure, &loaded.scene);
             console::count_warnings(1);
-            "a trial run fails".into()
+            "the trial run failed".into()
         }
         Some(Ok(())) => "measured".into(),
         None => {
             let watched = duration(watched);
-            format!("predicted: {watched} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}")
+            format!(
+                "extrapolated: a trial run of {watched} reached stage {stage}, time {time:.3e}, load factor {load:.3}"
+            )
         }
     };
     let own = if loaded.deck.accuracy.is_some() { ", with the elements and steps of the deck" } else { "" };

@@ -41,7 +41,7 @@ fn print_comparison(a: &Path, b: &Path, rtol: f64, atol: f64) -> Result<(), Comm
         ));
     }
     if !extra.is_empty() {
-        console::line(&format!("only in {}: {}", a.display(), extra.join(", ")));
+        console::line(&format!("only in {} (not compared): {}", a.display(), extra.join(", ")));
     }
     let beyond = table.iter().filter(|cell| cell.ratio > 1.0).count();
     if beyond > 0 {

@@ -135,7 +135,7 @@ pub fn threads(text: &str) -> Result<NonZero<usize>, String> {
 
 /// Reads a time of the command line: 90, 90s, 1.5m, 2h.
 pub fn duration(text: &str) -> Result<Duration, String> {
-    let wrong = || "a time is a number with s, m or h: 90s, 5m, 1h";
+    let wrong = || "a time must be a number with s, m or h: 90s, 5m, 1h";
     let number = text.trim_end_matches(['s', 'm', 'h']);
     let unit = match &text[number.len()..] {
         "" | "s" => 1.0,
@@ -147,7 +147,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     // Clocks can add this many seconds.
     const LONGEST: f64 = 100.0 * 365.0 * 86_400.0;
     if !(0.0..=LONGEST).contains(&seconds) {
-        return Err("a time is between 0 and a hundred years".into());
+        return Err("a time must be between 0 and 100 years".into());
     }
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }

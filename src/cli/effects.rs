@@ -88,7 +88,7 @@ fn print_reduced(reduced: &ReducedScene, found: &EffectStudy) {
 fn print_cheapest(found: &EffectStudy, tolerance: f64) {
     let cheapest = &found.cheapest;
     if cheapest.without.is_empty() {
-        return console::line(&format!("  within {tolerance}: keep all effects, leaving effects out saves no time"));
+        return console::line(&format!("  within {tolerance}: keep all effects: leaving effects out saves no time"));
     }
     let (change, _) = cheapest.largest();
     let time = cheapest.seconds() / found.whole.seconds;

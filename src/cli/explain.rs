@@ -20,7 +20,7 @@ pub fn explain(key: &str) -> Status {
                 Some(meant) => format!("did you mean `{meant}`?"),
                 None => "keys and tables are listed by `beamsim explain deck`".into(),
             };
-            console::error("usage", &format!("a deck has no `{key}`: {help}"));
+            console::error("usage", &format!("there is no key or table `{key}` in decks: {help}"));
             Status::Wrong
         }
     }

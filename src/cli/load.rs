@@ -73,7 +73,7 @@ pub fn count_of_errors(count: usize, path: &Path) -> String {
 /// The error of a sweep.toml where a deck is needed.
 fn sweep_as_deck(path: &Path) -> CommandError {
     let name = path.display();
-    CommandError::deck(format!("{name} is a sweep and no deck: try `beamsim sweep {name}`"))
+    CommandError::deck(format!("{name} is a sweep file, not a deck: try `beamsim sweep {name}`"))
 }
 
 /// The text of a table that a deck names by a path relative to the folder of the deck.
@@ -89,7 +89,7 @@ pub fn text(path: &Path) -> Result<String, CommandError> {
     let file = File::open(path).map_err(io)?;
     file.take(LARGEST_DECK + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > LARGEST_DECK {
-        let message = format!("{}: more than the largest supported {LARGEST_DECK} bytes", path.display());
+        let message = format!("{}: more bytes than the limit of {LARGEST_DECK}", path.display());
         return Err(CommandError::limit(message));
     }
     String::from_utf8(bytes).map_err(|e| {

@@ -205,7 +205,7 @@ fn picture(plot: &LinePlot, path: &Path) -> Result<Vec<u8>, CommandError> {
         None | Some("svg") => Ok(plot.to_svg().into_bytes()),
         Some("png") => png(plot),
         Some(other) => {
-            let message = format!("`.{other}`: pictures are written as .svg or .png");
+            let message = format!("unknown file type `.{other}`: plots are written as .svg or .png");
             Err(CommandError::Usage(message))
         }
     }
@@ -213,13 +213,13 @@ fn picture(plot: &LinePlot, path: &Path) -> Result<Vec<u8>, CommandError> {
 
 #[cfg(feature = "png")]
 fn png(plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
-    plot.to_png().map_err(|why| CommandError::Usage(format!("the picture cannot be drawn: {why}")))
+    plot.to_png().map_err(|why| CommandError::Usage(format!("the plot cannot be drawn: {why}")))
 }
 
 #[cfg(not(feature = "png"))]
 fn png(_plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
     let message =
-        "this build draws .svg only: `cargo install --path . --locked --features png` makes one that draws .png";
+        "this build writes .svg only; for .png, install it by `cargo install --path . --locked --features png`";
     Err(CommandError::Usage(message.into()))
 }
 
@@ -288,7 +288,7 @@ fn columns(wanted: &PlotArguments, history: &HistoryReader) -> Result<Vec<String
     let candidates = [changing.map(|(name, _)| name.clone()).collect(), displacements, all];
     let usual = candidates.into_iter().find(|names: &Vec<String>| !names.is_empty()).unwrap_or_default();
     if usual.is_empty() {
-        return Err(CommandError::Usage("the history has no columns to draw".into()));
+        return Err(CommandError::Usage("the history has no columns to plot".into()));
     }
     Ok(usual.into_iter().take(MAX_DEFAULT_COLUMNS).collect())
 }

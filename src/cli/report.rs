@@ -32,12 +32,12 @@ pub fn report(folders: &[PathBuf], out: Option<&Path>) -> Status {
 fn one(folder: &Path, out: Option<&Path>) -> Result<(), CommandError> {
     let record = Record::read(folder)?;
     let Some(text) = record.text() else {
-        let error = OutputError::content(folder, "run.json holds no deck: run it again");
+        let error = OutputError::content(folder, "run.json contains no deck: run the deck again");
         return Err(error.into());
     };
     let scene = scene::from_text(text).map(|(scene, _)| scene).map_err(|_| {
         let folder = folder.display();
-        CommandError::deck(format!("{folder}: this version of beamsim does not read the deck: run it again"))
+        CommandError::deck(format!("{folder}: this version of beamsim cannot read the stored deck: run the deck again"))
     })?;
     let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::folder_name(&path));
     // The history holds only the requested nodes; the shapes come from another run of the deck.
@@ -53,7 +53,7 @@ fn filmed(scene: &Scene, name: &str) -> Result<Film, CommandError> {
         let message = "stopped before the report was written".into();
         return Err(CommandError::Stopped { signal, message });
     }
-    finished.film.ok_or_else(|| CommandError::Io("no shapes were recorded".into()))
+    finished.film.ok_or_else(|| CommandError::Io("no shapes of the structure were recorded".into()))
 }
 
 /// Writes the page and prints its path.

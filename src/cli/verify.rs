@@ -24,7 +24,7 @@ pub fn verify(paths: &[PathBuf], settings: &[String], out: Option<&Path>) -> Sta
         }
     };
     if decks.is_empty() {
-        verdict.fail(CommandError::Usage("there are no decks here".into()));
+        verdict.fail(CommandError::Usage("no decks found".into()));
         return verdict.finish(0);
     }
     let mut held = 0;

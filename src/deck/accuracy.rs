@@ -22,7 +22,7 @@ impl Accuracy {
         if (LEAST..1.0).contains(&value) {
             return Ok(value);
         }
-        Err(format!("an accuracy lies between {LEAST:e} and 1, found {value:?}"))
+        Err(format!("an accuracy must be between {LEAST:e} and 1, found {value:?}"))
     }
 
     pub(super) fn read(top: &Table) -> Option<Self> {
@@ -39,7 +39,7 @@ impl Accuracy {
             .map(|(name, item)| Some((name, context.number(item).and_then(checked)?)))
             .collect::<Option<_>>()?;
         if columns.is_empty() {
-            context.report(Diagnostic::error("`accuracy` names no column", table.span.clone()));
+            context.report(Diagnostic::error("`accuracy` must name at least one column", table.span.clone()));
         }
         Some(Self::Columns(columns))
     }

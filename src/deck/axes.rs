@@ -13,11 +13,12 @@ const ORTHONORMAL: f64 = 1e-6;
 pub(super) fn read_axes(table: &Table) -> Option<Option<Axes>> {
     table.optional("axes", |context, item| {
         let DeValue::Array(rows) = item.get_ref() else {
-            return context.wrong(item.span(), format!("`axes` is two vectors, found {}", kind_of(item.get_ref())));
+            return context
+                .wrong(item.span(), format!("`axes` must be two vectors, found {}", kind_of(item.get_ref())));
         };
         if rows.len() != 2 {
             return context
-                .wrong(item.span(), format!("`axes` is the first two of three directions, found {}", rows.len()));
+                .wrong(item.span(), format!("`axes` must be the first two of three directions, found {}", rows.len()));
         }
         let rows: Vec<Option<[f64; 3]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
         let [a, b]: [Option<[f64; 3]>; 2] = rows.try_into().ok()?;

@@ -119,13 +119,13 @@ fn read_order(context: &Context, item: &Item) -> Option<usize> {
     if order.value <= 3 {
         return Some(order.value);
     }
-    context.wrong(order.span, format!("`order` is 1, 2 or 3, found {}", order.value))
+    context.wrong(order.span, format!("`order` must be 1, 2 or 3, found {}", order.value))
 }
 
 /// `Some(None)` where there is no key.
 fn read_free_strain(table: &Table) -> Option<Option<FreeStrain>> {
     if !table.has("free_strain") {
-        table.refuse("history", "`history` of a beam belongs to its `free_strain`");
+        table.refuse("history", "`history` of a beam is only allowed with `free_strain`");
     }
     table.optional("free_strain", |context, item| {
         let strain = context.vector::<6>(item)?.value;
@@ -139,8 +139,10 @@ fn read_sections(context: &Context, item: &Item) -> Option<Vec<Spanned<String>>>
     }
     let names = context.texts(item)?;
     if names.is_empty() {
-        return context
-            .wrong(item.span(), "`section` is one name, two for a taper from start to end, or more with `stations`");
+        return context.wrong(
+            item.span(),
+            "`section` must be one name, two for a taper from start to end, or more with `stations`",
+        );
     }
     Some(names)
 }
@@ -161,12 +163,14 @@ fn read_stations(table: &Table, sections: usize) -> Option<Option<Spanned<Vec<f6
     let values = &stations.value;
     if values.len() != sections || sections < 2 {
         let message =
-            format!("`stations` are as many as sections, two or more: there are {} and {sections}", values.len());
+            format!("`stations` must be as many as sections, two or more: found {} and {sections}", values.len());
         return context.wrong(stations.span, message);
     }
     if values[0] != 0.0 || !values.is_sorted_by(|a, b| a < b) {
-        return context
-            .wrong(stations.span, "`stations` rise from 0, the start of the beam, to 1, or its length, at its end");
+        return context.wrong(
+            stations.span,
+            "`stations` must increase from 0 (the start of the beam) to 1, or to its length (the end)",
+        );
     }
     Some(Some(stations))
 }
@@ -185,12 +189,14 @@ fn read_path(table: &Table) -> Option<Path> {
             let points = read_point_list(context, item)?;
             let count = points.len();
             let Ok(points) = points.try_into() else {
-                let message = format!("`arc` is [start, any point between, end], found {count} point(s)");
+                let message = format!("`arc` must be [start, any point between, end], found {count} point(s)");
                 return context.wrong(item.span(), message);
             };
             Some(Path::Arc(points))
         }
-        (Some(_), Some(item)) => context.wrong(item.span(), "a beam goes `through` points or along an `arc`, not both"),
+        (Some(_), Some(item)) => {
+            context.wrong(item.span(), "a beam takes either `through` (points) or `arc`, not both")
+        }
         (None, None) => table.wrong("[[beam]] needs `through` (straight pieces) or `arc` (a circular arc)"),
     }
 }

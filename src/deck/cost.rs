@@ -125,7 +125,7 @@ fn read_factors(table: &Table, key: &str, farthest: f64) -> Option<Vec<f64>> {
         if (1.0 / farthest..=farthest).contains(&number.value) {
             return Some(number.value);
         }
-        let message = format!("`{key}` lies from {:e} to {farthest:e}, found {}", 1.0 / farthest, number.value);
+        let message = format!("`{key}` must be between {:e} and {farthest:e}, found {}", 1.0 / farthest, number.value);
         context.wrong(number.span, message)
     })
 }

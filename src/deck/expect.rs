@@ -136,7 +136,7 @@ pub(super) fn read_expect<'a>(context: &'a Context, item: &'a Item<'a>) -> Optio
 /// Reports the first key beside `own` that an expectation of a whole run has no use for.
 fn refuse_keys_beside(table: &Table, own: &str, what: &str) -> Option<()> {
     match KEYS.into_iter().find(|key| ![own, "source"].contains(key) && table.has(key)) {
-        Some(key) => table.wrong_key(key, format!("{what} has no `{key}`")),
+        Some(key) => table.wrong_key(key, format!("`{key}` is not allowed in {what}")),
         None => Some(()),
     }
 }
@@ -148,7 +148,7 @@ fn read_warns(table: &Table) -> Option<ExpectBody> {
     let name = match item.get_ref() {
         DeValue::Boolean(false) => return Some(ExpectBody::Quiet),
         DeValue::String(name) => name,
-        _ => return context.wrong(item.span(), "`warns` is the name of a warning, or false"),
+        _ => return context.wrong(item.span(), "`warns` must be the name of a warning, or false"),
     };
     if let Some(kind) = WarningKind::of(name) {
         return Some(ExpectBody::Warns(kind));
@@ -170,7 +170,7 @@ fn read_fails(table: &Table) -> Option<ExpectBody> {
     }
     let known: Vec<&str> = FailureKind::words().collect();
     let hint = hints::for_word("fails", &name.value, &known).help();
-    let help = hint.unwrap_or_else(|| format!("failures are {}", one_of(known)));
+    let help = hint.unwrap_or_else(|| format!("known failures: {}", one_of(known)));
     table.context.report(Diagnostic::error(format!("there is no failure `{}`", name.value), name.span).help(help));
     None
 }
@@ -182,7 +182,7 @@ fn read_column(table: &Table) -> Option<ExpectBody> {
     let above = table.number("above").map(|v| v.value);
     if !table.has("value") {
         if let Some(key) = ["rtol", "atol"].into_iter().find(|key| table.has(key)) {
-            return table.wrong_key(key, format!("`{key}` belongs to a `value`"));
+            return table.wrong_key(key, format!("`{key}` is only allowed with `value`"));
         }
         if !table.has("below") && !table.has("above") {
             return table.wrong("[[expect]] needs `value`, `below`, `above`, `fails` or `warns`");
@@ -197,7 +197,7 @@ fn read_target(table: &Table) -> Option<Target> {
     let atol = table.non_negative_or("atol", 0.0);
     let rtol = table.non_negative_or("rtol", 0.0);
     if !table.has("atol") && !table.has("rtol") {
-        return table.wrong_key("value", "a `value` needs `rtol` or `atol`: how close is close enough?");
+        return table.wrong_key("value", "`value` needs a tolerance: `rtol` or `atol`");
     }
     Some(Target { value: value?.value, atol: atol?, rtol: rtol? })
 }
@@ -208,8 +208,9 @@ fn read_reduce(table: &Table) -> Option<Reduce> {
         (None, None) => Some(Reduce::At(Instant::End)),
         (Some(item), None) => read_instant(context, item).map(Reduce::At),
         (None, Some(_)) => table.word("reduce").map(|reduction| Reduce::Over(reduction.value)),
-        (Some(_), Some(item)) => context
-            .wrong(item.span(), "an expectation looks `at` one instant or takes a `reduce` over all rows, not both"),
+        (Some(_), Some(item)) => {
+            context.wrong(item.span(), "use either `at` (one instant) or `reduce` (over all rows), not both")
+        }
     }
 }
 
@@ -224,8 +225,7 @@ fn read_instant<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Instant>
             table.required_number("load").map(|v| Instant::Load(v.value))
         }
         DeValue::Integer(_) | DeValue::Float(_) => context.number(item).map(|v| Instant::Time(v.value)),
-        other => {
-            context.wrong(item.span(), format!("`at` is \"end\", a time or {{ load = … }}, found {}", kind_of(other)))
-        }
+        other => context
+            .wrong(item.span(), format!("`at` must be \"end\", a time or {{ load = … }}, found {}", kind_of(other))),
     }
 }

@@ -125,7 +125,7 @@ impl Expression {
     /// Parses `text`.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
         if text.len() > LONGEST {
-            let message = format!("an expression has at most {LONGEST} characters");
+            let message = format!("an expression can have at most {LONGEST} characters");
             return Err(ExpressionError { message, offset: 0 });
         }
         let mut parser = Parser { text, at: 0, depth: 0 };
@@ -236,7 +236,7 @@ impl Parser<'_> {
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_ascii_alphabetic() || c == '_' => self.name_or_call(),
             Some(c) => Err(self.error(format!("unexpected `{c}`"))),
-            None => Err(self.error("the expression ends too early".into())),
+            None => Err(self.error("the expression is incomplete".into())),
         }
     }
 
@@ -278,7 +278,7 @@ impl Parser<'_> {
         self.at += 1;
         let Some(function) = Function::of(name) else {
             let known = Function::words().collect::<Vec<_>>().join(", ");
-            let message = format!("unknown function `{name}`; there are {known}");
+            let message = format!("unknown function `{name}`; known functions: {known}");
             return Err(ExpressionError { message, offset: start });
         };
         let mut arguments = vec![self.sum()?];

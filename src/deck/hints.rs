@@ -91,9 +91,22 @@ const EXPLAINED: [Explained; 44] = [
     Explained { table: "material", written: &["viscosity", "damping", "relaxation"], help: "use [damping] for Rayleigh damping; materials are elastic" },
     Explained { table: "material", written: &["alpha", "cte", "expansion", "thermal_expansion"], help: "use `free_strain` of [[beam]], such as [\"alpha*dT\", 0, 0, 0, 0, 0]" },
     Explained { table: "section", written: &["diameter", "d", "r"], help: "use `radius`, half the diameter" },
-    Explained { table: "section", written: &["e", "nu", "g", "rho", "density", "young", "poisson"], help: "these belong to a [material.NAME], which `material` of the section names" },
-    Explained { table: "section", written: &["a", "area", "i", "iy", "iz", "i2", "i3", "j", "inertia"], help: "give the resultants `EA`, `GA`, `GJ`, `EI` and `rhoA`, `rhoJ`, or `material` and `shape`" },
-    Explained { table: "beam", written: &["radius", "diameter", "material", "shape", "e", "young"], help: "these belong to a [section.NAME], which `section` of the beam names" },
+    Explained { table: "section", written: &["e", "nu", "g", "rho", "density", "young", "poisson"], help: "give this in a [material.NAME], and name it by `material` of the section" },
+    Explained { table: "section", written: &["a", "area", "i", "iy", "iz", "i2", "i3", "j", "inertia"], help: "give \
+                                                                                                               the \
+                                                                                                               stiffnesses \
+                                                                                                               `EA`, \
+                                                                                                               `GA`, \
+                                                                                                               `GJ`, \
+                                                                                                               `EI` \
+                                                                                                               with \
+                                                                                                               `rhoA`, \
+                                                                                                               `rhoJ`, \
+                                                                                                               or \
+                                                                                                               `material` \
+                                                                                                               and \
+                                                                                                               `shape`" },
+    Explained { table: "beam", written: &["radius", "diameter", "material", "shape", "e", "young"], help: "give this in a [section.NAME], and name it by `section` of the beam" },
     Explained { table: "beam", written: &["start", "from", "to", "begin", "end"], help: "use `through`, such as [\"root\", \"tip\"]" },
     Explained { table: "beam", written: &["length"], help: "the length follows from the points of `through`" },
     Explained { table: "beam", written: &["damping"], help: "use [damping]" },
@@ -102,10 +115,11 @@ const EXPLAINED: [Explained; 44] = [
     Explained { table: "joint", written: &["limit", "limits", "stop", "stops", "range"], help: "stops of joints are not supported yet" },
     Explained { table: "joint", written: &["friction"], help: "friction is not supported yet; `damping` is viscous" },
     Explained { table: "joint", written: &["torque", "force", "moment"], help: "torques in joints are not supported yet; [[load]] acts at nodes" },
-    Explained { table: "stage", written: &["gravity"], help: "`gravity` stands at the top of the deck" },
+    Explained { table: "stage", written: &["gravity"], help: "`gravity` is a key at the top of the deck" },
     Explained { table: "stage", written: &["damping"], help: "use [damping], above the stages" },
     Explained { table: "stage", written: &["every", "output", "interval", "save"], help: "use `every` or `interval` of [output]" },
-    Explained { table: "stage", written: &["start", "begin", "t0", "start_time"], help: "a stage starts where the one before ends" },
+    Explained { table: "stage", written: &["start", "begin", "t0", "start_time"], help: "a stage starts at the time at \
+                                                                                         which the previous one ends" },
     Explained { table: "stage", written: &["solver", "linear_solver"], help: "there is one solver; `tolerance` and `max_iterations` are those of Newton's method" },
     Explained { table: "support", written: &["value", "displacement"], help: "use [[motion]] to prescribe a displacement" },
 ];
@@ -217,7 +231,16 @@ const EXPLAINED_WORDS: [ExplainedWord; 6] = [
     ExplainedWord { key: "kind", written: &["explicit", "explicit_dynamic"], help: "explicit time integration is not supported; use kind = \"dynamic\"" },
     ExplainedWord { key: "scheme", written: &["explicit", "rk4", "runge_kutta", "central_difference", "verlet", "leapfrog"], help: "explicit schemes are not supported" },
     ExplainedWord { key: "control", written: &["displacement", "displacements"], help: "prescribe the displacement by [[motion]]" },
-    ExplainedWord { key: "shape", written: &["box", "i_beam", "ibeam", "i", "h", "c", "l", "t", "ellipse"], help: "give the resultants of other shapes: `EA`, `GA`, `GJ`, `EI`" },
+    ExplainedWord { key: "shape", written: &["box", "i_beam", "ibeam", "i", "h", "c", "l", "t", "ellipse"], help: "give \
+                                                                                                                   the \
+                                                                                                                   stiffnesses \
+                                                                                                                   of \
+                                                                                                                   other \
+                                                                                                                   shapes: \
+                                                                                                                   `EA`, \
+                                                                                                                   `GA`, \
+                                                                                                                   `GJ`, \
+                                                                                                                   `EI`" },
     ExplainedWord { key: "columns", written: &["stress", "stresses"], help: "stresses are not written; `resultant` gives the forces and moments of sections, `strain` their strains" },
 ];
 

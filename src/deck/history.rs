@@ -68,8 +68,10 @@ pub(super) fn read_history_use(table: &Table, acting: Option<&Vec<usize>>) -> Op
     let name = name?;
     let idle = |stage: &&usize| acting.is_some_and(|acting| !acting.contains(stage));
     if let Some(stage) = stages.iter().flatten().find(idle) {
-        let message =
-            format!("the history `{}` belongs to stage {stage}, in which {} does not act", name.value, table.what);
+        let message = format!(
+            "the history `{}` is for stage {stage}, but {} is not active in that stage",
+            name.value, table.what
+        );
         named.refuse("stages", message);
     }
     Some(HistoryUse { name, stages })
@@ -85,12 +87,14 @@ pub(super) fn read_history<'a>(
     let table = Table::new(context, item, what.clone(), &KEYS)?;
     if let Some(key) = ["csv", "column"].into_iter().find(|key| table.has(key)) {
         // Where the deck is a file, tables beside it stand in its text by now.
-        return table
-            .wrong_key(key, format!("`{key}` of {what} names a table that was not read: `csv = \"file.csv\"`"));
+        return table.wrong_key(
+            key,
+            format!("`{key}` of {what} refers to a table that was not read: write `csv = \"file.csv\"`"),
+        );
     }
     let body = if table.has("expr") {
         if let Some(key) = ["times", "values", "smooth"].into_iter().find(|key| table.has(key)) {
-            return table.wrong_key(key, format!("{what} is `times` and `values`, or `expr`, not both"));
+            return table.wrong_key(key, format!("{what} takes either `times` and `values`, or `expr`, not both"));
         }
         HistoryBody::Expression(read_expression(&table)?)
     } else {
@@ -114,7 +118,7 @@ fn read_table(table: &Table) -> Option<HistoryBody> {
         return context.wrong(values.span, message);
     }
     if let Some(pair) = times.value.windows(2).find(|pair| pair[1] <= pair[0]) {
-        return context.wrong(times.span, format!("`times` must increase: {} follows {}", pair[1], pair[0]));
+        return context.wrong(times.span, format!("`times` must increase, but {} comes after {}", pair[1], pair[0]));
     }
     Some(HistoryBody::Table { times: times.value, values: values.value, smooth })
 }

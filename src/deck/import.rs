@@ -33,8 +33,9 @@ pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
         if let Some(all) = all.as_table_like_mut() {
             for (name, section) in sections {
                 if all.insert(&name, section).is_some() {
-                    let message =
-                        format!("the deck has a section `{name}`, which is what a station of a table is called");
+                    let message = format!(
+                        "the section name `{name}` is reserved for a station of a CSV table: rename the section"
+                    );
                     return Err(vec![Diagnostic::whole(message)]);
                 }
             }
@@ -130,13 +131,13 @@ impl Csv {
                 Some(_) if number == 0 && numbers.iter().all(Option::is_none) => {
                     names = record.iter().map(str::to_string).collect()
                 }
-                Some(column) => return Err(format!("line {line}: `{}` is no number", &record[column])),
+                Some(column) => return Err(format!("line {line}: `{}` is not a number", &record[column])),
             }
             if rows.len() > MOST_ROWS {
-                return Err(format!("more than the largest supported {MOST_ROWS} rows"));
+                return Err(format!("more rows than the limit of {MOST_ROWS}"));
             }
         }
-        if rows.is_empty() { Err("there are no numbers".into()) } else { Ok(Self { names, rows }) }
+        if rows.is_empty() { Err("the table contains no numbers".into()) } else { Ok(Self { names, rows }) }
     }
 
     fn width(&self) -> usize {
@@ -156,7 +157,7 @@ impl Csv {
         let places = match ["x", "y", "z"].map(|name| self.place(name)) {
             [Some(x), Some(y), Some(z)] => [x, y, z],
             _ if self.names.is_empty() && self.width() == 3 => [0, 1, 2],
-            _ => return Err("a line of points has the columns `x`, `y`, `z`".into()),
+            _ => return Err("a table of points needs the columns `x`, `y`, `z`".into()),
         };
         let point = |row: &Vec<f64>| Value::from(places.iter().map(|&k| row[k]).collect::<Array>());
         Ok(self.rows.iter().map(point).collect())
@@ -171,7 +172,11 @@ impl Csv {
                 .ok_or_else(|| format!("there is no column `{name}`, only {}", self.names.join(", ")))?,
             // Of two the one that is not the time.
             None if self.width() == 2 => 1 - time,
-            None => return Err("it has not two columns: name one (`column = \"…\"`); the first is the time".into()),
+            None => {
+                return Err("the table does not have two columns: name the column of values (`column = \"…\"`); the \
+                            first column is the time"
+                    .into());
+            }
         };
         Ok((self.column(time).collect(), self.column(value).collect()))
     }
@@ -179,27 +184,28 @@ impl Csv {
     /// Stations along a beam (`fraction` of its length, or `s` along it), and the section at each.
     fn sections(&self) -> Result<(Vec<f64>, Vec<Table>), String> {
         let place = self.place("fraction").or(self.place("s"));
-        let place = place.ok_or("stations have a column `fraction` (of the length), or `s` (along it)")?;
+        let place = place.ok_or("a table of stations needs a column `fraction` (of the length) or `s` (arc length)")?;
         if self.rows.len() < 2 {
-            return Err("a beam has two stations or more".into());
+            return Err("a beam needs at least two stations".into());
         }
         let known =
             |name: &str| ["fraction", "s"].contains(&name) || RESULTANTS.contains(&name) || entry(name).is_some();
         if let Some(unknown) = self.names.iter().find(|name| !known(name)) {
             return Err(format!(
-                "a section has no `{unknown}`: columns are {}, or C11 to C66 and M11 to M66",
+                "`{unknown}` is not a column of a section: columns are {}, or C11 to C66 and M11 to M66",
                 RESULTANTS.join(", ")
             ));
         }
         let matrices = self.names.iter().any(|name| entry(name).is_some());
         if let Some(other) = self.names.iter().find(|name| matrices && RESULTANTS.contains(&name.as_str())) {
             return Err(format!(
-                "a section is given by `C11` to `C66` and `M11` to `M66`, or by `{other}` and the like, not by both"
+                "a section is given either by `C11` to `C66` and `M11` to `M66`, or by `{other}` and others like it, \
+                 not by both"
             ));
         }
         let rotary = ["rhoJ1", "rhoJ2", "rhoJ3"].map(|name| self.place(name).is_some());
         if rotary.contains(&true) && rotary.contains(&false) {
-            return Err("rotary inertia has the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
+            return Err("rotary inertia needs the three columns `rhoJ1`, `rhoJ2`, `rhoJ3`".into());
         }
         let sections = self.rows.iter().map(|row| self.section(row)).collect::<Result<_, _>>()?;
         Ok((self.column(place).collect(), sections))
@@ -291,10 +297,10 @@ mod tests {
     fn what_is_wrong_is_told_at_the_name_of_the_file() {
         let through = "[[beam]]\nthrough = { csv = \"a.csv\" }\n";
         for (file, told) in [
-            ("x,y,z\n0,0,zero\n", "a.csv: line 2: `zero` is no number"),
+            ("x,y,z\n0,0,zero\n", "a.csv: line 2: `zero` is not a number"),
             ("x,y\n0,0\n", "columns `x`, `y`, `z`"),
             ("s,x,y\n0,0,0\n", "columns `x`, `y`, `z`"),
-            ("O,0,0\n1,0,0\n", "line 1: `O` is no number"),
+            ("O,0,0\n1,0,0\n", "line 1: `O` is not a number"),
             ("x,y,z\n", "no numbers"),
         ] {
             let found = with(through, file).unwrap_err();

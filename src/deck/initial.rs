@@ -40,7 +40,7 @@ pub(super) fn read_initial<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
         (None, Some(item)) => context.text(item).map(InitialTarget::Beam),
         (None, None) => Some(InitialTarget::All),
         (Some(_), Some(item)) => {
-            context.wrong(item.span(), "[[initial]] speaks of a node (`at`) or of a `beam`, not both")
+            context.wrong(item.span(), "[[initial]] takes either a node (`at`) or a `beam`, not both")
         }
     };
     if !table.has("velocity") && !table.has("spin") {

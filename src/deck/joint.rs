@@ -96,7 +96,7 @@ pub(super) fn read_joint<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
         Some(key) => Some(JointMotor { value: table.number(key)?.value, history: read_history_use(&table, None) }),
     };
     if motor.is_none() {
-        table.refuse("history", "`history` of a joint belongs to `angle` or `displacement`");
+        table.refuse("history", "`history` of a joint is only allowed with `angle` or `displacement`");
     }
     Some(Joint { kind, parts, axes: axes?, stiffness: stiffness?, damping: damping?, motor, span: table.span.clone() })
 }
@@ -106,13 +106,13 @@ fn refuse_drive_of_others(table: &Table, kind: JointKind) {
     let own = kind.driven.map(|coordinate| ["stiffness", "damping", coordinate.word(), "history"]);
     for key in DRIVE.into_iter().filter(|key| table.has(key) && !own.is_some_and(|own| own.contains(key))) {
         let help = match kind.driven {
-            Some(coordinate) => format!("its motor is `{}`", coordinate.word()),
+            Some(coordinate) => format!("its motor is given by `{}`", coordinate.word()),
             None => format!(
-                "springs, dampers and motors belong to joints with one free coordinate: {}",
+                "springs, dampers and motors are only allowed in joints with one free coordinate: {}",
                 one_of(driven_kinds())
             ),
         };
-        let message = format!("a {} joint has no `{key}`", kind.word);
+        let message = format!("`{key}` is not allowed in a {} joint", kind.word);
         table.context.report(Diagnostic::error(message, table.key_span(key)).help(help));
     }
 }
@@ -124,7 +124,7 @@ fn driven_kinds() -> Vec<&'static str> {
 
 fn read_parts(table: &Table) -> Option<JointParts> {
     match (table.has("beams"), table.has("nodes")) {
-        (true, true) => table.wrong_key("nodes", "a joint connects `beams` or `nodes`, not both"),
+        (true, true) => table.wrong_key("nodes", "a joint takes either `beams` or `nodes`, not both"),
         (false, true) => {
             let nodes = read_one_or_two(table, "nodes");
             let at = table.optional("at", read_point);
@@ -146,7 +146,9 @@ fn read_one_or_two(table: &Table, key: &str) -> Option<Vec<Spanned<String>>> {
     match &names[..] {
         [a, b] if a.value == b.value => context.wrong(b.span.clone(), format!("a joint needs two different {key}")),
         [_] | [_, _] => Some(names),
-        [] | [_, _, _, ..] => context.wrong(item.span(), format!("`{key}` names one or two, found {}", names.len())),
+        [] | [_, _, _, ..] => {
+            context.wrong(item.span(), format!("`{key}` must have one or two names, found {}", names.len()))
+        }
     }
 }
 
@@ -159,8 +161,8 @@ fn read_joint_axes(table: &Table, kind: JointKind) -> Option<Vec<[f64; 3]>> {
     };
     for key in ["axis", "axes"].into_iter().filter(|key| Some(*key) != wanted) {
         let message = match wanted {
-            Some(wanted) => format!("this joint has `{wanted}`, not `{key}`"),
-            None => format!("this joint has no `{key}`"),
+            Some(wanted) => format!("this kind of joint needs `{wanted}`, not `{key}`"),
+            None => format!("`{key}` is not allowed in this kind of joint"),
         };
         table.refuse(key, message);
     }
@@ -175,12 +177,12 @@ fn read_normal_pair(table: &Table) -> Option<Vec<[f64; 3]>> {
     let context = table.context;
     let item = table.required("axes")?;
     let DeValue::Array(rows) = item.get_ref() else {
-        return context.wrong(item.span(), "`axes` is two vectors");
+        return context.wrong(item.span(), "`axes` must be two vectors");
     };
     let axes: Vec<[f64; 3]> = rows.iter().map(|row| read_unit(context, row)).collect::<Option<_>>()?;
     match axes[..] {
         [a, b] if dot(a, b).abs() < NORMAL => Some(axes),
-        _ => context.wrong(item.span(), "`axes` is two vectors normal to each other"),
+        _ => context.wrong(item.span(), "`axes` must be two vectors normal to each other"),
     }
 }
 

@@ -64,7 +64,9 @@ pub(super) fn read_load<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<
     let target = match (table.get("at"), table.get("along")) {
         (Some(item), None) => context.text(item).map(LoadTarget::At),
         (None, Some(item)) => context.text(item).map(LoadTarget::Along),
-        (Some(_), Some(item)) => context.wrong(item.span(), "a load acts `at` a node or `along` a beam, not both"),
+        (Some(_), Some(item)) => {
+            context.wrong(item.span(), "a load acts either `at` a node or `along` a beam, not both")
+        }
         (None, None) => table.wrong("[[load]] needs `at` (a node) or `along` (a beam)"),
     };
     if !table.has("force") && !table.has("moment") {
@@ -98,11 +100,11 @@ fn read_vector(table: &Table, key: &str) -> Option<Option<LoadVector>> {
             }
         };
         if !table.has("along") {
-            let message = format!("`{key}` at a node is one vector; [start, end] belongs to `along`");
+            let message = format!("`{key}` at a node must be one vector; [start, end] is only allowed with `along`");
             return context.wrong(item.span(), message);
         }
         if rows.len() != 2 {
-            let message = format!("`{key}` is a vector or [start vector, end vector], found {} rows", rows.len());
+            let message = format!("`{key}` must be a vector or [start vector, end vector], found {} rows", rows.len());
             return context.wrong(item.span(), message);
         }
         let rows: Vec<Option<[f64; 3]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();

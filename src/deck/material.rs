@@ -33,7 +33,7 @@ pub(super) fn read_material<'a>(context: &'a Context, name: Spanned<String>, ite
         table.wrong::<()>(format!("{} needs `nu` or `G`", table.what));
     }
     if let Some(nu) = poisson.as_ref().filter(|nu| !(-1.0 < nu.value && nu.value <= 0.5)) {
-        let message = format!("`nu` lies above -1 and up to 0.5, found {}", nu.value);
+        let message = format!("`nu` must be above -1 and at most 0.5, found {}", nu.value);
         return context.wrong(nu.span.clone(), message);
     }
     let young = young?.value;

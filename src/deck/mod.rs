@@ -251,7 +251,7 @@ fn named<'a, T>(
 ) -> Vec<T> {
     let Some(item) = top.get(key) else { return Vec::new() };
     let DeValue::Table(entries) = item.get_ref() else {
-        top.context.report(Diagnostic::error(format!("`{key}` holds named tables: [{key}.NAME]"), item.span()));
+        top.context.report(Diagnostic::error(format!("`{key}` must contain named tables: [{key}.NAME]"), item.span()));
         return Vec::new();
     };
     let mut all: Vec<_> = entries.iter().collect();

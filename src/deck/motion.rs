@@ -63,7 +63,7 @@ fn read_what(table: &Table) -> Option<MotionWhat> {
     match (&given[..], table.get("rotate")) {
         (&[direction], None) => {
             if table.has("angle") {
-                return table.wrong_key("angle", "`angle` belongs to `rotate`");
+                return table.wrong_key("angle", "`angle` is only allowed with `rotate`");
             }
             Some(MotionWhat::Displacement { direction, value: table.number(DISPLACEMENTS[direction])?.value })
         }
@@ -71,13 +71,12 @@ fn read_what(table: &Table) -> Option<MotionWhat> {
             let angle = table.required_number("angle");
             let axis = context.vector::<3>(item)?;
             if axis.value == [0.0; 3] {
-                return context.wrong(axis.span, "`rotate` is an axis and must not be zero");
+                return context.wrong(axis.span, "`rotate` must be an axis that is not zero");
             }
             Some(MotionWhat::Rotation { axis: axis.value, angle: angle?.value })
         }
         ([], None) => table.wrong("[[motion]] needs one of `ux`, `uy`, `uz`, or `rotate` with `angle`"),
-        ([_, ..], _) => {
-            table.wrong("[[motion]] prescribes one thing: one of `ux`, `uy`, `uz`, or `rotate`; use one table for each")
-        }
+        ([_, ..], _) => table
+            .wrong("one [[motion]] prescribes one component (`ux`, `uy`, `uz` or `rotate`): use one table for each"),
     }
 }

@@ -19,7 +19,7 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
         let Some((path, value)) = setting.split_once('=') else {
             return Err(format!("--set {setting}: expected KEY=VALUE"));
         };
-        let keys = Key::parse(path.trim()).map_err(|_| format!("--set {setting}: `{path}` is no key"))?;
+        let keys = Key::parse(path.trim()).map_err(|_| format!("--set {setting}: `{path}` is not a key"))?;
         set(document.as_item_mut(), &keys, read_value(value.trim()))
             .map_err(|why| format!("--set {setting}: {why}"))?;
         given.push(keys.iter().map(|key| key.get().to_string()).collect::<Vec<_>>());
@@ -80,7 +80,7 @@ fn set_below(item: &mut Item, keys: &[Key], new: Value, make: bool) -> Result<()
     }
     match item.as_table_mut() {
         Some(table) => set_in_table(table, keys, new, make),
-        None => Err(format!("`{key}` has no keys")),
+        None => Err(format!("`{key}` is not a table and has no keys")),
     }
 }
 
@@ -126,7 +126,7 @@ fn set_in_value(value: &mut Value, keys: &[Key], new: Value) -> Result<(), Strin
             }
             None => Err(format!("the deck has no `{key}`")),
         },
-        _ => Err(format!("there is nothing below `{key}`")),
+        _ => Err(format!("`{key}` is not a table and has no keys")),
     }
 }
 
@@ -142,7 +142,7 @@ fn index(key: &str, count: usize) -> Result<usize, String> {
 }
 
 fn no_entry(key: &str, count: usize) -> String {
-    format!("there is no entry {key}: there are {count}")
+    format!("there is no entry {key}: the list has {count}, counted from 0")
 }
 
 #[cfg(test)]

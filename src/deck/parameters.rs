@@ -76,7 +76,10 @@ impl Parameters {
         }
         if let Some(start) = path.iter().position(|p| p == name) {
             let circle = [&path[start..], &[name.to_string()]].concat().join(" -> ");
-            diagnostics.push(Diagnostic::error(format!("parameters go in a circle: {circle}"), entry.span.clone()));
+            diagnostics.push(Diagnostic::error(
+                format!("parameters refer to each other in a circle: {circle}"),
+                entry.span.clone(),
+            ));
             self.broken.extend(path[start..].iter().cloned());
             return None;
         }
@@ -144,7 +147,8 @@ fn unusable(name: &str) -> Option<String> {
         return None;
     }
     Some(format!(
-        "`{name}` cannot stand in an expression: a parameter is letters, digits and _, beginning with a letter"
+        "`{name}` cannot be used in an expression: the name of a parameter has letters, digits and _, and starts with \
+         a letter"
     ))
 }
 
@@ -159,7 +163,7 @@ fn read_entry(item: &toml::Spanned<DeValue>, diagnostics: &mut Vec<Diagnostic>) 
         }
         DeValue::String(text) => text.to_string(),
         other => {
-            let message = format!("a parameter is a number or an expression, found {}", kind_of(other));
+            let message = format!("a parameter must be a number or an expression, found {}", kind_of(other));
             diagnostics.push(Diagnostic::error(message, item.span()));
             return None;
         }

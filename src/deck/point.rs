@@ -39,7 +39,7 @@ pub(super) fn read_point(context: &Context, item: &Item) -> Option<Spanned<Point
     match item.get_ref() {
         DeValue::String(name) => Some(Spanned { value: PointRef::Name(name.to_string()), span: item.span() }),
         DeValue::Array(_) => Some(context.vector(item)?.map(PointRef::Coordinates)),
-        other => context.wrong(item.span(), format!("a point is a name or [x, y, z], found {}", kind_of(other))),
+        other => context.wrong(item.span(), format!("a point must be a name or [x, y, z], found {}", kind_of(other))),
     }
 }
 

@@ -117,7 +117,7 @@ impl Context {
             return self.wrong(span, format!("expected at least {least}, found {value}"));
         }
         if value > most as f64 {
-            let message = format!("{value} is more than the largest supported {most}");
+            let message = format!("{value} is more than the limit of {most}");
             self.report(Diagnostic::limit(message, span));
             return None;
         }
@@ -128,7 +128,7 @@ impl Context {
     pub fn text(&self, item: &Item) -> Option<Spanned<String>> {
         match item.get_ref() {
             DeValue::String(text) => Some(Spanned { value: text.to_string(), span: item.span() }),
-            other => self.wrong(item.span(), format!("expected a text, found {}", kind_of(other))),
+            other => self.wrong(item.span(), format!("expected a string, found {}", kind_of(other))),
         }
     }
 
@@ -138,7 +138,7 @@ impl Context {
         if let Some(value) = W::of(&text.value) {
             return Some(Spanned { value, span: text.span });
         }
-        let message = format!("`{key}` is {}, not `{}`", one_of(W::words()), text.value);
+        let message = format!("`{key}` must be {}, not `{}`", one_of(W::words()), text.value);
         let mut diagnostic = Diagnostic::error(message, text.span);
         let known: Vec<&str> = W::words().collect();
         diagnostic.help = hints::for_word(key, &text.value, &known).help();
@@ -150,7 +150,7 @@ impl Context {
     pub fn texts(&self, item: &Item) -> Option<Vec<Spanned<String>>> {
         match item.get_ref() {
             DeValue::Array(array) => array.iter().map(|entry| self.text(entry)).collect(),
-            other => self.wrong(item.span(), format!("expected a list of texts, found {}", kind_of(other))),
+            other => self.wrong(item.span(), format!("expected a list of strings, found {}", kind_of(other))),
         }
     }
 }
@@ -228,7 +228,7 @@ impl<'a> Table<'a> {
             if !keys.contains(&name) {
                 let hint = hints::for_key(&self.what, name, keys);
                 self.misspelt.extend(hint.meant().map(str::to_string));
-                let list = || format!("{} knows {}", self.what, one_of(keys.iter().copied()));
+                let list = || format!("keys of {}: {}", self.what, one_of(keys.iter().copied()));
                 let message = format!("unknown key `{name}` in {}", self.what);
                 let help = hint.help().unwrap_or_else(list);
                 self.context.report(Diagnostic::error(message, key.span()).help(help));
@@ -406,7 +406,9 @@ impl<'a> Table<'a> {
         let item = self.get(key)?;
         match item.get_ref() {
             DeValue::Boolean(value) => Some(*value),
-            other => self.context.wrong(item.span(), format!("`{key}` is true or false, found {}", kind_of(other))),
+            other => {
+                self.context.wrong(item.span(), format!("`{key}` must be true or false, found {}", kind_of(other)))
+            }
         }
     }
 

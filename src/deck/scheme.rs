@@ -85,7 +85,7 @@ pub(super) fn read_scheme(table: &Table) -> Option<SchemeWord> {
     for key in COEFFICIENTS.into_iter().filter(|key| !name.coefficients().contains(key)) {
         let owners = SchemeName::values().filter(|owner| owner.coefficients().contains(&key));
         let owners: Vec<String> = owners.map(|owner| format!("\"{}\"", owner.word())).collect();
-        table.refuse(key, format!("`{key}` belongs to scheme = {}", owners.join(" or ")));
+        table.refuse(key, format!("`{key}` is only allowed with scheme = {}", owners.join(" or ")));
     }
     match name {
         SchemeName::Newmark => {
@@ -110,5 +110,5 @@ fn read_within(table: &Table, key: &str, default: f64, most: f64) -> Option<f64>
     if (0.0..=most).contains(&number.value) {
         return Some(number.value);
     }
-    table.context.wrong(number.span, format!("`{key}` lies from 0 to {most}, found {}", number.value))
+    table.context.wrong(number.span, format!("`{key}` must be between 0 and {most}, found {}", number.value))
 }

@@ -110,12 +110,12 @@ pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item
         (None, Some(_), None) => read_full(&table),
         (None, None, Some(_)) => read_shaped(&table),
         (None, None, None) => table.wrong(format!(
-            "{} needs resultants (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
+            "{} needs section stiffnesses (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
             table.what
         )),
         (Some(_), Some(second), _) | (Some(_), None, Some(second)) | (None, Some(_), Some(second)) => table.wrong_key(
             second,
-            format!("{} is given in two ways; keep resultants, or `stiffness`, or `shape`", table.what),
+            format!("{} is defined in two ways; keep only one of: EA, GA, GJ, EI; `stiffness`; `shape`", table.what),
         ),
     };
     Some(Section { name, body: body? })
@@ -160,11 +160,11 @@ fn read_full(table: &Table) -> Option<SectionBody> {
 pub(super) fn read_matrix<const N: usize>(table: &Table, key: &str, item: &Item) -> Option<[[f64; N]; N]> {
     let context = table.context;
     let DeValue::Array(rows) = item.get_ref() else {
-        let message = format!("`{key}` is a list of {N} rows, found {}", kind_of(item.get_ref()));
+        let message = format!("`{key}` must be a list of {N} rows, found {}", kind_of(item.get_ref()));
         return context.wrong(item.span(), message);
     };
     if rows.len() != N {
-        return context.wrong(item.span(), format!("`{key}` has {N} rows, found {}", rows.len()));
+        return context.wrong(item.span(), format!("`{key}` must have {N} rows, found {}", rows.len()));
     }
     let rows: Vec<Option<[f64; N]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
     let rows: Vec<[f64; N]> = rows.into_iter().collect::<Option<_>>()?;
@@ -176,7 +176,7 @@ pub(super) fn read_matrix<const N: usize>(table: &Table, key: &str, item: &Item)
                 let row = i + 1;
                 let column = j + 1;
                 let message = format!(
-                    "`{key}` must be symmetric; entry ({row}, {column}) is {}, its mirror {}",
+                    "`{key}` must be symmetric; entry ({row}, {column}) is {}, but the mirrored one is {}",
                     out[i][j], out[j][i]
                 );
                 return context.wrong(item.span(), message);
@@ -193,7 +193,7 @@ fn read_shaped(table: &Table) -> Option<SectionBody> {
     let material = context.text(material?)?;
     let kind: ShapeWord = context.word(shape?, "shape")?.value;
     for key in DIMENSIONS.into_iter().filter(|key| !kind.keys().contains(key)) {
-        table.refuse(key, format!("a {} has no `{key}`", kind.word()));
+        table.refuse(key, format!("`{key}` is not allowed with shape = \"{}\"", kind.word()));
     }
     for key in kind.keys() {
         table.required(key);

@@ -53,7 +53,10 @@ pub(super) fn read_spring<'a>(context: &'a Context, item: &'a Item<'a>) -> Optio
     let table = Table::new(context, item, "[[spring]]", &KEYS)?;
     let stages = read_stages(&table);
     if table.has("at") && table.has("between") {
-        return table.wrong_key("between", "a spring goes from a node (`at`) to ground or `between` two nodes");
+        return table.wrong_key(
+            "between",
+            "a spring connects either a node (`at`) to ground, or the two nodes in `between`, not both",
+        );
     }
     if !table.has("stiffness") && !table.has("damping") {
         return table.wrong("[[spring]] needs `stiffness` or `damping`");
@@ -64,7 +67,7 @@ pub(super) fn read_spring<'a>(context: &'a Context, item: &'a Item<'a>) -> Optio
 
 fn read_ground(table: &Table) -> Option<SpringBody> {
     for key in ["length", "tension_only"] {
-        table.refuse(key, format!("`{key}` belongs to a spring `between` nodes"));
+        table.refuse(key, format!("`{key}` is only allowed in a spring `between` nodes"));
     }
     let at = table.required_text("at");
     let stiffness = table.non_negative_vector_or("stiffness", [0.0; 6]);
@@ -75,10 +78,10 @@ fn read_ground(table: &Table) -> Option<SpringBody> {
 
 fn read_between(table: &Table) -> Option<SpringBody> {
     let context = table.context;
-    table.refuse("axes", "a spring between nodes has no `axes`");
+    table.refuse("axes", "`axes` is not allowed in a spring between nodes");
     let item = table.get("between")?;
     let Ok(nodes) = <[Spanned<String>; 2]>::try_from(context.texts(item)?) else {
-        return context.wrong(item.span(), "`between` names two nodes");
+        return context.wrong(item.span(), "`between` must name two nodes");
     };
     let stiffness = table.non_negative_or("stiffness", 0.0);
     let damping = table.non_negative_or("damping", 0.0);

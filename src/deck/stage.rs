@@ -213,8 +213,8 @@ pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
         table.refuse(
             key,
             match key {
-                "frame" => "`frame` belongs to static, modal and buckling stages".into(),
-                other => format!("`{other}` does not belong to a {} stage", kind.word()),
+                "frame" => "`frame` is only allowed in static, modal and buckling stages".into(),
+                other => format!("`{other}` is not allowed in a {} stage", kind.word()),
             },
         );
     }
@@ -244,7 +244,7 @@ fn read_static(table: &Table) -> Option<StageBody> {
     let steps = |table: &Table| table.required("steps").and_then(|item| table.context.whole(item, 1, MOST_STEPS));
     match control {
         ControlWord::Load => {
-            table.refuse("max_steps", "`max_steps` belongs to control = \"arc_length\"");
+            table.refuse("max_steps", "`max_steps` is only allowed with control = \"arc_length\"");
             let steps = steps(table);
             let adaptive = table.flag_or("adaptive", true);
             Some(StageBody::Static { steps: steps?.value, adaptive: adaptive? })
@@ -252,9 +252,13 @@ fn read_static(table: &Table) -> Option<StageBody> {
         ControlWord::ArcLength => {
             table.refuse(
                 "frame",
-                "`frame` does not go with control = \"arc_length\": its forces grow with the square of the load factor",
+                "`frame` is not allowed with control = \"arc_length\": centrifugal forces grow with the square of the \
+                 load factor",
             );
-            table.refuse("adaptive", "`adaptive` does not belong to control = \"arc_length\", which always adapts");
+            table.refuse(
+                "adaptive",
+                "`adaptive` is not allowed with control = \"arc_length\", which always adapts its increments",
+            );
             let steps = steps(table)?.value;
             let default = steps.saturating_mul(INCREMENTS_PER_STEP);
             let max_steps = table.whole_or("max_steps", 1..=MOST_STEPS, default)?;
@@ -281,7 +285,7 @@ fn read_dynamic(table: &Table) -> Option<StageBody> {
     let step = step?;
     let count = end / step.value;
     if count > MOST_STEPS as f64 {
-        let message = format!("{count:.3e} steps are more than the largest supported {MOST_STEPS}");
+        let message = format!("{count:.3e} steps are more than the limit of {MOST_STEPS}");
         context.report(Diagnostic::limit(message, step.span));
         return None;
     }
@@ -297,7 +301,7 @@ fn read_step_tolerance(table: &Table) -> Option<Option<f64>> {
         return Some(Some(tolerance));
     }
     if table.has("step_tolerance") {
-        let message = "`step_tolerance` belongs to adaptive = true";
+        let message = "`step_tolerance` is only allowed with adaptive = true";
         let span = table.key_span("step_tolerance");
         // With `adaptive = false` the tolerance is kept for later: studies change one key and leave
         // the other.
@@ -318,7 +322,9 @@ fn read_tolerance(table: &Table) -> Option<f64> {
     if tolerance.value < 1.0 {
         return Some(tolerance.value);
     }
-    table.context.wrong(tolerance.span, format!("`tolerance` is relative and below 1, found {}", tolerance.value))
+    table
+        .context
+        .wrong(tolerance.span, format!("`tolerance` is relative and must be below 1, found {}", tolerance.value))
 }
 
 fn read_until<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Until> {
@@ -336,7 +342,7 @@ fn read_until<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Until> {
 pub(super) fn read_stages(table: &Table) -> Option<Option<Vec<usize>>> {
     table.optional("stages", |context, item| {
         let DeValue::Array(array) = item.get_ref() else {
-            let message = format!("`stages` is a list of stage numbers from 1, found {}", kind_of(item.get_ref()));
+            let message = format!("`stages` must be a list of stage numbers from 1, found {}", kind_of(item.get_ref()));
             return context.wrong(item.span(), message);
         };
         if array.is_empty() {

@@ -73,7 +73,7 @@ pub(super) fn read_support<'a>(context: &'a Context, item: &'a Item<'a>) -> Opti
 }
 
 /// The forms that `fix` takes.
-const FIX: &str = "`fix` is \"all\", \"pin\" or a list of ux uy uz rx ry rz";
+const FIX: &str = "`fix` must be \"all\", \"pin\" or a list of ux uy uz rx ry rz";
 
 fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
     match item.get_ref() {
@@ -102,7 +102,7 @@ fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
                 };
                 let held = &mut fix[direction as usize];
                 if *held {
-                    return context.wrong(word.span.clone(), format!("`{}` stands twice", word.value));
+                    return context.wrong(word.span.clone(), format!("`{}` is listed twice", word.value));
                 }
                 *held = true;
             }
@@ -116,5 +116,5 @@ fn read_fix(context: &Context, item: &Item) -> Option<[bool; 6]> {
 }
 
 fn unknown_direction(word: &str, span: Span) -> Diagnostic {
-    Diagnostic::error(format!("`fix` does not know `{word}`"), span)
+    Diagnostic::error(format!("`{word}` is not a direction of `fix`"), span)
 }

@@ -123,7 +123,8 @@ fn read_vary<'a>(context: &'a Context, key: Spanned<String>, item: &'a Item<'a>)
             }
         }
         other => {
-            let message = format!("a list of values, or {{ from = …, to = …, count = … }}, found {}", kind_of(other));
+            let message =
+                format!("expected a list of values, or {{ from = …, to = …, count = … }}, found {}", kind_of(other));
             return context.wrong(item.span(), message);
         }
     };
@@ -142,7 +143,7 @@ fn as_toml(context: &Context, item: &Item) -> Option<String> {
         value => match (literal(value), value) {
             (Some(number), DeValue::Integer(_)) => Some(format!("{number}")),
             (Some(number), _) => Some(format!("{number:?}")),
-            (None, other) => context.wrong(item.span(), format!("a value of a deck is not {}", kind_of(other))),
+            (None, other) => context.wrong(item.span(), format!("a value in a deck cannot be {}", kind_of(other))),
         },
     }
 }

@@ -24,7 +24,7 @@ pub enum OutputError {
         reason: String,
     },
     /// A path that ends in no file name, such as `..`.
-    #[error("{}: this names no file", .0.display())]
+    #[error("{}: not a file name", .0.display())]
     NoFileName(PathBuf),
     /// A stream without a path failed.
     #[error(transparent)]

@@ -43,12 +43,13 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     for stage in &deck.stages {
         if let StageBody::Dynamic { end, .. } = stage.body {
             if end <= clock {
-                let message = format!("`end` is {end} on the run's clock, but the stage starts at {clock}");
+                let message =
+                    format!("`end` is {end}, but the stage starts at time {clock} (`end` is a time, not a duration)");
                 diagnostics.push(Diagnostic::error(message, stage.span.clone()));
             }
             let interval = deck.output.interval.unwrap_or(f64::INFINITY);
             if (end - clock) / interval > deck::MOST_STEPS as f64 {
-                let message = format!("`interval` asks for more than the largest supported {} rows", deck::MOST_STEPS);
+                let message = format!("`interval` gives more rows than the limit of {}", deck::MOST_STEPS);
                 diagnostics.push(Diagnostic::limit(message, stage.span.clone()));
             }
             clock = end;
@@ -77,9 +78,9 @@ fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         let diagnostic = if deck.bodies.is_empty() || tapers {
             Diagnostic::error(format!("section `{}` needs {key} for {why}", name.value), name.span.clone())
         } else {
-            let message = format!("section `{}` has no mass: in {why} only bodies have", name.value);
+            let message = format!("section `{}` has no mass: in {why} only bodies have mass", name.value);
             Diagnostic::warning(WarningKind::MasslessSection, message, name.span.clone())
-                .help(format!("where that is meant, {zero} says so"))
+                .help(format!("if this is intended, write {zero}"))
         };
         diagnostics.push(diagnostic.context(beam.name.span.clone(), "used by this beam"));
     }
@@ -116,10 +117,12 @@ fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     for (k, (name, place)) in deck.points.iter().enumerate() {
         for (other, there) in &deck.points[..k] {
             if place == there && used(&name.value) && used(&other.value) {
-                let message =
-                    format!("the points `{}` and `{}` lie at the same place and stay apart", other.value, name.value);
+                let message = format!(
+                    "the points `{}` and `{}` have the same coordinates but are not connected",
+                    other.value, name.value
+                );
                 let diagnostic = Diagnostic::warning(WarningKind::EqualPlaces, message, name.span.clone());
-                diagnostics.push(diagnostic.help("beams are joined where they name the same point"));
+                diagnostics.push(diagnostic.help("beams are connected where they use the same point name"));
             }
         }
     }
@@ -145,7 +148,7 @@ fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
             StageBody::Static { .. } | StageBody::Modal { .. } | StageBody::Dynamic { .. } => continue,
         };
         for history in histories_in(deck, number + 1) {
-            let message = format!("{what} refuses histories: its load factor may go back");
+            let message = format!("{what} does not support `history`: its load factor may decrease");
             let diagnostic = Diagnostic::error(message, history.span.clone());
             diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
         }
@@ -179,7 +182,7 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
     }
     for support in &deck.supports {
         if support.fix[3..].iter().filter(|&&fixed| fixed).count() == 1 {
-            let message = format!("{scheme} cannot hold a single component of a rotation vector");
+            let message = format!("{scheme} cannot fix a single rotation component");
             let diagnostic = Diagnostic::error(message, support.span.clone()).help("use a joint to ground");
             diagnostics.push(diagnostic.context(stage.span.clone(), "this stage"));
         }
@@ -201,9 +204,9 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
             GeneralizedAlpha(rho) | LieGeneralizedAlpha(rho) => rho >= 1.0,
         };
         if undamped {
-            let message = "joints with multipliers need a scheme that dissipates: without, accelerations and forces of joints \
-                           oscillate from step to step";
-            let help = "take scheme = \"generalized_alpha\"; without dissipation a run may even lose its balance";
+            let message = "joints with Lagrange multipliers need a scheme with numerical dissipation: otherwise \
+                           accelerations and joint forces oscillate from step to step";
+            let help = "use scheme = \"generalized_alpha\"; without dissipation the run may even fail to converge";
             let diagnostic = Diagnostic::warning(WarningKind::UndampedMultipliers, message, stage.span.clone());
             diagnostics.push(diagnostic.help(help));
         }
@@ -251,8 +254,8 @@ pub fn refuse_moments(deck: &Deck, mesh: &Mesh, loose: &[Support], diagnostics: 
         let moment = Vec3(moment.start);
         if axes(&at.value).any(|axis| axis.dot(moment).abs() > 1e-9 * moment.norm()) {
             let message =
-                format!("a moment turns `{}` about an axis that has no inertia, and that nothing holds", at.value);
-            let help = "give the body `inertia` about it, or hold it by a support or a spring";
+                format!("the moment on `{}` acts about an axis without inertia and without constraint", at.value);
+            let help = "give the body `inertia` about it, or constrain it by a support or a spring";
             diagnostics.push(Diagnostic::error(message, load.span.clone()).help(help));
         }
     }

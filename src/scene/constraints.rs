@@ -239,8 +239,8 @@ fn refuse_clashes(deck: &Deck, mesh: &Mesh, held: &[Held], diagnostics: &mut Vec
                 .iter()
                 .find(|n| n.node.u == slot || n.node.p == slot)
                 .map_or("?".into(), |n| mesh.names.of(n.node.p));
-            let how = if same { "the same direction" } else { "directions that are neither the same nor orthogonal" };
-            let message = format!("this {} and another {} hold {how} of node `{node}`", b.what, a.what);
+            let how = if same { "the same direction" } else { "directions that are neither parallel nor orthogonal" };
+            let message = format!("this {} and another {} both constrain {how} of node `{node}`", b.what, a.what);
             diagnostics.push(
                 Diagnostic::error(message, b.span.clone()).context(a.span.clone(), format!("the other {}", a.what)),
             );

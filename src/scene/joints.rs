@@ -79,7 +79,7 @@ fn between_nodes<'a>(
     if let [Some(a), Some(b)] = nodes
         && mesh.nodes[a].node.p == mesh.nodes[b].node.p
     {
-        return Err(Diagnostic::error("both names stand for the same node", joint.span.clone()));
+        return Err(Diagnostic::error("both names refer to the same node", joint.span.clone()));
     }
     let last = nodes[1].map_or(Vec3::ZERO, |node| mesh.nodes[node].place);
     let place = at.map_or(Ok(last), |point| names::place(deck, point))?;

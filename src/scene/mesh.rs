@@ -225,7 +225,7 @@ impl Mesh {
                 continue;
             }
             if let Some(away) = known.iter().find(|name| !passes(deck, &name.value, &at.value)) {
-                let message = format!("beam `{}` does not meet the point `{}`", away.value, at.value);
+                let message = format!("beam `{}` does not pass through the point `{}`", away.value, at.value);
                 diagnostics.push(Diagnostic::error(message, away.span.clone()));
                 continue;
             }
@@ -237,7 +237,7 @@ impl Mesh {
             if let [_, second] = &beams[..] {
                 let key = (second.value.clone(), point.clone());
                 if self.parted.contains_key(&key) {
-                    let message = format!("beam `{}` is already parted at `{point}`", second.value);
+                    let message = format!("beam `{}` is already separated at `{point}` by another joint", second.value);
                     diagnostics.push(Diagnostic::error(message, second.span.clone()));
                     continue;
                 }
@@ -311,7 +311,7 @@ impl Mesh {
         let section = section.along(line.length).map_err(|last| {
             let span = beam.stations.as_ref().map_or(beam.span.clone(), |stations| stations.span.clone());
             let message = format!(
-                "the last of the `stations` is {last}: the beam ends at 1 as a fraction, or at its length {}",
+                "the last of the `stations` is {last}; it must be 1 (a fraction) or the length of the beam, {}",
                 line.length
             );
             Diagnostic::error(message, span)
@@ -466,7 +466,7 @@ fn count_nodes(deck: &Deck) -> Result<usize, Diagnostic> {
         let elements = if counts.len() == 1 { counts[0].saturating_mul(pieces) } else { counts.iter().sum() };
         total = total.saturating_add(elements.saturating_mul(beam.order));
         if total > deck::MOST_ELEMENTS {
-            let message = format!("more than the largest supported {} nodes", deck::MOST_ELEMENTS);
+            let message = format!("more nodes than the limit of {}", deck::MOST_ELEMENTS);
             return Err(Diagnostic::limit(message, beam.elements.span.clone()));
         }
     }

@@ -404,7 +404,7 @@ fn expected_column(
             return Err(names::unknown("counter", &name, RunCounter::words()));
         };
         if reduce != Reduce::At(Instant::End) {
-            let message = "a counter is looked at at the end of the run";
+            let message = "counters are only available at the end of the run";
             return Err(Diagnostic::error(message, column.span.clone()));
         }
         return Ok(ExpectationKind::Counter { counter, bounds });
@@ -424,11 +424,11 @@ fn expected_column(
         };
         let known = columns.deck.stages.iter().map(wanted).max().unwrap_or(0);
         if number >= known {
-            let message = format!("no stage of this deck asks for `{}`", column.value);
+            let message = format!("no stage of this deck computes `{}`", column.value);
             return Err(Diagnostic::error(message, column.span.clone()));
         }
         if reduce != Reduce::At(Instant::End) {
-            let message = "a mode has no history: leave `at` and `reduce` out";
+            let message = "modes have no history: remove `at` and `reduce`";
             return Err(Diagnostic::error(message, column.span.clone()));
         }
         return Ok(ExpectationKind::Mode { quantity, number, bounds });

@@ -44,7 +44,7 @@ pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item
     match nearest(&name.value, known.iter().copied()) {
         Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
         None if known.is_empty() => diagnostic.help(format!("the deck defines no {kind}")),
-        None if known.len() <= 12 => diagnostic.help(format!("there is {}", one_of(known))),
+        None if known.len() <= 12 => diagnostic.help(format!("choose {}", one_of(known))),
         None => diagnostic,
     }
 }
@@ -98,7 +98,8 @@ impl Mesh {
             Found::Node(node, on) => Ok((node, on)),
             Found::Between(beam, fraction) => {
                 let beam = &self.beams[beam];
-                let message = format!("`{}` lies within an element of beam `{}`, it is no node", name.value, beam.name);
+                let message =
+                    format!("`{}` lies inside an element of beam `{}`, but a node is needed", name.value, beam.name);
                 Err(Diagnostic::error(message, name.span.clone()).help(propose(beam, fraction)))
             }
         }
@@ -119,8 +120,8 @@ impl Mesh {
             text => match text.parse::<f64>() {
                 Ok(fraction) if (0.0..=1.0).contains(&fraction) => fraction,
                 _ => {
-                    let message = format!("`{rest}` is no place on beam `{beam}`");
-                    let help = "after @ stands start, end, or a fraction of the length from 0 to 1";
+                    let message = format!("`{rest}` is not a place on beam `{beam}`");
+                    let help = "write start, end, or a fraction of the length from 0 to 1 after @";
                     return Err(Diagnostic::error(message, name.span.clone()).help(help));
                 }
             },
@@ -155,7 +156,7 @@ impl Mesh {
 
     /// A point that is no node: perhaps it lies on a beam, and a finer mesh would put one there.
     fn no_node(&self, name: &Spanned<String>, place: Vec3) -> Diagnostic {
-        let message = format!("the point `{}` is no node of the mesh", name.value);
+        let message = format!("the point `{}` is not a node of the mesh", name.value);
         let diagnostic = Diagnostic::error(message, name.span.clone());
         let on = self.beams.iter().find_map(|beam| beam.line.find(place).map(|fraction| (beam, fraction)));
         match on {
@@ -164,7 +165,7 @@ impl Mesh {
                 beam.name,
                 propose(beam, fraction)
             )),
-            None => diagnostic.help("no beam goes through it and no body sits there"),
+            None => diagnostic.help("no beam passes through it and no body is attached to it"),
         }
     }
 
@@ -235,9 +236,9 @@ pub fn propose(beam: &MeshBeam, fraction: f64) -> String {
     };
     let now = beam.elements.len();
     match (now.max(1)..=10_000).find(whole) {
-        Some(n) if beam.line.pieces.len() == 1 => format!("`elements = {n}` puts a node there"),
-        Some(n) => format!("{n} `elements` on piece {} put a node there", piece + 1),
-        None => "no element count puts a node there".into(),
+        Some(n) if beam.line.pieces.len() == 1 => format!("`elements = {n}` gives a node there"),
+        Some(n) => format!("{n} `elements` on piece {} give a node there", piece + 1),
+        None => "no element count gives a node there".into(),
     }
 }
 

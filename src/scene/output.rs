@@ -27,7 +27,7 @@ impl Columns<'_> {
             if suffixes(&group.value).is_none() {
                 diagnostics.push(unknown_group(group));
             } else if known.iter().any(|k| k.value == group.value) {
-                diagnostics.push(Diagnostic::error(format!("`{}` stands twice", group.value), group.span.clone()));
+                diagnostics.push(Diagnostic::error(format!("`{}` is listed twice", group.value), group.span.clone()));
             } else {
                 known.push(group);
             }
@@ -57,7 +57,8 @@ impl Columns<'_> {
         };
         for (k, node) in nodes.iter().enumerate() {
             if nodes[..k].iter().any(|other| other.value == node.value) {
-                diagnostics.push(Diagnostic::error(format!("node `{}` stands twice", node.value), node.span.clone()));
+                diagnostics
+                    .push(Diagnostic::error(format!("node `{}` is listed twice", node.value), node.span.clone()));
             }
         }
         nodes.clone()
@@ -78,7 +79,7 @@ impl Columns<'_> {
             "a" => Quantity::Acceleration(place),
             "alpha" => Quantity::AngularAcceleration(place),
             "reaction" => Quantity::Reaction(place.node().ok_or_else(|| {
-                let message = format!("`{}` lies within an element; reactions are at nodes", node.value);
+                let message = format!("`{}` lies inside an element; reactions exist only at nodes", node.value);
                 Diagnostic::error(message, node.span.clone())
             })?),
             "resultant" => Quantity::Resultant(self.beam_point(node, &found)?),
@@ -99,7 +100,7 @@ impl Columns<'_> {
             } else {
                 let (first, fraction) = beams[0];
                 let end = if fraction > 0.5 { "end" } else { "start" };
-                refuse(format!("several beams meet at `{}`; whose resultants are meant?", node.value))
+                refuse(format!("several beams meet at `{}`, so that the resultants are ambiguous", node.value))
                     .help(format!("name the place on a beam, such as `{}@{end}`", self.mesh.beams[first].name))
             });
         };
@@ -161,6 +162,6 @@ fn unknown_group(group: &Spanned<String>) -> Diagnostic {
     let diagnostic = unknown("group of columns", group, known.iter().copied());
     match hint("columns", &group.value, &known) {
         Some(help) => diagnostic.help(help),
-        None => diagnostic.help(format!("groups are {}", one_of(known))),
+        None => diagnostic.help(format!("known groups: {}", one_of(known))),
     }
 }

@@ -198,7 +198,8 @@ fn line(
     let length = (end - start).norm();
     let size = start.norm().max(end.norm());
     if !length.is_finite() {
-        let message = format!("a piece of beam `{}` is too long to be measured", beam.name.value);
+        let message =
+            format!("a piece of beam `{}` has a length beyond the range of floating-point numbers", beam.name.value);
         return Err(Diagnostic::error(message, span.clone()));
     }
     if length <= 1e-12 * size || length == 0.0 {
@@ -212,7 +213,8 @@ fn line(
     let axis = axis3.map_or(default, |axis| axis.value);
     if let Some(axis) = axis3.filter(|axis| axis.value.cross(tangent).norm() <= 1e-6 * axis.value.norm()) {
         let message = format!("`axis3` is parallel to a piece of beam `{}`", beam.name.value);
-        return Err(Diagnostic::error(message, axis.span.clone()).help("local axis 3 is its part normal to the beam"));
+        return Err(Diagnostic::error(message, axis.span.clone())
+            .help("local axis 3 is the component of `axis3` normal to the beam"));
     }
     Ok(Piece { start, end, curve: Curve::Line, length, axis3: axis })
 }
@@ -251,7 +253,7 @@ fn arc(
         let parallel =
             |k: i32| piece.tangent(f64::from(k) / 720.0).cross(axis.value).norm() <= 1e-2 * axis.value.norm();
         if (0..=720).any(parallel) {
-            let message = format!("`axis3` is parallel to the arc of beam `{}` somewhere", beam.name.value);
+            let message = format!("`axis3` is parallel to the arc of beam `{}` at some point", beam.name.value);
             return Err(Diagnostic::error(message, axis.span.clone()));
         }
     }

@@ -17,7 +17,7 @@ pub fn plane(
 ) -> (Option<Plane>, Reason) {
     let wanted = deck.effects.said(EffectWord::Planar);
     let found = match wanted {
-        Some(flag) if !flag.value => Err("off by [effects]".to_string()),
+        Some(flag) if !flag.value => Err("switched off in [effects]".to_string()),
         _ => find(deck, model, mesh, initial),
     };
     let name = "planar";
@@ -30,9 +30,8 @@ pub fn plane(
             } else {
                 format!("the plane normal to {}", rounded(plane.normal()))
             };
-            let reason = format!(
-                "all of it lies in {which} and is loaded there: three unknowns a node in static and dynamic stages"
-            );
+            let reason =
+                format!("geometry and loads lie in {which}: three unknowns per node in static and dynamic stages");
             (Some(plane), Reason { name, active: true, reason })
         }
         Err(reason) => {
@@ -47,12 +46,12 @@ pub fn plane(
 
 fn find(deck: &Deck, model: &Model, mesh: &Mesh, initial: &[InitialMotion]) -> Result<Plane, String> {
     if model.linear {
-        return Err("large_rotations = false: linear stages are simulated in space".into());
+        return Err("large_rotations = false: linear stages are simulated in 3D".into());
     }
     let is_lie =
         |body: &StageBody| matches!(body, StageBody::Dynamic { scheme: SchemeWord::LieGeneralizedAlpha(_), .. });
     if deck.stages.iter().any(|stage| is_lie(&stage.body)) {
-        return Err("lie_generalized_alpha: no kernel for planes".into());
+        return Err("lie_generalized_alpha has no planar form".into());
     }
     Plane::of(model.length, &|show| {
         let nodes = mesh.beams.iter().flat_map(|beam| &beam.nodes);

@@ -62,7 +62,8 @@ struct Warned<'a> {
 
 const SMOOTH: &str = "`smooth = true` makes velocity and acceleration continuous";
 /// A smooth table stands still at each of its times.
-const SAMPLED: &str = "an `expr`, or a table of more points, has none (`smooth = true` has none either, but stands still at each of its times)";
+const SAMPLED: &str = "an `expr`, or a table with more points, has no kinks (`smooth = true` has none either, but its \
+                       velocity is zero at each of its times)";
 
 struct Teller<'a> {
     deck: &'a Deck,
@@ -93,20 +94,21 @@ impl Teller<'_> {
         let name = history.map_or(String::new(), |name| format!(" `{name}`"));
         let more = match others {
             0 => String::new(),
-            1 => format!(" (and so does another {what})"),
-            _ => format!(" (and so do {others} other {what}s)"),
+            1 => format!(" (likewise another {what})"),
+            _ => format!(" (likewise {others} other {what}s)"),
         };
         let begins_there = self.deck.stages[*stage].span.clone();
         match how {
             JumpKind::NotFinite => {
                 let message = format!(
-                    "the history{name} of this {what} has no finite value, velocity or acceleration where stage {number} begins{more}"
+                    "the history{name} of this {what} has no finite value, velocity or acceleration at the start of \
+                     stage {number}{more}"
                 );
                 Diagnostic::error(message, table.span.clone())
             }
             JumpKind::Value { from, to } => {
                 let message = format!(
-                    "the history{name} of this {what} jumps from {from} to {to} where stage {number} begins{more}"
+                    "the history{name} of this {what} jumps from {from} to {to} at the start of stage {number}{more}"
                 );
                 let diagnostic = Diagnostic::warning(WarningKind::HistoryJump, message, table.span.clone())
                     .context(begins_there, "this stage");
@@ -116,10 +118,11 @@ impl Teller<'_> {
                 let has = if *from == 0.0 { "is at rest".into() } else { format!("has {from}") };
                 let whose = if what == "motion" { "node" } else { "joint" };
                 let message = format!(
-                    "this {what} begins with a velocity of {to} in stage {number}, while its {whose} {has}: velocities jump there{more}"
+                    "this {what} starts stage {number} with a velocity of {to}, but its {whose} {has}: the velocity \
+                     jumps{more}"
                 );
-                let help = "a history that begins with a slope of zero does not excite vibrations; in the first dynamic stage `[[initial]]` can \
-                            give the velocity";
+                let help = "let the history start with zero slope, or give the velocity by `[[initial]]` (first \
+                            dynamic stage only)";
                 Diagnostic::warning(WarningKind::VelocityJump, message, table.span.clone()).help(help)
             }
             JumpKind::Kink { time } => {
@@ -150,13 +153,18 @@ impl Teller<'_> {
         let before = (0..*stage).rev().find(|&k| self.kind(k).advances_state());
         let before = before.unwrap_or_default();
         match (own_stages, self.kind(*stage) == self.kind(before)) {
-            (true, _) => "a static stage reads it over the load factor from 0 to 1: let it begin where the stage before has left it".into(),
-            (false, true) => "each static stage reads it over the load factor from 0 to 1: let it end where it begins, or give the stages \
-                              histories of their own"
+            (true, _) => {
+                "in a static stage the history is a function of the load factor, from 0 to 1: let it start at the \
+                 value that the previous stage ended with"
+                    .into()
+            }
+            (false, true) => "in each static stage the history is a function of the load factor, from 0 to 1: let it \
+                              end at its first value, or give each stage its own history"
                 .into(),
             (false, false) => format!(
-                "static stages read it over the load factor, dynamic ones over the clock: `history = {{ name = \"{}\", stages = [{own}] }}` holds \
-                 its first value before stage {own}, `stages = [{last}]` its last behind stage {last}",
+                "a history is a function of the load factor in static stages and of time in dynamic ones: with \
+                 `history = {{ name = \"{}\", stages = [{own}] }}` it keeps its first value before stage {own}; with \
+                 `stages = [{last}]`, its last value after stage {last}",
                 history.unwrap_or_default(),
                 own = stage + 1,
                 last = before + 1

@@ -154,8 +154,9 @@ fn within_range(found: SectionMatrices, section: &deck::Section) -> Result<Secti
         return Ok(found);
     }
     let name = &section.name;
-    let message = format!("the resultants of section `{}` are beyond the range of floating-point numbers", name.value);
-    Err(Diagnostic::error(message, name.span.clone()).help("look at its dimensions and its material"))
+    let message =
+        format!("the stiffness or mass of section `{}` is beyond the range of floating-point numbers", name.value);
+    Err(Diagnostic::error(message, name.span.clone()).help("check its dimensions and its material"))
 }
 
 /// The course of a taper between two sections.

@@ -39,22 +39,22 @@ pub fn refuse_impossible(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     for stage in &deck.stages {
         let looks = !stage.body.writes_rows();
         if let (true, Some(word)) = (looks, incomplete) {
-            let message = format!("{} = false leaves out part of the tangent, which this stage is about", word.key());
+            let message = format!("{} = false removes part of the tangent, which this stage needs", word.key());
             diagnostics.push(Diagnostic::error(message, stage.span.clone()));
         }
         if !linear {
             continue;
         }
         let why = match stage.body {
-            StageBody::Path { .. } => "control = \"arc_length\" follows what is not linear",
+            StageBody::Path { .. } => "control = \"arc_length\" needs a nonlinear stage",
             StageBody::Dynamic { scheme: SchemeWord::LieGeneralizedAlpha(_), .. } => {
-                "lie_generalized_alpha has increments of large rotations for unknowns"
+                "lie_generalized_alpha needs large rotations"
             }
             StageBody::Modal { .. } | StageBody::Buckling { .. } => {
                 if !moved {
                     continue;
                 }
-                "this one looks at the full theory about the state reached"
+                "this stage linearises the full nonlinear model about the state reached"
             }
             StageBody::Static { .. } | StageBody::Dynamic { .. } => {
                 moved = true;

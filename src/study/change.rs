@@ -84,7 +84,9 @@ pub enum Change {
 pub fn apply(deck: &Deck, changes: &[Change]) -> Result<Deck, StudyError> {
     let mut changed = deck.clone();
     for change in changes {
-        change.apply(&mut changed).ok_or_else(|| StudyError::NoScene(format!("`{change}` is no value of the deck")))?;
+        change
+            .apply(&mut changed)
+            .ok_or_else(|| StudyError::NoScene(format!("`{change}` is not a value of the deck")))?;
     }
     Ok(changed)
 }

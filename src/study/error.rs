@@ -15,7 +15,7 @@ pub enum StudyError {
     #[error("{0}")]
     NoScene(String),
     /// A changed deck has other outputs than the deck itself.
-    #[error("it has other outputs than the deck")]
+    #[error("its outputs differ from those of the deck")]
     OtherOutputs,
     /// A run failed.
     #[error("{0}")]
@@ -47,7 +47,7 @@ impl From<Failure> for StudyError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ComparisonError {
     /// The histories have different numbers of rows.
-    #[error("{rows} rows against {stored} stored ones")]
+    #[error("{rows} rows, but the stored history has {stored}")]
     Rows {
         /// Rows of the history
         rows: usize,
@@ -55,7 +55,7 @@ pub enum ComparisonError {
         stored: usize,
     },
     /// The stored history is empty.
-    #[error("the stored history has no rows: nothing would be compared")]
+    #[error("the stored history has no rows")]
     Empty,
     /// The history lacks a stored column.
     #[error("the column `{0}` is missing")]
@@ -66,7 +66,7 @@ pub enum ComparisonError {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SweepError {
     /// No key is varied.
-    #[error("nothing is varied: give --vary KEY=V1,V2,…")]
+    #[error("no key is varied: give --vary KEY=V1,V2,…")]
     NothingVaried,
     /// An option `--vary` without key or values.
     #[error("--vary {0}: expected KEY=V1,V2,… or KEY=FROM:TO:COUNT")]
@@ -91,7 +91,7 @@ pub enum SweepError {
     #[error("there is an empty value in `{0}`")]
     EmptyValue(String),
     /// A text that is no range.
-    #[error("`{0}` is no range: write FROM:TO or FROM:TO:COUNT, with `:log` at the end for logarithmic spacing")]
+    #[error("`{0}` is not a range: write FROM:TO or FROM:TO:COUNT, with `:log` at the end for logarithmic spacing")]
     NoRange(String),
     /// A logarithmic range with a bound that is not positive.
     #[error("logarithmic spacing from {from} to {to} needs positive ends")]
@@ -105,7 +105,7 @@ pub enum SweepError {
     #[error("a range needs at least one value")]
     NoNumbers,
     /// More points than are supported.
-    #[error("more than the largest supported {0} points")]
+    #[error("more points than the limit of {0}")]
     TooManyPoints(usize),
     /// A key without values.
     #[error("`{0}` has no values")]
@@ -132,10 +132,10 @@ pub enum SweepError {
     #[error("{0}")]
     Setting(String),
     /// A counter of the run as an output.
-    #[error("`{0}` is no output of a point: steps, iterations and factorisations have columns anyway")]
+    #[error("`{0}` cannot be an output: steps, iterations and factorisations are always in the table")]
     CounterAsOutput(String),
     /// A table beside the deck as a varied key.
-    #[error("`{0}` cannot be varied: tables beside the deck are read once, for all points")]
+    #[error("`{0}` cannot be varied: CSV tables are read once for all points")]
     Table(String),
     /// A parameter that the deck does not have.
     #[error("the deck has no parameter `{name}`{hint}")]

@@ -80,7 +80,9 @@ pub fn error_bars(
     let runs: Vec<Result<CompanionRun, Failure>> = thread::scope(|scope| {
         let started: Vec<_> = sources.into_iter().map(|source| threads::beside(scope, || run(source))).collect();
         let broken = |why: String| Err(Failure::Limit(format!("no error bars: {why}")));
-        let join = |thread: ScopedJoinHandle<_>| thread.join().unwrap_or(broken("a run broke off".into()));
+        let join = |thread: ScopedJoinHandle<_>| {
+            thread.join().unwrap_or(broken("a run stopped with an internal error".into()))
+        };
         started.into_iter().map(|thread| thread.map_or_else(|error| broken(error.to_string()), join)).collect()
     });
     let companions = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -194,8 +196,8 @@ pub fn polylines(deck: &Deck) -> Vec<String> {
         let widest = angles.iter().fold(0.0, |widest: f64, &angle| widest.max(angle));
         if angles.len() >= 2 && (SMALLEST_BEND..LARGEST_BEND).contains(&widest) {
             messages.push(format!(
-                "beam {}: its {} straight pieces meet at angles of up to {:.1}°; if they stand for a curve, the estimated errors do not include the \
-                 difference (use `arc`, or more points)",
+                "beam {}: its {} straight pieces meet at angles of up to {:.1}°; if they approximate a curve, the \
+                 estimated errors do not include that approximation (use `arc`, or more points)",
                 beam.name.value,
                 ways.len(),
                 widest.to_degrees()
@@ -210,9 +212,9 @@ pub fn polylines(deck: &Deck) -> Vec<String> {
 pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
     for stage in &deck.stages {
         let message = match stage.body {
-            StageBody::Path { .. } => "error bars need runs with common rows: paths by arc length have none",
+            StageBody::Path { .. } => "error bars need runs with common rows: arc length does not give them",
             StageBody::Dynamic { step_tolerance: Some(_), .. } if deck.output.interval.is_none() => {
-                "error bars need runs with common rows: steps adapt, so give [output] interval"
+                "error bars need runs with common rows: with adaptive steps, set [output] interval"
             }
             StageBody::Static { .. }
             | StageBody::Dynamic { .. }

@@ -183,7 +183,8 @@ pub(in crate::study) fn columns(scene: &Scene) -> Vec<String> {
 /// The number of a column that a deck names.
 pub(in crate::study) fn find_column(columns: &[String], name: &Spanned<String>) -> Result<usize, Diagnostic> {
     columns.iter().position(|column| is_named(column, &name.value)).ok_or_else(|| {
-        let diagnostic = Diagnostic::error(format!("`{}` is no column of the history", name.value), name.span.clone());
+        let diagnostic =
+            Diagnostic::error(format!("`{}` is not a column of the history", name.value), name.span.clone());
         match nearest(&name.value, columns.iter().map(String::as_str)) {
             Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
             None => diagnostic.help("columns are chosen in [output]"),
@@ -244,7 +245,7 @@ impl Observer for OutputCollector<'_> {
         match (self.interrupted)() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),
             None if self.attempts > self.most_attempts => Err(Failure::Limit(format!(
-                "given up at {at} after {} attempts at steps, far more than the scene should need",
+                "stopped at {at} after {} attempted steps, far more than the scene should need",
                 self.most_attempts
             ))),
             None => Ok(()),

@@ -353,7 +353,7 @@ fn scenes_whose_outputs_stay_zero_are_refused() {
     ];
     for refusal in refusals {
         let Some(StudyError::Deck(diagnostic)) = refusal else { panic!("not refused") };
-        assert!(diagnostic.message.contains("zero from beginning to end"), "{}", diagnostic.message);
+        assert!(diagnostic.message.contains("zero throughout"), "{}", diagnostic.message);
     }
 }
 

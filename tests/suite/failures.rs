@@ -117,7 +117,7 @@ fn a_motion_that_would_jump_is_an_error_of_the_deck() {
          [[stage]]\nkind = \"dynamic\"\nend = 0.1\nstep = 0.1\n[[stage]]\nkind = \"dynamic\"\nend = 0.2\nstep = 0.1\n",
     );
     assert_eq!(failure.name(), "deck");
-    assert!(failure.to_string().contains("jump from 0 to 0.1"), "{failure}");
+    assert!(failure.to_string().contains("must start at 0, where the node is, but starts at 0.1"), "{failure}");
 }
 
 #[test]

@@ -135,9 +135,9 @@ fn what_cannot_be_drawn_is_told() {
     for (words, told) in [
         (&["h.csv", "--column", "tip.uq"][..], "did you mean `tip.uz`?"),
         (&["h.csv", "--x", "lod"], "did you mean `load`?"),
-        (&["empty.csv"], "no columns to draw"),
+        (&["empty.csv"], "no columns to plot"),
         (&["nothing.csv"], "nothing.csv"),
-        (&["h.csv", "--out", "h.pdf"], "`.pdf`: pictures are written as .svg or .png"),
+        (&["h.csv", "--out", "h.pdf"], "unknown file type `.pdf`: plots are written as .svg or .png"),
         #[cfg(not(feature = "png"))]
         (&["h.csv", "--out", "h.png"], "--features png"),
     ] {

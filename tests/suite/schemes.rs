@@ -667,7 +667,7 @@ fn the_smallest_step_is_not_taken_on_trust() {
     let result = crate::scenes::attempt(&text).result;
     let failure = result.expect_err("no step is that good");
     assert_eq!(failure.name(), "not_converged");
-    assert!(failure.to_string().contains("the smallest step has an error"), "{failure}");
+    assert!(failure.to_string().contains("the smallest step has an estimated error"), "{failure}");
 }
 
 /// Late on the clock a short step is hardly longer than the clock's round-off: it is still one step.

@@ -125,7 +125,7 @@ steps = 10
     let failure = simulation.result.expect_err("20 is the most it carries");
     let Failure::LimitPoint { at, goal, increments, .. } = &failure else { panic!("{failure}") };
     assert!((at.load - 2.0 / 3.0).abs() < 1e-3 && *goal == 0.7 && *increments > 100, "{failure}");
-    assert!(simulation.hint.is_some_and(|hint| hint.contains("does not come to this load")));
+    assert!(simulation.hint.is_some_and(|hint| hint.contains("does not reach the load")));
     let most = simulation.rows.iter().map(|row| row[0]).fold(0.0, f64::max);
     assert!((most - 2.0 / 3.0).abs() < 1e-4, "the rows go to the limit: {most}");
 }

@@ -98,7 +98,7 @@ fn a_point_that_fails_is_a_row_and_stops_no_other() {
     let rows = table(&path);
     let states: Vec<&str> = rows.iter().map(|row| row["status"].as_str()).collect();
     assert_eq!(states, ["finished", "singular", "deck", "deck", "finished", "singular"]);
-    assert!(rows[1]["tip.uz"].is_empty() && rows[1]["message"].contains("nothing holds"));
+    assert!(rows[1]["tip.uz"].is_empty() && rows[1]["message"].contains("is not constrained"));
     assert!(rows[2]["message"].contains("at least 1"));
     // The same command has nothing left to do, but to say so again.
     let bytes = fs::read(&path).unwrap();
@@ -183,7 +183,7 @@ fn wrong_words_for_a_sweep_are_told() {
         (&["--vary", "param.L=1,2", "--output", "tip.uq"], "there is no column `tip.uq`"),
         (&["--vary", "param.L=1,2", "--only", "3"], "points are numbers from 1 to 2"),
         (&["--vary", "param.L"], "expected KEY=V1,V2"),
-        (&[], "nothing is varied"),
+        (&[], "no key is varied"),
     ] {
         let output = folder.beamsim(&[&["sweep", "deck.toml"], words].concat());
         assert!(status(&output) == 2 && last_line(&output).contains(told), "{words:?}: {}", last_line(&output));

@@ -255,7 +255,7 @@ fn an_accuracy_that_is_missed_has_a_status_of_its_own_and_the_best_is_written() 
     // A few rounds fit into a second, and none comes near.
     let output = folder.beamsim(&["run", "deck.toml", "--accuracy", "1e-12", "--budget", "1s"]);
     assert_eq!(status(&output), 5, "{}", last_line(&output));
-    assert!(last_line(&output).starts_with("error[accuracy]: an error of 1e-12 of `a.ux` is not reached"));
+    assert!(last_line(&output).starts_with("error[accuracy]: an error of 1e-12 of `a.ux` was not reached"));
     let read = |name: &str| fs::read(folder.0.join("results/deck").join(name)).unwrap();
     let record: Value = serde_json::from_slice(&read("run.json")).unwrap();
     assert_eq!((&record["accuracy"]["reached"], &record["status"]), (&false.into(), &"finished".into()));
@@ -314,7 +314,7 @@ fn error_bars_say_where_a_polyline_may_stand_for_a_curve() {
         let output = folder.beamsim(&[&["run", "deck.toml", "--out", "out"][..], words].concat());
         assert_eq!(status(&output), 0, "{}", last_line(&output));
         let said = [output.stdout, output.stderr].concat();
-        String::from_utf8_lossy(&said).contains("straight pieces turn by up to")
+        String::from_utf8_lossy(&said).contains("straight pieces meet at angles of up to")
     };
     let pieces = "through = [[0, 0, 0], [1, 0, 0], [1.98, 0.2, 0], [2.9, 0.6, 0]]\nelements = 2";
     let corner = "through = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]\nelements = 2";

@@ -86,7 +86,7 @@ impl fmt::Display for BuildError {
             Self::AxisAlongBeam(axis) => {
                 write!(f, "axis3 = {:?} lies along the beam: choose a direction normal to it", axis.0)
             }
-            Self::NoAxis(axis) => write!(f, "{:?} is no direction: its length must be positive", axis.0),
+            Self::NoAxis(axis) => write!(f, "{:?} is not a direction: its length must be positive", axis.0),
             Self::Mass(value) => write!(f, "{value}: masses and moments of inertia must not be negative"),
             Self::NoNodes => write!(f, "the model has no nodes"),
         }

@@ -223,45 +223,47 @@ impl fmt::Display for Failure {
             Self::Deck(message) | Self::Limit(message) | Self::Io(message) => f.write_str(message),
             Self::NotConverged { at, place, residual, force, history, tried } => write!(
                 f,
-                "no balance at {at}: after {} iterations and {} cut-backs the residual at {place} is {residual:.3e}, the \
-                 largest force {force:.3e}",
+                "no convergence at {at}: after {} iterations and {} cut-backs the residual at {place} is \
+                 {residual:.3e} (largest force {force:.3e})",
                 history.len().saturating_sub(1),
                 tried.cutbacks
             ),
             Self::TurnsTooFar { at, node, angle } => {
                 write!(
                     f,
-                    "node \"{node}\" turns by {angle:.3} rad at once ({at}), so that its direction cannot be told"
+                    "node \"{node}\" turns by {angle:.3} rad in one step ({at}): near half a turn and above, the \
+                     direction of rotation is ambiguous"
                 )
             }
             Self::LimitPoint { at, goal, increments, end } => write!(
                 f,
-                "the load does not grow to the factor {goal}: load control stands still at {at}, and {increments} increments of arc \
-                 length along the path end at load factor {}",
+                "load factor {goal} was not reached: load control stopped at {at}; the equilibrium path was then \
+                 followed by {increments} arc-length increments, to load factor {}",
                 end.load
             ),
             Self::StepTooSmall { at, place, error, share } => write!(
                 f,
-                "the smallest step has an error of {error:.3e} at {place}, where it may have {share:.3e} ({at})"
+                "the smallest step has an estimated error of {error:.3e} at {place}; allowed is {share:.3e} ({at})"
             ),
             Self::Singular { at, place: Some(place) } if place.is_joint() => {
-                write!(f, "the {place} holds what is held already ({at})")
+                write!(f, "the {place} is redundant: other constraints already fix the same motion ({at})")
             }
             Self::Singular { at, place: Some(place) } => {
-                write!(f, "nothing holds {place} ({at}): a mechanism or a loose part")
+                write!(f, "{place} is not constrained ({at}): the structure is a mechanism, or a part is loose")
             }
-            Self::Singular { at, place: None } => write!(f, "the tangent cannot be solved with at {at}"),
+            Self::Singular { at, place: None } => write!(f, "the tangent matrix is singular at {at}"),
             Self::NonFinite { at, effect, node } => {
                 let effect = effect.unwrap_or("the sum of forces");
-                write!(f, "{effect} is not finite at \"{node}\" ({at})")
+                write!(f, "{effect} is infinite or not a number at \"{node}\" ({at})")
             }
             Self::MeshTooCoarse { at, nodes: [a, b], relative_rotation } => write!(
                 f,
-                "the element between \"{a}\" and \"{b}\" turns by {relative_rotation:.3} rad from node to node ({at})"
+                "the mesh is too coarse between \"{a}\" and \"{b}\": neighbouring nodes are rotated by \
+                 {relative_rotation:.3} rad relative to each other ({at})"
             ),
             Self::EnergyGrowth { at, grown, largest } => write!(
                 f,
-                "the total energy has grown by {grown:.3e}, where the largest energies so far add up to {largest:.3e} ({at})"
+                "the total energy has grown by {grown:.3e}; the largest energies so far add up to {largest:.3e} ({at})"
             ),
             // Between the runs of a study.
             Self::Interrupted { at, signal } if at.stage == 0 => write!(f, "stopped by signal {signal}"),

@@ -17,12 +17,16 @@ impl Failure {
             Self::TurnsTooFar { at, .. } => Some(has(at)?.hint_of_turns()),
             Self::LimitPoint { at, .. } => Some(has(at)?.hint_of_limit()),
             Self::StepTooSmall { at, .. } => {
-                let cures = [has(at)?.damping(), Some("take fixed steps".into()), Some("allow a larger `step_tolerance`".into())];
-                Some(format!("accelerations jump there from step to step: {}", any_of(cures)))
+                let cures = [
+                    has(at)?.damping(),
+                    Some("use fixed steps".into()),
+                    Some("allow a larger `step_tolerance`".into()),
+                ];
+                Some(format!("accelerations oscillate there from step to step: {}", any_of(cures)))
             }
             Self::Singular { place: Some(place), .. } if place.is_joint() => Some(
-                "a support, another joint or a loop of rigid parts holds the same already: release one of them, for example by a \
-                 spherical joint in place of a revolute one"
+                "a support, another joint or a closed loop of rigid parts already constrains this motion: release one \
+                 constraint, for example by a spherical joint in place of a revolute one"
                     .into(),
             ),
             Self::Singular { at, .. } => Some(has(at)?.hint_of_mechanism()),
@@ -31,7 +35,8 @@ impl Failure {
                 let cures = [has(at)?.damping(), Some("take a smaller `step`".into())];
                 let cures = any_of(cures);
                 Some(format!(
-                    "the time step does not resolve the motion: {cures}; where the growth is meant, raise `energy_limit`"
+                    "the time step does not resolve the motion: {cures}; if the growth is intended, raise \
+                     `energy_limit`"
                 ))
             }
             Self::NonFinite { .. } => {
@@ -59,23 +64,25 @@ impl<'a> Has<'a> {
 
     fn hint_of_balance(&self, tried: &Attempts) -> String {
         if tried.soft {
-            return "round-off takes the stiffness of the softest motion (see the warning): use fewer elements of a higher order".into();
+            return "round-off hides the stiffness of the softest mode (see the warning): use fewer elements of a \
+                    higher order"
+                .into();
         }
-        let mesh = self.has_beams().then(|| "more `elements` where it turns most".to_string());
+        let mesh = self.has_beams().then(|| "more `elements` where the curvature is largest".to_string());
         let work = &self.stage.work;
         if work.kind().advances_time() {
             let cures = [self.damping(), Some("take a smaller `step`".into()), mesh.map(|mesh| format!("use {mesh}"))];
             return format!("smaller steps were tried: {}", any_of(cures));
         }
         if work.load_levels().is_some() && work.follows_path() {
-            return "shorter increments were tried: the mesh may be too coarse where it turns most, or a branch cross the path (a small side \
-                    force chooses one)"
+            return "shorter increments were tried: the mesh may be too coarse where the curvature is largest, or a \
+                    branch may cross the path (a small lateral force selects one)"
                 .into();
         }
         match work.approach() {
             Some(Approach::Straight) => {
                 let cures = [
-                    Some("leave `adaptive = false` out, so that the stage takes smaller levels".into()),
+                    Some("remove `adaptive = false`, so that the stage takes smaller load levels".into()),
                     self.levels(),
                 ];
                 any_of(cures)
@@ -84,18 +91,18 @@ impl<'a> Has<'a> {
                 let what = if self.stage.rotating { "`frame`" } else { "`history`" };
                 let stages = match self.stage.rotating {
                     true => "",
-                    false => " (load and unload in stages of their own, with `stages = [1]` in a load)",
+                    false => " (load and unload in separate stages, with `stages = [1]` in a load)",
                 };
                 let cures = any_of([self.levels(), self.fall()]);
                 format!(
-                    "smaller load levels were tried: a limit load may lie just ahead, around which only arc length leads, and that follows no \
-                     {what}{stages}; else {cures}"
+                    "smaller load levels were tried: there may be a limit point just ahead; only arc length passes it, \
+                     and arc length does not support {what}{stages}; otherwise {cures}"
                 )
             }
             Some(Approach::Path) | None => {
                 let mesh = mesh.map(|mesh| format!("use {mesh}"));
                 let cures =
-                    any_of([self.levels(), mesh, Some("choose a branch by a small side force".into()), self.fall()]);
+                    any_of([self.levels(), mesh, Some("select a branch by a small lateral force".into()), self.fall()]);
                 format!("smaller load levels and arc length were tried: {cures}")
             }
         }
@@ -105,36 +112,43 @@ impl<'a> Has<'a> {
         if self.stage.work.kind().advances_time() {
             let else_damp = self.damping().map_or(String::new(), |damping| format!(": {damping}"));
             format!(
-                "use smaller steps; in a stage in which nothing should turn so fast the step does not resolve the motion{else_damp}"
+                "use smaller steps; if nothing should rotate this fast, the step does not resolve the \
+                 vibration{else_damp}"
             )
         } else if self.stage.work.approach() == Some(Approach::Straight) {
-            "use smaller steps: leave `adaptive = false` out, or take more `steps`".into()
+            "use smaller steps: remove `adaptive = false`, or increase `steps`".into()
         } else {
-            "use smaller steps: more `steps`".into()
+            "use smaller steps: increase `steps`".into()
         }
     }
 
     fn hint_of_limit(&self) -> String {
         let cures = any_of([
-            self.levels().map(|levels| format!("{levels}, which may keep it on another")),
-            Some("load it less".into()),
-            Some("prescribe a motion in place of the load".into()),
+            self.levels().map(|levels| format!("{levels}, which may follow another branch")),
+            Some("reduce the load".into()),
+            Some("prescribe a displacement in place of the load".into()),
             self.fall(),
         ]);
-        format!("the path it is on does not come to this load (the rows follow it beyond its limit points): {cures}")
+        format!(
+            "this branch of the equilibrium path does not reach the load (the rows follow it past its limit points): \
+             {cures}"
+        )
     }
 
     fn hint_of_mechanism(&self) -> String {
-        let hold = "add a support, a spring or a joint that holds this direction";
+        let hold = "add a support, a spring or a joint that constrains this direction";
         let work = &self.stage.work;
         if work.kind().needs_inertia() {
             format!("{hold}, or give it mass")
         } else if work.follows_path() {
-            format!("{hold}; what its loads hold comes to rest in a static stage with load levels, before this one")
+            format!(
+                "{hold}; if only loads hold the structure (such as a hanging chain), put a static stage with load \
+                 levels before this one, which finds the state of rest"
+            )
         } else if self.plan.model.linear || work.approach() == Some(Approach::Straight) {
             hold.into()
         } else {
-            format!("{hold}: its loads do not, either")
+            format!("{hold}: the loads do not stabilise it either")
         }
     }
 
@@ -145,12 +159,12 @@ impl<'a> Has<'a> {
     /// More load levels, where they are not many already.
     fn levels(&self) -> Option<String> {
         let steps = self.stage.work.load_levels()?;
-        (steps < MANY_LEVELS).then(|| format!("take more `steps` than {steps}"))
+        (steps < MANY_LEVELS).then(|| format!("use more than {steps} `steps`"))
     }
 
     /// A damped motion to where it comes to rest, where none comes before.
     fn fall(&self) -> Option<String> {
-        let words = "let it fall in a dynamic stage with `[damping]`, and find its balance in a static stage behind it";
+        let words = "let it settle in a dynamic stage with `[damping]`, followed by a static stage";
         (!self.falls_before()).then(|| words.into())
     }
 
@@ -167,7 +181,7 @@ impl<'a> Has<'a> {
             SchemeFamily::GeneralizedAlpha { radius } if radius > 0.0 => "a smaller `rho_inf`",
             SchemeFamily::GeneralizedAlpha { .. } => return None,
         };
-        Some(format!("damp what it does not resolve ({cure})"))
+        Some(format!("damp unresolved vibrations ({cure})"))
     }
 }
 

@@ -7,7 +7,8 @@ pub fn refusal(error: &StageError, model: &Model) -> String {
     let node = |slot: u32| model.node_at(slot as usize);
     match error {
         StageError::Conflict(conflict) => format!(
-            "constraints on node \"{}\" act along directions that are neither the same nor orthogonal",
+            "constraints on node \"{}\" have directions that are neither parallel nor orthogonal, which is not \
+             supported",
             node(conflict.slot)
         ),
         StageError::Jump(Jump { motion, from, to }) => {
@@ -15,26 +16,28 @@ pub fn refusal(error: &StageError, model: &Model) -> String {
             let turns = motion.kind == MotionKind::Rotation;
             let name = node(motion.slot);
             if from == to {
-                return format!("the motion of node \"{name}\" turns it about another axis than it has turned about");
+                return format!(
+                    "the motion of node \"{name}\" changes its axis of rotation: the node has already turned about \
+                     another axis"
+                );
             }
             let (from, to) = (size(*from, turns), size(*to, turns));
-            format!("the motion of node \"{name}\" would have to jump from {from} to {to}")
+            format!("the motion of node \"{name}\" must start at {from}, where the node is, but starts at {to}")
         }
-        StageError::TurnedHinge(slot) => format!(
-            "a support takes hold of single rotation components of node \"{}\", which has already turned",
-            node(*slot)
-        ),
+        StageError::TurnedHinge(slot) => {
+            format!("a support fixes single rotation components of node \"{}\", which has already rotated", node(*slot))
+        }
         StageError::MotorJump(MotorJump { slot, turns, from, to, .. }) => {
             let (from, to) = (size(*from, *turns), size(*to, *turns));
-            format!("the motor of the {} would have to jump from {from} to {to}", node(*slot))
+            format!("the motor of the {} must start at {from}, where the joint is, but starts at {to}", node(*slot))
         }
         StageError::NothingGrows(StageKind::Buckling) => {
-            "no load and no motion grows with the load factor: nothing can buckle".into()
+            "a buckling stage needs a load or a motion that grows with the load factor".into()
         }
         StageError::NothingGrows(_) => {
             "control = \"arc_length\" needs a load or a motion that grows with the load factor".into()
         }
-        StageError::NoMass => "a modal stage needs mass: nothing that is free to move has any".into(),
+        StageError::NoMass => "a modal stage needs mass: no node that is free to move has mass".into(),
     }
 }
 
@@ -42,15 +45,15 @@ pub fn refusal(error: &StageError, model: &Model) -> String {
 pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<String> {
     let driven = |own_stages: Option<bool>| match own_stages {
         None if stage == 0 => {
-            "a dynamic stage starts where the scene is: give it a `history` that begins with 0".into()
+            "a dynamic stage starts from the current state: give it a `history` that starts at 0".into()
         }
-        None => "give it a `history` that begins there".into(),
+        None => "give it a `history` that starts at the current value".into(),
         Some(false) => format!(
-            "a history is read over the load factor in static stages and over the clock in dynamic ones: `history = {{ name = …, \
-             stages = [{}] }}` begins with this stage and holds its first value before",
+            "a history is a function of the load factor in static stages and of time in dynamic ones: `history = {{ \
+             name = …, stages = [{}] }}` starts with this stage and keeps its first value before",
             stage + 1
         ),
-        Some(true) => "its history must begin where the stages before have left it".into(),
+        Some(true) => "its history must start at the value that the previous stage ended with".into(),
     };
     match error {
         StageError::Jump(Jump { from, to, .. }) if from == to => None,
@@ -65,14 +68,14 @@ pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<S
             Some(_) if stage == 0 => Some(START.into()),
             own_stages => Some(driven(own_stages)),
         },
-        StageError::TurnedHinge(_) => Some("hold all three, or hold them from the first stage on".into()),
+        StageError::TurnedHinge(_) => Some("fix all three, or fix them from the first stage on".into()),
         StageError::Conflict(_) | StageError::NothingGrows(_) | StageError::NoMass => None,
     }
 }
 
 /// The cure where the first stage is dynamic.
 const START: &str =
-    "a dynamic stage starts where the scene is: its history must begin with 0 there, or a static stage come before it";
+    "a dynamic stage starts from the current state: the history must start at 0, or a static stage must come before";
 
 /// A displacement, or an angle in radians and degrees.
 fn size(value: f64, turns: bool) -> String {

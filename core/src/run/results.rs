@@ -119,9 +119,9 @@ impl fmt::Display for Event {
         write!(f, "{} in stage {stage} at load factor {load}", self.kind.name())?;
         match self.negative_pivots {
             None => Ok(()),
-            Some(0) => f.write_str(": stable behind it"),
-            Some(1) => f.write_str(": unstable behind it, 1 negative pivot"),
-            Some(n) => write!(f, ": unstable behind it, {n} negative pivots"),
+            Some(0) => f.write_str(": stable after it"),
+            Some(1) => f.write_str(": unstable after it, 1 negative pivot"),
+            Some(n) => write!(f, ": unstable after it, {n} negative pivots"),
         }
     }
 }

@@ -21,7 +21,7 @@ impl InSpace {
         let (solver, system) = (&stage.newton.solver, &stage.assembly.system);
         match LinearSolver::beside(solver, system, &assembly.system, &stage.model.multipliers) {
             Some(solver) => Ok(Self { assembly, solver }),
-            None => Err(Failure::Limit("not enough memory to look at the tangent in space".into())),
+            None => Err(Failure::Limit("not enough memory for the out-of-plane stability check".into())),
         }
     }
 }
@@ -84,9 +84,8 @@ impl StageRun<'_> {
         let planar = self.model.plane.is_some() && self.stage().work.kind().advances_state();
         if planar && self.plane.is_none() {
             let stage = self.number + 1;
-            let message = format!(
-                "stage {stage} is simulated in space: the state in which it begins is not in the plane of the scene to the last digits"
-            );
+            let message =
+                format!("stage {stage} is simulated in 3D: its initial state is not exactly in the plane of the scene");
             self.warn(WarningKind::SimulatedInSpace, message);
         }
     }
@@ -96,8 +95,8 @@ impl StageRun<'_> {
         self.issued.unstable = Some(self.number);
         let at = self.moment();
         let message = format!(
-            "unstable out of plane ({at}): in space {count} more pivot(s) are negative than in the plane that this scene is treated in: \
-             what it would do is seen with a small load or imperfection out of the plane"
+            "unstable out of plane ({at}): {count} more negative pivot(s) in 3D than in the plane in which the scene \
+             is simulated; to see the motion out of the plane, add a small load or imperfection in that direction"
         );
         self.warn(WarningKind::UnstableOutOfPlane, message);
     }

@@ -238,8 +238,8 @@ impl StageRun<'_> {
         let Some(slot) = ambiguous.into_iter().find(|slot| self.model.sprung.contains(slot)) else { return Ok(()) };
         let (at, node) = (self.moment(), self.model.node_at(slot as usize));
         Err(Failure::Deck(format!(
-            "the rotational spring at node \"{node}\" has been wound by more than a turn and its node left the axis ({at}): how \
-             far it is wound is not defined there; hold the other rotations of the node, or use a joint"
+            "the rotational spring at node \"{node}\" is twisted by more than one turn and the node has left its axis \
+             of rotation ({at}): the twist is then undefined; fix the other rotations of the node, or use a joint"
         )))
     }
 
@@ -253,7 +253,7 @@ impl StageRun<'_> {
             return Err(failure);
         }
         self.issued.coarse = true;
-        self.warn(WarningKind::CoarseMesh, format!("{failure}: more elements would tell the shape better"));
+        self.warn(WarningKind::CoarseMesh, format!("{failure}: use more elements to resolve the shape"));
         Ok(())
     }
 

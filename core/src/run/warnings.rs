@@ -36,8 +36,9 @@ impl StageRun<'_> {
         if uncertainty > 10.0 * self.issued.uncertainty {
             self.issued.uncertainty = uncertainty;
             let message = format!(
-                "round-off has taken about {:.0} of 16 digits: displacements are uncertain by about {uncertainty:.0e} of the \
-                 largest (very slender beams on very fine meshes lose them: use fewer elements of a higher order)",
+                "about {:.0} of 16 digits are lost to round-off: displacements are uncertain by about \
+                 {uncertainty:.0e} of the largest (typical of very slender beams on very fine meshes: use fewer \
+                 elements of a higher order)",
                 16.0 + uncertainty.log10()
             );
             self.warn(WarningKind::LostDigits, message);
@@ -50,8 +51,9 @@ impl StageRun<'_> {
         if !std::mem::replace(&mut self.issued.soft, true) {
             self.warn(
                 WarningKind::LostStiffness,
-                "the softest motion has less than 1e-15 of the stiffness of the terms it is the difference of: a linear solve loses \
-                 all 16 digits of it; corrections are refined for as long as that helps (fewer elements of a higher order lose less)",
+                "the stiffness of the softest mode is a difference of terms that are more than 1e15 times larger: a \
+                 linear solve loses all 16 digits of it; iterative refinement is used as long as it helps (fewer \
+                 elements of a higher order lose less)",
             );
         }
     }
@@ -64,7 +66,8 @@ impl StageRun<'_> {
         let loose = Convergence { tolerance: LOOSE_BALANCE };
         let (verdict, _) = loose.judge(self.model, &self.assembly.system, round_off, None);
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
-            let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
+            let message = "the modal or buckling stage does not start from an equilibrium: put a static stage before \
+                           it";
             self.warn(WarningKind::OutOfBalance, message);
         }
     }
@@ -81,8 +84,8 @@ impl StageRun<'_> {
             let stage = self.number + 1;
             let percent = 100.0 * share.abs();
             let message = format!(
-                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy: what moved stands still since the stage began, and \
-                 works are summed by the trapezoidal rule from load level to load level"
+                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy: the kinetic energy of the \
+                 previous stage was dropped, and work is integrated by the trapezoidal rule between load levels"
             );
             self.warn(WarningKind::EnergyBalance, message);
         }
@@ -100,9 +103,10 @@ impl StageRun<'_> {
         if error > self.issued.frame {
             self.issued.frame = 2.0 * error;
             let message = format!(
-                "interpolation = \"total\": neighbouring nodes are turned by up to {angle:.2} rad against each other, so that curvatures of \
-                 two-node elements depend on the orientation of the scene by up to {:.1} % (\"relative\" has no such error; it falls with \
-                 the square of the element's length)",
+                "interpolation = \"total\": neighbouring nodes are rotated by up to {angle:.2} rad relative to each \
+                 other, so that curvatures of two-node elements depend on the orientation of the scene by up to {:.1} \
+                 %; use \"relative\", which has no such error, or shorter elements (the error falls with the square of \
+                 their length)",
                 100.0 * error
             );
             self.warn(WarningKind::FrameDependence, message);
@@ -114,8 +118,8 @@ impl StageRun<'_> {
         if !std::mem::replace(&mut self.issued.axis, true) {
             let (at, node) = (self.moment(), self.model.node_at(slot as usize));
             let message = format!(
-                "node \"{node}\" left its axis near a whole turn ({at}): how its rotation vector continues is not defined there; `rc` counts \
-                 its increments from there on, and depends on the steps (`r` does not)"
+                "node \"{node}\" changed its axis of rotation near a whole turn ({at}), where the continuous rotation \
+                 vector is undefined: from there on `rc` sums increments and depends on the steps (`r` does not)"
             );
             self.warn(WarningKind::LostAxis, message);
         }

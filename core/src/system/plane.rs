@@ -42,13 +42,19 @@ impl fmt::Display for MirrorData {
         let (what, v) = match self {
             Self::Place(v) => ("the place", v),
             Self::Vector(v) => ("the vector", v),
-            Self::Axial(v) => ("what turns about", v),
+            Self::Axial(v) => ("the rotation or moment about", v),
             Self::Line(v) => ("the axis", v),
-            Self::Tensor(_) => return f.write_str("a stiffness, an inertia or a support with axes aside of the plane"),
-            Self::Coupling(_) => {
-                return f.write_str("a coupling of strain in the plane with torsion or with bending out of it");
+            Self::Tensor(_) => {
+                return f.write_str(
+                    "a stiffness, an inertia or a support whose axes are neither in the plane nor normal to it",
+                );
             }
-            Self::Spatial => return f.write_str("what has no kernel for planes"),
+            Self::Coupling(_) => {
+                return f.write_str(
+                    "a section that couples strain in the plane with torsion or with bending out of the plane",
+                );
+            }
+            Self::Spatial => return f.write_str("an effect without a planar form"),
         };
         write!(f, "{what} {}", rounded(*v))
     }
@@ -149,7 +155,7 @@ impl Plane {
     pub fn of(length: f64, shown: &Shown) -> Result<Self, String> {
         let search = Search::through(length, shown);
         if let Some(name) = search.spatial {
-            return Err(format!("{name}: no kernel for planes"));
+            return Err(format!("{name} has no planar form"));
         }
         let mut apart = None;
         for plane in search.normals().filter_map(Self::normal_to) {
@@ -160,10 +166,8 @@ impl Plane {
             }
         }
         match apart {
-            None => Err("nothing tells a plane: all lies in one line".into()),
-            Some((name, aspect)) => {
-                Err(format!("{name}: {aspect} is not its own image in a plane that all else shares"))
-            }
+            None => Err("the plane is undefined: all points and loads lie on one line".into()),
+            Some((name, aspect)) => Err(format!("{name}: {aspect} does not fit the plane of the rest of the scene")),
         }
     }
 }
@@ -298,7 +302,7 @@ mod tests {
         ]);
         assert_eq!(
             apart.unwrap_err(),
-            "part: the vector [0.0, 1.0, -0.5] is not its own image in a plane that all else shares"
+            "part: the vector [0.0, 1.0, -0.5] does not fit the plane of the rest of the scene"
         );
     }
 

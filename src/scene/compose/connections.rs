@@ -82,7 +82,7 @@ impl Composer<'_> {
             let why = if connections.is_empty() {
                 "no [[joint]]"
             } else {
-                "every [[joint]] is held by supports or shared nodes"
+                "every [[joint]] is modelled by supports or shared nodes"
             };
             return self.reason("joints", false, why);
         }
@@ -107,9 +107,9 @@ impl Composer<'_> {
         let nodes = connection.nodes.map(|node| node.map(|node| self.mesh.nodes[node].node));
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
         if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.shares_displacement()) {
-            let message = "these parts share their displacement through another joint at the same point";
+            let message = "another joint at this point already connects these parts";
             let diagnostic = Diagnostic::error(message, joint.span.clone());
-            self.diagnostics.push(diagnostic.help("give the parts points of their own, and join these"));
+            self.diagnostics.push(diagnostic.help("give each part its own point, and connect these by the joint"));
             return None;
         }
         if shared && drive.is_none() && normal.is_empty() {

@@ -20,9 +20,9 @@ impl Composer<'_> {
             return self.reason(effect.name(), false, "no static stage after a dynamic one");
         }
         if !self.deck.effects.allow(EffectWord::LargeRotations) {
-            return self.reason(effect.name(), false, "linear stages find balance from anywhere");
+            return self.reason(effect.name(), false, "linear stages find the equilibrium from any state");
         }
-        self.push(effect, format!("{} begins where something may move", named.join(", ")));
+        self.push(effect, format!("{} starts from a state that may be moving", named.join(", ")));
     }
 
     /// Static stages after a dynamic one, and after static ones that may have ended before all was

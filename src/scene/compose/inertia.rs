@@ -51,15 +51,15 @@ impl Composer<'_> {
         if mass.is_empty() {
             self.reason(names[0], false, "no section has mass on its centre line");
         } else {
-            self.push(mass, "sections have `rhoA`, and something moves or may vibrate".into());
+            self.push(mass, "sections have `rhoA`, and stages or columns need mass".into());
         }
         match (rotary.elements.is_empty(), wanted) {
             (_, false) => self.reason(names[1], false, SWITCHED_OFF),
-            (true, _) if !bodies.is_empty() => self.reason(names[1], false, "what sections have is at the nodes"),
-            (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
-            (false, true) => {
-                self.push(rotary, "sections have rotary inertia, and something moves or may vibrate".into())
+            (true, _) if !bodies.is_empty() => {
+                self.reason(names[1], false, "the rotary inertia of sections is lumped at the nodes")
             }
+            (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
+            (false, true) => self.push(rotary, "sections have rotary inertia, and stages or columns need mass".into()),
         }
         if bodies.is_empty() {
             self.reason(
@@ -110,7 +110,7 @@ impl Composer<'_> {
             (true, _) => self.reason("rigid body inertia", false, "no [[body]]"),
             (false, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
             (false, true) => {
-                let reason = format!("{} [[body]] table(s), and something moves or may vibrate", bodies.len());
+                let reason = format!("{} [[body]] table(s), and stages or columns need mass", bodies.len());
                 let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
                 self.push(RigidBody { name: "rigid body inertia", bodies, gyroscopic }, reason);
             }
@@ -215,7 +215,7 @@ impl Composer<'_> {
             let (elements, nodal) = self.inertia_elements(|_, _, inertia| inertia);
             bodies.extend(nodal.into_iter().filter(|body| body.inertia.mass > 0.0));
             if elements.is_empty() {
-                self.reason("gravity on beams", false, "all masses of beams are eccentric and sit at their nodes");
+                self.reason("gravity on beams", false, "all masses of beams are eccentric and lumped at the nodes");
             } else {
                 self.push(BeamGravity { acceleration, amplitude, elements }, "`gravity` is set".into());
             }
@@ -237,7 +237,7 @@ impl Composer<'_> {
             } else if mass == 0.0 {
                 "no `mass` in [damping]"
             } else {
-                "nothing moves in time"
+                "no stage with motion"
             };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }

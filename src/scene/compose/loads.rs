@@ -35,7 +35,7 @@ impl Composer<'_> {
         for (kind, loads) in kinds {
             let effect = NodeLoad { kind, loads, tangent };
             if effect.loads.is_empty() {
-                self.reason(effect.name(), false, "no such [[load]] at a node");
+                self.reason(effect.name(), false, "no [[load]] of this kind at a node");
             } else {
                 let reason = format!("{} at nodes", effect.loads.len());
                 self.push(effect, reason);
@@ -67,7 +67,7 @@ impl Composer<'_> {
                 None
             }
             [(first, fraction), _, ..] => {
-                let message = format!("several beams meet at `{}`; whose section is meant?", at.value);
+                let message = format!("several beams meet at `{}`, so that the section is ambiguous", at.value);
                 let end = if fraction > 0.5 { "end" } else { "start" };
                 let help = format!("name the node on a beam, such as `{}@{end}`", self.mesh.beams[first].name);
                 self.diagnostics.push(Diagnostic::error(message, at.span.clone()).help(help));
@@ -111,8 +111,8 @@ impl Composer<'_> {
             elements.shrink_to_fit();
             let effect = LineLoad { kind, elements, tangent };
             if effect.elements.is_empty() {
-                let but = if acts_at_nodes { ", but on `relative` beams, where it acts at their nodes" } else { "" };
-                self.reason(effect.name(), false, format!("no such [[load]] along a beam{but}"));
+                let but = if acts_at_nodes { ", except on `relative` beams, where it acts at the nodes" } else { "" };
+                self.reason(effect.name(), false, format!("no [[load]] of this kind along a beam{but}"));
             } else {
                 self.push(effect, "[[load]] along a beam".into());
             }

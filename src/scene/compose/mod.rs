@@ -95,9 +95,9 @@ struct Composer<'a> {
 /// The reason of effects that are switched off
 const SWITCHED_OFF: &str = "switched off in [effects]";
 /// The reason of a switched-off geometric stiffness
-const UNSTRESSED: &str = "switched off in [effects]: what stress makes unstable is not told";
+const UNSTRESSED: &str = "switched off in [effects]: buckling is not detected";
 /// The reason of a switched-off tangent of following loads
-const UNTURNED: &str = "switched off in [effects]: negative pivots are those of a tangent without it";
+const UNTURNED: &str = "switched off in [effects]: the number of negative pivots ignores it";
 
 /// Composes the effects of a deck.
 pub fn compose(
@@ -192,7 +192,7 @@ impl Composer<'_> {
         let large = "large rotations";
         let linear = "switched off in [effects]: static and dynamic stages are linear";
         if self.deck.effects.allow(EffectWord::LargeRotations) {
-            self.reason(large, true, "forces and tangents of the present state");
+            self.reason(large, true, "forces and tangents follow the current shape");
         } else {
             self.reason(large, false, linear);
         }
@@ -202,7 +202,7 @@ impl Composer<'_> {
             (
                 EffectWord::GeometricStiffness,
                 "geometric stiffness",
-                "the tangent knows how stress turns with the beams",
+                "the tangent includes how stress rotates with the beams",
             ),
         ];
         for (word, name, why) in parts {
@@ -250,7 +250,7 @@ impl Composer<'_> {
         } else if !self.deck.effects.allow(EffectWord::Damping) {
             self.reason(I::DAMPING_NAME, false, SWITCHED_OFF);
         } else {
-            self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time");
+            self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or no stage with motion");
         }
     }
 
@@ -279,10 +279,14 @@ impl Composer<'_> {
         let loads = ["following line loads", "following forces", "following moments", "dead moments"];
         let turns = acts(&inertia);
         let loaded = acts(&loads);
-        let spin = "inertia against rotation has forces of its spin alone";
-        let why = [spin, SWITCHED_OFF, "nothing has inertia against rotation"];
+        let spin = "rotary inertia causes gyroscopic forces";
+        let why = [spin, SWITCHED_OFF, "nothing has rotary inertia"];
         self.part(EffectWord::Gyroscopic, "gyroscopic forces", turns, why);
-        let why = ["the tangent knows how loads turn", UNTURNED, "no load follows, and no moment stands fixed"];
+        let why = [
+            "the tangent includes how follower loads and fixed moments change with rotation",
+            UNTURNED,
+            "no follower load and no moment that is fixed in space",
+        ];
         self.part(EffectWord::FollowerTangent, "follower tangent", loaded, why);
     }
 
@@ -299,7 +303,7 @@ impl Composer<'_> {
     fn never(&mut self) {
         let seams = self.mesh.beams.iter().any(|beam| beam.interpolation == InterpolationWord::Total);
         let why = if seams {
-            "as soon as neighbouring nodes of beams with interpolation = \"total\" sit in different charts"
+            "used where neighbouring nodes of beams with interpolation = \"total\" are in different rotation charts"
         } else {
             "no beam with interpolation = \"total\""
         };

@@ -45,11 +45,11 @@ impl Composer<'_> {
         let parts = "straight part(s) free to spin about their own axis";
         self.hold_spins(
             SpinHold { parts: in_motion, held_in: HeldIn::Motion },
-            &format!("{parts}, without inertia against it"),
+            &format!("{parts}, without inertia about it"),
         );
         self.hold_spins(
             SpinHold { parts: in_statics, held_in: HeldIn::Statics },
-            &format!("{parts}, which no load feels: held as they are"),
+            &format!("{parts}, which no load resists: the spin is fixed"),
         );
     }
 

@@ -156,7 +156,7 @@ impl<'a> Search<'a> {
             };
             let Some(trials) = trials else { break };
             runs += trials.runs;
-            ended = format!("; the last of {runs} ended with `{}`", trials.own.status);
+            ended = format!("; the last of {runs} runs ended with `{}`", trials.own.status);
             match self.after_own_run(&round, &trials.own, best.is_none(), &pool)? {
                 Next::Estimates => {}
                 Next::Another => continue,
@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
             self.refine(&estimates.own);
         }
         best.map(|best| Found { runs, ..best }).ok_or_else(|| {
-            let message = format!("no run finished whose error could be estimated{ended}");
+            let message = format!("no finished run allowed an error estimate{ended}");
             StudyError::Failure(Failure::Limit(message))
         })
     }

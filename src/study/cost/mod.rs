@@ -180,7 +180,7 @@ fn sampler(
     let compared = sampler.differences(&samples, &samples, &scales);
     let (known, lacking): (Vec<usize>, Vec<usize>) = sampler.outputs.iter().partition(|&&k| !compared[k].is_nan());
     if known.is_empty() {
-        return Err(Diagnostic::whole(format!("{made} has no number for any output of the deck")));
+        return Err(Diagnostic::whole(format!("{made} contains none of the outputs of the deck")));
     }
     let lacking: Vec<&str> = lacking.iter().map(|&k| sampler.columns[k].as_str()).collect();
     let made = match lacking.len() {
@@ -210,7 +210,7 @@ fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
     if early {
         let message = format!("the given history ends at {clock:.6} of stage {stage}, before the deck does");
         let mut diagnostic = Diagnostic::error(message, last.span.clone());
-        diagnostic.help = Some("give one of the whole deck, or shorten the deck by --set".into());
+        diagnostic.help = Some("use a history of the whole run, or shorten the run by --set".into());
         return Err(diagnostic);
     }
     Ok(())

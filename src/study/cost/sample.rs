@@ -191,8 +191,9 @@ impl Sampler {
         if self.outputs.iter().any(|&k| scales[k] > 0.0) {
             return Ok(());
         }
-        let message = "all outputs are zero from beginning to end: errors relative to them cannot be measured";
-        Err(Diagnostic::whole(message).help("does a load move the nodes in [output]? name other `nodes` or `columns`"))
+        let message = "all outputs are zero throughout: relative errors are undefined";
+        Err(Diagnostic::whole(message)
+            .help("check that a load moves the nodes in [output], or choose other `nodes` or `columns`"))
     }
 
     /// Rows of the history, then the modes.

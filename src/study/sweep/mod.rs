@@ -112,7 +112,7 @@ impl Sweep {
             let done = point::run(&self.text, &self.settings(k), self.error_bars, &interrupted);
             (done.status != FailureKind::Interrupted.name()).then_some(done)
         };
-        let broken = |_| PointResult::failed("broke_off", "a fault of the program: please report it".into());
+        let broken = |_| PointResult::failed("broke_off", "internal error: please report it".into());
         let mut kept = Ok(());
         let failed = AtomicBool::new(false);
         let stopped = || interrupted().is_some() || failed.load(Ordering::Relaxed);

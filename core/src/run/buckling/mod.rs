@@ -46,8 +46,8 @@ const NEAREST_EXTRAPOLATION: f64 = 5e-3;
 const MOST_EXTRAPOLATIONS: usize = 48;
 
 /// The message about a scene without critical loads.
-const NOTHING_BUCKLES: &str = "no load of this scene takes stiffness away: nothing can buckle (under following loads it may flutter: see a modal \
-                               stage)";
+const NOTHING_BUCKLES: &str = "no load of this scene reduces its stiffness, so it cannot buckle (follower loads may \
+                               cause flutter: use a modal stage)";
 
 /// A buckling stage.
 pub(super) struct Buckling<'s, 'r> {
@@ -283,8 +283,8 @@ impl Buckling<'_, '_> {
 
     fn warn_of_turn_aside(&mut self, load: f64) {
         let message = format!(
-            "next to load factor {load} the path turns aside, as where a structure with a smaller imperfection buckles; the buckling load \
-             that is listed lies further on"
+            "near load factor {load} the path bends away: a structure with a smaller imperfection would buckle there; \
+             the buckling load in the list lies further along the path"
         );
         self.stage.warn(WarningKind::BucklingEstimate, message);
     }
@@ -292,13 +292,13 @@ impl Buckling<'_, '_> {
     fn warn_of_estimate(&mut self, from: f64, ended: Option<Walked>) {
         let coarse = ended == Some(Walked::TooCoarse);
         let why = if coarse {
-            "beyond it the mesh is too coarse for the shape: use more `elements`"
+            "beyond it the mesh is too coarse: use more `elements`"
         } else {
-            "a structure with a small imperfection bends aside and has none"
+            "a structure with a small imperfection deflects gradually and has none"
         };
         let message = format!(
-            "a buckling load is an estimate, extrapolated from smaller loads: no critical point was found on the path up to load factor \
-             {from} ({why})"
+            "a buckling load is only an estimate, extrapolated from smaller loads: no critical point was found on the \
+             path up to load factor {from} ({why})"
         );
         self.stage.warn(WarningKind::BucklingEstimate, message);
     }

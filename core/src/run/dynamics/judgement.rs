@@ -38,20 +38,20 @@ impl Dynamics<'_, '_> {
         let percent = 100.0 * share.abs();
         if !is_own {
             let message = format!(
-                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, most of it from the stages before: their work is \
-                 summed by the trapezoidal rule from load level to load level (more `steps` there)"
+                "stage {stage}: energy.total is off by {percent:.0} % of the largest energy, mostly because the work \
+                 of earlier stages is integrated by the trapezoidal rule between load levels (use more `steps` there)"
             );
             self.stage.warn(WarningKind::EnergyBalance, message);
         } else if share < 0.0 {
             let message = format!(
-                "stage {stage}: the scheme has taken {percent:.0} % of the largest energy: its steps do not resolve part of the motion (a \
-                 smaller `step`, or less dissipation)"
+                "stage {stage}: the time integration has dissipated {percent:.0} % of the largest energy: the steps do \
+                 not resolve part of the motion (use a smaller `step`, or less dissipation)"
             );
             self.stage.warn(WarningKind::EnergyLoss, message);
         } else {
             let message = format!(
-                "stage {stage}: the total energy is off by {percent:.0} % of the largest energy, which comes from nothing: the steps do not \
-                 resolve part of the motion (a smaller `step`, or a scheme that dissipates)"
+                "stage {stage}: the time integration has added {percent:.0} % of the largest energy: the steps do not \
+                 resolve part of the motion (use a smaller `step`, or a scheme with numerical dissipation)"
             );
             self.stage.warn(WarningKind::EnergyGain, message);
         }

@@ -375,7 +375,8 @@ impl Dynamics<'_, '_> {
     fn warn_of_subdivision(&mut self) {
         if !std::mem::replace(&mut self.stage.issued.subdivision, true) {
             let at = self.stage.moment();
-            let message = format!("a step fails at {at} and is taken in smaller ones, as are others that fail");
+            let message =
+                format!("a time step did not converge at {at} and was subdivided, as are later ones that fail");
             self.stage.warn(WarningKind::StepSubdivided, message);
         }
     }

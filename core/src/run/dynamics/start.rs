@@ -104,7 +104,8 @@ impl Dynamics<'_, '_> {
             if gap > LARGEST_GAP * size {
                 let at = self.stage.moment();
                 return Err(Failure::Deck(format!(
-                    "the {} is open by {gap:.3e} where the stage begins ({at}), and would have to jump",
+                    "the {} has a gap of {gap:.3e} at the start of the stage ({at}), which it would have to close at \
+                     once",
                     self.stage.model.node_at(slot as usize)
                 )));
             }
@@ -124,8 +125,8 @@ impl Dynamics<'_, '_> {
         let Some(solved) = self.solve_with_mass(&rates2)? else {
             self.stage.warn(
                 WarningKind::NoStartAccelerations,
-                "mass does not determine the accelerations at the start (a point mass with an offset and without inertia?): the motion \
-                 begins without them",
+                "the mass matrix is singular, so that the accelerations at the start are undefined (a point mass with \
+                 an offset and without inertia?): they are set to zero",
             );
             self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
             return Ok(());

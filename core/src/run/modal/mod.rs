@@ -124,13 +124,13 @@ impl Modal<'_, '_> {
         let stage = self.stage.number + 1;
         if found.missing > 0 {
             let missing = found.missing;
-            let message = format!("stage {stage}: {missing} more unstable mode(s) exist and were not found");
+            let message = format!("stage {stage}: {missing} more unstable mode(s) exist but were not found");
             self.stage.warn(WarningKind::MissingModes, message);
         }
         if found.is_short {
             let message = format!(
-                "stage {stage}: a mode among those that are asked for was not found: pivots count more of them (very slender beams on \
-                 very fine meshes lose digits: use fewer elements of a higher order)"
+                "stage {stage}: at least one of the requested modes was not found: the number of negative pivots shows \
+                 more (very slender beams on very fine meshes lose digits: use fewer elements of a higher order)"
             );
             self.stage.warn(WarningKind::MissingModes, message);
         }

@@ -78,7 +78,7 @@ impl<'r> Analysis<'r> for ArcLength<'_, 'r> {
         let arrival = Follower { stage, space: &mut space, path: &mut path }.go_to(1.0, bounds)?;
         if arrival == Arrival::OutOfSteps {
             let at = stage.moment();
-            let message = format!("the path ends after `max_steps` = {max_steps} increments at {at}");
+            let message = format!("the path was stopped after `max_steps` = {max_steps} increments at {at}");
             stage.warn(WarningKind::PathEnds, message);
         }
         conclude(stage, &mut space, path.here.signature, path.here.on_limit)

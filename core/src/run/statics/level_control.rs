@@ -14,8 +14,8 @@ use crate::solve::{NewtonFailure, Signature};
 use crate::warning::WarningKind;
 
 /// The words about a stage that took over much from a motion.
-const IN_MOTION: &str =
-    " (the stage began in motion, whose forces fade: `[damping]` in the dynamic stage before it leaves less of them)";
+const IN_MOTION: &str = "(the stage started from a moving state, whose inertia forces are ramped down: `[damping]` in the previous dynamic \
+     stage makes them smaller)";
 
 /// The outcome of a step.
 enum StepOutcome {
@@ -140,13 +140,13 @@ impl LevelControl<'_, '_> {
         rest::refuse_loose(self.stage, &mut self.space)?;
         let at = self.stage.moment();
         let why = if let Failure::Singular { place: Some(place), .. } = &failure {
-            format!("nothing but its loads holds {place}")
+            format!("only the loads hold {place}")
         } else {
-            "load levels lead to no balance".into()
+            "load levels do not converge".into()
         };
         let message = format!(
-            "{why}: the state at {at} is where the structure came to rest, moved by all forces against an artificial resistance; it is in \
-             balance without that"
+            "{why}: the structure was moved by all forces against an artificial damping until it came to rest; the \
+             state at {at} is in equilibrium without that damping"
         );
         self.stage.warn(WarningKind::CameToRest, message);
         self.stability.signature = self.stability.look(self.stage);
@@ -201,8 +201,7 @@ impl LevelControl<'_, '_> {
         }
         let (at, steps) = (self.stage.moment(), self.stage.counters.steps);
         let motion = if self.stage.state.fading.is_empty() { "" } else { IN_MOTION };
-        let message =
-            format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
+        let message = format!("load control fails at {at}: the path is followed by arc length from there{motion}");
         self.stage.warn(WarningKind::ArcLengthDetour, message);
         let arrival = detour(self.stage, &mut self.space, &self.levels, target);
         let (end, increments) = (self.stage.moment(), self.stage.counters.steps - steps);
@@ -231,7 +230,7 @@ impl LevelControl<'_, '_> {
         self.levels.restart();
         self.stage.warn(
             WarningKind::LoadControlResumed,
-            format!("load control goes on at load factor {target}, after {increments} increments of arc length"),
+            format!("load control continues at load factor {target}, after {increments} arc-length increments"),
         );
     }
 }

@@ -83,7 +83,8 @@ fn warn_of_soft_mode(stage: &mut StageRun, soft_mode: SoftMode) {
     // At the start of a run cables and strings are meant to be so.
     if soft_mode.is_held_by_stress() {
         let named = stage.name_mechanism(Some(soft_mode.vector), &stage.assembly.system);
-        let message = format!("but for the stress it is under at the start of the stage: {named}");
+        let message =
+            format!("only the stress at the start of the stage stabilises the structure; without it: {named}");
         stage.warn(WarningKind::HeldByStress, message);
     }
 }

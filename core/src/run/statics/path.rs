@@ -124,7 +124,7 @@ impl Path {
         let sizes = self.here.tangent.iter().map(|t| t.norm());
         let largest = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(slot, _)| slot);
         let node = stage.model.node_at(largest);
-        Err(Failure::NonFinite { at: stage.moment(), effect: Some("what a unit of load moves"), node })
+        Err(Failure::NonFinite { at: stage.moment(), effect: Some("the displacement per unit load"), node })
     }
 
     /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to

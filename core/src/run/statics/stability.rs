@@ -128,7 +128,7 @@ pub(super) fn tell_of_points(
     match stage.issued.points {
         0..MOST_TOLD => stage.warn(kind.warning(), event.to_string()),
         MOST_TOLD => {
-            let message = "more limit and branch points follow: run.json lists all of them as `events`";
+            let message = "more limit and branch points follow: all are listed in run.json under `events`";
             stage.warn(WarningKind::MorePoints, message);
         }
         _ => {}
