@@ -28,7 +28,7 @@ use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
 use beamsim_core::probe::{Figure, Probe, Quantity};
-use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
+use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
@@ -346,7 +346,8 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
             StageBody::Modal { modes } => StageWork::Modal { modes },
             StageBody::Buckling { modes } => StageWork::Buckling { modes },
             StageBody::Dynamic { end, step, scheme, step_tolerance, energy_limit } => {
-                StageWork::Dynamic { end, step, scheme: coefficients(scheme), adaptive: step_tolerance, energy_limit }
+                let scheme = coefficients(scheme);
+                StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: step_tolerance, energy_limit })
             }
         };
         let tolerance = stage.tolerance;

@@ -27,7 +27,7 @@ pub struct Assembly {
 /// An effect in a stage.
 struct Acting {
     effect: Arc<dyn Effect>,
-    /// What does its work, where the stage is one in a plane
+    /// The form that adds in its place, where the stage is treated in a plane
     planar: Option<Box<dyn PlanarForm>>,
     memory: Memory,
     instances: u64,
@@ -49,7 +49,7 @@ impl Acting {
         }
     }
 
-    /// Of its forces.
+    /// The categories of its forces.
     fn categories(&self) -> impl Iterator<Item = Category> {
         std::iter::once(self.effect.category()).chain(self.effect.damps().then_some(Category::Damping))
     }
@@ -85,7 +85,7 @@ fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part
     }
 }
 
-/// The same of those that inertia or damping come from, without a tangent.
+/// Adds the forces of effects that inertia or damping come from, without a tangent.
 fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
     for (number, acting) in effects.iter().enumerate() {
         if !acting.categories().any(|category| matches!(category, Category::Inertia | Category::Damping)) {
@@ -109,7 +109,7 @@ impl Assembly {
         let connectivity = threads::map(acting.iter(), |effect| effect.connectivity());
         let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, dof_map.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&connectivity).map(acts).collect();
-        // What is linear adds its forces by itself.
+        // Linear stages add their forces by themselves.
         let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
         let categories: Vec<Vec<Category>> = effects.iter().map(|acting| acting.categories().collect()).collect();
         let node_blocks = model.node_blocks(dof_map.layout());
@@ -134,8 +134,8 @@ impl Assembly {
         Ok(())
     }
 
-    /// Forces of the state, and the tangent of the weights; `prescribed_increment`: see [`System::clear`]. Without weights the tangent is left as
-    /// it is.
+    /// Forces of the state, and the tangent of the weights; `prescribed_increment`: see
+    /// [`System::clear`]. Without weights the tangent is left as it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, prescribed_increment: Option<&[Vec3]>) {
         match self.linear.take() {
             None => self.evaluate_effects(state, weights, prescribed_increment),
@@ -146,7 +146,8 @@ impl Assembly {
         }
     }
 
-    /// The same where factors may have taken the place of a tangent that was formed already.
+    /// Forces and tangent as [`Self::evaluate`] forms them, also where factors have taken the place
+    /// of a tangent that was formed already.
     pub fn form_again(&mut self, state: &State, weights: Weights) {
         if let Some(linear) = &mut self.linear {
             linear.formed = None;
@@ -155,7 +156,8 @@ impl Assembly {
         self.evaluate(state, weights, prescribed_increment.as_deref());
     }
 
-    /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
+    /// The tangent is formed where its weights change; and where increments are prescribed, which
+    /// act through it.
     fn evaluate_linear(
         &mut self,
         linear: &mut Linear,
@@ -182,7 +184,7 @@ impl Assembly {
         let with_tangent = weights != Weights::NONE;
         debug_assert!(with_tangent || prescribed_increment.is_none(), "prescribed increments act through the tangent");
         self.system.begin(with_tangent, prescribed_increment);
-        // What has just been cleared is still near.
+        // Memory that has just been cleared is still in the cache.
         self.add_effects(state, weights, |part| part.clear(with_tangent));
     }
 
@@ -199,8 +201,8 @@ impl Assembly {
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 
-    /// Inertia and damping of a state alone, into other forces than those of the system, which stay; what else stands there is nobody's.
-    /// In linear stages those of its rates.
+    /// Inertia and damping of a state alone, into other forces than those of the system, which
+    /// stay; what else stands there is nobody's. In linear stages those of its rates.
     pub fn evaluate_rates(&mut self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         if let Some(linear) = &self.linear {
             force.iter_mut().for_each(|force| force.fill(Vec3::ZERO));
@@ -218,7 +220,7 @@ impl Assembly {
         std::mem::swap(&mut self.system.force, force);
     }
 
-    /// Whether any effect forms tangents with something that it foresees.
+    /// Tells whether any effect forms tangents with stresses that it foresees.
     pub fn foresees(&self) -> bool {
         self.linear.is_none() && self.effects.iter().any(|acting| !acting.memory.points.is_empty())
     }
@@ -238,7 +240,8 @@ impl Assembly {
         self.effects.iter_mut().for_each(|acting| acting.memory.valid = false);
     }
 
-    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Constraint::drift`](crate::effect::Constraint::drift).
+    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers;
+    /// see [`Constraint::drift`](crate::effect::Constraint::drift).
     pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
         let [mut rates, mut rates2] = [state.q.len(); 2].map(zeros);
         let constraints = self.effects.iter().filter_map(|acting| acting.effect.roles().constraint);
@@ -257,8 +260,8 @@ impl Assembly {
         self.effects.iter().map(|acting| acting.effect.strain_of(state, field, length)).fold(0.0, f64::max)
     }
 
-    /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of the others; `None` where no effect does.
-    /// The tangent is used up.
+    /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of
+    /// the others; `None` where no effect does. The tangent is used up.
     pub fn stiffness_along(&mut self, state: &State, field: &[Vec3]) -> Option<f64> {
         let told_by = |acting: &Acting| acting.effect.roles().stresses?.stiffness_along(state, field);
         let told: Vec<Option<f64>> = self.effects.iter().map(told_by).collect();

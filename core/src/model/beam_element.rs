@@ -1,11 +1,11 @@
-//! From the geometry of beam elements to the elements of effects: integration points, elasticity, volume points, mass at nodes.
+//! From the geometry of beam elements to the elements of effects: integration points, elasticity,
+//! volume points, mass at nodes.
 
-use crate::effect::elasticity::{ElasticElement, ElasticElements};
+use crate::effect::elasticity::{BeamLaw, ElasticElement, ElasticElements, ElasticPoint};
 use crate::effect::inertia::Body;
 use crate::effect::{Connection, VolumeElement, VolumeElements};
-use crate::kernel::beam::StiffnessPoint;
-use crate::kernel::elastic::{Stiffness, Strain};
 use crate::kernel::inertia::Inertia;
+use crate::kernel::law::Strain;
 use crate::kernel::volume::VolumePoint;
 use crate::kernel::{MAX_NODES, shape};
 use crate::system::Node;
@@ -45,7 +45,8 @@ pub enum Rule {
     Inner,
     /// For mass and line loads
     Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
+    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated
+    /// as vectors
     Nodal,
 }
 
@@ -131,19 +132,20 @@ fn volume<const N: usize, Q: Copy + PartialEq>(
 }
 
 /// The elastic properties of an integration point.
-pub struct ElasticPoint {
+pub struct SectionPoint {
     /// The section in global components
-    pub stiffness: Stiffness,
+    pub law: BeamLaw,
     /// The strain without stress for an amplitude of one
     pub free: Option<Strain>,
 }
 
-/// Pushes an elastic element into the batch of its order; `free`: the number of the amplitude of its free strain.
+/// Pushes an elastic element into the batch of its order; `free`: the number of the amplitude of
+/// its free strain.
 pub fn push_elastic(
     batches: &mut ElasticElements,
     element: &impl ElementGeometry,
     free: Option<usize>,
-    point: impl Fn(&Station) -> ElasticPoint,
+    point: impl Fn(&Station) -> SectionPoint,
 ) {
     match element.count() {
         2 => batches.two.push(elastic(element, free, point, batches.two.last())),
@@ -155,23 +157,23 @@ pub fn push_elastic(
 fn elastic<const N: usize, const G: usize>(
     element: &impl ElementGeometry,
     free: Option<usize>,
-    point: impl Fn(&Station) -> ElasticPoint,
+    point: impl Fn(&Station) -> SectionPoint,
     neighbour: Option<&ElasticElement<N, G>>,
 ) -> ElasticElement<N, G> {
     let stations = element.stations(Rule::Inner);
-    let stiffness_point = |k: usize| {
+    let elastic_point = |k: usize| {
         let station = &stations[k];
-        let ElasticPoint { stiffness, free } = point(station);
-        StiffnessPoint {
+        let SectionPoint { law, free } = point(station);
+        ElasticPoint {
             shape: std::array::from_fn(|i| station.shape[i]),
             slope: std::array::from_fn(|i| station.slope[i]),
             weight: station.weight,
             tangent: station.axes.column(0),
-            stiffness,
+            law,
             free,
         }
     };
-    let points = std::array::from_fn(stiffness_point);
+    let points = std::array::from_fn(elastic_point);
     ElasticElement::new(connect(element), element.rounding(), element.arms(), points, free, neighbour)
 }
 

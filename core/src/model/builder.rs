@@ -1,7 +1,7 @@
 //! Builds a [`Model`] from nodes, straight beams, supports and loads, without a deck.
 
 use super::beam_element::{
-    ElasticPoint, ElementGeometry, NodalInertia, PlacedNode, Rule, Station, body_inertia, push_elastic, push_volume,
+    ElementGeometry, NodalInertia, PlacedNode, Rule, SectionPoint, Station, body_inertia, push_elastic, push_volume,
     shape_at,
 };
 use super::parts::ModelParts;
@@ -25,14 +25,16 @@ const PARALLEL: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeId(usize);
 
-/// A straight beam of equal elements with one section, whose rotations are interpolated relative to each element.
+/// A straight beam of equal elements with one section, whose rotations are interpolated relative to
+/// each element.
 #[derive(Clone, Debug)]
 pub struct StraightBeam {
     /// Start and end
     pub ends: [NodeId; 2],
     /// Its section
     pub section: SectionMatrices,
-    /// The third section axis is the part of it normal to the beam; EI2 bends about the second, EI3 about the third.
+    /// The third section axis is the part of it normal to the beam; EI2 bends about the second, EI3
+    /// about the third.
     pub axis3: Vec3,
     /// The number of elements
     pub elements: usize,
@@ -40,14 +42,14 @@ pub struct StraightBeam {
     pub order: usize,
 }
 
-/// What a builder was given and cannot use.
+/// The reason why a part cannot be built.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BuildError {
     /// A node of another builder
     UnknownNode(usize),
     /// Two nodes at one place
     NoLength {
-        /// What lies between them
+        /// The part that lies between them
         what: &'static str,
         /// The names of both
         nodes: [String; 2],
@@ -174,8 +176,9 @@ impl ElementGeometry for StraightElement<'_> {
 
 /// Collects the parts of a scene.
 ///
-/// Loads and motions come with an [`Amplitude`], which says when they act: `Amplitude::default()` ramps a load up in the first
-/// static stage, and applies it in full from the start of a dynamic one.
+/// Loads and motions come with an [`Amplitude`], which says when they act: `Amplitude::default()`
+/// ramps a load up in the first static stage, and applies it in full from the start of a dynamic
+/// one.
 #[derive(Default)]
 pub struct ModelBuilder {
     nodes: Vec<PlacedNode>,
@@ -247,6 +250,10 @@ impl ModelBuilder {
             if row[place].is_nan() || row[place] <= 0.0 {
                 return Err(BuildError::Stiffness(place, row[place]));
             }
+        }
+        let mass = beam.section.mass_per_length().mass;
+        if mass.is_nan() || mass < 0.0 {
+            return Err(BuildError::Mass(mass));
         }
         let length = way.norm();
         let tangent = way * (1.0 / length);
@@ -324,8 +331,8 @@ impl ModelBuilder {
         self.load(node, NodeLoadKind::SpatialMoment, moment, Amplitude::default())
     }
 
-    /// A rigid body at a node: its mass, the place of its mass centre as seen from the node, and its inertia about the mass centre
-    /// along the global axes.
+    /// A rigid body at a node: its mass, the place of its mass centre as seen from the node, and
+    /// its inertia about the mass centre along the global axes.
     pub fn body(&mut self, node: NodeId, mass: f64, offset: Vec3, inertia: [f64; 3]) -> Result<(), BuildError> {
         let PlacedNode { node, place } = self.find(node)?;
         if let Some(&wrong) = [mass].iter().chain(&inertia).find(|value| !value.is_finite() || **value < 0.0) {
@@ -336,7 +343,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// A spring from a node to ground: stiffness against displacement and rotation, along the global axes.
+    /// A spring from a node to ground: stiffness against displacement and rotation, along the
+    /// global axes.
     pub fn ground_spring(&mut self, node: NodeId, stiffness: [f64; 6]) -> Result<(), BuildError> {
         let node = self.slots(node)?;
         let [x, y, z, rx, ry, rz] = stiffness;
@@ -369,8 +377,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Prescribes the displacement of a node along an axis, or its rotation about one; the amplitude is one
-    /// [of a motion](Amplitude::of_motion).
+    /// Prescribes the displacement of a node along an axis, or its rotation about one; the
+    /// amplitude is one [of a motion](Amplitude::of_motion).
     pub fn motion(
         &mut self,
         node: NodeId,
@@ -444,20 +452,24 @@ impl ModelBuilder {
             let is_eccentric = turned.offset != Vec3::ZERO;
             let at_nodes = if is_eccentric { turned } else { Inertia { mass: 0.0, ..turned } };
             let on_line = Inertia { about_node: Mat3::ZERO, ..turned };
-            let stiffness = beam.section.stiffness_in(beam.axes);
+            let law = beam.section.law_in(beam.axes);
             for number in 0..beam.elements {
                 let element = StraightElement { nodes: &self.nodes, beam, number };
-                push_elastic(&mut elastic, &element, None, |_| ElasticPoint { stiffness, free: None });
+                push_elastic(&mut elastic, &element, None, |_| SectionPoint { law, free: None });
                 for (i, station) in element.stations(Rule::Nodal).iter().enumerate() {
                     nodal.add(element.node_number(i), &at_nodes, station.weight);
                 }
                 if !is_eccentric && on_line.mass != 0.0 {
                     let stations = element.stations(Rule::Volume);
                     push_volume(&mut mass, &element, &stations, |_| on_line.mass);
-                    push_volume(&mut heavy, &element, &stations, |_| on_line);
+                    if self.gravity != Vec3::ZERO {
+                        push_volume(&mut heavy, &element, &stations, |_| on_line);
+                    }
                 }
             }
         }
+        elastic.shrink_to_fit();
+        heavy.shrink_to_fit();
         let sections = nodal.bodies(|node| self.nodes[node]);
         effects.push(!elastic.is_empty(), BeamElasticity::<RelativeVectors>::new(elastic));
         let mass = BeamMass::new(&mass);
@@ -467,7 +479,8 @@ impl ModelBuilder {
         let sections = RigidBody { name: "section inertia at nodes", bodies: sections, gyroscopic: true };
         effects.push(!sections.bodies.is_empty(), sections);
         if self.gravity != Vec3::ZERO {
-            let (acceleration, amplitude) = (self.gravity, self.amplitude(Amplitude::default()));
+            let acceleration = self.gravity;
+            let amplitude = self.amplitude(Amplitude::default());
             effects.push(!heavy.is_empty(), BeamGravity { acceleration, amplitude, elements: heavy });
             effects.push(!massive.is_empty(), BodyGravity { acceleration, amplitude, bodies: massive });
         }

@@ -15,7 +15,8 @@ pub struct Support {
 }
 
 impl Support {
-    /// What of it decides whether the scene lies in a plane: the directions that it holds at each slot.
+    /// Shows the directions that it holds at each slot, which decide whether the scene lies in a
+    /// plane.
     pub fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for at_slot in self.directions.chunk_by(|a, b| a.slot == b.slot) {
             let held = at_slot.iter().fold(Mat3::ZERO, |sum, direction| sum + direction.axis.outer(direction.axis));
@@ -60,13 +61,13 @@ impl Motion {
         }
     }
 
-    /// Whether two positions are different ones, on the scale of a scene of this `length`.
+    /// Tells whether two positions differ, on the scale of a scene of this `length`.
     pub fn is_apart(&self, from: f64, to: f64, length: f64) -> bool {
         let scale = if self.kind == MotionKind::Translation { length } else { 1.0 };
         (to - from).abs() > 1e-9 * scale
     }
 
-    /// What of it decides whether the scene lies in a plane.
+    /// The vector that decides whether the scene lies in a plane.
     pub fn aspect(&self) -> MirrorData {
         let full = self.amplitude.full();
         match self.kind {
@@ -84,12 +85,13 @@ impl Motion {
         }
     }
 
-    /// Sets position, velocity and acceleration in a state, from the value and its two derivatives over time. A rotation about
-    /// n is P = theta n, Pd = theta' n, Pdd = theta'' n, with theta at the representative nearest to the present chart; an
-    /// increment is what theta has grown by, and the spin theta' n.
+    /// Sets position, velocity and acceleration in a state, from the value and its two derivatives
+    /// over time. A rotation about n is P = theta n, Pd = theta' n, Pdd = theta'' n, with theta at
+    /// the representative nearest to the present chart; an increment is what theta has grown by,
+    /// and the spin theta' n.
     ///
-    /// Returns how far it turns the node from the last converged state: beyond half a turn nobody could tell in which
-    /// direction it went.
+    /// Returns how far it turns the node from the last converged state: beyond half a turn nobody
+    /// could tell in which direction it went.
     pub(super) fn impose(&self, [value, rate, rate2]: [f64; 3], state: &mut State) -> f64 {
         let (slot, n) = (self.slot as usize, self.axis);
         match self.kind {

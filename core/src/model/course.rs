@@ -1,10 +1,10 @@
-//! How loads and prescribed motions go through the stages: the part of it that never changes ([`Amplitude`]), and the part that
-//! does ([`Progress`]).
+//! How loads and prescribed motions go through the stages: the part of it that never changes
+//! ([`Amplitude`]), and the part that does ([`Progress`]).
 
 use super::history::{HistoryClock, Phase, Reading};
 use crate::system::{StageKind, StageSet};
 
-/// What a load or a motion does in one stage.
+/// The way of a load or a motion through one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Course {
     /// It does nothing.
@@ -40,15 +40,17 @@ impl Ramp {
 /// How something enters and leaves the stages in which it acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Entry {
-    /// Static stages ramp it up, and down where it acts no more; it acts in full from the start of dynamic ones.
+    /// Static stages ramp it up, and down where it acts no more; it acts in full from the start of
+    /// dynamic ones.
     Load,
     /// It is there or not.
     Switch,
-    /// Static stages ramp it up; a dynamic stage behind one in which it has acted keeps it where it is.
+    /// Static stages ramp it up; a dynamic stage behind one in which it has acted keeps it where it
+    /// is.
     Motion,
 }
 
-/// What leads a load or a motion through a stage in which it acts.
+/// The aim of a load or a motion in a stage in which it acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Goal {
     /// Its full size, or that part of it with which its history will begin
@@ -77,8 +79,9 @@ impl Default for Amplitude {
 }
 
 impl Amplitude {
-    /// The factor of a load with this history, or with the default one: up with the load factor of the first static stage in
-    /// which it acts, then in full; in full from the start of a dynamic stage.
+    /// The factor of a load with this history, or with the default one: up with the load factor of
+    /// the first static stage in which it acts, then in full; in full from the start of a dynamic
+    /// stage.
     pub fn of_load(history: Option<Reading>, stages: StageSet) -> Self {
         Self { history, stages, entry: Entry::Load, full: 1.0 }
     }
@@ -103,12 +106,12 @@ impl Amplitude {
         &self.stages
     }
 
-    /// Whether its history belongs to some stages only; `None` without a history.
+    /// Tells whether its history belongs to some stages only; `None` without a history.
     pub fn has_own_stages(&self) -> Option<bool> {
         self.history.as_ref().map(Reading::has_own_stages)
     }
 
-    /// Whether it acts in stage number `stage`, from 0.
+    /// Tells whether it acts in stage number `stage`, from 0.
     pub fn acts_in(&self, stage: usize) -> bool {
         self.stages.contains(stage)
     }
@@ -138,11 +141,12 @@ pub(super) struct StageStart {
     pub kind: StageKind,
     /// The run's clock
     pub time: f64,
-    /// Whether loads or motions act for the first time in it
+    /// Tells whether loads or motions act for the first time in it
     pub fresh: bool,
 }
 
-/// What a load or a motion does in the present stage, and what earlier stages have left of it: all of it that changes in a run.
+/// The course of a load or a motion in the present stage, and the traces of earlier stages: all of
+/// it that changes in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
     course: Course,
@@ -155,14 +159,14 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Whether it would grow for the first time in a static stage with this number.
+    /// Tells whether it would grow for the first time in a static stage with this number.
     pub(super) fn is_fresh(&self, amplitude: &Amplitude, stage: usize) -> bool {
         let grows = matches!(amplitude.goal(stage), Goal::Value(factor) if factor != 0.0);
         amplitude.acts_in(stage) && !self.has_acted && amplitude.entry != Entry::Switch && grows
     }
 
-    /// Settles the course of a stage. A buckling stage goes on where the last static one has stopped, unless there are loads
-    /// that are fresh in it: then these alone grow.
+    /// Settles the course of a stage. A buckling stage goes on where the last static one has
+    /// stopped, unless there are loads that are fresh in it: then these alone grow.
     pub(super) fn begin_stage(&mut self, amplitude: &Amplitude, start: &StageStart) {
         if let Some(history) = &amplitude.history {
             history.begin_stage(&mut self.clock, start.number, start.kind, start.time);
@@ -209,7 +213,7 @@ impl Progress {
         }
     }
 
-    /// Whether it goes with the load factor in the present stage.
+    /// Tells whether it goes with the load factor in the present stage.
     pub(super) fn grows(&self) -> bool {
         matches!(self.course, Course::Ramp(ramp) if ramp.grows())
     }
@@ -227,12 +231,12 @@ impl<'a> Timeline<'a> {
         Self { amplitude, progress }
     }
 
-    /// Whether it acts in the present stage: what is off prescribes nothing.
+    /// Tells whether it acts in the present stage.
     pub fn acts(&self) -> bool {
         self.progress.course != Course::Off
     }
 
-    /// Whether it follows a history in the present stage.
+    /// Tells whether it follows a history in the present stage.
     pub fn follows_history(&self) -> bool {
         matches!(self.progress.course, Course::History(_))
     }

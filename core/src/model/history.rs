@@ -31,8 +31,9 @@ pub trait History: Send + Sync {
 
 /// A history as a load or a motion reads it: in all stages, or in those that it belongs to.
 ///
-/// Static stages read it over the load factor, dynamic ones over the clock. A history that belongs to stages reads the time
-/// that has passed in its dynamic stages instead, so that it begins where the first of them does.
+/// Static stages read it over the load factor, dynamic ones over the clock. A history that belongs
+/// to stages reads the time that has passed in its dynamic stages instead, so that it begins where
+/// the first of them does.
 #[derive(Clone)]
 pub struct Reading {
     function: Arc<dyn History>,
@@ -105,7 +106,8 @@ impl Reading {
         }
     }
 
-    /// The value in a stage, and its derivatives over time. In statics the load takes the place of the time, and nothing moves.
+    /// The value in a stage, and its derivatives over time. In statics the load takes the place of
+    /// the time, and nothing moves.
     pub fn at(&self, clock: &HistoryClock, kind: StageKind, time: f64, load: f64) -> [f64; 3] {
         match kind {
             StageKind::Static => [self.function.at(load)[0], 0.0, 0.0],
@@ -145,8 +147,8 @@ fn next_on_clock(clock: &HistoryClock, time: f64, next: impl Fn(f64) -> Option<f
     Some(x + origin)
 }
 
-/// A table: linear between its points and constant outside; or smooth, each interval by s^3 (10 - 15 s + 6 s^2), whose
-/// first and second derivatives vanish at both ends.
+/// A table: linear between its points and constant outside; or smooth, each interval by s^3 (10 -
+/// 15 s + 6 s^2), whose first and second derivatives vanish at both ends.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// Increasing abscissas
@@ -209,7 +211,8 @@ impl History for Table {
     }
 }
 
-/// A velocity that jumps by less than this part of the largest one is that of a smooth motion as a table samples it.
+/// A velocity that jumps by less than this part of the largest one is that of a smooth motion as a
+/// table samples it.
 pub const NOTICED: f64 = 0.05;
 
 impl Table {

@@ -36,8 +36,9 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// A state that is out of a plane by less, relative to the largest motion, is in it: a stage before that ran in space leaves round-off of
-/// a few thousand steps. What is left aside is dropped, a hundredth of what planar and spatial answers may differ by.
+/// A state that is out of a plane by less, relative to the largest motion, is in it: a stage before
+/// that ran in space leaves round-off of a few thousand steps. What is left aside is dropped, a
+/// hundredth of what planar and spatial answers may differ by.
 const OUT_OF_PLANE: f64 = 1e-12;
 
 /// The kind of vector that a slot holds.
@@ -57,17 +58,18 @@ impl SlotKind {
     /// All of them, in their order
     pub const ALL: [Self; 4] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment];
 
-    /// Whether it is one of multipliers: no unknowns of motion, and what stands in the place of forces are gaps.
+    /// Tells whether it holds multipliers: no unknowns of motion, with gaps in the place of forces.
     pub fn is_multiplier(self) -> bool {
         matches!(self, Self::Force | Self::Moment)
     }
 
-    /// What turns the forces of such a slot into forces that compare: a length for moments, 1 for forces.
+    /// The arm that moments are divided by to compare with forces: a length for rotations, else 1.
     pub fn arm(self, length: f64) -> f64 {
         if self == Self::Rotation { length } else { 1.0 }
     }
 
-    /// What the unknowns of such a slot are compared with: a length for displacements, 1 for rotations.
+    /// The scale that the unknowns of such a slot are compared with: a length for displacements, 1
+    /// for rotations.
     pub fn scale(self, length: f64) -> f64 {
         if self == Self::Displacement { length } else { 1.0 }
     }
@@ -78,7 +80,8 @@ impl SlotKind {
 pub struct ElementInfo {
     all: [Slot; MAX_NODES],
     count: u8,
-    /// Whether it interpolates total rotation vectors, so that all of them must be taken in one chart
+    /// True where it interpolates total rotation vectors, so that all of them must be taken in one
+    /// chart
     pub in_one_chart: bool,
 }
 
@@ -134,7 +137,7 @@ pub struct Model {
     pub(crate) motions: Vec<Motion>,
     /// The plane that the scene lies in, where it is treated in one
     pub plane: Option<Plane>,
-    /// Whether static and dynamic stages are linear in the displacements
+    /// True where static and dynamic stages are linear in the displacements
     pub linear: bool,
     /// The length to which displacements are compared: the diagonal of the scene's box, or 1
     pub length: f64,
@@ -156,7 +159,7 @@ impl Model {
         State::rest(self.slots(), self.elements, self.amplitudes.len(), self.angles)
     }
 
-    /// Whether a slot holds a rotation vector.
+    /// Tells whether a slot holds a rotation vector.
     pub fn is_rotation(&self, slot: Slot) -> bool {
         self.kinds[slot as usize] == SlotKind::Rotation
     }
@@ -178,7 +181,7 @@ impl Model {
         rotations + displacements / self.length.powi(2)
     }
 
-    /// Whether no mass of a stage sits where something is free to move.
+    /// Tells whether no mass of a stage sits where something is free to move.
     pub fn lacks_mass(&self, stage: &StageContext, dof_map: &DofMap) -> bool {
         let is_free = |&slot: &Slot| dof_map.of(slot).iter().any(|&number| number != DofMap::HELD);
         let effects = self.effects.iter().filter(|effect| effect.category() == Category::Inertia && effect.acts(stage));
@@ -218,7 +221,7 @@ impl Model {
         if self.is_linear(kind) { NONE } else { &self.rotating }
     }
 
-    /// Whether stages of a kind are linear in the displacements.
+    /// Tells whether stages of a kind are linear in the displacements.
     pub fn is_linear(&self, kind: StageKind) -> bool {
         self.linear && kind.advances_state()
     }
@@ -232,7 +235,8 @@ impl Model {
         self.motions.iter().for_each(|motion| show("motions", motion.aspect()));
     }
 
-    /// Takes out of a state what round-off has put aside of its plane: nothing else would, and it grows from step to step.
+    /// Takes out of a state what round-off has put aside of its plane: nothing else would, and it
+    /// grows from step to step.
     pub fn flatten(&self, plane: &Plane, state: &mut State) {
         if !plane.is_tilted() {
             return;
@@ -251,7 +255,7 @@ impl Model {
         }
     }
 
-    /// Whether a state lies in a plane and moves in it, but for round-off.
+    /// Tells whether a state lies in a plane and moves in it, but for round-off.
     fn keeps(&self, state: &State, plane: &Plane) -> bool {
         let normal = plane.normal();
         let aside = |(kind, value): (&SlotKind, &Vec3)| match kind {
@@ -312,13 +316,13 @@ impl Model {
         sum
     }
 
-    /// What joints to ground do to a node, see [`Constraint::held_by_ground`].
+    /// Force and moment of joints to ground on a node, see [`Constraint::held_by_ground`].
     pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
         let parts = self.constraints().map(|constraint| constraint.held_by_ground(state, node));
         parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
     }
 
-    /// What is driven from outside: each coordinate with the derivative of the energy over it.
+    /// Coordinates that are driven from outside, each with the derivative of the energy over it.
     pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
         let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);

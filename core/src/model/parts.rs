@@ -12,7 +12,8 @@ use std::sync::Arc;
 pub struct ModelParts {
     /// The names of the nodes, by their slots
     pub names: Names,
-    /// The slots of multipliers, which follow those of the nodes: their kinds, and the joints that they are named after
+    /// The slots of multipliers, which follow those of the nodes: their kinds, and the joints that
+    /// they are named after
     pub multipliers: Vec<(SlotKind, String)>,
     /// The beam elements in their order
     pub elements: Vec<ElementInfo>,
@@ -28,7 +29,7 @@ pub struct ModelParts {
     pub supports: Vec<Support>,
     /// Prescribed motions
     pub motions: Vec<Motion>,
-    /// Whether static and dynamic stages are linear in the displacements
+    /// True where static and dynamic stages are linear in the displacements
     pub linear: bool,
 }
 
@@ -65,7 +66,8 @@ impl ModelParts {
     }
 }
 
-/// The diagonal of the box around some places, or 1 where it has none: the length to which displacements are compared.
+/// The diagonal of the box around some places, or 1 where it has none: the length to which
+/// displacements are compared.
 fn diagonal(places: impl Iterator<Item = Vec3>) -> f64 {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];

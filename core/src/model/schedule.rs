@@ -1,4 +1,5 @@
-//! What changes in a run besides the state: what loads and motions do in the present stage, and what earlier stages have left of them.
+//! What changes in a run besides the state: what loads and motions do in the present stage, and
+//! what earlier stages have left of them.
 
 use super::course::{Progress, StageStart, Timeline};
 use super::stage_error::{Jump, StageError};
@@ -10,10 +11,12 @@ use std::collections::HashMap;
 /// The angle by which a prescribed rotation may go in one step or load increment, in radians.
 const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
 
-/// The part of a rotation vector along a held axis above which it has turned about it, in radians; and the sine above which axes differ.
+/// The part of a rotation vector along a held axis above which it has turned about it, in radians;
+/// and the sine above which axes differ.
 const NOT_ZERO: f64 = 1e-9;
 
-/// The courses of all loads and prescribed motions of a model. Plain data: with the state it is all of a scene that changes in a run.
+/// The courses of all loads and prescribed motions of a model. Plain data: with the state it is all
+/// of a scene that changes in a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     stage: usize,
@@ -92,14 +95,15 @@ impl Schedule {
         }
     }
 
-    /// Whether loads or motions without a history act for the first time in a stage that has not begun.
+    /// Tells whether loads or motions without a history act for the first time in a stage that has
+    /// not begun.
     pub fn has_fresh_loads(&self, model: &Model, stage: usize) -> bool {
         let loads = self.loads.iter().zip(&model.amplitudes);
         let motions = self.motions.iter().zip(model.motions.iter().map(|motion| &motion.amplitude));
         loads.chain(motions).any(|(progress, amplitude)| progress.is_fresh(amplitude, stage))
     }
 
-    /// Whether neither a load nor a motion goes with the load factor in the present stage.
+    /// Tells whether neither a load nor a motion goes with the load factor in the present stage.
     pub fn is_idle(&self) -> bool {
         !self.loads.iter().chain(&self.motions).any(Progress::grows)
     }
@@ -134,7 +138,8 @@ impl Schedule {
         numbered.map_err(StageError::Conflict)
     }
 
-    /// One or two held components of a rotation vector survive a change of chart only where they are zero.
+    /// One or two held components of a rotation vector survive a change of chart only where they
+    /// are zero.
     pub fn refuse_turned_hinges(&self, model: &Model, state: &State) -> Result<(), StageError> {
         let mut held: HashMap<Slot, Vec<Vec3>> = HashMap::new();
         self.held_directions(model).iter().for_each(|d| held.entry(d.slot).or_default().push(d.axis));
@@ -155,8 +160,8 @@ impl Schedule {
         timelines.filter_map(|timeline| timeline.next_corner(time)).min_by(f64::total_cmp)
     }
 
-    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions. Where a motion turns
-    /// its node too far at once, its slot and the angle are returned.
+    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed
+    /// motions. Where a motion turns its node too far at once, its slot and the angle are returned.
     pub fn set_clock(&self, model: &Model, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
         let before = state.amplitude.clone();
         (state.time, state.load) = (time, load);
@@ -183,7 +188,8 @@ impl Schedule {
     fn held_directions(&self, model: &Model) -> Vec<Direction> {
         let supports = model.supports.iter().filter(|support| support.stages.contains(self.stage));
         let moved = self.motions(model).filter(|(_, timeline)| timeline.acts());
-        // A prescribed rotation holds all of its node, so that what a joint about the same axis holds is no question any more.
+        // A prescribed rotation holds all of its node, so that what a joint about the same axis
+        // holds is no question any more.
         let prescribed = moved.flat_map(|(motion, _)| motion.directions());
         prescribed.chain(supports.flat_map(|support| support.directions.clone())).collect()
     }

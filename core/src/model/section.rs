@@ -1,8 +1,12 @@
 //! Sections of beams as matrices in their own axes: the first is the tangent of the centre line.
 
-use crate::kernel::elastic::Stiffness;
+use crate::effect::elasticity::BeamLaw;
 use crate::kernel::inertia::Inertia;
+use crate::kernel::law::{Linear, Stiffness};
 use crate::tensor::{Mat3, Vec3};
+
+/// Largest relative difference of stiffnesses, or of inertias, about two axes that a section does not tell apart.
+const ALIKE: f64 = 1e-9;
 
 /// Stiffness and mass of a section, local axes, order Gamma1 Gamma2 Gamma3 K1 K2 K3.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,24 +35,37 @@ impl SectionMatrices {
         Self { stiffness: std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))), mass: None }
     }
 
-    /// The section with a mass per length on the centre line, and inertia per length about the section axes.
+    /// The section with a mass per length on the centre line, and inertia per length about the
+    /// section axes.
     pub fn with_mass(self, mass: f64, about_axes: [f64; 3]) -> Self {
         let mass = MassPerLength { mass, offset: Vec3::ZERO, about_line: Mat3::diagonal(about_axes) };
         Self { mass: Some(mass), ..self }
     }
 
-    /// The stiffness in global components, for section axes R0.
-    pub fn stiffness_in(&self, r0: Mat3) -> Stiffness {
+    /// The law in global components, for section axes R0.
+    pub fn law_in(&self, r0: Mat3) -> BeamLaw {
         let block = |row: usize, column: usize| {
             Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.stiffness[3 * row + i][3 * column + j])))
         };
         let turned = |m: Mat3| r0 * m * r0.transpose();
         let coupling = block(0, 1);
-        Stiffness {
+        let stiffness = Stiffness {
             cn: turned(block(0, 0)),
             cm: turned(block(1, 1)),
             cc: (coupling != Mat3::ZERO).then(|| turned(coupling)),
-        }
+        };
+        Linear { stiffness }
+    }
+
+    /// True if the section bends, shears and has inertia about all axes across the beam alike, and couples nothing.
+    pub fn is_round(&self) -> bool {
+        let Self { stiffness: k, mass } = self;
+        let j = mass.map_or(Mat3::ZERO, |mass| mass.about_line).0;
+        let turns_alike = (j[1][1] - j[2][2]).abs() <= ALIKE * j[1][1].abs() && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
+        let size = |i: usize| k[i][i].abs();
+        let alike = |i: usize, j: usize| (k[i][i] - k[j][j]).abs() <= ALIKE * size(i).max(size(j));
+        let apart = |i: usize, j: usize| i == j || k[i][j].abs() <= ALIKE * (size(i) * size(j)).sqrt();
+        turns_alike && alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
     }
 
     /// The mass per length: zero where none is given.

@@ -2,7 +2,8 @@
 
 use crate::system::{FrameConflict, Slot, StageKind};
 
-/// Largest jump of a motor at the start of a dynamic stage, in radians or relative to the scene's length.
+/// Largest jump of a motor at the start of a dynamic stage, in radians or relative to the scene's
+/// length.
 pub const LARGEST_GAP: f64 = 1e-6;
 
 /// Why a stage cannot begin.
@@ -40,7 +41,7 @@ pub struct MotorJump {
     pub slot: Slot,
     /// The number of its amplitude
     pub amplitude: usize,
-    /// Whether it turns, or slides
+    /// True where it turns, false where it slides
     pub turns: bool,
     /// The angle or displacement that it has reached
     pub from: f64,

@@ -29,7 +29,7 @@ pub struct Place {
 
 /// Attempts at a balance that was not found, and a known cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tried {
+pub struct Attempts {
     /// Attempts that were taken back
     pub cutbacks: u64,
     /// Round-off takes the stiffness of the softest motion.
@@ -54,7 +54,7 @@ pub enum Failure {
         /// The largest residual of each iterate of the last attempt, over what is allowed
         history: Vec<f64>,
         /// Attempts before it
-        tried: Tried,
+        tried: Attempts,
     },
     /// A node turns so far at once that nobody could tell which way.
     TurnsTooFar {

@@ -1,6 +1,6 @@
 //! Hints after a failure: cures that the plan does not have already.
 
-use super::failure::{Failure, Moment, Tried};
+use super::failure::{Attempts, Failure, Moment};
 use super::plan::{Approach, Plan, Stage};
 use crate::integrate::Scheme;
 use crate::system::Category;
@@ -57,7 +57,7 @@ impl<'a> Has<'a> {
         Some(Self { plan, stage: plan.stages.get(number - 1)?, before })
     }
 
-    fn hint_of_balance(&self, tried: &Tried) -> String {
+    fn hint_of_balance(&self, tried: &Attempts) -> String {
         if tried.soft {
             return "round-off takes the stiffness of the softest motion (see the warning): use fewer elements of a higher order".into();
         }

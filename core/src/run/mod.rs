@@ -31,7 +31,7 @@ pub use energy::Ledger;
 pub use failure::{Failure, Moment, Place};
 pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
 pub use observer::{Counters, Observer, Snapshot};
-pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, Until};
+pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until};
 pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};

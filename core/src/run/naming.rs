@@ -1,6 +1,6 @@
 //! Failures of a stage, named with their moment and their node.
 
-use super::failure::{Failure, Place, Tried};
+use super::failure::{Attempts, Failure, Place};
 use super::refusal::{refusal, refusal_help};
 use super::stage_run::StageRun;
 use crate::model::{Model, StageError};
@@ -26,7 +26,7 @@ impl StageRun<'_> {
                 residual: residual.value.norm(),
                 force: residual.force,
                 history,
-                tried: Tried { cutbacks: self.counters.cutbacks - self.cutbacks_before, soft: self.soft },
+                tried: Attempts { cutbacks: self.counters.cutbacks - self.cutbacks_before, soft: self.soft },
             },
             NewtonFailure::StepTooSmall { slot, error, share } => {
                 Failure::StepTooSmall { at, place: Place::of(self.model, slot, Vec3::ZERO), error, share }

@@ -84,10 +84,13 @@ pub struct Stage {
 }
 
 /// The tolerance of stages that name none: the part of the largest forces that may be out of balance.
-const TOLERANCE: f64 = 1e-8;
+const TOLERANCE: f64 = 1e-9;
 
 /// The limit of Newton's iterations of stages that name none
 const MAX_ITERATIONS: usize = 25;
+
+/// The part of the largest energies so far by which the total may grow, in dynamic stages that name none
+const ENERGY_LIMIT: f64 = 0.2;
 
 impl Stage {
     /// A stage seen from a frame at rest, with the usual tolerance.
@@ -102,7 +105,7 @@ impl Stage {
 
     /// Equal time steps to a time on the run's clock.
     pub fn dynamics(end: f64, step: f64, scheme: Scheme) -> Self {
-        Self::new(StageWork::Dynamic { end, step, scheme, adaptive: None, energy_limit: f64::INFINITY })
+        Self::new(StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: None, energy_limit: ENERGY_LIMIT }))
     }
 
     /// As effects see it, at this place among the stages.
@@ -139,18 +142,22 @@ pub enum StageWork {
         modes: usize,
     },
     /// Time steps
-    Dynamic {
-        /// Time on the run's clock at which it ends
-        end: f64,
-        /// Step, or the first one
-        step: f64,
-        /// The method
-        scheme: Scheme,
-        /// Tolerance of the errors of all steps, where they adapt to it
-        adaptive: Option<f64>,
-        /// The part of the largest energies so far by which the total may grow
-        energy_limit: f64,
-    },
+    Dynamic(TimeStepping),
+}
+
+/// The settings of time steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeStepping {
+    /// Time on the run's clock at which they end
+    pub end: f64,
+    /// The time step, or the first one
+    pub step: f64,
+    /// The scheme
+    pub scheme: Scheme,
+    /// Tolerance of the errors of all steps, where they adapt to it
+    pub adaptive: Option<f64>,
+    /// The part of the largest energies so far by which the total may grow
+    pub energy_limit: f64,
 }
 
 /// Newton iterations that a load level, a time step, a mode and a critical load usually take.
@@ -166,7 +173,7 @@ impl StageWork {
             Self::Static { .. } | Self::Path { .. } => StageKind::Static,
             Self::Modal { .. } => StageKind::Modal,
             Self::Buckling { .. } => StageKind::Buckling,
-            Self::Dynamic { .. } => StageKind::Dynamic,
+            Self::Dynamic(_) => StageKind::Dynamic,
         }
     }
 
@@ -174,7 +181,7 @@ impl StageWork {
     pub fn load_levels(&self) -> Option<usize> {
         match *self {
             Self::Static { steps, .. } | Self::Path { steps, .. } => Some(steps),
-            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic(_) => None,
         }
     }
 
@@ -182,14 +189,14 @@ impl StageWork {
     pub fn approach(&self) -> Option<Approach> {
         match *self {
             Self::Static { approach, .. } => Some(approach),
-            Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
+            Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic(_) => None,
         }
     }
 
     /// Its time scheme.
     pub fn scheme(&self) -> Option<Scheme> {
         match *self {
-            Self::Dynamic { scheme, .. } => Some(scheme),
+            Self::Dynamic(steps) => Some(steps.scheme),
             Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => None,
         }
     }
@@ -197,7 +204,7 @@ impl StageWork {
     /// The time on the run's clock at which it ends.
     pub fn end(&self) -> Option<f64> {
         match *self {
-            Self::Dynamic { end, .. } => Some(end),
+            Self::Dynamic(steps) => Some(steps.end),
             Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => None,
         }
     }
@@ -207,7 +214,7 @@ impl StageWork {
     pub fn follows_path(&self) -> bool {
         match self {
             Self::Path { .. } | Self::Buckling { .. } => true,
-            Self::Static { .. } | Self::Modal { .. } | Self::Dynamic { .. } => false,
+            Self::Static { .. } | Self::Modal { .. } | Self::Dynamic(_) => false,
         }
     }
 
@@ -215,7 +222,7 @@ impl StageWork {
     pub fn speeds_up(&self) -> bool {
         match self {
             Self::Buckling { .. } => true,
-            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Dynamic { .. } => false,
+            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Dynamic(_) => false,
         }
     }
 
@@ -224,7 +231,7 @@ impl StageWork {
         match *self {
             Self::Static { steps, .. } => steps as f64 * ITERATIONS_OF_A_LEVEL,
             Self::Path { max_steps, .. } => max_steps as f64 * ITERATIONS_OF_A_LEVEL,
-            Self::Dynamic { end, step, .. } => (end - start) / step * ITERATIONS_OF_A_STEP,
+            Self::Dynamic(steps) => (steps.end - start) / steps.step * ITERATIONS_OF_A_STEP,
             Self::Modal { modes } => modes as f64 * ITERATIONS_OF_A_MODE,
             Self::Buckling { modes } => modes as f64 * ITERATIONS_OF_A_CRITICAL_LOAD,
         }
@@ -236,7 +243,7 @@ impl StageWork {
         match *self {
             Self::Modal { modes } => (1..=modes).flat_map(mode).collect(),
             Self::Buckling { modes } => (1..=modes).map(|mode| format!("buckling{mode}.load")).collect(),
-            Self::Static { .. } | Self::Path { .. } | Self::Dynamic { .. } => Vec::new(),
+            Self::Static { .. } | Self::Path { .. } | Self::Dynamic(_) => Vec::new(),
         }
     }
 }

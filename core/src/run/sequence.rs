@@ -10,7 +10,7 @@ use super::naming::describe;
 use super::observer::{Counters, Observer};
 use super::plan::{Plan, StageWork};
 use super::rehearsal::lacking;
-use super::stage_run::{Analysis, Past, StageRun, newton_for};
+use super::stage_run::{Analysis, EarlierStages, StageRun, newton_for};
 use super::statics::{ArcLength, LoadLevels};
 use crate::model::{Assembly, Model, Schedule};
 use crate::system::State;
@@ -29,7 +29,7 @@ pub struct Run<'o> {
     counters: Counters,
     issued: IssuedWarnings,
     bookkeeper: Bookkeeper,
-    past: Past,
+    past: EarlierStages,
 }
 
 impl<'o> Run<'o> {
@@ -47,7 +47,7 @@ impl<'o> Run<'o> {
             counters: Counters::default(),
             issued: IssuedWarnings::default(),
             bookkeeper: Bookkeeper::default(),
-            past: Past::default(),
+            past: EarlierStages::default(),
         }
     }
 
@@ -67,9 +67,7 @@ impl<'o> Run<'o> {
             StageWork::Path { steps, max_steps } => carry_out(ArcLength { stage, steps, max_steps }),
             StageWork::Modal { modes } => carry_out(Modal { stage, modes }),
             StageWork::Buckling { modes } => carry_out(Buckling { stage, modes }),
-            StageWork::Dynamic { end, step, scheme, adaptive, energy_limit } => {
-                carry_out(Dynamics::new(stage, end, step, scheme, adaptive, energy_limit))
-            }
+            StageWork::Dynamic(steps) => carry_out(Dynamics::new(stage, steps)),
         }?;
         run.hand_over();
         self.schedule.end_stage(&self.model, &self.state);

@@ -28,7 +28,7 @@ pub(super) trait Analysis<'r> {
 
 /// Facts that stages leave to later ones, beside the state and the account of the energy.
 #[derive(Default)]
-pub(super) struct Past {
+pub(super) struct EarlierStages {
     /// The first row is written.
     pub started: bool,
     /// A dynamic stage has begun.
@@ -71,7 +71,7 @@ pub(super) struct StageRun<'r> {
     pub counters: &'r mut Counters,
     pub issued: &'r mut IssuedWarnings,
     pub bookkeeper: &'r mut Bookkeeper,
-    pub past: &'r mut Past,
+    pub past: &'r mut EarlierStages,
     pub assembly: Assembly,
     pub newton: Newton,
     /// The plane that the stage is treated in

@@ -147,8 +147,7 @@ impl Composer<'_> {
             return None;
         }
         self.out.sprung_joints.push(nodes.map(|node| node.map(|node| node.p)));
-        self.out.angles += 1;
-        Some(self.out.angles - 1)
+        Some(self.out.sprung_joints.len() - 1)
     }
 
     /// Components of multipliers that a joint does not use are held at zero.

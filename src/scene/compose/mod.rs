@@ -16,8 +16,8 @@ use beamsim_core::effect::elasticity::{
 };
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
-use beamsim_core::kernel::elastic::Strain;
-use beamsim_core::model::beam_element::{ElasticPoint, push_elastic};
+use beamsim_core::kernel::law::Strain;
+use beamsim_core::model::beam_element::{SectionPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::run::Driven;
 use beamsim_core::system::Slot;
@@ -73,8 +73,6 @@ pub struct Composition {
     pub jointed: Vec<usize>,
     /// Tables that histories drive, but for motions
     pub driven: Vec<DrivenTable>,
-    /// Number of joints that remember their angle
-    pub angles: usize,
     /// The slots of the rotations on both sides of each of them
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
@@ -122,7 +120,6 @@ pub fn compose(
         idle_multipliers: Vec::new(),
         jointed: Vec::new(),
         driven: Vec::new(),
-        angles: 0,
         sprung_joints: Vec::new(),
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
@@ -227,8 +224,8 @@ impl Composer<'_> {
                 return;
             }
             let beam = element.beam;
-            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| ElasticPoint {
-                stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
+            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| SectionPoint {
+                law: beam.section.at(station.fraction).law_in(station.axes),
                 free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
             });
         });

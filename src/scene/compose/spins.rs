@@ -4,19 +4,14 @@ use super::Composer;
 use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
-
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::spin_hold::{HeldIn, SpinHold, SpinningPart};
-use beamsim_core::model::SectionMatrices;
 use beamsim_core::system::Slot;
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
 
 /// Distance of a node from a straight line that still counts as on it, relative to the length of the line.
 const STRAIGHT: f64 = 1e-9;
-
-/// Largest relative difference of equal stiffnesses.
-const ALIKE: f64 = 1e-9;
 
 /// No beam, in lists by slot.
 const NONE: usize = usize::MAX;
@@ -32,19 +27,9 @@ struct StraightPart<'m> {
 impl StraightPart<'_> {
     /// It is straight without load, and bends and turns about all axes alike: a spin in a bend strains nothing, nor does it move mass.
     fn is_round(&self) -> bool {
-        let at = |beam: &MeshBeam, fraction: f64| {
-            let SectionMatrices { stiffness: k, mass } = beam.section.at(fraction);
-            let j = mass.map_or(Mat3::ZERO, |mass| mass.about_line).0;
-            let turns_alike =
-                (j[1][1] - j[2][2]).abs() <= ALIKE * j[1][1].abs() && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
-            let size = |i: usize| k[i][i].abs();
-            let alike = |i: usize, j: usize| (k[i][i] - k[j][j]).abs() <= ALIKE * size(i).max(size(j));
-            let apart = |i: usize, j: usize| i == j || k[i][j].abs() <= ALIKE * (size(i) * size(j)).sqrt();
-            turns_alike && alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
-        };
-        self.beams
-            .iter()
-            .all(|beam| beam.free_strain.is_none() && beam.fractions.iter().all(|&fraction| at(beam, fraction)))
+        let has_round_sections =
+            |beam: &MeshBeam| beam.fractions.iter().all(|&fraction| beam.section.at(fraction).is_round());
+        self.beams.iter().all(|beam| beam.free_strain.is_none() && has_round_sections(beam))
     }
 }
 

@@ -1,14 +1,13 @@
 //! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
 
-use super::element::ElasticElement;
+use super::element::{ElasticElement, ElasticPoint};
 use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
 use super::planar::PlanarElasticity;
 use crate::effect::{
     AT_ONCE, ByOrder, Driven, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints, TangentForm, at_slots,
     for_each_batch, side_by_side,
 };
-use crate::kernel::beam::StiffnessPoint;
-use crate::kernel::elastic::{Strain, Stress};
+use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
 use crate::kernel::{ElementSystem, NodePlace, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, State};
@@ -103,11 +102,13 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
         for_each_batch!(self.elements, |_first, batch| for alike in batch.chunk_by(ElasticElement::is_like) {
             for point in alike[0].points() {
                 show(MirrorData::Vector(point.tangent));
-                show(MirrorData::Tensor(point.stiffness.cn));
-                show(MirrorData::Tensor(point.stiffness.cm));
-                if let Some(cc) = point.stiffness.cc {
-                    show(MirrorData::Coupling(cc));
-                }
+                point.law.show_directions(&mut |stiffness| {
+                    show(MirrorData::Tensor(stiffness.cn));
+                    show(MirrorData::Tensor(stiffness.cm));
+                    if let Some(cc) = stiffness.cc {
+                        show(MirrorData::Coupling(cc));
+                    }
+                });
                 if let Some(free) = point.free {
                     show(MirrorData::Vector(free.gamma));
                     show(MirrorData::Axial(free.kappa));
@@ -202,7 +203,7 @@ impl<I: Interpolation> Driven for BeamElasticity<I> {
                 .iter()
                 .zip(&element.strains_and_stresses::<I>(at))
                 .map(|(point, (_, stress))| {
-                    let free = point.free.unwrap_or(Strain { gamma: Vec3::ZERO, kappa: Vec3::ZERO });
+                    let free = point.free.unwrap_or_default();
                     -point.weight * (free.gamma.dot(stress.n) + free.kappa.dot(stress.m))
                 })
                 .sum();
@@ -273,7 +274,7 @@ pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> 
 /// The points of an element, or of several side by side, with the stresses that geometric parts are formed with where these are
 /// not the present ones.
 struct Sum<const N: usize, const G: usize, T> {
-    points: [StiffnessPoint<N, T>; G],
+    points: [ElasticPoint<N, T>; G],
     stresses: Option<[Stress<T>; G]>,
     free: T,
 }
@@ -415,15 +416,13 @@ fn each_energy<I: Interpolation, const N: usize, const G: usize>(
 /// The strain energy of an element, by its points and the nodes that its kernel is shown.
 #[inline(always)]
 fn strain_energy<const N: usize, const G: usize, T: Real>(
-    points: &[StiffnessPoint<N, T>; G],
+    points: &[ElasticPoint<N, T>; G],
     nodes: &[NodePlace<T>; N],
     free: T,
 ) -> T {
     let mut sum = T::zero();
     for point in points {
-        let (strain, stress) = point.strain_and_stress(nodes, free);
-        let elastic = point.elastic_part(&strain, free);
-        sum += (elastic.gamma.dot(stress.n) + elastic.kappa.dot(stress.m)) * point.weight * 0.5;
+        sum += point.energy(nodes, free);
     }
     sum
 }
@@ -447,7 +446,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
-        let at_point = |point: &StiffnessPoint<N>| {
+        let at_point = |point: &ElasticPoint<N>| {
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
         };
@@ -458,14 +457,13 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
         let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
         let (free, length) = (self.free_amplitude(at), self.points().iter().map(|point| point.weight).sum::<f64>());
-        let at_point = |point: &StiffnessPoint<N>| {
-            let (strain, _) = point.strain_and_stress(view.nodes(), free);
-            let elastic = point.elastic_part(&strain, free);
+        let at_point = |point: &ElasticPoint<N>| {
+            let elastic = point.elastic_strain(view.nodes(), free);
             if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
                 return None;
             }
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
-            let stress = point.stiffness.stress(&strain);
+            let stress = point.law.stiffness_at_rest().stress(&strain);
             Some(point.weight * (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)))
         };
         self.points().iter().map(at_point).sum()

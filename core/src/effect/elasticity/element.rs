@@ -2,10 +2,17 @@
 
 use crate::effect::{Connection, RoundOff, shared};
 use crate::kernel::beam::StiffnessPoint;
+use crate::kernel::law::{Linear, SectionLaw};
 use crate::scalar::{LANES, Lanes, Pack, each_lane};
 use crate::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
+
+/// The law of all sections. It is one type, so that elements of different sections stand side by side in lanes.
+pub type BeamLaw<T = f64> = Linear<T>;
+
+/// An integration point of a beam.
+pub type ElasticPoint<const N: usize, T = f64> = StiffnessPoint<N, T, BeamLaw<T>>;
 
 /// An element of N nodes with G = N - 1 points for internal forces.
 #[derive(Clone, Debug)]
@@ -26,16 +33,19 @@ pub struct ElasticElement<const N: usize, const G: usize> {
 struct Common<const N: usize, const G: usize> {
     /// The initial places of the nodes as seen from the first
     arms: [Vec3; N],
-    points: [StiffnessPoint<N>; G],
+    points: [ElasticPoint<N>; G],
     /// Round-off of the force of each point, and of its moment for slopes of one
     rounding: [RoundOff; G],
 }
 
 impl<const N: usize, const G: usize> Common<N, G> {
-    fn new(arms: [Vec3; N], points: [StiffnessPoint<N>; G]) -> Self {
-        let of_point = |point: &StiffnessPoint<N>| RoundOff {
-            force: f64::EPSILON * point.stiffness.cn.max_abs(),
-            moment: f64::EPSILON * point.stiffness.cm.max_abs() * PI,
+    fn new(arms: [Vec3; N], points: [ElasticPoint<N>; G]) -> Self {
+        let of_point = |point: &ElasticPoint<N>| {
+            let stiffness = point.law.stiffness_at_rest();
+            RoundOff {
+                force: f64::EPSILON * stiffness.cn.max_abs(),
+                moment: f64::EPSILON * stiffness.cm.max_abs() * PI,
+            }
         };
         Self { rounding: points.each_ref().map(of_point), arms, points }
     }
@@ -48,7 +58,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         connection: Connection<N>,
         length: f64,
         arms: [Vec3; N],
-        points: [StiffnessPoint<N>; G],
+        points: [ElasticPoint<N>; G],
         free: Option<usize>,
         neighbour: Option<&Self>,
     ) -> Self {
@@ -63,7 +73,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// Its integration points.
     #[inline(always)]
-    pub fn points(&self) -> [StiffnessPoint<N>; G] {
+    pub fn points(&self) -> [ElasticPoint<N>; G] {
         let mut points = self.common.points;
         points.iter_mut().for_each(|point| point.lengthen(self.length));
         points
@@ -95,7 +105,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// The integration points of elements side by side.
     #[inline(always)]
-    pub fn points_side_by_side(elements: [&Self; LANES]) -> [StiffnessPoint<N, Lanes>; G] {
+    pub fn points_side_by_side(elements: [&Self; LANES]) -> [ElasticPoint<N, Lanes>; G] {
         let share = elements[1..].iter().all(|element| element.is_like(elements[0]));
         let mut points = [Self::side_by_side(elements, share, 0); G];
         for g in 1..G {
@@ -105,10 +115,10 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     }
 
     #[inline(always)]
-    fn side_by_side(elements: [&Self; LANES], share: bool, g: usize) -> StiffnessPoint<N, Lanes> {
+    fn side_by_side(elements: [&Self; LANES], share: bool, g: usize) -> ElasticPoint<N, Lanes> {
         let mut point = match share {
             true => elements[0].common.points[g].lifted(),
-            false => StiffnessPoint::pack(each_lane!(|k| &elements[k].common.points[g])),
+            false => ElasticPoint::pack(each_lane!(|k| &elements[k].common.points[g])),
         };
         point.lengthen(Lanes(each_lane!(|k| elements[k].length)));
         point

@@ -1,10 +1,9 @@
 //! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and carries what the kernel
 //! gives back to the nodes of the scene.
 
-use super::element::Member;
+use super::element::{ElasticPoint, Member};
 use crate::effect::{Connection, after_displacement, at_slots};
-use crate::kernel::beam::StiffnessPoint;
-use crate::kernel::elastic::Stress;
+use crate::kernel::law::Stress;
 use crate::kernel::relative::Relative;
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
 use crate::rotation::Rotation;
@@ -87,7 +86,7 @@ pub const fn is_half_way(nodes: usize, points: usize) -> bool {
 /// An elastic point with the amplitude of its free strain, and the stress of its geometric part where that is not the present one.
 pub struct HalfWay<'a, const N: usize, T> {
     /// The point
-    pub point: &'a StiffnessPoint<N, T>,
+    pub point: &'a ElasticPoint<N, T>,
     /// The amplitude
     pub free: T,
     /// The stress
@@ -142,7 +141,7 @@ pub trait View<const N: usize, T: Real> {
     #[inline(always)]
     fn extrapolated<const G: usize>(
         &self,
-        points: &[StiffnessPoint<N, T>; G],
+        points: &[ElasticPoint<N, T>; G],
         free: T,
         du: &[Vec3<T>; N],
         dp: &[Vec3<T>; N],
@@ -158,7 +157,7 @@ pub trait View<const N: usize, T: Real> {
 #[inline(always)]
 fn extrapolated<const N: usize, const G: usize, T: Real>(
     view: &impl View<N, T>,
-    points: &[StiffnessPoint<N, T>; G],
+    points: &[ElasticPoint<N, T>; G],
     free: T,
     du: &[Vec3<T>; N],
     dp: &[Vec3<T>; N],
@@ -311,7 +310,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
     #[inline(always)]
     fn extrapolated<const G: usize>(
         &self,
-        points: &[StiffnessPoint<N, T>; G],
+        points: &[ElasticPoint<N, T>; G],
         free: T,
         du: &[Vec3<T>; N],
         dp: &[Vec3<T>; N],

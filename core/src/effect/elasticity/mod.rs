@@ -7,6 +7,6 @@ mod planar;
 mod strain_rate_damping;
 
 pub use beam::{BeamElasticity, ElasticElements, StressField};
-pub use element::ElasticElement;
+pub use element::{BeamLaw, ElasticElement, ElasticPoint};
 pub use interpolation::{Interpolation, RelativeVectors, TotalVectors};
 pub use strain_rate_damping::StrainRateDamping;

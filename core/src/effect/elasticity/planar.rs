@@ -1,11 +1,11 @@
 //! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a node.
 
 use super::beam::{BeamElasticity, stresses_of, workspace};
-use super::element::ElasticElement;
+use super::element::{BeamLaw, ElasticElement};
 use super::interpolation::Interpolation;
 use crate::effect::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
-use crate::kernel::elastic::Stress;
-use crate::kernel::planar::{PlanarNode, PlanarPoint, PlanarStress, flattened, in_one_turn, in_space};
+use crate::kernel::law::{PlanarStress, StoredLaw, Stress};
+use crate::kernel::planar::{PlanarNode, PlanarPoint, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
 use crate::system::{Assembler, Memory, Plane, Slot, State};
@@ -21,11 +21,14 @@ pub struct PlanarElasticity<I> {
     blocks: ByOrder<Block<2, 1>, Block<3, 2>, Block<4, 3>>,
 }
 
+/// An integration point of elements side by side.
+type PlanarPoints<const N: usize> = <PlanarPoint<N, f64, <BeamLaw as StoredLaw>::InPlane> as Pack>::Packed;
+
 /// Elements side by side.
 struct Block<const N: usize, const G: usize> {
     u: [[Slot; LANES]; N],
     p: [[Slot; LANES]; N],
-    points: [PlanarPoint<N, Lanes>; G],
+    points: [PlanarPoints<N>; G],
 }
 
 impl<I: Interpolation> PlanarElasticity<I> {

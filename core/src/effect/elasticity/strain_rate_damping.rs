@@ -1,5 +1,5 @@
 //! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so that rigid motion is not
-//! damped.
+//! damped. C is the stiffness of the section at rest.
 //!
 //! With b_k = w dE_k/dq for each strain component E_k of a point of weight w, and G_k = db_k/dq:
 //!
@@ -12,11 +12,11 @@
 //! its force under a unit stress, and G_k qd the rate of that: a jet along the motion brings both.
 
 use super::beam::BeamElasticity;
-use super::element::{ElasticElement, Member};
+use super::element::{ElasticElement, ElasticPoint, Member};
 use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
 use crate::effect::{Effect, Roles, TangentForm, after_displacement, for_each_batch};
-use crate::kernel::beam::StiffnessPoint;
-use crate::kernel::elastic::{Point, Stiffness, Strain, Stress};
+use crate::kernel::elastic::Point;
+use crate::kernel::law::{SectionLaw, Stiffness, Strain, Stress};
 use crate::kernel::{ElementSystem, NodeMotion, NodePlace, Weights};
 use crate::scalar::Jet;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, RotationRate, State};
@@ -124,7 +124,7 @@ impl<const N: usize> Motion<N> {
         }
     }
 
-    /// See [`RotationRate::pull_back`].
+    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the derivative over the rate of the state.
     fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
         if block.is_multiple_of(2) { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }
@@ -143,7 +143,7 @@ impl<const N: usize> Motion<N> {
     /// Adds force and tangent of all points.
     fn add<I: Interpolation, const G: usize>(
         &self,
-        points: &[StiffnessPoint<N>; G],
+        points: &[ElasticPoint<N>; G],
         factor: f64,
         weights: Weights,
         room: &mut Room,
@@ -158,7 +158,7 @@ impl<const N: usize> Motion<N> {
             let moving = I::View::<N, Jet>::new(&self.jets());
             for point in points {
                 let strains = Strains::new(self, &moving, &point.lifted(), &mut room.jets);
-                strains.add_tangent(&point.stiffness, factor / point.weight, weights, out);
+                strains.add_tangent(&point.law.stiffness_at_rest(), factor / point.weight, weights, out);
             }
         }
     }
@@ -167,14 +167,15 @@ impl<const N: usize> Motion<N> {
     fn stresses<const G: usize>(
         &self,
         view: &impl View<N, f64>,
-        points: &[StiffnessPoint<N>; G],
+        points: &[ElasticPoint<N>; G],
         factor: f64,
     ) -> [Stress; G] {
         let (nodes, rates) = (view.nodes(), view.variation(&self.displacements, &self.rotations.map(|of| of.rate)));
         std::array::from_fn(|g| {
             let place = points[g].configuration(nodes);
             let rate = points[g].strain_variation(&place, |i| rates[i].0, |i| rates[i].1);
-            points[g].stiffness.stress(&Strain { gamma: rate.gamma * factor, kappa: rate.kappa * factor })
+            let scaled = Strain { gamma: rate.gamma * factor, kappa: rate.kappa * factor };
+            points[g].law.stiffness_at_rest().stress(&scaled)
         })
     }
 }
@@ -186,7 +187,7 @@ fn jet(value: Vec3, rate: Vec3) -> Vec3<Jet> {
 
 /// Points under stresses that do not depend on their strains.
 struct Stressed<'a, const N: usize, const G: usize> {
-    points: &'a [StiffnessPoint<N>; G],
+    points: &'a [ElasticPoint<N>; G],
     stresses: &'a [Stress; G],
 }
 
@@ -209,7 +210,7 @@ impl<const N: usize, const G: usize> PointSum<N, f64> for Stressed<'_, N, G> {
 
 /// A moving point, at a known place, under a stress of one in one component.
 struct UnitStress<'a, const N: usize> {
-    point: &'a StiffnessPoint<N, Jet>,
+    point: &'a ElasticPoint<N, Jet>,
     place: &'a Point<Jet>,
     component: usize,
 }
@@ -248,7 +249,7 @@ impl Strains {
     fn new<const N: usize>(
         motion: &Motion<N>,
         moving: &impl View<N, Jet>,
-        point: &StiffnessPoint<N, Jet>,
+        point: &ElasticPoint<N, Jet>,
         (system, scratch): &mut (ElementSystem<Jet>, Scratch<Jet>),
     ) -> Self {
         let place = point.configuration(moving.nodes());

@@ -9,14 +9,14 @@ mod search;
 mod spectrum;
 mod walk;
 
-use self::search::{Search, Sight};
+use self::search::{CriticalSearch, Sight};
 use self::spectrum::{critical_loads, negative_pivots, rank};
 use self::walk::{Walked, continue_path, has_leapt};
 use super::distance::distance;
 use super::failure::Failure;
 use super::results::{CriticalKind, CriticalLoad, StageResult};
 use super::stage_run::{Analysis, StageRun};
-use super::statics::Direction;
+use super::statics::PathDirection;
 use crate::system::State;
 use crate::warning::WarningKind;
 
@@ -130,7 +130,7 @@ impl Buckling<'_, '_> {
     fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<CriticalLoad, Failure> {
         let start_rate = self.size_of_rate()?;
         let none = negative_pivots(self.stage);
-        let mut search = Search::new(self.stage.state.clone(), estimate);
+        let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
         for _ in 0..MOST_LOOKS {
             if let Some(found) = search.found() {
                 let off = if search.ended.is_some() { self.foreseen(&search, found, before)? } else { 0.0 };
@@ -181,7 +181,7 @@ impl Buckling<'_, '_> {
     /// How far from a load, relative to it, the tangent of the last point before it looks singular.
     /// A structure with a small imperfection has no critical point there, but its path runs aside
     /// as if it had, the more sharply the smaller the imperfection.
-    fn foreseen(&mut self, search: &Search, load: f64, before: usize) -> Result<f64, Failure> {
+    fn foreseen(&mut self, search: &CriticalSearch, load: f64, before: usize) -> Result<f64, Failure> {
         self.stage.state.copy_from(&search.here);
         let seen = critical_loads(self.stage, before + 4)?;
         Ok(seen.into_iter().map(|seen| (seen - load).abs() / load.abs()).fold(f64::INFINITY, f64::min))
@@ -189,7 +189,7 @@ impl Buckling<'_, '_> {
 
     /// True if load control follows the path past a load from next to it, with so many negative
     /// pivots. The state is then that point.
-    fn goes_on(&mut self, search: &Search, load: f64, negative: Option<usize>) -> Result<bool, Failure> {
+    fn goes_on(&mut self, search: &CriticalSearch, load: f64, negative: Option<usize>) -> Result<bool, Failure> {
         self.stage.go_back_to(&search.here);
         let walked = continue_path(self.stage, load + search.way * BEHIND * load.abs());
         Ok(walked == Walked::There
@@ -214,7 +214,7 @@ impl Buckling<'_, '_> {
 
     /// How far a unit of load moves the scene at the present state, in lengths of it and radians.
     fn size_of_rate(&mut self) -> Result<f64, Failure> {
-        let Some(Direction { rate, .. }) = self.stage.path_direction()? else { return Ok(0.0) };
+        let Some(PathDirection { rate, .. }) = self.stage.path_direction()? else { return Ok(0.0) };
         let sizes = rate.iter().zip(self.stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
         Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.stage.model.length)).fold(0.0, f64::max))
     }

@@ -23,15 +23,15 @@ impl Sight {
 }
 
 /// A critical load between a state that lies before it and a load that lies beyond.
-pub struct Search {
+pub struct CriticalSearch {
     pub here: State,
-    pub beyond: Option<f64>,
+    beyond: Option<f64>,
     /// The state at the load that lies beyond, where load control comes to it
     pub behind: Option<State>,
     /// The estimate from here
     pub estimate: f64,
     /// How much farther than the estimate the next look goes: it may fall short again and again
-    pub stretch: f64,
+    stretch: f64,
     pub way: f64,
     /// The estimate from the last point before it
     seen: f64,
@@ -40,7 +40,7 @@ pub struct Search {
     pub ended: Option<Walked>,
 }
 
-impl Search {
+impl CriticalSearch {
     /// From a state on, in the direction of an estimate.
     pub fn new(here: State, estimate: f64) -> Self {
         let way = (estimate - here.load).signum();

@@ -4,7 +4,7 @@
 use crate::kernel::Weights;
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
-use crate::run::statics::Direction;
+use crate::run::statics::PathDirection;
 use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
 use crate::system::System;
 use crate::tensor::Vec3;
@@ -28,7 +28,7 @@ pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
 
 /// The critical loads as they look from the present state.
 pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
-    let Some(Direction { rate: direction, .. }) = stage.path_direction()? else { return Ok(Vec::new()) };
+    let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(Vec::new()) };
     let length = stage.model.length;
     let moving = direction.iter().zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
     let size = moving.map(|(d, kind)| d.norm() * kind.arm(length) / length).fold(0.0, f64::max);

@@ -5,7 +5,7 @@ use crate::model::charts;
 use crate::run::distance::{NO_MOTION, distance};
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
-use crate::run::statics::{Direction, LARGEST_CONTRACTION};
+use crate::run::statics::{LARGEST_CONTRACTION, PathDirection};
 use crate::system::State;
 
 /// A state that has moved so many times further than the tangent said has come down on another
@@ -76,7 +76,7 @@ pub fn has_leapt(stage: &mut StageRun, from: &State) -> Result<bool, Failure> {
     let (to, step) = (stage.state.clone(), stage.state.load - from.load);
     stage.state.copy_from(from);
     let direction = stage.path_direction()?;
-    let ahead = direction.map_or(0.0, |Direction { rate, .. }| {
+    let ahead = direction.map_or(0.0, |PathDirection { rate, .. }| {
         let mut ahead = from.clone();
         ahead.q.iter_mut().zip(&rate).for_each(|(q, rate)| *q += *rate * step);
         distance(stage.model, from, &ahead)

@@ -79,8 +79,8 @@ impl Dynamics<'_, '_> {
     /// Steps or a scheme that err less.
     fn advice(&self, excess: &Excess) -> String {
         // Beyond its own size an error that grows linearly tells no more.
-        let shorter = round_down(self.step * (PROPOSED_ERROR / excess.over.min(1.0 / TOLD_ERROR)).sqrt());
-        let other_scheme_helps = excess.of_rotations && self.scheme.rotations == Rotations::Totals;
+        let shorter = round_down(self.settings.step * (PROPOSED_ERROR / excess.over.min(1.0 / TOLD_ERROR)).sqrt());
+        let other_scheme_helps = excess.of_rotations && self.settings.scheme.rotations == Rotations::Totals;
         if !other_scheme_helps {
             format!("`step = {shorter}`")
         } else if (PROPOSED_ERROR / excess.over).sqrt() < LEAST_PART_OF_STEP {

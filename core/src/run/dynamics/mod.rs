@@ -9,8 +9,9 @@ use self::adaptive::Control;
 use self::grid::Grid;
 use super::energy::{EnergyGuard, Growth};
 use super::failure::Failure;
+use super::plan::TimeStepping;
 use super::stage_run::{Analysis, StageRun};
-use crate::integrate::{Increments, Predictor, Rotations, Scheme, Step, TimeError};
+use crate::integrate::{Increments, Predictor, Rotations, Step, TimeError};
 use crate::kernel::Weights;
 use crate::solve::NewtonFailure;
 use crate::system::{Slot, State};
@@ -27,13 +28,7 @@ const TOLERATED_STRAIN: f64 = 1e-9;
 /// A dynamic stage.
 pub(super) struct Dynamics<'s, 'r> {
     stage: &'s mut StageRun<'r>,
-    /// Time on the run's clock at which it ends
-    end: f64,
-    /// The time step, or the first one
-    step: f64,
-    scheme: Scheme,
-    /// Tolerance of the errors of all steps, where they adapt to it
-    adaptive: Option<f64>,
+    settings: TimeStepping,
     /// The length of the last step
     last_length: f64,
     /// The unknowns of time steps where those are increments of rotation
@@ -48,25 +43,14 @@ pub(super) struct Dynamics<'s, 'r> {
 }
 
 impl<'s, 'r> Dynamics<'s, 'r> {
-    /// Time steps of a scheme up to `end` on the run's clock; `energy_limit` is the part of the
-    /// largest energies so far by which the total may grow.
-    pub fn new(
-        stage: &'s mut StageRun<'r>,
-        end: f64,
-        step: f64,
-        scheme: Scheme,
-        adaptive: Option<f64>,
-        energy_limit: f64,
-    ) -> Self {
-        let guard = (!stage.is_linear()).then(|| energy_guard(stage, energy_limit));
+    /// Before the start of the stage.
+    pub fn new(stage: &'s mut StageRun<'r>, settings: TimeStepping) -> Self {
+        let guard = (!stage.is_linear()).then(|| energy_guard(stage, settings.energy_limit));
         stage.keeps_account |= guard.is_some();
-        let has_increments = scheme.rotations == Rotations::Increments;
+        let has_increments = settings.scheme.rotations == Rotations::Increments;
         Self {
-            end,
-            step,
-            scheme,
-            adaptive,
-            last_length: step,
+            last_length: settings.step,
+            settings,
             increments: has_increments
                 .then(|| Increments::new(stage.model, stage.schedule.kind(), &stage.assembly.system.pattern.dof_map)),
             predictor: Predictor::new(stage.model),
@@ -94,14 +78,15 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
     fn run(&mut self) -> Result<(), Failure> {
         self.start()?;
         self.find_rates();
-        match self.adaptive {
+        match self.settings.adaptive {
             None => {
                 self.follow_errors();
                 self.run_fixed()
             }
             Some(tolerance) => {
-                let span = self.end - self.stage.state.time;
-                let control = Control::new(tolerance, span, self.step, self.scheme, self.massive.clone());
+                let span = self.settings.end - self.stage.state.time;
+                let control =
+                    Control::new(tolerance, span, self.settings.step, self.settings.scheme, self.massive.clone());
                 self.run_adaptive(control)
             }
         }
@@ -116,7 +101,7 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
 impl Dynamics<'_, '_> {
     /// The first step.
     fn first_step(&self) -> Step {
-        Step { scheme: self.scheme, length: self.step }
+        Step { scheme: self.settings.scheme, length: self.settings.step }
     }
 
     /// The errors of fixed steps are estimated from here on.
@@ -124,17 +109,17 @@ impl Dynamics<'_, '_> {
         let first = self.first_step();
         let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
         let start = (&**state, self.increments.as_ref());
-        let duration = self.end - state.time;
+        let duration = self.settings.end - state.time;
         newton.time_error = Some(TimeError::new(model, assembly, start, &self.massive, (first, duration)));
     }
 
     /// Rows at start + k step, the last one at `end`.
     fn run_fixed(&mut self) -> Result<(), Failure> {
-        while self.stage.state.time < self.end {
+        while self.stage.state.time < self.settings.end {
             let grid = self.next_grid();
             for number in 1..=grid.steps {
                 let (next, length) = grid.step(number);
-                let last = self.stride(Step { scheme: self.scheme, length }, next)?;
+                let last = self.stride(Step { scheme: self.settings.scheme, length }, next)?;
                 if self.complete(&last)? {
                     return Ok(());
                 }
@@ -198,7 +183,7 @@ impl Dynamics<'_, '_> {
     /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller
     /// one.
     fn run_adaptive(&mut self, mut control: Control) -> Result<(), Failure> {
-        while self.stage.state.time < self.end {
+        while self.stage.state.time < self.settings.end {
             let (next, length) = control.propose(self.stage.state.time, self.next_corner());
             self.tell_time(next)?;
             let step = Step { scheme: control.scheme, length };
@@ -363,14 +348,14 @@ impl Dynamics<'_, '_> {
     fn next_grid(&self) -> Grid {
         let stop = self.next_stop();
         let over = if self.stage.plan.interval.is_some() { Grid::equal } else { Grid::over };
-        over(self.stage.state.time, stop, self.step)
+        over(self.stage.state.time, stop, self.settings.step)
     }
 
     /// The next instant that must be hit.
     fn next_stop(&self) -> f64 {
-        let Some(interval) = self.stage.plan.interval else { return self.end };
+        let Some(interval) = self.stage.plan.interval else { return self.settings.end };
         let next = ((self.stage.state.time / interval + 1e-9).floor() + 1.0) * interval;
-        if next >= self.end - 1e-9 * interval { self.end } else { next }
+        if next >= self.settings.end - 1e-9 * interval { self.settings.end } else { next }
     }
 
     /// The next instant that must be hit, or at which a load or a motion takes another course: what
@@ -382,7 +367,7 @@ impl Dynamics<'_, '_> {
 
     /// Tells the observer the part of the stage that lies behind at a time.
     fn tell_time(&mut self, time: f64) -> Result<(), Failure> {
-        let done = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) } else { 1.0 };
+        let done = if self.settings.end > 0.0 { (time / self.settings.end).clamp(0.0, 1.0) } else { 1.0 };
         self.stage.tell_progress(done)
     }
 

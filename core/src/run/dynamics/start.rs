@@ -28,7 +28,7 @@ impl Dynamics<'_, '_> {
         SpatialLook::default().refuse_loose(self.stage, step.weights())?;
         self.close_joints()?;
         self.solve_accelerations()?;
-        self.scheme.start(self.stage.state);
+        self.settings.scheme.start(self.stage.state);
         if let Some(increments) = &self.increments {
             increments.start(self.stage.state);
         }

@@ -66,7 +66,7 @@ pub fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(N
     if parts.len() > MOST_PARTS {
         return Vec::new();
     }
-    parts.iter().flat_map(|part| motions_of(part, system, model, state)).collect()
+    parts.iter().flat_map(|part| FreePart::new(part, system, model, state).motions()).collect()
 }
 
 /// Nodes that are connected, by what acts between them.
@@ -96,71 +96,133 @@ fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
     parts.into_values().collect()
 }
 
-/// A rigid motion of a node: of its displacement and of its rotation vector.
-fn moved(state: &State, node: Node, from_centre: Vec3, number: usize) -> (Vec3, Vec3) {
-    let axis = Vec3::UNIT[number % 3];
-    if number < 3 {
-        return (axis, Vec3::ZERO);
-    }
-    let rotation = Rotation::new(state.q[node.p as usize]);
-    (axis.cross(from_centre), rotation.t_inverse() * rotation.r.transpose_mul(axis))
+/// A free part of a structure in a state: nodes that are connected.
+struct FreePart<'p> {
+    nodes: &'p [(Node, Vec3)],
+    system: &'p System,
+    state: &'p State,
+    centre: Vec3,
+    /// The distance of the farthest node from the centre; turns are measured by what they move, so
+    /// that all motions compare
+    extent: f64,
 }
 
-fn motions_of(part: &[(Node, Vec3)], system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
-    let dof_map = &system.pattern.dof_map;
-    let now = |(node, place): &(Node, Vec3)| *place + state.q[node.u as usize];
-    let centre = part.iter().fold(Vec3::ZERO, |sum, node| sum + now(node)) * (1.0 / part.len() as f64);
-    let extent = part.iter().map(|node| (now(node) - centre).norm()).fold(0.0, f64::max);
-    let extent = if extent > 0.0 { extent } else { model.length };
-    // Turns are measured by what they move, so that all motions compare.
-    let unit = |number: usize| if number < 3 { 1.0 } else { 1.0 / extent };
-    // What moves held directions.
-    let mut held = DMatrix::<f64>::zeros(MOTIONS, MOTIONS);
-    for node in part {
-        let held_parts: [[f64; 6]; MOTIONS] = std::array::from_fn(|number| {
-            let (u, p) = moved(state, node.0, now(node) - centre, number);
-            let (u, p) = (dof_map.held_part(node.0.u, u), dof_map.held_part(node.0.p, p) * extent);
-            let [a, b] = [u.0, p.0].map(|v| v.map(|v| v * unit(number)));
-            [a[0], a[1], a[2], b[0], b[1], b[2]]
-        });
-        add_gram(&mut held, &held_parts);
+impl<'p> FreePart<'p> {
+    fn new(nodes: &'p [(Node, Vec3)], system: &'p System, model: &Model, state: &'p State) -> Self {
+        let now = |(node, place): &(Node, Vec3)| *place + state.q[node.u as usize];
+        let centre = nodes.iter().fold(Vec3::ZERO, |sum, node| sum + now(node)) * (1.0 / nodes.len() as f64);
+        let extent = nodes.iter().map(|node| (now(node) - centre).norm()).fold(0.0, f64::max);
+        let extent = if extent > 0.0 { extent } else { model.length };
+        Self { nodes, system, state, centre, extent }
     }
-    let Some(allowed) = null_space(held, HELD * HELD) else { return Vec::new() };
-    // What acts against those that are left.
-    let field = |number: usize| {
+
+    /// The motions against which nothing acts, one number an equation.
+    fn motions(&self) -> Vec<Vec<f64>> {
+        let Some(allowed) = null_space(self.held(), HELD * HELD) else { return Vec::new() };
+        let fields: Vec<Vec<f64>> = (0..MOTIONS).map(|number| self.field(number)).collect();
+        let combined = combine(&fields, &allowed);
+        let Some(free) = null_space(self.resisted(&combined, &allowed), NO_FORCE * NO_FORCE) else {
+            return Vec::new();
+        };
+        combine(&combined, &free)
+    }
+
+    /// The size of a motion as it is measured.
+    fn unit(&self, number: usize) -> f64 {
+        if number < 3 { 1.0 } else { 1.0 / self.extent }
+    }
+
+    /// A rigid motion of a node: its displacement and the change of its rotation vector.
+    fn moved(&self, (node, place): &(Node, Vec3), number: usize) -> (Vec3, Vec3) {
+        let axis = Vec3::UNIT[number % 3];
+        if number < 3 {
+            return (axis, Vec3::ZERO);
+        }
+        let from_centre = *place + self.state.q[node.u as usize] - self.centre;
+        let rotation = Rotation::new(self.state.q[node.p as usize]);
+        (axis.cross(from_centre), rotation.t_inverse() * rotation.r.transpose_mul(axis))
+    }
+
+    /// The Gram matrix of what the motions do to held directions.
+    fn held(&self) -> DMatrix<f64> {
+        let dof_map = &self.system.pattern.dof_map;
+        let mut held = DMatrix::<f64>::zeros(MOTIONS, MOTIONS);
+        for node in self.nodes {
+            let held_parts: [[f64; 6]; MOTIONS] = std::array::from_fn(|number| {
+                let (u, p) = self.moved(node, number);
+                let u = dof_map.held_part(node.0.u, u);
+                let p = dof_map.held_part(node.0.p, p) * self.extent;
+                let [a, b] = [u.0, p.0].map(|v| v.map(|v| v * self.unit(number)));
+                [a[0], a[1], a[2], b[0], b[1], b[2]]
+            });
+            add_gram(&mut held, &held_parts);
+        }
+        held
+    }
+
+    /// A motion of the part, one number an equation.
+    fn field(&self, number: usize) -> Vec<f64> {
+        let dof_map = &self.system.pattern.dof_map;
         let mut out = vec![0.0; dof_map.count()];
-        let mut motion = vec![Vec3::ZERO; state.q.len()];
-        for node in part {
-            let (u, p) = moved(state, node.0, now(node) - centre, number);
-            (motion[node.0.u as usize], motion[node.0.p as usize]) = (u * unit(number), p * unit(number));
+        let mut motion = vec![Vec3::ZERO; self.state.q.len()];
+        for node in self.nodes {
+            let (u, p) = self.moved(node, number);
+            motion[node.0.u as usize] = u * self.unit(number);
+            motion[node.0.p as usize] = p * self.unit(number);
         }
         dof_map.gather(|slot| motion[slot], &mut out);
         out
-    };
-    let fields: Vec<Vec<f64>> = (0..MOTIONS).map(field).collect();
-    let combined = combine(&fields, &allowed);
-    let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
-    let mut scale = vec![0.0_f64; dof_map.count()];
-    let mut forces: Vec<Vec<f64>> = Vec::new();
-    for (k, motion) in combined.iter().enumerate() {
-        let mut force = system.multiply(&system.values, motion);
-        let turn = Vec3([3, 4, 5].map(|number| allowed[(number, k)] / extent));
-        let expected = turned_forces(part, system, state, motion, turn);
-        force.iter_mut().zip(&expected).for_each(|(force, expected)| *force -= expected);
-        let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
-        let terms = system.multiply(&sizes, &absolute);
-        scale.iter_mut().zip(terms).zip(&expected).for_each(|((scale, term), e)| *scale = scale.max(term + e.abs()));
-        forces.push(force);
     }
-    let mut resisted = DMatrix::<f64>::zeros(forces.len(), forces.len());
-    for row in (0..dof_map.count()).filter(|&row| scale[row] > 0.0) {
-        let parts: Vec<f64> = forces.iter().map(|force| force[row] / scale[row]).collect();
-        for (i, a) in parts.iter().enumerate() {
-            parts.iter().enumerate().for_each(|(j, b)| resisted[(i, j)] += a * b);
+
+    /// The Gram matrix of the forces against motions, which are combined with the columns of
+    /// `allowed`; each force over its terms.
+    fn resisted(&self, motions: &[Vec<f64>], allowed: &DMatrix<f64>) -> DMatrix<f64> {
+        let system = self.system;
+        let count = system.pattern.dof_map.count();
+        let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+        let mut scale = vec![0.0_f64; count];
+        let mut forces: Vec<Vec<f64>> = Vec::new();
+        for (k, motion) in motions.iter().enumerate() {
+            let mut force = system.multiply(&system.values, motion);
+            let turn = Vec3([3, 4, 5].map(|number| allowed[(number, k)] / self.extent));
+            let expected = self.turned_forces(motion, turn);
+            force.iter_mut().zip(&expected).for_each(|(force, expected)| *force -= expected);
+            let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
+            let terms = system.multiply(&sizes, &absolute);
+            scale
+                .iter_mut()
+                .zip(terms)
+                .zip(&expected)
+                .for_each(|((scale, term), e)| *scale = scale.max(term + e.abs()));
+            forces.push(force);
         }
+        let mut resisted = DMatrix::<f64>::zeros(forces.len(), forces.len());
+        for row in (0..count).filter(|&row| scale[row] > 0.0) {
+            let parts: Vec<f64> = forces.iter().map(|force| force[row] / scale[row]).collect();
+            for (i, a) in parts.iter().enumerate() {
+                parts.iter().enumerate().for_each(|(j, b)| resisted[(i, j)] += a * b);
+            }
+        }
+        resisted
     }
-    let Some(free) = null_space(resisted, NO_FORCE * NO_FORCE) else { return Vec::new() };
-    combine(&combined, &free)
+
+    /// The change of the forces on the part where they turn with it, one number an equation.
+    fn turned_forces(&self, motion: &[f64], turn: Vec3) -> Vec<f64> {
+        let dof_map = &self.system.pattern.dof_map;
+        let mut field = vec![Vec3::ZERO; self.state.q.len()];
+        let mut change = field.clone();
+        dof_map.scatter(motion, None, &mut field);
+        for (node, _) in self.nodes {
+            let (u, p) = (node.u as usize, node.p as usize);
+            change[u] = turn.cross(self.system.total(u));
+            let rotation = Rotation::new(self.state.q[p]);
+            let moment = rotation.t_inverse().transpose_mul(self.system.total(p));
+            change[p] = rotation.c2(moment) * field[p];
+        }
+        let mut out = vec![0.0; dof_map.count()];
+        dof_map.gather(|slot| change[slot], &mut out);
+        out
+    }
 }
 
 /// The sums of fields with the coefficients of each column.
@@ -173,23 +235,6 @@ fn combine(fields: &[Vec<f64>], coefficients: &DMatrix<f64>) -> Vec<Vec<f64>> {
         sum
     };
     (0..coefficients.ncols()).map(sum).collect()
-}
-
-/// How the forces on a part change where they turn with it; one number an equation.
-fn turned_forces(part: &[(Node, Vec3)], system: &System, state: &State, motion: &[f64], turn: Vec3) -> Vec<f64> {
-    let dof_map = &system.pattern.dof_map;
-    let (mut field, mut change) = (vec![Vec3::ZERO; state.q.len()], vec![Vec3::ZERO; state.q.len()]);
-    dof_map.scatter(motion, None, &mut field);
-    for (node, _) in part {
-        let (u, p) = (node.u as usize, node.p as usize);
-        change[u] = turn.cross(system.total(u));
-        let rotation = Rotation::new(state.q[p]);
-        let moment = rotation.t_inverse().transpose_mul(system.total(p));
-        change[p] = rotation.c2(moment) * field[p];
-    }
-    let mut out = vec![0.0; dof_map.count()];
-    dof_map.gather(|slot| change[slot], &mut out);
-    out
 }
 
 fn add_gram(gram: &mut DMatrix<f64>, columns: &[[f64; 6]; MOTIONS]) {

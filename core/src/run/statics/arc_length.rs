@@ -3,7 +3,7 @@
 
 use super::begin;
 use super::levels::Levels;
-use super::path::{Path, Point, Target};
+use super::path::{Path, PathPoint, PathTarget};
 use super::stability::{conclude, tell_of_points};
 use crate::kernel::Weights;
 use crate::model::{StageError, StageKind};
@@ -101,19 +101,19 @@ pub fn detour(stage: &mut StageRun, space: &mut SpatialLook, levels: &Levels, go
 
 /// The signs that were passed last: on a located point itself they are nobody's.
 #[derive(Clone, Copy)]
-struct Signs {
+struct RateSigns {
     /// The load factor grows.
     rising: bool,
     /// The displacement that the loads do work on grows.
     working: bool,
 }
 
-impl Signs {
-    fn pass(&mut self, target: Option<Target>) {
+impl RateSigns {
+    fn pass(&mut self, target: Option<PathTarget>) {
         match target {
-            Some(Target::Limit) => self.rising = !self.rising,
-            Some(Target::Turning) => self.working = !self.working,
-            Some(Target::Load(_)) | None => {}
+            Some(PathTarget::Limit) => self.rising = !self.rising,
+            Some(PathTarget::Turning) => self.working = !self.working,
+            Some(PathTarget::Load(_)) | None => {}
         }
     }
 }
@@ -129,8 +129,8 @@ impl Follower<'_, '_> {
     /// Goes on until the load factor reaches `goal` from below, or `until`, or a bound.
     fn go_to(&mut self, goal: f64, bounds: Bounds) -> Result<Arrival, Failure> {
         let (mut highest, mut in_vain) = (self.stage.state.load, 0);
-        let mut signs = Signs { rising: self.path.here.load_rate > 0.0, working: self.path.here.work_rate > 0.0 };
-        let goal = Target::Load(goal);
+        let mut signs = RateSigns { rising: self.path.here.load_rate > 0.0, working: self.path.here.work_rate > 0.0 };
+        let goal = PathTarget::Load(goal);
         for number in 0..bounds.increments {
             if in_vain >= bounds.patience {
                 break;
@@ -162,13 +162,13 @@ impl Follower<'_, '_> {
     }
 
     /// The special points between here and the next point.
-    fn targets(&self, next: &Point, signs: Signs, goal: Target) -> Vec<Target> {
+    fn targets(&self, next: &PathPoint, signs: RateSigns, goal: PathTarget) -> Vec<PathTarget> {
         let mut targets = Vec::new();
         if (next.load_rate > 0.0) != signs.rising {
-            targets.push(Target::Limit);
+            targets.push(PathTarget::Limit);
         }
         if (next.work_rate > 0.0) != signs.working {
-            targets.push(Target::Turning);
+            targets.push(PathTarget::Turning);
         }
         if goal.value(&self.path.here) < 0.0 && goal.value(next) >= 0.0 {
             targets.push(goal);
@@ -177,11 +177,16 @@ impl Follower<'_, '_> {
     }
 
     /// The nearest of these points, or else the next one, `length` ahead.
-    fn nearest(&mut self, next: Point, length: f64, targets: &[Target]) -> Result<(Point, Option<Target>), Failure> {
+    fn nearest(
+        &mut self,
+        next: PathPoint,
+        length: f64,
+        targets: &[PathTarget],
+    ) -> Result<(PathPoint, Option<PathTarget>), Failure> {
         let behind = next.signature;
-        let beyond = (self.stage.plane.is_some() && targets.contains(&Target::Limit)).then(|| next.state.clone());
+        let beyond = (self.stage.plane.is_some() && targets.contains(&PathTarget::Limit)).then(|| next.state.clone());
         let (mut arrived, target) = self.path.nearest(self.stage, next, length, targets);
-        if target == Some(Target::Limit) {
+        if target == Some(PathTarget::Limit) {
             // On a limit point itself one pivot is next to zero: what counts is what lies behind
             // it.
             arrived.signature = behind;
@@ -195,8 +200,8 @@ impl Follower<'_, '_> {
     }
 
     /// From a point near it to a load factor itself, not further away than an increment.
-    fn hit(&mut self, goal: Target, point: &mut Point) -> bool {
-        let Target::Load(load) = goal else { return false };
+    fn hit(&mut self, goal: PathTarget, point: &mut PathPoint) -> bool {
+        let PathTarget::Load(load) = goal else { return false };
         self.stage.state.copy_from(&point.state);
         if self.stage.attempt(load).is_err() {
             return false;
@@ -210,16 +215,16 @@ impl Follower<'_, '_> {
     }
 
     /// Takes a point of the path: account, row, and a word where something special happened.
-    fn arrive(&mut self, point: Point, target: Option<Target>) -> Result<(), Failure> {
+    fn arrive(&mut self, point: PathPoint, target: Option<PathTarget>) -> Result<(), Failure> {
         self.stage.good.copy_from(&self.path.here.state);
         self.stage.state.copy_from(&point.state);
         self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         let kind = match target {
-            Some(Target::Limit) => Some(EventKind::Limit),
-            Some(Target::Turning) => Some(EventKind::Turning),
-            Some(Target::Load(_)) | None => None,
+            Some(PathTarget::Limit) => Some(EventKind::Limit),
+            Some(PathTarget::Turning) => Some(EventKind::Turning),
+            Some(PathTarget::Load(_)) | None => None,
         };
         tell_of_points(self.stage, self.space, kind, self.path.here.signature, point.signature)?;
         self.path.here = point;

@@ -3,7 +3,7 @@
 
 use super::arc_length::{Arrival, detour};
 use super::begin;
-use super::levels::{Levels, Way};
+use super::levels::{Levels, ReachedBy};
 use super::rest;
 use super::stability::{Stability, conclude, tell_of_points};
 use crate::run::failure::Failure;
@@ -18,7 +18,7 @@ const IN_MOTION: &str =
     " (the stage began in motion, whose forces fade: `[damping]` in the dynamic stage before it leaves less of them)";
 
 /// The outcome of a step.
-enum Tried {
+enum StepOutcome {
     /// Balance, with these signs of pivots
     Good(Option<Signature>),
     /// Balance, perhaps on another branch
@@ -110,18 +110,18 @@ impl LevelControl<'_, '_> {
             let next = self.levels.next(self.stage.good.load, target);
             self.stage.tell_progress(next)?;
             match self.try_step(next) {
-                Tried::Good(signature) => self.take_step(signature)?,
+                StepOutcome::Good(signature) => self.take_step(signature)?,
                 _ if self.levels.halve(self.stage.soft) => {
                     self.stage.counters.cutbacks += 1;
                     self.stage.state.copy_all_but_rates(self.stage.good);
                 }
                 // Nothing tells better.
-                Tried::Strayed(signature) => self.take_step(signature)?,
-                Tried::Jumped(signature) if self.levels.approach != Approach::Path => {
+                StepOutcome::Strayed(signature) => self.take_step(signature)?,
+                StepOutcome::Jumped(signature) if self.levels.approach != Approach::Path => {
                     self.take_step(signature)?;
                 }
-                Tried::Jumped(_) => return self.go_around(target, None),
-                Tried::Failed(failure) => return self.go_around(target, Some(failure)),
+                StepOutcome::Jumped(_) => return self.go_around(target, None),
+                StepOutcome::Failed(failure) => return self.go_around(target, Some(failure)),
             }
         }
         Ok(Reached::Level)
@@ -131,8 +131,9 @@ impl LevelControl<'_, '_> {
     /// else the stage ends with `failure`.
     fn rest_at(&mut self, target: f64, failure: Failure) -> Result<Reached, Failure> {
         let total = self.stage.bookkeeper.ledger().total();
-        let may_rest =
-            !self.stage.is_linear() && self.levels.approach != Approach::Straight && self.levels.way != Way::Levels;
+        let may_rest = !self.stage.is_linear()
+            && self.levels.approach != Approach::Straight
+            && self.levels.reached_by != ReachedBy::Levels;
         if !may_rest || !rest::come_to_rest(self.stage, target)? {
             return Err(failure);
         }
@@ -149,27 +150,27 @@ impl LevelControl<'_, '_> {
         );
         self.stage.warn(WarningKind::CameToRest, message);
         self.stability.signature = self.stability.look(self.stage);
-        self.levels.way = Way::Rest;
+        self.levels.reached_by = ReachedBy::Rest;
         self.take_step(self.stability.signature)?;
         self.stage.bookkeeper.damp_to(total);
         Ok(Reached::Level)
     }
 
-    fn try_step(&mut self, next: f64) -> Tried {
+    fn try_step(&mut self, next: f64) -> StepOutcome {
         if let Err(failure) = self.stage.attempt(next) {
-            return Tried::Failed(failure);
+            return StepOutcome::Failed(failure);
         }
         let signature = self.stability.look(self.stage);
         let StageRun { model, good, state, newton, soft, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
         if *soft {
-            Tried::Good(signature)
+            StepOutcome::Good(signature)
         } else if self.levels.may_have_jumped(model, [good, state], &newton.first, changes) {
-            Tried::Jumped(signature)
+            StepOutcome::Jumped(signature)
         } else if self.stability.may_have_strayed(newton.contraction, signature) {
-            Tried::Strayed(signature)
+            StepOutcome::Strayed(signature)
         } else {
-            Tried::Good(signature)
+            StepOutcome::Good(signature)
         }
     }
 
@@ -178,7 +179,7 @@ impl LevelControl<'_, '_> {
         let before = std::mem::replace(&mut self.stability.signature, signature);
         tell_of_points(self.stage, &mut self.space, None, before, signature)?;
         self.stage.good.copy_all_but_rates(self.stage.state);
-        self.levels.way = self.levels.way.max(Way::Levels);
+        self.levels.reached_by = self.levels.reached_by.max(ReachedBy::Levels);
         // Where pivots were looked at the stiffness is that of this state.
         if signature.is_some() {
             self.stage.newton.begin_with(&self.stage.assembly.system);

@@ -32,7 +32,7 @@ const BACK: f64 = -0.5;
 /// How a stage has come to its last good state. Where levels lead on, one that is not reached is a
 /// limit of the path: the state of rest behind it is not looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Way {
+pub(super) enum ReachedBy {
     /// It is that of its start.
     Start,
     /// By load levels
@@ -48,7 +48,7 @@ pub(super) struct Levels {
     /// Load factor from one to the next
     pub level: f64,
     pub approach: Approach,
-    pub way: Way,
+    pub reached_by: ReachedBy,
     /// Load factor from the last good state to the next one
     increment: f64,
 }
@@ -57,7 +57,7 @@ impl Levels {
     /// `count` levels from a state on.
     pub fn new(start: State, count: usize, approach: Approach) -> Self {
         let level = 1.0 / count as f64;
-        Self { start, level, approach, way: Way::Start, increment: level }
+        Self { start, level, approach, reached_by: ReachedBy::Start, increment: level }
     }
 
     /// The next load factor between `load` and `target`.

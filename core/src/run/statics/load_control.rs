@@ -14,14 +14,14 @@ use crate::threads;
 const LOAD_STEP: f64 = 1.0 / 4096.0;
 
 /// The direction of a path of equilibrium.
-pub(in crate::run) struct Direction {
+pub(in crate::run) struct PathDirection {
     /// dq/dload
     pub rate: Vec<Vec3>,
     /// dg/dload at rest: of the forces, and at multipliers of the gaps of motors
     pub pull: Vec<Vec3>,
 }
 
-impl Direction {
+impl PathDirection {
     /// The direction of a path on which nothing varies with the load factor.
     pub fn none(slots: usize) -> Self {
         Self { rate: vec![Vec3::ZERO; slots], pull: vec![Vec3::ZERO; slots] }
@@ -49,7 +49,7 @@ impl StageRun<'_> {
 
     /// The direction of the path; `None` where nothing varies with the load factor. The tangent
     /// stays factorised.
-    pub fn path_direction(&mut self) -> Result<Option<Direction>, Failure> {
+    pub fn path_direction(&mut self) -> Result<Option<PathDirection>, Failure> {
         let pull = self.load_derivative();
         let Self { assembly, newton, prescribed_increment, state, model, counters, .. } = self;
         if pull.iter().chain(prescribed_increment.iter()).all(|&v| v == Vec3::ZERO) {
@@ -67,7 +67,7 @@ impl StageRun<'_> {
         }
         let mut rate = vec![Vec3::ZERO; pull.len()];
         system.pattern.dof_map.scatter(&solution, Some(prescribed_increment), &mut rate);
-        Ok(Some(Direction { rate, pull }))
+        Ok(Some(PathDirection { rate, pull }))
     }
 
     /// The derivative of the forces over the load factor; that of prescribed directions goes into

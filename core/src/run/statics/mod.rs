@@ -10,7 +10,7 @@ mod stability;
 
 pub(super) use arc_length::ArcLength;
 pub(super) use level_control::LoadLevels;
-pub(super) use load_control::Direction;
+pub(super) use load_control::PathDirection;
 pub(super) use stability::LARGEST_CONTRACTION;
 
 use super::failure::Failure;

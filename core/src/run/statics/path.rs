@@ -11,7 +11,7 @@
 //! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in
 //! the load factor; rotation vectors follow through the equations, so that no chart enters.
 
-use super::load_control::Direction;
+use super::load_control::PathDirection;
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
 use crate::run::failure::Failure;
@@ -44,7 +44,7 @@ const LOCATED: f64 = 1e-9;
 
 /// A point of the path and its unit tangent.
 #[derive(Clone)]
-pub struct Point {
+pub struct PathPoint {
     pub state: State,
     tangent: Vec<Vec3>,
     /// The tangent's part in the load factor
@@ -58,14 +58,14 @@ pub struct Point {
 
 /// A special point between two points of a path, as a function that changes its sign there.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Target {
+pub enum PathTarget {
     Limit,
     Turning,
     Load(f64),
 }
 
-impl Target {
-    pub fn value(self, point: &Point) -> f64 {
+impl PathTarget {
+    pub fn value(self, point: &PathPoint) -> f64 {
         match self {
             Self::Limit => point.load_rate,
             Self::Turning => point.work_rate,
@@ -78,7 +78,7 @@ impl Target {
 pub struct Path {
     /// The load factor at which it was begun
     pub begun: f64,
-    pub here: Point,
+    pub here: PathPoint,
     /// The length of the next step
     length: f64,
     /// Length of the first step
@@ -92,7 +92,7 @@ pub struct Path {
 impl Path {
     /// `None` where nothing grows with the load factor.
     pub fn new(stage: &mut StageRun, steps: usize) -> Result<Option<Self>, Failure> {
-        let Some(Direction { rate: direction, .. }) = stage.path_direction()? else { return Ok(None) };
+        let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(None) };
         let mut path = Self::with_measure(stage, direction);
         path.here = path.look(stage, &path.here.clone())?;
         let first = 1.0 / (steps as f64 * path.here.load_rate.abs());
@@ -135,7 +135,7 @@ impl Path {
         let turned = rotated.map(|(_, d)| d.norm() * stage.model.length).fold(0.0, f64::max);
         // Displacements that are only round-off beside the rotations measure nothing.
         let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
-        let here = Point {
+        let here = PathPoint {
             state: stage.state.clone(),
             tangent: rate,
             load_rate: 1.0,
@@ -161,9 +161,9 @@ impl Path {
     }
 
     /// The point at the run's state: its tangent goes on in the direction of `before`.
-    fn look(&mut self, stage: &mut StageRun, before: &Point) -> Result<Point, Failure> {
+    fn look(&mut self, stage: &mut StageRun, before: &PathPoint) -> Result<PathPoint, Failure> {
         let slots = stage.state.q.len();
-        let Direction { rate, pull } = stage.path_direction()?.unwrap_or_else(|| Direction::none(slots));
+        let PathDirection { rate, pull } = stage.path_direction()?.unwrap_or_else(|| PathDirection::none(slots));
         // The tangent of the last evaluation tells the pivots.
         let StageRun { assembly, newton, .. } = stage;
         let mut tangent = Tangent::that_may_go(assembly, stage.state, Weights::STIFFNESS);
@@ -174,7 +174,7 @@ impl Path {
         // Of prescribed motions alone no displacement is known that loads would do work on.
         let work = work_of_loads(stage, &pull, &rate).unwrap_or(load_rate.signum());
         let tangent = rate.into_iter().map(|d| d * load_rate).collect();
-        Ok(Point {
+        Ok(PathPoint {
             state: stage.state.clone(),
             tangent,
             load_rate,
@@ -185,7 +185,7 @@ impl Path {
     }
 
     /// One step that is neither too hard nor too bent; its length.
-    pub fn step(&mut self, stage: &mut StageRun) -> Result<(Point, f64), Failure> {
+    pub fn step(&mut self, stage: &mut StageRun) -> Result<(PathPoint, f64), Failure> {
         loop {
             let length = self.length;
             let failure = match self.advance(stage, length) {
@@ -234,7 +234,7 @@ impl Path {
     }
 
     /// How far a point is from here; over its length along the tangent, the cosine between both.
-    fn chord(&self, stage: &StageRun, next: &Point) -> f64 {
+    fn chord(&self, stage: &StageRun, next: &PathPoint) -> f64 {
         let moved: Vec<Vec3> = next.state.q.iter().zip(&self.here.state.q).map(|(q, here)| *q - *here).collect();
         let risen = next.state.load - self.here.state.load;
         (squared(stage, &moved) * self.scale + risen * risen).sqrt()
@@ -243,7 +243,7 @@ impl Path {
     /// True if a step of this length may have gone to another branch: along a path one pivot
     /// changes its sign where the load turns, and else only where another branch begins, which a
     /// short step passes by.
-    fn may_have_jumped(&self, next: &Point, length: f64) -> bool {
+    fn may_have_jumped(&self, next: &PathPoint, length: f64) -> bool {
         let (Some(before), Some(after)) = (self.here.signature, next.signature) else { return false };
         // On a limit point the load has turned already.
         let turned = !self.here.on_limit && (next.load_rate > 0.0) != (self.here.load_rate > 0.0);
@@ -335,10 +335,10 @@ impl Path {
     pub fn nearest(
         &mut self,
         stage: &mut StageRun,
-        next: Point,
+        next: PathPoint,
         length: f64,
-        targets: &[Target],
-    ) -> (Point, Option<Target>) {
+        targets: &[PathTarget],
+    ) -> (PathPoint, Option<PathTarget>) {
         let mut best = (next, length, None);
         for &target in targets {
             if let Some((point, at)) = self.locate(stage, &best.0, best.1, target) {
@@ -350,7 +350,13 @@ impl Path {
 
     /// Where a function of the path has its zero between here and a point `length` ahead (Illinois'
     /// regula falsi); `None` where it has none.
-    fn locate(&mut self, stage: &mut StageRun, end: &Point, length: f64, target: Target) -> Option<(Point, f64)> {
+    fn locate(
+        &mut self,
+        stage: &mut StageRun,
+        end: &PathPoint,
+        length: f64,
+        target: PathTarget,
+    ) -> Option<(PathPoint, f64)> {
         let mut low = Bracket { at: 0.0, value: target.value(&self.here) };
         let mut high = Bracket { at: length, value: target.value(end) };
         if low.value * high.value > 0.0 {
