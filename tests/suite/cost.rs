@@ -216,7 +216,7 @@ fn outputs_that_a_reference_lacks_are_told() {
     let names = ["stage", "time", "load", "tip.uy"].map(String::from).to_vec();
     let table = beamsim::output::HistoryReader { names, rows: vec![vec![1.0, 0.0, 1.0, 6.366]] };
     let found = costs(&quarter(TIP), &Against::Table(table), 2);
-    assert_eq!(found.reference.made, "the given history (which says nothing of tip.ux, tip.uz)");
+    assert_eq!(found.reference.made, "the given history (without values of tip.ux, tip.uz)");
     assert_eq!(found.outputs, [1]);
 }
 

@@ -1,9 +1,9 @@
 //! Positions and drawing of the parts of a plot.
 
+use super::line_plot::{Level, Line, LinePlot, LineStyle, Scale};
 use super::svg::{Anchor, BACKGROUND, Colour, GRID, INK, LINES, MUTED, PAPER, Stroke, Svg, Text, Theme};
 use super::text::{Block, cut, width};
 use super::ticks::Ticks;
-use super::{Level, Line, LinePlot, LineStyle, Scale, thinned};
 use std::fmt::Write;
 
 // Lengths are in pixels.
@@ -46,6 +46,9 @@ const LEAST_RANGE: f64 = 1e-12;
 const LARGEST: f64 = 1e300;
 /// Smaller values count as zero.
 const SMALLEST: f64 = 1e-290;
+
+/// Largest number of drawn points per line; more would not be visible.
+pub const MAX_POINTS: usize = 2000;
 
 /// Dash patterns of lines; the first is solid.
 const DASHES: [&str; 4] = ["", "8 4", "2 3", "9 3 2 3"];
@@ -315,6 +318,26 @@ impl<'a> Layout<'a> {
             svg.text(text);
         }
     }
+}
+
+/// Indices of the drawn points of a line: the lowest and the highest point of each stretch, and both
+/// ends of the line.
+pub fn thinned(points: &[(f64, f64)]) -> Vec<usize> {
+    if points.len() <= MAX_POINTS {
+        return (0..points.len()).collect();
+    }
+    let stretch = points.len().div_ceil(MAX_POINTS / 2);
+    let mut kept = vec![0];
+    for first in (0..points.len()).step_by(stretch) {
+        let all = first..points.len().min(first + stretch);
+        let by_height = |a: &usize, b: &usize| points[*a].1.total_cmp(&points[*b].1);
+        kept.extend(all.clone().min_by(by_height));
+        kept.extend(all.max_by(by_height));
+    }
+    kept.push(points.len() - 1);
+    kept.sort_unstable();
+    kept.dedup();
+    kept
 }
 
 /// A text in the size and colour of tick labels.

@@ -1,3 +1,4 @@
+use super::layout::{MAX_POINTS, thinned};
 use super::text::{Block, width, wrapped};
 use super::ticks::Ticks;
 use super::*;

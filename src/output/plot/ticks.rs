@@ -3,7 +3,7 @@
 //! A tick is an integer times a power of ten. The label is made of these two, and the value is read
 //! from the label: so the label of a tick always agrees with its position.
 
-use super::Scale;
+use super::line_plot::Scale;
 
 /// A labelled tick.
 #[derive(Clone, Debug, PartialEq)]
