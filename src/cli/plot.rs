@@ -4,12 +4,11 @@ use super::load::Refusal;
 use super::{Status, Verdict, json, load, say};
 use crate::deck::nearest;
 use crate::output::{Curve, Curves, HistoryReader, PartFile};
+use beamsim_core::probe::{Quantity, clocks, quantity};
 use std::path::{Path, PathBuf};
 
 /// Columns that are drawn where none is named.
 const USUAL: usize = 6;
-/// Columns that belong to every history.
-const CLOCKS: [&str; 3] = ["stage", "time", "load"];
 
 /// What is drawn.
 #[derive(clap::Args)]
@@ -137,9 +136,9 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
     let shown = |name: &&String| {
-        !CLOCKS.contains(&name.as_str()) && !name.ends_with(".err") && Some(*name) != wanted.x.as_ref()
+        clocks().all(|clock| clock != name.as_str()) && !name.ends_with(".err") && Some(*name) != wanted.x.as_ref()
     };
-    let moved = |name: &&String| [".ux", ".uy", ".uz"].iter().any(|suffix| name.ends_with(suffix));
+    let moved = |name: &&String| quantity(name) == Some(Quantity::Displacement);
     let all: Vec<String> = history.names.iter().filter(shown).cloned().collect();
     let some: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
     let usual = if some.is_empty() { all } else { some };

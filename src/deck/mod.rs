@@ -19,7 +19,7 @@ mod resolved;
 mod schema;
 mod sweep;
 
-pub use accuracy::{Accuracy, is_named};
+pub use accuracy::{Accuracy, is_named, without_stage};
 pub use action::{
     Axes, Body, Frame, HistoryBody, HistoryTable, HistoryUse, Initial, InitialTarget, Joint, JointKind, JointParts,
     Load, LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,

@@ -1,6 +1,7 @@
 //! history.csv: one row a load level or time step, one column a number.
 
 use super::files::{PartFile, remove_if_there};
+use beamsim_core::probe::clocks;
 use beamsim_core::run::Moment;
 use std::fmt::Write;
 use std::fs::File;
@@ -92,8 +93,8 @@ impl HistoryWriter {
         let (part, file) = PartFile::create(folder, "history.csv")?;
         let mut writer = csv::Writer::from_writer(file);
         let others = beside.as_ref().map_or(Vec::new(), |beside| beside.names(&names));
-        let all = names.iter().chain(&others).map(String::as_str);
-        writer.write_record(["stage", "time", "load"].into_iter().chain(all)).map_err(io::Error::from)?;
+        let all = clocks().map(String::from).chain(names.iter().cloned()).chain(others);
+        writer.write_record(all).map_err(io::Error::from)?;
         Ok(Self {
             folder: folder.into(),
             part,

@@ -27,7 +27,7 @@ use beamsim_core::effect::link;
 use beamsim_core::effect::rigid_body::Body;
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
-use beamsim_core::probe::{Figure, Probe, Quantity};
+use beamsim_core::probe::{Figure, Need, Probe};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -223,10 +223,6 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
     // Where a beam could not be meshed, points may seem to be no nodes; names that are unknown are so all the same.
     diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
-    let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
-    let expected =
-        expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
-    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
@@ -260,8 +256,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
     let plan = Plan {
-        energy: expected || watched || probes.iter().any(energy),
-        continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
+        energy: output::needs(deck, Need::EnergyAccount),
+        continued: output::needs(deck, Need::ContinuedRotations),
         model,
         initial,
         places: places(&mesh, &stages),
@@ -436,7 +432,7 @@ fn expected_column(
 }
 
 /// `mode1.omega`, `mode1.growth`, `buckling1.load`: the quantity and the number of the mode from 0.
-fn mode_quantity(name: &str) -> Option<(ModeQuantity, usize)> {
+pub fn mode_quantity(name: &str) -> Option<(ModeQuantity, usize)> {
     let (mode, quantity) = name.split_once('.')?;
     let (quantity, digits) = match quantity {
         "omega" => (ModeQuantity::Omega, mode.strip_prefix("mode")?),

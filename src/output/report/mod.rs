@@ -6,6 +6,7 @@ mod film;
 pub use film::Film;
 
 use super::{HistoryReader, PartFile, Record};
+use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart};
 use encode::base64;
 use serde_json::{Value, json};
 use std::io;
@@ -47,6 +48,7 @@ impl Report<'_> {
             "deck": self.record.text(),
             "run": self.record.bare(),
             "history": table(&history, &shown, &columns, ""),
+            "parts": parts(),
             "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, ".err") },
             "scene": film.to_json(&row),
             "modes": numbers(&results.join("modes.csv"))?,
@@ -71,6 +73,18 @@ fn numbers(path: &Path) -> io::Result<Value> {
 /// Whether a column is the error bar of another.
 fn is_bar(names: &[String], k: usize) -> bool {
     names[k].strip_suffix(".err").is_some_and(|of| names.iter().any(|name| name == of))
+}
+
+/// Columns that share a picture: the group of the whole scene that they belong to, if they do, their heading, and the ends
+/// of their names.
+fn parts() -> Vec<Value> {
+    let of_history = COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_scene());
+    let of_group = |group: &'static ColumnGroup| {
+        let scene = group.is_of_scene().then_some(group.key);
+        let part = move |part: &ColumnPart| json!({ "scene": scene, "title": part.title, "suffixes": part.suffixes });
+        group.parts.iter().map(part)
+    };
+    of_history.flat_map(of_group).collect()
 }
 
 /// The rows that are shown: all, or each n-th and those with a frame.

@@ -9,6 +9,7 @@ mod spins;
 use super::constraints::find_history;
 use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh, Rule, Station};
+use super::output::needs;
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
 use beamsim_core::effect::beam_elasticity::{BeamElasticity, ElasticElements, StressField};
 use beamsim_core::effect::elastic_element::ElasticElement;
@@ -21,6 +22,7 @@ use beamsim_core::kernel::beam::StiffnessPoint;
 use beamsim_core::kernel::elastic::Strain;
 use beamsim_core::kernel::volume::VolumePoint;
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
+use beamsim_core::probe::Need;
 use beamsim_core::run::Driven;
 use beamsim_core::system::Slot;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -312,13 +314,7 @@ fn needs_mass(deck: &Deck) -> bool {
     let inertia =
         |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
     let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
-    let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
-    let expected = deck.expects.iter().any(|expect| match &expect.body {
-        deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
-        deck::ExpectBody::Fails(_) | deck::ExpectBody::Warns(_) | deck::ExpectBody::Quiet => false,
-    });
-    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
-    dynamic || written || expected || watched || may_flutter(deck)
+    dynamic || needs(deck, Need::Mass) || may_flutter(deck)
 }
 
 /// Whether a static stage may end under loads that turn, whose tangents are not symmetric.

@@ -7,6 +7,8 @@ mod table;
 use crate::deck::{Deck, Diagnostic, EffectWord};
 use crate::scene::{self, Scene};
 use crate::study::outcome::{Outcome, columns};
+use crate::study::scale::quantity;
+use beamsim_core::probe::Quantity;
 use beamsim_core::run::Failure;
 use change::changes;
 use present::acts;
@@ -139,7 +141,8 @@ impl Study<'_> {
         };
         if words.contains(&EffectWord::LargeRotations) {
             // Energies are those of the full theory, which the linear one does not keep.
-            let energies = self.columns.iter().zip(&mut changes).filter(|(column, _)| column.starts_with("energy."));
+            let is_energy = |column: &str| quantity(column) == Some(Quantity::Energy);
+            let energies = self.columns.iter().zip(&mut changes).filter(|(column, _)| is_energy(column));
             energies.for_each(|(_, change)| *change = f64::NAN);
         }
         Ok(Variant { without: words.to_vec(), outcome, changes })

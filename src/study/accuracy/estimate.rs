@@ -2,7 +2,8 @@
 
 use crate::deck::{Accuracy, Deck};
 use crate::study::cost::{Sampler, Samples};
-use crate::study::scale::kind;
+use crate::study::scale::mesh_error;
+use beamsim_core::probe::MeshError;
 
 /// The order of the error over the step that estimates count on, and that of smooth motions.
 const ORDER_IN_TIME: f64 = 1.5;
@@ -21,7 +22,10 @@ impl Falls {
     const ALL: [Self; 2] = [Self::Places, Self::Slopes];
 
     fn of(column: &str) -> Self {
-        if ["N", "M"].contains(&kind(column)) { Self::Slopes } else { Self::Places }
+        match mesh_error(column) {
+            MeshError::Slopes => Self::Slopes,
+            MeshError::Nodes | MeshError::Unspecified => Self::Places,
+        }
     }
 
     /// The order over the width of elements of an order that is assumed, and that at nodes of smooth scenes.

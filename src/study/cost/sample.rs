@@ -6,10 +6,10 @@ use super::places::Places;
 use crate::deck::{Deck, Diagnostic, NormWord, Path, StageBody};
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, columns, columns_of_history};
-use crate::study::scale::{kind, scales};
+use crate::study::scale::{mesh_error, scales};
 use crate::study::{Recorder, expected_values};
-use beamsim_core::probe::Quantity;
-use std::f64::consts::TAU;
+use beamsim_core::probe::{MeshError, Nearest, Probe};
+use std::ops::Range;
 
 /// Instants of a stage that are compared, at most.
 const MOST_INSTANTS: usize = 200;
@@ -32,8 +32,8 @@ pub struct Sampler {
     of_history: usize,
     /// Diagonal of the scene
     length: f64,
-    /// First columns of rotation vectors that are not continued from turn to turn
-    rotations: Vec<usize>,
+    /// Columns whose values are not unique, such as rotation vectors that are not continued from turn to turn
+    ambiguous: Vec<Ambiguous>,
     /// Whether the initial line of a beam is one that elements only come near
     curved: bool,
     /// Whether something is lumped to nodes where rotations are relative
@@ -48,6 +48,14 @@ pub struct Sampler {
 const LUMPED: [&str; 4] =
     ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "following line loads"];
 
+/// Columns of a group whose values are not unique.
+struct Ambiguous {
+    /// Numbers of the columns
+    columns: Range<usize>,
+    /// Replaces the first values by those that mean the same and are nearest to the second
+    nearest: Nearest,
+}
+
 /// What is looked at in a run.
 enum Look {
     /// Rows with these stages (from 1) and clocks, the last row, and modes
@@ -55,9 +63,6 @@ enum Look {
     /// What the deck expects
     Expected,
 }
-
-/// Kinds of columns that move as nodes do.
-const MOTIONS: [&str; 7] = ["u", "", "r", "d", "v", "w", "energy"];
 
 /// The numbers of a run that are compared: instant by instant all columns of the history, then modes.
 pub type Samples = Vec<f64>;
@@ -85,7 +90,7 @@ impl Sampler {
     pub fn of_expectations(deck: &Deck, scene: &Scene) -> (Self, Samples) {
         let (names, values): (Vec<_>, Vec<_>) = expected_values(&scene.expectations).into_iter().unzip();
         let count = names.len();
-        (Self { norm: NormWord::End, rotations: Vec::new(), ..Self::new(deck, scene, names, count) }, values)
+        (Self { norm: NormWord::End, ambiguous: Vec::new(), ..Self::new(deck, scene, names, count) }, values)
     }
 
     fn new(deck: &Deck, scene: &Scene, columns: Vec<String>, of_history: usize) -> Self {
@@ -96,7 +101,7 @@ impl Sampler {
             norm: deck.cost.norm.unwrap_or_default(),
             of_history,
             length: scene.plan.model.length,
-            rotations: rotations(scene),
+            ambiguous: ambiguous(scene),
             curved: deck.beams.iter().any(|beam| matches!(beam.path, Path::Arc(_))),
             lumped: scene.reasons.iter().any(|reason| reason.active && LUMPED.contains(&reason.name)),
             looks: Look::Expected,
@@ -187,7 +192,7 @@ impl Sampler {
         }
         for ((first, a), (_, b)) in self.split(came).zip(self.split(reference)) {
             let mut nearest = a.to_vec();
-            self.take_nearest_rotations(first, &mut nearest, b);
+            self.take_nearest(first, &mut nearest, b);
             for (k, (a, b)) in nearest.iter().zip(b).enumerate().filter(|(_, (a, b))| !(a.is_nan() || b.is_nan())) {
                 let difference = (a - b).abs();
                 let (largest, squares, count) = &mut sums[first + k];
@@ -218,7 +223,7 @@ impl Sampler {
         let mut all = Vec::with_capacity(one.len());
         for ((first, a), (_, b)) in self.split(one).zip(self.split(other)) {
             let mut nearest = b.to_vec();
-            self.take_nearest_rotations(first, &mut nearest, a);
+            self.take_nearest(first, &mut nearest, a);
             all.extend(a.iter().zip(&nearest).map(|(a, b)| a + weight * (a - b)));
         }
         all
@@ -227,7 +232,7 @@ impl Sampler {
     /// The order over the width of elements of an order at which errors of smooth scenes fall: twice that at nodes, or that at which the elements
     /// come near a curved line, and at which nodes stand for what is lumped to them; one more than that between nodes; `None` where outputs count that are not motions.
     pub fn order_in_space(&self, order: usize, relative: bool) -> Option<Expected> {
-        let motion = |&k: &usize| MOTIONS.contains(&kind(&self.columns[k]));
+        let motion = |&k: &usize| mesh_error(&self.columns[k]) == MeshError::Nodes;
         let between = |&k: &usize| {
             let node = self.columns[k].rsplit_once('.').map_or("", |(node, _)| node);
             let place = node.split_once('@').map_or("", |(_, place)| place);
@@ -243,35 +248,27 @@ impl Sampler {
         self.outputs.iter().all(motion).then_some(Expected { order: expected as f64, at_least })
     }
 
-    /// A rotation has two vectors of up to 2 pi: takes those that are nearer to another row's.
-    pub fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
-        let own = first..first + row.len();
-        for k in self.rotations.iter().filter(|&k| own.contains(k)).map(|k| k - first) {
-            let (r, goal): ([f64; 3], [f64; 3]) = ([row[k], row[k + 1], row[k + 2]], [to[k], to[k + 1], to[k + 2]]);
-            let angle = r.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if angle == 0.0 {
-                continue;
-            }
-            let other = r.map(|x| x * (1.0 - TAU / angle));
-            let away = |v: [f64; 3]| v.iter().zip(goal).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-            if away(other) < away(r) {
-                row[k..k + 3].copy_from_slice(&other);
+    /// Replaces values of a row that are not unique by those that mean the same and are nearest to another row's. `first`
+    /// is the number of the first column of the rows.
+    pub fn take_nearest(&self, first: usize, row: &mut [f64], to: &[f64]) {
+        for group in &self.ambiguous {
+            let own = group.columns.start.wrapping_sub(first)..group.columns.end.wrapping_sub(first);
+            if let (Some(values), Some(goal)) = (row.get_mut(own.clone()), to.get(own)) {
+                (group.nearest)(values, goal);
             }
         }
     }
 }
 
-/// The first columns of rotation vectors, which have another of up to 2 pi that means the same.
-fn rotations(scene: &Scene) -> Vec<usize> {
-    let mut first = 0;
-    let mut found = Vec::new();
-    for probe in &scene.probes {
-        if matches!(probe.quantity, Quantity::Rotation(_)) {
-            found.push(first);
-        }
-        first += probe.names.len();
-    }
-    found
+/// The columns of a history whose values are not unique.
+fn ambiguous(scene: &Scene) -> Vec<Ambiguous> {
+    let mut end = 0;
+    let columns = |probe: &Probe| {
+        let start = end;
+        end += probe.names.len();
+        Some(Ambiguous { columns: start..end, nearest: probe.group.nearest? })
+    };
+    scene.probes.iter().filter_map(columns).collect()
 }
 
 /// Levels of static stages, and multiples of the coarsest step of dynamic ones, after that step halved some times; paths have no instants in

@@ -12,7 +12,7 @@ pub use store::Store;
 
 use super::crowd::side_by_side;
 use super::variant::Variant;
-use crate::deck::{self, Deck, Looked, looking_at, nearest};
+use crate::deck::{self, Deck, Looked, looking_at, nearest, without_stage};
 use crate::scene::Scene;
 use std::io;
 
@@ -137,10 +137,7 @@ pub fn usual_outputs(scene: &Scene) -> Vec<Looked> {
     let mut names: Vec<String> = Vec::new();
     for column in super::outcome::columns(scene) {
         // Those of several stages have one name, which means the last.
-        let name = match column.strip_prefix("stage").and_then(|rest| rest.split_once('.')) {
-            Some((number, mode)) if number.parse::<usize>().is_ok() => mode.to_string(),
-            _ => column,
-        };
+        let name = without_stage(&column).to_string();
         if !names.contains(&name) {
             names.push(name);
         }
