@@ -5,7 +5,7 @@
 
 use super::place::{BeamPoint, Place};
 use crate::kernel::inertia::Spin;
-use crate::rotation::{Rotation, principal};
+use crate::rotation::{Rotation, Series, principal};
 use crate::run::Snapshot;
 use crate::system::Node;
 use crate::tensor::Vec3;
@@ -139,7 +139,7 @@ pub enum MeshError {
 
 /// All groups: those of nodes, of the whole scene, and of the run. Where suffixes stand in two groups, the first is
 /// meant unless a deck writes the other.
-pub static COLUMNS: [ColumnGroup; 17] = [
+pub static COLUMNS: [ColumnGroup; 18] = [
     ColumnGroup {
         key: "u",
         parts: &[part("displacement", Quantity::Displacement, &["ux", "uy", "uz"])],
@@ -178,6 +178,13 @@ pub static COLUMNS: [ColumnGroup; 17] = [
         source: Source::Place(section_axes),
         needs: &[],
         nearest: None,
+    },
+    ColumnGroup {
+        key: "q",
+        parts: &[part("unit quaternion", Quantity::Orientation, &["qw", "qx", "qy", "qz"])],
+        source: Source::Place(orientation),
+        needs: &[],
+        nearest: Some(nearest_quaternion),
     },
     ColumnGroup {
         key: "v",
@@ -332,12 +339,12 @@ impl ColumnGroup {
         if self.is_of_run() { vec![self.key.into()] } else { self.names_at(self.key) }
     }
 
-    /// Whether both groups have columns of the same names, so that a history holds one of them.
+    /// True if both groups have columns of the same names: a history then holds one of them.
     pub fn has_columns_of(&self, other: &Self) -> bool {
         self.is_of_node() && other.is_of_node() && self.suffixes().eq(other.suffixes())
     }
 
-    /// Whether the columns belong to a node, or a place on a beam.
+    /// True if the columns belong to a node, or a place on a beam.
     pub fn is_of_node(&self) -> bool {
         match self.source {
             Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) => true,
@@ -345,7 +352,7 @@ impl ColumnGroup {
         }
     }
 
-    /// Whether the columns belong to the whole scene.
+    /// True if the columns belong to the whole scene.
     pub fn is_of_scene(&self) -> bool {
         matches!(self.source, Source::Scene(_))
     }
@@ -477,6 +484,16 @@ fn section_axes(place: &Place, at: &Snapshot, out: &mut Vec<f64>) {
     (0..3).for_each(|k| out.extend(axes.column(k).0));
 }
 
+/// Unit quaternion of the total rotation: scalar part, which is not negative, then vector part, which points along the
+/// rotation vector of at most pi.
+fn orientation(place: &Place, at: &Snapshot, out: &mut Vec<f64>) {
+    let p = principal(place.motion(at.state).p);
+    // Cosine of half the angle, and sine over it: no angle in a denominator.
+    let [cosine, sine_over_half_angle, ..] = Series::at(0.25 * p.squared()).0;
+    out.push(cosine.max(0.0));
+    out.extend((p * (0.5 * sine_over_half_angle)).0);
+}
+
 /// Spatial angular velocity.
 fn angular_velocity(place: &Place, at: &Snapshot, out: &mut Vec<f64>) {
     let spin = spin(place, at);
@@ -527,6 +544,13 @@ fn nearest_rotation_vector(vector: &mut [f64], goal: &[f64]) {
     let other: Vec<f64> = vector.iter().map(|x| x * (1.0 - TAU / angle)).collect();
     if squared_distance(&other, goal) < squared_distance(vector, goal) {
         vector.copy_from_slice(&other);
+    }
+}
+
+/// A quaternion and its negative are the same rotation: takes the one that is nearer to `goal`.
+fn nearest_quaternion(quaternion: &mut [f64], goal: &[f64]) {
+    if quaternion.iter().zip(goal).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+        quaternion.iter_mut().for_each(|x| *x = -*x);
     }
 }
 
