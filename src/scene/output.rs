@@ -13,18 +13,18 @@ use std::sync::Arc;
 /// Groups that are written where a deck asks for none.
 const DEFAULT_GROUPS: [&str; 2] = ["u", "r"];
 
-/// Finds probes by name.
+/// Finder of columns by their names.
 pub struct Columns<'a> {
     /// The deck
     pub deck: &'a Deck,
     /// The mesh
     pub mesh: &'a Mesh,
-    /// The elasticity, for resultants
+    /// Elasticity of the scene, for strains and resultants
     pub elasticity: &'a [Arc<dyn StressField>],
 }
 
 impl Columns<'_> {
-    /// The probes of the history, in the order of its columns: node by node, then the whole scene.
+    /// Probes of the history, in the order of its columns: node by node, then the whole scene.
     pub fn written(&self, diagnostics: &mut Vec<Diagnostic>) -> Vec<Probe> {
         let groups = self.written_groups(diagnostics);
         let mut probes = Vec::new();
@@ -77,7 +77,7 @@ impl Columns<'_> {
         nodes.clone()
     }
 
-    /// The probe of a group at a node.
+    /// Probe of a group at a node.
     fn node_probe(&self, name: &Spanned<String>, group: &'static ColumnGroup) -> Result<Probe, Diagnostic> {
         let found = self.mesh.find(self.deck, name)?;
         let place = self.mesh.place(&found);
@@ -90,7 +90,7 @@ impl Columns<'_> {
         Ok(Probe { names: group.names_at(&name.value), group, reading })
     }
 
-    /// The point of a beam where resultants are asked for.
+    /// Point of a beam for strains and resultants.
     fn beam_point(&self, node: &Spanned<String>, found: &Found) -> Result<BeamPoint, Diagnostic> {
         let refuse = |message: String| Diagnostic::error(message, node.span.clone());
         let beams = self.mesh.beams_at(found);
@@ -113,7 +113,7 @@ impl Columns<'_> {
         Ok(BeamPoint { elasticity: self.elasticity.to_vec(), sides, frame: beam.frame(fraction) })
     }
 
-    /// Any column by its name: the probe and the component.
+    /// Probe and component of a column, by its name.
     pub fn find(&self, name: &Spanned<String>) -> Result<(Probe, usize), Diagnostic> {
         let (group, component) = column_of(self.deck, &name.value).ok_or_else(|| no_column(name))?;
         if let Some(probe) = whole_probe(group) {
@@ -125,7 +125,7 @@ impl Columns<'_> {
     }
 }
 
-/// Whether a column that a deck writes, expects or ends a stage by needs a part of the model or run.
+/// True if a column that a deck writes, expects or ends a stage by needs this part of the model or run.
 pub fn needs(deck: &Deck, need: Need) -> bool {
     let written = deck.output.columns.iter().flatten().filter_map(|key| group(&key.value));
     let expected = deck.expects.iter().filter_map(|expect| match &expect.body {
@@ -145,7 +145,7 @@ fn column_of(deck: &Deck, name: &str) -> Option<(&'static ColumnGroup, usize)> {
     Some((instead.unwrap_or(first), component))
 }
 
-/// The probe of a group that belongs to no node.
+/// Probe of a group that belongs to no node.
 fn whole_probe(group: &'static ColumnGroup) -> Option<Probe> {
     match group.source {
         Source::Scene(read) | Source::Run(read) => {
