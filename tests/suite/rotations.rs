@@ -483,7 +483,7 @@ columns = ["d", "q", "r"]
                 let vector = Vec3([quaternion[1], quaternion[2], quaternion[3]]);
                 let present = matrix_of_quaternion(quaternion) * axes(0);
                 let error = (present - axes(row)).max_abs();
-                assert!(error < 4e-15, "{node}, row {row} of case {case}: {error:e}");
+                assert!(error < 1e-14, "{node}, row {row} of case {case}: {error:e}");
                 let half_turn = vector.dot(Vec3([r[0][row], r[1][row], r[2][row]]));
                 assert!(quaternion[0] >= 0.0 && half_turn >= 0.0, "{node}, row {row} of case {case}: {quaternion:?}");
             }
