@@ -3,8 +3,8 @@
 //! `cargo bench --bench kernels`; compare figures of one run only.
 
 use beamsim_core::kernel::beam::StiffnessPoint;
-use beamsim_core::kernel::elastic::Stiffness;
 use beamsim_core::kernel::inertia::Rotary;
+use beamsim_core::kernel::law::{Linear, Stiffness};
 use beamsim_core::kernel::volume::VolumePoint;
 use beamsim_core::kernel::{ElementSystem, NodeMotion, Weights, shape};
 use beamsim_core::rotation::Rotation;
@@ -35,10 +35,12 @@ fn stiffness_points<const N: usize, const G: usize>() -> [StiffnessPoint<N>; G] 
             slope: shape::derivatives::<N>(xi).map(|d| 2.0 * d),
             weight: 0.5 * weight,
             tangent: Vec3::UNIT[0],
-            stiffness: Stiffness {
-                cn: Mat3::diagonal([1e4, 5e3, 5e3]),
-                cm: Mat3::diagonal([80.0, 100.0, 120.0]),
-                cc: None,
+            law: Linear {
+                stiffness: Stiffness {
+                    cn: Mat3::diagonal([1e4, 5e3, 5e3]),
+                    cm: Mat3::diagonal([80.0, 100.0, 120.0]),
+                    cc: None,
+                },
             },
             free: None,
         }

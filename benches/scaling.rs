@@ -6,7 +6,7 @@
 use beamsim::scene;
 use beamsim_core::effect::RoundOff;
 use beamsim_core::kernel::{ElementSystem, Weights};
-use beamsim_core::model::{Assembly, Model, StageContext, StageKind};
+use beamsim_core::model::{Assembly, Model, Schedule, StageContext, StageKind};
 use beamsim_core::run::{Failure, Observer, Run, Snapshot};
 use beamsim_core::solve::{Convergence, LinearSolver};
 use beamsim_core::system::Leftover;
@@ -44,18 +44,17 @@ fn deck(elements: usize, dynamic: bool, way: &str) -> String {
 
 /// Seconds that scattering one set of element systems takes.
 fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
-    let mut model = model.clone();
     let state = model.rest();
-    let Ok(dof_map) = model.begin_stage(0, kind, &state) else { return 0.0 };
+    let Ok(dof_map) = Schedule::new(model).begin_stage(model, 0, kind, &state) else { return 0.0 };
     let stage = StageContext { number: 0, kind, rotating: false };
     let effects = model.acting(&stage);
     let shapes: Vec<_> = effects.iter().map(|effect| effect.connectivity()).collect();
-    let mut assembly = Assembly::new(&stage, dof_map, &model);
+    let mut assembly = Assembly::new(&stage, dof_map, model);
     let mut scatter = || {
         let start = Instant::now();
         for (number, (effect, connectivity)) in effects.iter().zip(&shapes).enumerate() {
             let element = ElementSystem::new(connectivity.iter().next().map_or(1, <[u32]>::len));
-            let mut sink = assembly.system.sink(number, effect.category(), effect.has_tangent());
+            let mut sink = assembly.system.sink(number, effect.category(), effect.tangent().exists());
             for k in 0..connectivity.len() {
                 sink.add(k, black_box(&element));
             }
@@ -81,14 +80,14 @@ fn quickest(mut part: impl FnMut()) -> f64 {
 fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     let (scene, _) =
         scene::from_text(&deck(elements, dynamic, interpolation)).unwrap_or_else(|_| panic!("the deck is good"));
-    let mut model = scene.plan.model;
+    let model = scene.plan.model;
     let state = model.rest();
     let (kind, weights) = if dynamic {
         (StageKind::Dynamic, Weights { stiffness: 1.0, damping: 200.0, mass: 4e4 })
     } else {
         (StageKind::Static, Weights::STIFFNESS)
     };
-    let Ok(dof_map) = model.begin_stage(0, kind, &state) else { return };
+    let Ok(dof_map) = Schedule::new(&model).begin_stage(&model, 0, kind, &state) else { return };
     let mut assembly = Assembly::new(&StageContext { number: 0, kind, rotating: false }, dof_map, &model);
     let tangent = quickest(|| assembly.evaluate(&state, weights, None));
     let force = quickest(|| assembly.evaluate(&state, Weights::NONE, None));

@@ -1,33 +1,40 @@
 //! `beamsim run --accuracy`: elements and steps for a wanted accuracy.
 
-use super::load::{Loaded, Refusal};
+use super::error::{CommandError, DeckError};
+use super::load::Loaded;
 use super::progress::Progress;
-use super::{Status, cores, load, run, say, signals};
+use super::simulate::RunExtras;
+use super::thread_count::cores;
+use super::variant::{describe, paste_lines};
+use super::{console, load, signals};
 use crate::deck::{Accuracy, Deck};
-use crate::output::{Film, Reached};
+use crate::output::{Film, ReachedAccuracy, ReachedColumn};
 use crate::scene::Scene;
-use crate::study::Outcome;
 use crate::study::accuracy::{Found, reach};
-use crate::study::cost::{self, Journal, Options, Pace, Point};
+use crate::study::cost::{Journal, StudyOptions};
 use crate::study::error_bars::{ErrorBars, error_bars, polylines, refuse_paths};
+use crate::study::{Outcome, StudyError};
 use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What the user wants of a run.
+/// Arguments of `beamsim run` besides the decks.
 #[derive(clap::Args)]
-pub struct Target {
-    /// Choose elements and steps for this estimated error of all outputs, relative to the largest value of each kind
+pub struct RunArguments {
+    /// Choose elements and steps so that the estimated error of all outputs is below ERROR,
+    /// relative to the largest value of each kind
     #[arg(long, value_name = "ERROR")]
     accuracy: Option<f64>,
-    /// Search no longer than this for them: 90s, 5m, 1h
-    #[arg(long, value_parser = say::duration, value_name = "TIME")]
+    /// Time limit of this search: 90s, 5m, 1h
+    #[arg(long, value_parser = console::duration, value_name = "TIME")]
     budget: Option<Duration>,
-    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two coarser runs
+    /// Write estimated errors beside the columns of the history (`tip.ux.err`), from two more runs
+    /// with other elements and steps
     #[arg(long)]
     error_bars: bool,
-    /// Threads, at most (default: one a core); they serve a search and large scenes, whose results are the same on any number of them
-    #[arg(long, value_parser = say::threads, value_name = "N")]
+    /// Largest number of threads (default: one per core), for a search and for large scenes;
+    /// results do not depend on it
+    #[arg(long, value_parser = console::threads, value_name = "N")]
     pub threads: Option<NonZero<usize>>,
     /// Also write report.html, a page that plays the run back
     #[arg(long)]
@@ -35,177 +42,140 @@ pub struct Target {
 }
 
 /// A scene that is ready to run.
-pub struct Aimed {
-    /// The deck as it was read
-    pub text: String,
+pub struct PreparedRun {
     /// The scene
     pub scene: Scene,
-    /// The accuracy that was wanted, and what was reached
-    pub reached: Option<Reached>,
-    /// By what it was missed, if it was
+    /// How far the wanted accuracy is missed, as a message, if it is
     pub missed: Option<String>,
-    /// Its outputs, where the search for that accuracy has run it
-    pub outcome: Option<Outcome>,
-    /// Error bars, where they are wanted
-    pub bars: Option<ErrorBars>,
-    /// What films it for a report, where one is wanted
-    pub film: Option<Film>,
+    /// Additions to the results: accuracy, error bars, film
+    pub extras: RunExtras,
 }
 
-impl Target {
+impl RunArguments {
     /// Reads a deck, and searches for the wanted accuracy where there is one.
-    pub fn aim(&self, name: &str, path: &Path, settings: &[String]) -> Result<Aimed, Refusal> {
+    pub fn prepare(&self, name: &str, path: &Path, settings: &[String]) -> Result<PreparedRun, CommandError> {
         let loaded = load::deck(path, settings)?;
-        let usage = |why: String| Refusal::of(Status::Wrong, "usage", why);
-        self.accuracy.map(Accuracy::check).transpose().map_err(|why| usage(format!("--accuracy: {why}")))?;
+        self.accuracy
+            .map(Accuracy::check)
+            .transpose()
+            .map_err(|why| CommandError::Usage(format!("--accuracy: {why}")))?;
         let Some(wanted) = self.accuracy.map(Accuracy::All).or(loaded.deck.accuracy.clone()) else {
             if self.budget.is_some() {
-                let why = "--budget bounds the search for an accuracy: give --accuracy, or `accuracy` in the deck";
-                return Err(usage(why.into()));
+                let why = "--budget limits the search for an accuracy: give --accuracy, or `accuracy` in the deck";
+                return Err(CommandError::Usage(why.into()));
             }
             return self.with_bars(path, loaded, None, None);
         };
-        tell_polylines(&loaded.deck);
+        note_polylines(&loaded.deck);
         if self.error_bars {
-            refuse_paths(&loaded.deck).map_err(|why| refused(cost::Refusal::Deck(why), path, &loaded))?;
+            refuse_paths(&loaded.deck).map_err(|found| study_error(found.into(), path, &loaded))?;
         }
         let start = Instant::now();
         let mut found = self.search(name, path, &loaded, &wanted)?;
-        tell(name, &loaded.deck, &found, &wanted);
-        let columns = found.columns.iter().zip(&found.estimates).filter(|(_, estimate)| !estimate.is_nan());
-        let columns = columns.map(|(column, &estimate)| (column.clone(), wanted.of(column), estimate));
-        let reached = Reached {
-            columns: columns.filter(|(_, wanted, _)| wanted.is_finite()).collect(),
-            is_reached: found.reached,
-            settings: found.settings.clone(),
-            runs: found.runs,
-            seconds: start.elapsed().as_secs_f64(),
-        };
-        // The file may have changed since it was read.
-        let loaded = load::again(path, &loaded.text, &found.settings)?;
+        print_found(name, &loaded.deck, &found, &wanted);
+        let accuracy = reached(&found, &wanted, start.elapsed());
+        // The text in memory is used, since the file may have changed in the meantime.
+        let loaded = load::again(path, &loaded.text, &found.settings())?;
         let missed = (!found.reached).then(|| missed(&found, &wanted));
-        let aimed = self.with_bars(path, loaded, Some(reached), found.outcome.take())?;
-        Ok(Aimed { missed, ..aimed })
+        let prepared = self.with_bars(path, loaded, Some(accuracy), found.outcome.take())?;
+        Ok(PreparedRun { missed, ..prepared })
     }
 
     fn with_bars(
         &self,
         path: &Path,
         loaded: Loaded,
-        reached: Option<Reached>,
+        accuracy: Option<ReachedAccuracy>,
         outcome: Option<Outcome>,
-    ) -> Result<Aimed, Refusal> {
-        let made = || error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
-        let bars = self.error_bars.then(made).transpose().map_err(|refusal| refused(refusal, path, &loaded))?;
-        if self.error_bars && reached.is_none() {
-            tell_polylines(&loaded.deck);
+    ) -> Result<PreparedRun, CommandError> {
+        let bars = if self.error_bars { Some(bars(path, &loaded)?) } else { None };
+        if self.error_bars && accuracy.is_none() {
+            note_polylines(&loaded.deck);
         }
         let film = self.report.then(|| Film::of(&loaded.scene));
-        Ok(Aimed { text: loaded.text, scene: loaded.scene, reached, missed: None, outcome, bars, film })
+        let extras = RunExtras { accuracy, outcome, bars, text: loaded.text, film };
+        Ok(PreparedRun { scene: loaded.scene, missed: None, extras })
     }
 
-    fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, Refusal> {
+    fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, CommandError> {
         signals::caught();
         let mut progress = Progress::new(name);
-        let mut tell = |done: usize, all: usize| {
-            progress.tell(done as f64 / all as f64, || format!("looking for the accuracy: {done} of {all} runs"));
+        let mut show = |done: usize, all: usize| {
+            progress.show(done as f64 / all as f64, || format!("searching for the accuracy: {done} of {all} runs"));
         };
-        let options = Options {
+        let options = StudyOptions {
             threads: cores(self.threads),
             budget: self.budget,
             interrupted: &signals::caught,
-            tell: &mut tell,
+            progress: &mut show,
             journal: &mut Journal::default(),
         };
         let found = reach(&loaded.text, &loaded.deck, &loaded.scene, wanted, options);
         progress.done();
-        let found = found.map_err(|refusal| refused(refusal, path, loaded))?;
-        match &found.stopped {
+        let mut found = found.map_err(|error| study_error(error, path, loaded))?;
+        match found.stopped.take() {
             None => Ok(found),
-            Some(stopped) => {
-                lines(&loaded.deck, &found.settings).iter().for_each(|line| say::note(line));
-                let message = format!("the search was stopped: {}", missed(&found, wanted));
-                Err(Refusal::of(run::status_of(stopped), stopped.name(), message))
+            Some(by) => {
+                paste_lines(&loaded.deck, &found.settings()).iter().for_each(|line| console::note(line));
+                Err(CommandError::SearchStopped { by, missed: missed(&found, wanted) })
             }
         }
     }
 }
 
-/// Says by how much an accuracy is missed.
+fn bars(path: &Path, loaded: &Loaded) -> Result<ErrorBars, CommandError> {
+    let bars = error_bars(&loaded.text, &loaded.deck, &loaded.scene, &signals::caught);
+    bars.map_err(|error| study_error(error, path, loaded))
+}
+
+/// The outputs of which an accuracy is wanted, with their estimated errors.
+fn reached(found: &Found, wanted: &Accuracy, time: Duration) -> ReachedAccuracy {
+    let mut columns = Vec::new();
+    for (name, &estimate) in found.columns.iter().zip(&found.estimates) {
+        let wanted = wanted.of(name);
+        if wanted.is_finite() && !estimate.is_nan() {
+            columns.push(ReachedColumn { name: name.clone(), wanted, estimate });
+        }
+    }
+    ReachedAccuracy {
+        columns,
+        is_reached: found.reached,
+        settings: found.settings(),
+        runs: found.runs,
+        seconds: time.as_secs_f64(),
+    }
+}
+
+/// The message about an accuracy that was not reached.
 fn missed(found: &Found, wanted: &Accuracy) -> String {
     let (column, estimate) = found.worst(wanted);
     format!(
         "an error of {:e} of `{column}` is not reached, the best estimate is {estimate:.1e}, with {}",
         wanted.of(column),
-        describe(&found.point)
+        describe(&found.variant)
     )
 }
 
-/// Notes beams whose straight pieces may stand for curves, which no estimate contains.
-fn tell_polylines(deck: &Deck) {
-    polylines(deck).iter().for_each(|line| say::note(line));
+/// Notes beams whose straight pieces may approximate curves: no estimate contains that error.
+fn note_polylines(deck: &Deck) {
+    polylines(deck).iter().for_each(|line| console::note(line));
 }
 
-/// A study that could not be made, as it is told for a deck.
-pub fn refused(refusal: cost::Refusal, path: &Path, loaded: &Loaded) -> Refusal {
-    match refusal {
-        cost::Refusal::Failure(failure) => Refusal::of(run::status_of(&failure), failure.name(), failure.to_string()),
-        cost::Refusal::Deck(diagnostic) => Refusal {
-            details: diagnostic.render(&path.display().to_string(), &loaded.text, say::styled()),
-            ..Refusal::of(Status::Wrong, "deck", format!("1 error in {}", path.display()))
-        },
+/// The error of a study as the error of its deck, with the lines of the text.
+pub fn study_error(error: StudyError, path: &Path, loaded: &Loaded) -> CommandError {
+    match error {
+        StudyError::Deck(diagnostic) => CommandError::Deck(DeckError {
+            message: format!("1 error in {}", path.display()),
+            details: diagnostic.render(&path.display().to_string(), &loaded.text, console::styled()),
+            ..DeckError::default()
+        }),
+        other => other.into(),
     }
 }
 
-fn tell(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {
+fn print_found(name: &str, deck: &Deck, found: &Found, wanted: &Accuracy) {
     let (column, estimate) = found.worst(wanted);
-    say::line(&format!("{name}: estimated error {estimate:.1e}, of {column} ({} runs to find)", found.runs));
-    say::line(&format!("  {}", describe(&found.point)));
-    lines(deck, &found.settings).iter().for_each(|line| say::line(&format!("    {line}")));
-}
-
-/// A variant in words.
-pub fn describe(point: &Point) -> String {
-    let elements = match point.count() {
-        0 => None,
-        1 => Some("1 element".into()),
-        count => Some(format!("{count} elements")),
-    };
-    let pace = match point.pace {
-        Pace::Timeless => None,
-        Pace::Steps(1.0) => Some("the deck's step".into()),
-        Pace::Steps(factor) => Some(format!("{factor} times the step")),
-        Pace::Adapts(tolerance) => Some(format!("step_tolerance {tolerance:e}")),
-    };
-    [Some(point.family.name()), elements, pace].into_iter().flatten().collect::<Vec<_>>().join(", ")
-}
-
-/// Settings as lines to paste into a deck, and as they stand on a command line.
-pub fn lines(deck: &Deck, settings: &[String]) -> Vec<String> {
-    if settings.is_empty() {
-        return vec!["with the deck as it stands".into()];
-    }
-    let mut lines = Vec::new();
-    let mut table = "";
-    for setting in settings {
-        let (path, value) = setting.split_once('=').unwrap_or((setting, ""));
-        let (place, key) = path.rsplit_once('.').unwrap_or(("", path));
-        if place != table {
-            table = place;
-            let (list, number) = place.split_once('.').unwrap_or((place, "0"));
-            let number: usize = number.parse().unwrap_or(0);
-            let which = match deck.beams.get(number).filter(|_| list == "beam") {
-                Some(beam) => format!("beam {}", beam.name.value),
-                None => format!("{list} {}", number + 1),
-            };
-            lines.push(format!("in [[{list}]] of {which}:"));
-        }
-        lines.push(format!("  {key} = {value}"));
-    }
-    let words = settings.iter().map(|setting| {
-        let bare = setting.replace('"', "");
-        if bare.contains(['[', ' ']) { format!("--set '{bare}'") } else { format!("--set {bare}") }
-    });
-    lines.push(format!("or: {}", words.collect::<Vec<_>>().join(" ")));
-    lines
+    console::line(&format!("{name}: estimated error {estimate:.1e} of {column} ({} runs)", found.runs));
+    console::line(&format!("  {}", describe(&found.variant)));
+    paste_lines(deck, &found.settings()).iter().for_each(|line| console::line(&format!("    {line}")));
 }

@@ -1,108 +1,122 @@
 //! `beamsim check`
 
+use super::error::CommandError;
 use super::load::Loaded;
-use super::run::status_of;
-use super::{Status, Verdict, json, load, on_threads, say, threads_of};
-use crate::scene::{Mesh, Rule, Scene};
+use super::status::Status;
+use super::thread_count::{on_threads, threads_of};
+use super::verdict::Verdict;
+use super::{console, json, load};
+use crate::scene::{Mesh, Scene};
 use crate::study::forecast::{Forecast, forecast};
-use beamsim_core::model::{Assembly, EffectSize};
+use beamsim_core::model::beam_element::{ElementGeometry, Rule};
+use beamsim_core::model::{Assembly, EffectSize, Schedule, SectionMatrices};
 use beamsim_core::run::{Failure, Moment, refusal};
-use beamsim_core::system::StageKind;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::threads;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How long a run is watched to tell how long it will take.
-const PATIENCE: Duration = Duration::from_millis(250);
+/// Time limit of the trial run from which the duration of the whole run is predicted.
+const TRIAL_TIME: Duration = Duration::from_millis(250);
 
-/// Reads decks and tells what would be simulated, and how long it will take.
+/// Reads decks and prints what would be simulated, and how long it will take.
 pub fn check(decks: &[PathBuf], settings: &[String]) -> Status {
     let mut verdict = Verdict::default();
     for path in decks {
-        let begun = Instant::now();
-        match load::deck(path, settings) {
-            Ok(loaded) => {
-                let reading = begun.elapsed();
-                say::line(&format!("{}: {}", path.display(), loaded.scene.title.as_deref().unwrap_or("(no title)")));
-                let told = tell(&loaded.scene).map_err(Failure::Deck).and_then(|()| tell_time(&loaded, reading));
-                match told {
-                    Ok(seconds) => json::check(path, &loaded.scene, Some(seconds)),
-                    Err(failure) => {
-                        hint(&failure, &loaded.scene);
-                        verdict.fail(status_of(&failure), failure.name(), failure.to_string());
-                    }
-                }
-            }
-            Err(refusal) => verdict.refuse(refusal),
+        if let Err(error) = one(path, settings) {
+            verdict.fail(error);
         }
     }
     verdict.finish(decks.len())
 }
 
-fn tell(scene: &Scene) -> Result<(), String> {
-    tell_beams(&scene.mesh);
-    tell_mass(scene);
-    let size = tell_size(scene);
+fn one(path: &Path, settings: &[String]) -> Result<(), CommandError> {
+    let begun = Instant::now();
+    let loaded = load::deck(path, settings)?;
+    let reading = begun.elapsed();
+    let title = loaded.scene.title.as_deref().unwrap_or("(no title)");
+    console::line(&format!("{}: {title}", path.display()));
+    print_scene(&loaded.scene).map_err(CommandError::Run)?;
+    let seconds = print_time(&loaded, reading).map_err(|failure| {
+        print_hint(&failure, &loaded.scene);
+        CommandError::Run(failure)
+    })?;
+    json::check(path, &loaded.scene, seconds);
+    Ok(())
+}
+
+fn print_scene(scene: &Scene) -> Result<(), Failure> {
+    print_beams(&scene.mesh);
+    print_mass(scene);
+    let size = print_size(scene);
     let shares = size.as_ref().map_or(&[][..], |shares| shares);
-    say::line("effects");
+    console::line("effects");
     let width = scene.reasons.iter().map(|r| r.name.len()).max().unwrap_or(0);
     for reason in &scene.reasons {
         let mark = if reason.active { "on " } else { "off" };
         let share = shares.iter().find(|share| reason.active && share.name == reason.name);
-        let added = share.map_or(String::new(), |EffectSize { instances, unknowns, entries, .. }| {
-            format!(
-                " ({instances} in the first stage; {unknowns} unknowns and {entries} entries of the matrix come from nothing else)"
-            )
-        });
-        say::line(&format!("  {mark} {:<width$}  {}{added}", reason.name, reason.reason));
+        let added = share.map_or(String::new(), describe_share);
+        console::line(&format!("  {mark} {:<width$}  {}{added}", reason.name, reason.reason));
     }
     size.map(|_| ())
 }
 
-/// How long a run will take; `Err` where it ends before it has computed anything. One that an accuracy is wanted of begins with a search
-/// among other meshes and steps.
-fn tell_time(loaded: &Loaded, reading: Duration) -> Result<f64, Failure> {
+/// The size of an effect, and the part of the equations that would vanish without it, where there
+/// is one.
+fn describe_share(share: &EffectSize) -> String {
+    let EffectSize { instances, unknowns, entries, .. } = share;
+    let mut text = format!(" ({instances} in the first stage");
+    if *unknowns > 0 || *entries > 0 {
+        text += &format!("; without it {unknowns} unknowns and {entries} matrix entries fewer");
+    }
+    text + ")"
+}
+
+/// Prints how long a run will take, in seconds; `Err` where it fails before it has computed
+/// anything. A run with a wanted accuracy begins with a search, whose time is not included.
+fn print_time(loaded: &Loaded, reading: Duration) -> Result<f64, Failure> {
     let count = threads_of(&loaded.scene, None);
-    let Forecast { seconds, watched, ended, computed, at } = threads::on(count, || forecast(&loaded.scene, PATIENCE));
+    let Forecast { seconds, watched, ended, computed, at } = threads::on(count, || forecast(&loaded.scene, TRIAL_TIME));
     let whole = duration(seconds + reading.as_secs_f64());
     let Moment { stage, time, load } = at;
-    let how = match &ended {
-        Some(Ok(())) => "it was run to its end".into(),
-        Some(Err(_)) => "it was run, and fails".into(),
-        None => format!("{} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}", duration(watched)),
-    };
-    match ended {
-        Some(Err(failure)) if !computed || failure.is_of_start() => {
-            return Err(failure);
-        }
+    let how = match ended {
+        Some(Err(failure)) if !computed || failure.is_of_start() => return Err(failure),
         Some(Err(failure)) => {
-            say::note(&format!("warning: a run ends as `{}`: {failure}", failure.name()));
-            hint(&failure, &loaded.scene);
-            say::count_warnings(1);
+            console::note(&format!("warning: a run ends as `{}`: {failure}", failure.name()));
+            print_hint(&failure, &loaded.scene);
+            console::count_warnings(1);
+            "a trial run fails".into()
         }
-        _ => {}
-    }
-    let own = if loaded.deck.accuracy.is_some() { ", with its own elements and steps" } else { "" };
-    say::line(&format!("run: about {whole} on this machine{}{own} ({how})", on_threads(count)));
+        Some(Ok(())) => "measured".into(),
+        None => {
+            let watched = duration(watched);
+            format!("predicted: {watched} of it led to stage {stage}, time {time:.3e}, load factor {load:.3}")
+        }
+    };
+    let own = if loaded.deck.accuracy.is_some() { ", with the elements and steps of the deck" } else { "" };
+    console::line(&format!("run: about {whole} on this machine{}{own} ({how})", on_threads(count)));
     Ok(seconds + reading.as_secs_f64())
 }
 
-/// What to try after a failure.
-fn hint(failure: &Failure, scene: &Scene) {
+/// Prints advice after a failure.
+fn print_hint(failure: &Failure, scene: &Scene) {
     if let Some(hint) = failure.hint(&scene.plan) {
-        say::note(&format!("hint: {hint}"));
+        console::note(&format!("hint: {hint}"));
     }
 }
 
-/// In few digits: more are not known.
+/// A predicted time with about two digits.
 fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 0.0095 => format!("{:.1} ms", 1e3 * s),
-        s if s < 0.95 => format!("{:.0} ms", 1e3 * s),
-        s if s < 99.5 => format!("{s:.1} s"),
-        s if s < 99.5 * 60.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.0} h", s / 3600.0),
+    if seconds < 0.0095 {
+        format!("{:.1} ms", 1e3 * seconds)
+    } else if seconds < 0.95 {
+        format!("{:.0} ms", 1e3 * seconds)
+    } else if seconds < 99.5 {
+        format!("{seconds:.1} s")
+    } else if seconds < 99.5 * 60.0 {
+        format!("{:.0} min", seconds / 60.0)
+    } else {
+        format!("{:.0} h", seconds / 3600.0)
     }
 }
 
@@ -111,27 +125,28 @@ fn number(value: f64) -> String {
     if value == 0.0 || (1e-5..1e16).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
-fn tell_beams(mesh: &Mesh) {
+fn print_beams(mesh: &Mesh) {
     for beam in &mesh.beams {
         let count = beam.elements.len();
-        say::line(&format!(
+        console::line(&format!(
             "beam {}: length {}, {count} elements of order {}, {} nodes",
             beam.name,
             number(beam.line.length),
             beam.order,
             beam.nodes.len()
         ));
-        let (start, end) = (beam.section.at(0.0), beam.section.at(1.0));
-        tell_section(&start, if start == end { "" } else { " at the start" });
+        let start = beam.section.at(0.0);
+        let end = beam.section.at(1.0);
+        print_section(&start, if start == end { "" } else { " at the start" });
         if start != end {
-            tell_section(&end, " at the end");
+            print_section(&end, " at the end");
         }
     }
 }
 
-fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
+fn print_section(section: &SectionMatrices, place: &str) {
     let k = section.stiffness;
-    say::line(&format!(
+    console::line(&format!(
         "  section{place}: EA {} GA [{}, {}] GJ {} EI [{}, {}]",
         number(k[0][0]),
         number(k[1][1]),
@@ -142,11 +157,11 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
     ));
     let coupled = (0..6).any(|i| (0..i).any(|j| k[i][j] != 0.0));
     if coupled {
-        say::line("  its stiffness couples");
+        console::line("  the stiffness matrix has off-diagonal entries");
     }
     if let Some(mass) = &section.mass {
         let j = mass.about_line.0;
-        say::line(&format!(
+        console::line(&format!(
             "  rhoA {} rhoJ [{}, {}, {}] mass centre {:?}",
             number(mass.mass),
             number(j[0][0]),
@@ -157,12 +172,15 @@ fn tell_section(section: &crate::scene::SectionMatrices, place: &str) {
     }
 }
 
-/// Mass, centre and inertia about the centre, in the initial placement. Moments are taken about a node: far from the origin those about it
-/// are differences of large numbers.
-fn tell_mass(scene: &Scene) {
+/// Prints mass, centre, and inertia about the centre in the initial placement. Moments are summed
+/// about a node: for a scene far from the origin, moments about the origin would be differences of
+/// large numbers.
+fn print_mass(scene: &Scene) {
     let own = scene.mesh.nodes.first().map(|node| node.place);
     let about = own.or_else(|| scene.bodies.first().map(|body| body.place)).unwrap_or(Vec3::ZERO);
-    let (mut mass, mut first, mut second) = (0.0, Vec3::ZERO, Mat3::ZERO);
+    let mut mass = 0.0;
+    let mut first = Vec3::ZERO;
+    let mut second = Mat3::ZERO;
     let mut add = |m: f64, centre: Vec3, own: Mat3| {
         let arm = centre - about;
         mass += m;
@@ -186,51 +204,55 @@ fn tell_mass(scene: &Scene) {
         add(body.inertia.mass, body.place + d, body.inertia.about_node - steiner(d, body.inertia.mass));
     }
     if mass == 0.0 {
-        return say::line("mass: none given");
+        return console::line("mass: none");
     }
     let arm = first * (1.0 / mass);
     let inertia = second - steiner(arm, mass);
     if !(mass.is_finite() && arm.is_finite() && inertia.max_abs().is_finite()) {
-        return say::line("mass: its sums are beyond the range of floating-point numbers");
+        return console::line("mass: too large for floating-point numbers");
     }
-    say::line(&format!("mass {}, centre {:?}", number(mass), (about + arm).0));
-    say::line(&format!("inertia about the centre {:?}", inertia.0));
+    console::line(&format!("mass {}, centre {:?}", number(mass), (about + arm).0));
+    console::line(&format!("inertia about the centre {:?}", inertia.0));
 }
 
-/// What a mass off an axis adds to the inertia.
+/// The inertia about a point of a mass at `arm` from it (parallel-axis theorem).
 fn steiner(arm: Vec3, mass: f64) -> Mat3 {
     (Mat3::diagonal([arm.squared(); 3]) - arm.outer(arm)) * mass
 }
 
-/// States, forces, mesh, elements and the places of their blocks: as much as so many vectors a slot, as measured for chains of a million
-/// elements, whose factors stand within the tangent.
+/// Memory of a static scene beside its tangent, in vectors per slot (3 numbers each), measured on
+/// chains of a million elements: states, forces, mesh, elements and the positions of their blocks.
+/// Factors are stored within the tangent.
 const VECTORS: usize = 12;
 
-/// The same with rates, masses and what is learnt from steps
+/// Memory of a dynamic scene beside its tangent, in vectors per slot.
 const VECTORS_IN_DYNAMICS: usize = 27;
 
-/// What a planar scene takes besides where it is kept in space, too
+/// Additional memory of a planar scene, which is also set up in space, in vectors per slot.
 const VECTORS_IN_SPACE: usize = 6;
 
-/// Unknowns, entries of the tangent, memory, and what each effect adds to them; and whether the first stage can begin.
-fn tell_size(scene: &Scene) -> Result<Vec<EffectSize>, String> {
-    let mut model = scene.plan.model.clone();
+/// Prints unknowns, entries of the tangent and memory; gives the part of each effect. `Err` where
+/// the first stage cannot begin.
+fn print_size(scene: &Scene) -> Result<Vec<EffectSize>, Failure> {
+    let model = &scene.plan.model;
+    let mut schedule = Schedule::new(model);
     let state = model.rest();
     let kind = scene.plan.stages[0].work.kind();
-    let begun = model.begin_stage(0, kind, &state);
-    let equations = begun.map_err(|error| format!("stage 1: {}", refusal(&error, &model)))?;
-    let (free, slots) = (equations.count(), model.slots());
+    let begun = schedule.begin_stage(model, 0, kind, &state);
+    let equations = begun.map_err(|error| Failure::Deck(format!("stage 1: {}", refusal(&error, model))))?;
+    let free = equations.count();
+    let slots = model.slots();
     let context = scene.plan.stages[0].context(0);
     let shares = model.shares(&context, &equations);
-    // A planar scene is kept in space, too, for the looks out of the plane.
-    let in_space = equations.plane().and_then(|_| model.number(0, None).ok());
-    let in_space = in_space.map(|equations| Assembly::new(&context, equations, &model).system.pattern.values());
-    let assembly = Assembly::new(&context, equations, &model);
+    // A planar scene is also set up in space, to check its stability out of the plane.
+    let in_space = equations.plane().and_then(|_| schedule.dof_map(model, None).ok());
+    let in_space = in_space.map(|equations| Assembly::new(&context, equations, model).system.pattern.values());
+    let assembly = Assembly::new(&context, equations, model);
     let entries = assembly.system.pattern.nonzeros();
-    let vectors = if kind == StageKind::Dynamic { VECTORS_IN_DYNAMICS } else { VECTORS };
+    let vectors = if kind.advances_time() { VECTORS_IN_DYNAMICS } else { VECTORS };
     let vectors = vectors + in_space.map_or(0, |_| VECTORS_IN_SPACE);
     let bytes = 8 * (assembly.system.pattern.values() + in_space.unwrap_or(0)) + 24 * vectors * slots;
-    say::line(&format!(
+    console::line(&format!(
         "{} nodes, {} elements, {free} free unknowns of {}, {entries} entries in the tangent, about {:.1} MB",
         scene.mesh.nodes.len(),
         scene.mesh.element_count,

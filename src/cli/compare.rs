@@ -1,49 +1,52 @@
 //! `beamsim compare`
 
-use super::{Status, json, say};
+use super::error::CommandError;
+use super::status::Status;
+use super::verdict::Verdict;
+use super::{console, json};
 use crate::output::HistoryReader;
-use crate::study;
+use crate::study::{self, ComparedHistories};
 use std::path::Path;
 
 /// Prints the worst cell of each column.
 pub fn compare(a: &Path, b: &Path, rtol: f64, atol: f64) -> Status {
+    let mut verdict = Verdict::default();
+    if let Err(error) = print_comparison(a, b, rtol, atol) {
+        verdict.fail(error);
+    }
+    verdict.finish(1)
+}
+
+fn print_comparison(a: &Path, b: &Path, rtol: f64, atol: f64) -> Result<(), CommandError> {
     let usable = |tolerance: f64| tolerance.is_finite() && tolerance >= 0.0;
     if !(usable(rtol) && usable(atol)) {
-        say::error("usage", "--rtol and --atol must be finite and not negative");
-        return Status::Wrong;
+        return Err(CommandError::Usage("--rtol and --atol must be finite and not negative".into()));
     }
-    let (came, stored) = match (HistoryReader::read(a), HistoryReader::read(b)) {
-        (Ok(came), Ok(stored)) => (came, stored),
-        (Err(error), _) | (_, Err(error)) => {
-            say::error("io", &error.to_string());
-            return Status::Io;
-        }
-    };
-    let (table, extra) = match study::compare(&came, &stored, rtol, atol) {
-        Ok(found) => found,
-        Err(message) => {
-            say::error("unexpected", &message);
-            return Status::Unexpected;
-        }
-    };
+    let history = HistoryReader::read(a)?;
+    let stored = HistoryReader::read(b)?;
+    let ComparedHistories { columns: table, extra } =
+        study::compare(&history, &stored, rtol, atol).map_err(|error| CommandError::Unexpected(error.to_string()))?;
     json::compare(a, b, &table);
     let width = table.iter().map(|c| c.column.chars().count()).max().unwrap_or(0);
-    say::line(&format!("  {:<width$}  {:>6}  {:>24}  {:>24}  {:>10}", "column", "row", "came", "stored", "difference"));
+    console::line(&format!(
+        "  {:<width$}  {:>6}  {:>24}  {:>24}  {:>10}",
+        "column", "row", "history", "stored", "difference"
+    ));
     for cell in &table {
         let mark = if cell.ratio <= 1.0 { " " } else { "X" };
         let difference = (cell.came - cell.stored).abs();
-        say::line(&format!(
+        console::line(&format!(
             "{mark} {:<width$}  {:>6}  {:>24?}  {:>24?}  {difference:>10.2e}",
             cell.column, cell.row, cell.came, cell.stored
         ));
     }
     if !extra.is_empty() {
-        say::line(&format!("only in {}: {}", a.display(), extra.join(", ")));
+        console::line(&format!("only in {}: {}", a.display(), extra.join(", ")));
     }
     let beyond = table.iter().filter(|cell| cell.ratio > 1.0).count();
     if beyond > 0 {
-        say::error("unexpected", &format!("{beyond} column(s) differ by more than {atol} + {rtol} |stored|"));
-        return Status::Unexpected;
+        let message = format!("{beyond} column(s) differ by more than {atol} + {rtol} |stored|");
+        return Err(CommandError::Unexpected(message));
     }
-    Status::Fine
+    Ok(())
 }

@@ -1,103 +1,186 @@
-//! Summaries for scripts: with `--json` a line on standard output for each deck, folder or table, instead of words.
+//! Summaries for scripts: with `--json` a line on standard output for each deck, folder or table,
+//! instead of text.
 
-use super::say;
+use super::console;
 use crate::deck::EffectWord;
-use crate::output::{Record, warnings};
+use crate::output::{Record, RunSummary, WarningRecord};
 use crate::scene::Scene;
-use crate::study::ablation::{Ablation, Variant};
+use crate::study::effects::{EffectStudy, ReducedScene};
 use crate::study::{Comparison, Judgement};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-fn tell(command: &str, rest: Value) {
-    let mut entries = Map::from_iter([("command".to_string(), json!(command))]);
-    if let Value::Object(rest) = rest {
-        entries.extend(rest);
-    }
-    say::data(&Value::Object(entries).to_string());
+/// A line of JSON: the name of the command, then its summary.
+#[derive(Serialize)]
+struct Line<'a, T> {
+    command: &'a str,
+    #[serde(flatten)]
+    summary: T,
 }
 
-/// A run: what run.json says, but for the deck.
-pub fn run(deck: &Path, results: &Path, record: &Record) {
-    if !say::speaks_json() {
+fn print(command: &str, summary: impl Serialize) {
+    if !console::prints_json() {
         return;
     }
-    let mut rest = record.bare();
-    rest["deck"] = json!(deck);
-    rest["results"] = json!(results);
-    tell("run", rest);
+    match serde_json::to_string(&Line { command, summary }) {
+        Ok(line) => console::data(&line),
+        Err(error) => console::note(&format!("warning[io]: no JSON for `{command}`: {error}")),
+    }
 }
 
-/// A deck that was looked at; seconds are those that a run will take, where it can run.
-pub fn check(deck: &Path, scene: &Scene, seconds: Option<f64>) {
-    let effects: Vec<&str> = scene.reasons.iter().filter(|reason| reason.active).map(|reason| reason.name).collect();
-    tell(
-        "check",
-        json!({
-            "deck": deck,
-            "elements": scene.mesh.element_count,
-            "nodes": scene.mesh.nodes.len(),
-            "unknowns": scene.plan.model.slots() * 3,
-            "effects": effects,
-            "seconds": seconds,
-            "warnings": warnings(scene.warnings.iter()),
-        }),
-    );
+/// Paths that are no UTF-8 are printed with replacement characters.
+fn text(path: &Path) -> String {
+    path.display().to_string()
 }
 
-/// A deck that was held against what it expects.
-pub fn verify(deck: &Path, seconds: f64, judgements: &[Judgement]) {
-    let one = |j: &Judgement| json!({ "what": j.what, "expected": j.expected, "came": j.came, "error": j.error, "ratio": j.ratio, "holds": j.holds });
-    let all: Vec<Value> = judgements.iter().map(one).collect();
-    let holds = judgements.iter().all(|judgement| judgement.holds);
-    tell("verify", json!({ "deck": deck, "seconds": seconds, "holds": holds, "expectations": all }));
+/// Prints the content of run.json without the text and the tables of the deck.
+pub fn run(deck: &Path, results: &Path, record: &Record) {
+    print("run", RunSummary::of(record, text(deck), text(results)));
 }
 
-/// A history that was compared with a stored one.
-pub fn compare(a: &Path, b: &Path, cells: &[Comparison]) {
-    let one = |c: &Comparison| json!({ "column": c.column, "row": c.row, "came": c.came, "stored": c.stored, "holds": c.ratio <= 1.0 });
-    let columns: Vec<Value> = cells.iter().map(one).collect();
-    let holds = cells.iter().all(|cell| cell.ratio <= 1.0);
-    tell("compare", json!({ "history": a, "stored": b, "holds": holds, "columns": columns }));
+#[derive(Serialize)]
+struct Check<'a> {
+    deck: String,
+    elements: usize,
+    nodes: usize,
+    unknowns: usize,
+    effects: Vec<&'a str>,
+    seconds: f64,
+    warnings: Vec<WarningRecord>,
 }
 
-/// What each effect of a deck changes and costs, as the table tells it, and what all outputs can do without.
-pub fn effects(deck: &Path, file: &Path, found: &Ablation, tolerance: f64) {
-    let keys = |words: &[EffectWord]| words.iter().map(|word| word.key()).collect::<Vec<_>>();
-    let one = |variant: &Variant| {
-        let ((change, column), outcome) = (variant.largest(), variant.outcome());
-        json!({
-            "without": keys(&variant.without),
-            "failure": if outcome.is_none() { Some(variant.failure()) } else { None },
-            "change": outcome.map(|_| change),
-            "of": outcome.filter(|_| change > 0.0).map(|_| &found.columns[column]),
-            "time": outcome.map(|outcome| outcome.seconds / found.whole.seconds),
-            "iterations": outcome.map(|outcome| outcome.counters.work.iterations),
-        })
+/// Prints the size of a scene and the predicted time of a run in seconds.
+pub fn check(deck: &Path, scene: &Scene, seconds: f64) {
+    let summary = Check {
+        deck: text(deck),
+        elements: scene.mesh.element_count,
+        nodes: scene.mesh.nodes.len(),
+        unknowns: scene.plan.model.slots() * 3,
+        effects: scene.reasons.iter().filter(|reason| reason.active).map(|reason| reason.name).collect(),
+        seconds,
+        warnings: scene.warnings.iter().map(WarningRecord::from).collect(),
     };
-    let all: Vec<Value> = found.variants.iter().map(one).collect();
-    tell(
-        "effects",
-        json!({
-            "deck": deck,
-            "file": file,
-            "seconds": found.whole.seconds,
-            "iterations": found.whole.counters.work.iterations,
-            "tolerance": tolerance,
-            "variants": all,
-            "cheapest": one(&found.cheapest),
-            "absent": keys(&found.absent),
-        }),
-    );
+    print("check", summary);
 }
 
-/// A sweep, with the points that did not finish by what they ended with.
+#[derive(Serialize)]
+struct Verification<'a> {
+    deck: String,
+    seconds: f64,
+    holds: bool,
+    expectations: &'a [Judgement],
+}
+
+/// Prints the judgements of the expectations of a deck.
+pub fn verify(deck: &Path, seconds: f64, expectations: &[Judgement]) {
+    let holds = expectations.iter().all(|judgement| judgement.holds);
+    print("verify", Verification { deck: text(deck), seconds, holds, expectations });
+}
+
+#[derive(Serialize)]
+struct ComparedColumn<'a> {
+    column: &'a str,
+    row: usize,
+    came: f64,
+    stored: f64,
+    holds: bool,
+}
+
+#[derive(Serialize)]
+struct ComparedFiles<'a> {
+    history: String,
+    stored: String,
+    holds: bool,
+    columns: Vec<ComparedColumn<'a>>,
+}
+
+/// Prints the worst cell of each column of a history that was compared with a stored one.
+pub fn compare(history: &Path, stored: &Path, cells: &[Comparison]) {
+    let mut columns = Vec::new();
+    for Comparison { column, row, came, stored, ratio } in cells {
+        columns.push(ComparedColumn { column, row: *row, came: *came, stored: *stored, holds: *ratio <= 1.0 });
+    }
+    let holds = columns.iter().all(|column| column.holds);
+    print("compare", ComparedFiles { history: text(history), stored: text(stored), holds, columns });
+}
+
+#[derive(Serialize)]
+struct Reduced<'a> {
+    without: Vec<&'a str>,
+    failure: Option<String>,
+    change: Option<f64>,
+    of: Option<&'a str>,
+    time: Option<f64>,
+    iterations: Option<u64>,
+}
+
+impl<'a> Reduced<'a> {
+    fn of(scene: &'a ReducedScene, found: &'a EffectStudy) -> Self {
+        let outcome = scene.outcome();
+        let (change, column) = scene.largest();
+        Self {
+            without: keys(&scene.without),
+            failure: if outcome.is_none() { Some(scene.failure()) } else { None },
+            change: outcome.map(|_| change),
+            of: outcome.filter(|_| change > 0.0).map(|_| found.columns[column].as_str()),
+            time: outcome.map(|outcome| outcome.seconds / found.whole.seconds),
+            iterations: outcome.map(|outcome| outcome.counters.work.iterations),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Effects<'a> {
+    deck: String,
+    file: String,
+    seconds: f64,
+    iterations: u64,
+    tolerance: f64,
+    variants: Vec<Reduced<'a>>,
+    cheapest: Reduced<'a>,
+    absent: Vec<&'a str>,
+}
+
+fn keys(words: &[EffectWord]) -> Vec<&'static str> {
+    words.iter().map(|word| word.key()).collect()
+}
+
+/// Prints the change and the time of each reduced scene, and the effects that all outputs can do
+/// without.
+pub fn effects(deck: &Path, file: &Path, found: &EffectStudy, tolerance: f64) {
+    let summary = Effects {
+        deck: text(deck),
+        file: text(file),
+        seconds: found.whole.seconds,
+        iterations: found.whole.counters.work.iterations,
+        tolerance,
+        variants: found.reduced.iter().map(|scene| Reduced::of(scene, found)).collect(),
+        cheapest: Reduced::of(&found.cheapest, found),
+        absent: keys(&found.absent),
+    };
+    print("effects", summary);
+}
+
+#[derive(Serialize)]
+struct Sweep<'a> {
+    table: String,
+    points: usize,
+    finished: usize,
+    failed: &'a BTreeMap<&'a str, Vec<usize>>,
+}
+
+/// Prints the size of a sweep, and the numbers of the points that did not finish by their status.
 pub fn sweep(table: &Path, points: usize, finished: usize, failed: &BTreeMap<&str, Vec<usize>>) {
-    tell("sweep", json!({ "table": table, "points": points, "finished": finished, "failed": failed }));
+    print("sweep", Sweep { table: text(table), points, finished, failed });
 }
 
-/// Anything else that leaves a file.
+#[derive(Serialize)]
+struct Wrote {
+    file: String,
+}
+
+/// Prints the path of a file that a command has written.
 pub fn wrote(command: &str, path: &Path) {
-    tell(command, json!({ "file": path }));
+    print(command, Wrote { file: text(path) });
 }

@@ -1,137 +1,277 @@
 //! `beamsim plot`
 
-use super::load::Refusal;
-use super::{Status, Verdict, json, load, say};
+use super::error::CommandError;
+use super::status::Status;
+use super::verdict::Verdict;
+use super::{console, json, load};
 use crate::deck::nearest;
-use crate::output::{Curve, Curves, HistoryReader, PartFile};
+use crate::output::{
+    Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
+};
 use beamsim_core::probe::{Quantity, clocks, quantity};
 use std::path::{Path, PathBuf};
 
-/// Columns that are drawn where none is named.
-const USUAL: usize = 6;
+/// Largest number of columns that are drawn without `--column`.
+const MAX_DEFAULT_COLUMNS: usize = 6;
+/// Smallest change of a displacement relative to the largest one; smaller changes are round-off.
+const MIN_CHANGE: f64 = 1e-9;
 
-/// What is drawn.
+/// Arguments of `beamsim plot`.
 #[derive(clap::Args)]
-pub struct Wanted {
-    /// Folders of results, or histories (CSV); several stand on one axis
+pub struct PlotArguments {
+    /// Folders of results, or histories (CSV); several are drawn on the same axes
     #[arg(required = true, value_name = "RESULTS")]
     results: Vec<PathBuf>,
-    /// A column, such as tip.ux (default: displacements)
+    /// A column, such as tip.ux (default: displacements that change)
     #[arg(long = "column", value_name = "COLUMN")]
     columns: Vec<String>,
-    /// What stands on the horizontal axis (default: the time, or the load factor where no time passes)
+    /// The column of the horizontal axis (default: time; if all stages are static, the load factor,
+    /// stage by stage)
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
     /// A stored history (CSV) to compare with
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// The picture, .svg or, where that was built in, .png (default: plot.svg in the first folder)
+    /// The picture, .svg or (in builds with `--features png`) .png (default: plot.svg in the first
+    /// folder)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 /// A history with its name in the legend.
-struct Named {
+struct NamedHistory {
     name: String,
+    /// The path that the user gave
+    path: PathBuf,
     history: HistoryReader,
-    stored: bool,
+    /// The record of the run, if run.json is beside the history
+    record: Option<Record>,
+    is_reference: bool,
+}
+
+/// The quantity of the horizontal axis.
+enum Abscissa {
+    /// A column of the histories
+    Column(String),
+    /// The load factors of static stages, one stage after the other
+    StageByStage,
 }
 
 /// Draws histories.
-pub fn plot(wanted: &Wanted) -> Status {
+pub fn plot(wanted: &PlotArguments) -> Status {
     let mut verdict = Verdict::default();
-    if let Err(refusal) = draw(wanted) {
-        verdict.refuse(refusal);
+    if let Err(error) = draw(wanted) {
+        verdict.fail(error);
     }
     verdict.finish(1)
 }
 
-fn draw(wanted: &Wanted) -> Result<(), Refusal> {
+fn draw(wanted: &PlotArguments) -> Result<(), CommandError> {
     let mut runs = wanted.results.iter().map(|path| read(path, false)).collect::<Result<Vec<_>, _>>()?;
     runs.extend(wanted.reference.as_ref().map(|path| read(path, true)).transpose()?);
+    tell_apart(&mut runs);
     let columns = columns(wanted, &runs[0].history)?;
-    let x = match &wanted.x {
-        Some(name) => find(&runs[0].history, name).map(|_| name.clone())?,
-        None => clock(&runs).into(),
+    let abscissa = match &wanted.x {
+        Some(name) => find(&runs[0].history, name).map(|_| Abscissa::Column(name.clone()))?,
+        None => usual_abscissa(&runs),
     };
-    let mut curves = Vec::new();
-    for (dash, run) in runs.iter().enumerate() {
-        for (colour, column) in columns.iter().enumerate() {
+    let units = common_units(&runs);
+    let y_title = y_title(&columns, &units);
+    let mut lines = Vec::new();
+    for (number, run) in runs.iter().enumerate() {
+        for (place, column) in columns.iter().enumerate() {
             // A stored history need not have all columns.
-            if run.stored && !run.history.names.contains(column) {
+            if run.is_reference && !run.history.names.contains(column) {
                 continue;
             }
+            let of_column = if y_title.is_empty() { units.title(column, column) } else { column.clone() };
             // One column needs no name on each line, and its runs differ by colour.
             let (name, colour, dash) = match (runs.len(), columns.len()) {
-                (1, _) => (column.clone(), colour, 0),
-                (_, 1) => (run.name.clone(), dash, dash),
-                _ => (format!("{}: {column}", run.name), colour, dash),
+                (1, _) => (of_column, place, 0),
+                (_, 1) => (run.name.clone(), number, number),
+                _ => (format!("{}: {of_column}", run.name), place, number),
             };
-            curves.push(curve(run, &x, column, Curve { name, points: Vec::new(), bars: None, colour, dash })?);
+            let (points, bars) = points(run, &abscissa, column)?;
+            lines.push(Line { name, points, bars, beside: Vec::new(), style: LineStyle::Dashed { colour, dash } });
         }
     }
-    let title = runs.iter().filter(|run| !run.stored).map(|run| run.name.as_str()).collect::<Vec<_>>().join(", ");
-    let y = if let [column] = &columns[..] { column.clone() } else { String::new() };
+    let plot = LinePlot {
+        title: title(&runs),
+        x: Axis { title: abscissa.title(&units), scale: Scale::Linear },
+        y: Axis { title: y_title, scale: Scale::Linear },
+        lines,
+        level: None,
+        boundaries: abscissa.boundaries(&runs),
+    };
     let path = wanted.out.clone().unwrap_or_else(|| beside(&wanted.results[0]));
-    let picture = picture(&Curves { title, x, y, curves }, &path)?;
-    PartFile::write_to(&path, &picture).map_err(Refusal::io)?;
-    say::line(&format!("{}", path.display()));
+    let picture = picture(&plot, &path)?;
+    PartFile::write_to(&path, &picture)?;
+    console::line(&format!("{}", path.display()));
     json::wrote("plot", &path);
     Ok(())
 }
 
+/// The title of the deck if one run is drawn, else the names of the runs.
+fn title(runs: &[NamedHistory]) -> String {
+    let drawn: Vec<&NamedHistory> = runs.iter().filter(|run| !run.is_reference).collect();
+    let names: Vec<&str> = drawn.iter().map(|run| run.name.as_str()).collect();
+    match &drawn[..] {
+        [run] => run.record.as_ref().and_then(Record::title).unwrap_or(&run.name).into(),
+        _ => names.join(", "),
+    }
+}
+
+/// The units that all runs with a deck share. A stored history is taken to have the units of the runs
+/// that it is compared with.
+fn common_units(runs: &[NamedHistory]) -> Units {
+    let mut known = runs.iter().filter_map(|run| run.record.as_ref()).map(Record::units);
+    let first = known.next().unwrap_or_default();
+    if known.all(|units| units == first) {
+        return first;
+    }
+    console::note("warning: the runs have different units; the plot shows no units");
+    Units::default()
+}
+
+/// The title of the vertical axis: the column, or the quantity if all columns show the same one.
+/// Otherwise it is empty, and the legend shows the units.
+fn y_title(columns: &[String], units: &Units) -> String {
+    if let [column] = columns {
+        return units.title(column, column);
+    }
+    let quantity = quantity_of(&columns[0]);
+    let is_common = columns.iter().all(|column| quantity_of(column) == quantity);
+    quantity.filter(|_| is_common).map_or(String::new(), |quantity| units.title(quantity, &columns[0]))
+}
+
+impl Abscissa {
+    fn title(&self, units: &Units) -> String {
+        match self {
+            Self::Column(name) if name == "load" => "load factor".into(),
+            Self::Column(name) => units.title(name, name),
+            Self::StageByStage => "load factor, stage by stage".into(),
+        }
+    }
+
+    /// The values of the axis, one per row of a history.
+    fn values(&self, run: &NamedHistory) -> Result<Vec<f64>, CommandError> {
+        match self {
+            Self::Column(name) => run.column(name),
+            Self::StageByStage => Ok(stage_by_stage(&run.column("stage")?, &run.column("load")?)),
+        }
+    }
+
+    /// Starts of stages, on axes on which stages follow one another.
+    fn boundaries(&self, runs: &[NamedHistory]) -> Vec<Boundary> {
+        let is_ordered = match self {
+            Self::Column(name) => name == "time",
+            Self::StageByStage => true,
+        };
+        let mut found: Vec<Boundary> = Vec::new();
+        for run in runs.iter().filter(|_| is_ordered) {
+            let (Ok(stages), Ok(values)) = (run.column("stage"), self.values(run)) else { continue };
+            for row in 1..stages.len() {
+                let boundary = Boundary { at: values[row - 1], name: format!("stage {}", stages[row]) };
+                if stages[row] != stages[row - 1] && !found.contains(&boundary) {
+                    found.push(boundary);
+                }
+            }
+        }
+        found.sort_by(|a, b| a.at.total_cmp(&b.at));
+        found
+    }
+}
+
+/// Load factors, one stage after another. The length of a stage on the axis is the range of its load
+/// factor, which includes 0.
+fn stage_by_stage(stages: &[f64], loads: &[f64]) -> Vec<f64> {
+    let mut values = Vec::new();
+    let mut start = 0.0;
+    for stage in stages.chunk_by(|a, b| a == b) {
+        let loads = &loads[values.len()..][..stage.len()];
+        let low = loads.iter().fold(0.0, |low: f64, load| low.min(*load));
+        let high = loads.iter().fold(low, |high, load| high.max(*load));
+        values.extend(loads.iter().map(|load| start + load - low));
+        start += high - low;
+    }
+    values
+}
+
 /// In the format that the name of the file asks for.
-fn picture(curves: &Curves, path: &Path) -> Result<Vec<u8>, Refusal> {
+fn picture(plot: &LinePlot, path: &Path) -> Result<Vec<u8>, CommandError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
-        None | Some("svg") => Ok(curves.to_svg().into_bytes()),
-        Some("png") => png(curves),
+        None | Some("svg") => Ok(plot.to_svg().into_bytes()),
+        Some("png") => png(plot),
         Some(other) => {
             let message = format!("`.{other}`: pictures are written as .svg or .png");
-            Err(Refusal::of(Status::Wrong, "usage", message))
+            Err(CommandError::Usage(message))
         }
     }
 }
 
 #[cfg(feature = "png")]
-fn png(curves: &Curves) -> Result<Vec<u8>, Refusal> {
-    curves.to_png().map_err(|why| Refusal::of(Status::Wrong, "usage", format!("the picture cannot be drawn: {why}")))
+fn png(plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
+    plot.to_png().map_err(|why| CommandError::Usage(format!("the picture cannot be drawn: {why}")))
 }
 
 #[cfg(not(feature = "png"))]
-fn png(_curves: &Curves) -> Result<Vec<u8>, Refusal> {
+fn png(_plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
     let message =
         "this build draws .svg only: `cargo install --path . --locked --features png` makes one that draws .png";
-    Err(Refusal::of(Status::Wrong, "usage", message.into()))
+    Err(CommandError::Usage(message.into()))
 }
 
 /// The history in a folder, or the file itself.
-fn read(path: &Path, stored: bool) -> Result<Named, Refusal> {
+fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, CommandError> {
     let file = HistoryReader::of_results(path).unwrap_or_else(|| path.to_path_buf());
-    let history = HistoryReader::read(&file).map_err(Refusal::io)?;
+    let history = HistoryReader::read(&file)?;
+    let is_of_run = file.file_name().is_some_and(|name| name == "history.csv" || name == "history.partial.csv");
+    let folder = file.parent().filter(|_| is_of_run).and_then(|folder| std::fs::canonicalize(folder.join(".")).ok());
     // `results/arm/history.csv` is `arm`.
-    let place = if file.file_stem().is_some_and(|stem| stem.to_string_lossy().starts_with("history")) {
-        file.parent()
-    } else {
-        None
-    };
-    let whole = place.and_then(|place| std::fs::canonicalize(place).ok());
-    Ok(Named { name: load::name(whole.as_deref().unwrap_or(&file)), history, stored })
+    let name = folder.as_deref().map_or_else(|| load::without_extension(&file, ".csv"), load::folder_name);
+    let record = folder.and_then(|folder| Record::read(&folder).ok());
+    Ok(NamedHistory { name, path: path.into(), history, record, is_reference })
+}
+
+/// Renames runs that share a name: they are named by their paths.
+fn tell_apart(runs: &mut [NamedHistory]) {
+    let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
+    for run in runs {
+        if names.iter().filter(|name| **name == run.name).count() > 1 {
+            run.name = run.path.display().to_string();
+        }
+    }
+}
+
+impl NamedHistory {
+    /// The values of a column.
+    fn column(&self, name: &str) -> Result<Vec<f64>, CommandError> {
+        let place =
+            find(&self.history, name).map_err(|error| CommandError::Usage(format!("{}: {error}", self.name)))?;
+        Ok(self.history.rows.iter().map(|row| row[place]).collect())
+    }
+
+    /// True if the values of a column differ.
+    fn varies(&self, name: &str) -> bool {
+        self.column(name).is_ok_and(|values| values.iter().any(|value| *value != values[0]))
+    }
 }
 
 /// The place of a column.
-fn find(history: &HistoryReader, name: &str) -> Result<usize, Refusal> {
+fn find(history: &HistoryReader, name: &str) -> Result<usize, CommandError> {
     history.names.iter().position(|known| known == name).ok_or_else(|| {
         let help = match nearest(name, history.names.iter().map(String::as_str)) {
             Some(meant) => format!("did you mean `{meant}`?"),
             None => format!("there are {}", history.names.join(", ")),
         };
-        Refusal::of(Status::Wrong, "usage", format!("the history has no column `{name}`: {help}"))
+        CommandError::Usage(format!("the history has no column `{name}`: {help}"))
     })
 }
 
-/// The columns that are named; or the displacements, or the first.
-fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refusal> {
+/// The columns that the user names; else the displacements that change, or all displacements, or all
+/// columns.
+fn columns(wanted: &PlotArguments, history: &HistoryReader) -> Result<Vec<String>, CommandError> {
     if !wanted.columns.is_empty() {
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
@@ -140,37 +280,49 @@ fn columns(wanted: &Wanted, history: &HistoryReader) -> Result<Vec<String>, Refu
     };
     let moved = |name: &&String| quantity(name) == Some(Quantity::Displacement);
     let all: Vec<String> = history.names.iter().filter(shown).cloned().collect();
-    let some: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
-    let usual = if some.is_empty() { all } else { some };
+    let displacements: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
+    let changes: Vec<f64> = displacements.iter().map(|name| change(history, name)).collect();
+    let largest = changes.iter().copied().fold(0.0, f64::max);
+    let changing = displacements.iter().zip(&changes).filter(|(_, change)| **change > MIN_CHANGE * largest);
+    let candidates = [changing.map(|(name, _)| name.clone()).collect(), displacements, all];
+    let usual = candidates.into_iter().find(|names: &Vec<String>| !names.is_empty()).unwrap_or_default();
     if usual.is_empty() {
-        return Err(Refusal::of(Status::Wrong, "usage", "the history has no columns to draw".into()));
+        return Err(CommandError::Usage("the history has no columns to draw".into()));
     }
-    Ok(usual.into_iter().take(USUAL).collect())
+    Ok(usual.into_iter().take(MAX_DEFAULT_COLUMNS).collect())
 }
 
-/// What tells the rows of all runs apart.
-fn clock(runs: &[Named]) -> &'static str {
-    let passes = |run: &Named| {
-        let time = run.history.names.iter().position(|name| name == "time");
-        time.is_none_or(|k| run.history.rows.last().zip(run.history.rows.first()).is_some_and(|(a, b)| a[k] > b[k]))
-    };
+/// The difference of the largest and the smallest value of a column.
+fn change(history: &HistoryReader, name: &str) -> f64 {
+    let Some(place) = history.names.iter().position(|known| known == name) else { return 0.0 };
+    let values = || history.rows.iter().map(|row| row[place]);
+    values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+}
+
+/// Time if it advances in any run; else the load factor, stage by stage if there are several stages.
+fn usual_abscissa(runs: &[NamedHistory]) -> Abscissa {
     let has = |name: &str| runs.iter().all(|run| run.history.names.iter().any(|known| known == name));
-    if (has("time") && runs.iter().any(passes)) || !has("load") { "time" } else { "load" }
+    let varies = |name: &str| runs.iter().any(|run| run.varies(name));
+    if (has("time") && varies("time")) || !has("load") {
+        Abscissa::Column("time".into())
+    } else if has("stage") && varies("stage") {
+        Abscissa::StageByStage
+    } else {
+        Abscissa::Column("load".into())
+    }
 }
 
-fn curve(run: &Named, x: &str, column: &str, empty: Curve) -> Result<Curve, Refusal> {
-    let place = |column: &str| {
-        find(&run.history, column).map_err(|why| Refusal { message: format!("{}: {}", run.name, why.message), ..why })
-    };
-    let (x, y) = (place(x)?, place(column)?);
-    let points: Vec<(f64, f64)> = run.history.rows.iter().map(|row| (row[x], row[y])).collect();
+/// The points of a column, and their error bars if the history has finite ones.
+type PointsAndBars = (Vec<(f64, f64)>, Option<Vec<f64>>);
+
+fn points(run: &NamedHistory, abscissa: &Abscissa, column: &str) -> Result<PointsAndBars, CommandError> {
+    let points: Vec<(f64, f64)> = abscissa.values(run)?.into_iter().zip(run.column(column)?).collect();
     if let Some(row) = points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
         let message = format!("{}: row {} of `{column}` is not finite", run.name, row + 1);
-        return Err(Refusal::of(Status::Wrong, "usage", message));
+        return Err(CommandError::Usage(message));
     }
-    let bars = run.history.names.iter().position(|name| *name == format!("{column}.err"));
-    let bars = bars.map(|k| run.history.rows.iter().map(|row| row[k]).collect::<Vec<f64>>());
-    Ok(Curve { points, bars: bars.filter(|bars| bars.iter().all(|bar| bar.is_finite())), ..empty })
+    let bars = run.column(&format!("{column}.err")).ok();
+    Ok((points, bars.filter(|bars| bars.iter().all(|bar| bar.is_finite()))))
 }
 
 /// plot.svg in the folder of the results.

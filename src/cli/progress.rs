@@ -1,14 +1,14 @@
-//! How far a run has come: a bar on a terminal, a line now and then elsewhere.
+//! Progress of a run: a bar on a terminal, a line every few seconds elsewhere.
 
-use super::say;
+use super::console;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Between lines where there is no terminal.
-const QUIET: Duration = Duration::from_secs(10);
-/// Between looks at the clock; a look costs less than a step, but not nothing.
-const REDRAW: Duration = Duration::from_millis(100);
+/// Time between lines where there is no terminal.
+const LINE_INTERVAL: Duration = Duration::from_secs(10);
+/// Time between updates of the bar.
+const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Shows progress on standard error.
 pub struct Progress {
@@ -18,9 +18,9 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// For a run of this name.
+    /// Progress of a run of this name.
     pub fn new(name: &str) -> Self {
-        let bar = (std::io::stderr().is_terminal() && !say::is_quiet()).then(|| {
+        let bar = (std::io::stderr().is_terminal() && !console::is_quiet()).then(|| {
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} % {elapsed} (left {eta}) {msg}");
             let bar = ProgressBar::new(10_000).with_prefix(name.to_string());
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
@@ -28,9 +28,9 @@ impl Progress {
         Self { bar, name: name.into(), last: Instant::now() }
     }
 
-    /// From 0 to 1, and where that is, for lines.
-    pub fn tell(&mut self, done: f64, place: impl Fn() -> String) {
-        let wait = if self.bar.is_some() { REDRAW } else { QUIET };
+    /// Shows the finished part, from 0 to 1, and a description of the present place.
+    pub fn show(&mut self, done: f64, place: impl Fn() -> String) {
+        let wait = if self.bar.is_some() { REDRAW_INTERVAL } else { LINE_INTERVAL };
         if self.last.elapsed() < wait {
             return;
         }
@@ -40,19 +40,19 @@ impl Progress {
                 bar.set_message(place());
                 bar.set_position((done * 10_000.0) as u64);
             }
-            None => say::remark(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),
+            None => console::remark(&format!("{}: {:.1} % ({})", self.name, 100.0 * done, place())),
         }
     }
 
-    /// A line that does not disturb the bar.
+    /// Prints a line above the bar.
     pub fn note(&self, text: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| say::note(text)),
-            None => say::note(text),
+            Some(bar) => bar.suspend(|| console::note(text)),
+            None => console::note(text),
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn done(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

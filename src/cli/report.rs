@@ -1,9 +1,12 @@
-//! `beamsim report`: the page of results that are there.
+//! `beamsim report`: the page of results that exist already.
 
-use super::load::Refusal;
-use super::run::{Beyond, simulate};
-use super::{Status, Verdict, json, load, say, signals, threads_of};
-use crate::output::{Film, Record, Report};
+use super::error::CommandError;
+use super::simulate::{RunExtras, simulate};
+use super::status::Status;
+use super::thread_count::threads_of;
+use super::verdict::Verdict;
+use super::{console, json, load, signals};
+use crate::output::{Film, OutputError, Record, Report};
 use crate::scene::{self, Scene};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,12 +15,12 @@ use std::path::{Path, PathBuf};
 pub fn report(folders: &[PathBuf], out: Option<&Path>) -> Status {
     let mut verdict = Verdict::default();
     if out.is_some() && folders.len() > 1 {
-        verdict.fail(Status::Wrong, "usage", "--out names one file: give one folder of results".into());
+        verdict.fail(CommandError::Usage("--out names one file: give one folder of results".into()));
         return verdict.finish(1);
     }
     for folder in folders {
-        if let Err(refusal) = one(folder, out) {
-            verdict.refuse(refusal);
+        if let Err(error) = one(folder, out) {
+            verdict.fail(error);
         }
         if signals::caught().is_some() {
             break;
@@ -26,34 +29,34 @@ pub fn report(folders: &[PathBuf], out: Option<&Path>) -> Status {
     verdict.finish(folders.len())
 }
 
-fn one(folder: &Path, out: Option<&Path>) -> Result<(), Refusal> {
-    let record = Record::read(folder).map_err(Refusal::io)?;
+fn one(folder: &Path, out: Option<&Path>) -> Result<(), CommandError> {
+    let record = Record::read(folder)?;
     let Some(text) = record.text() else {
-        let message = format!("{}: run.json holds no deck: run it again", folder.display());
-        return Err(Refusal::of(Status::Io, "io", message));
+        let error = OutputError::content(folder, "run.json holds no deck: run it again");
+        return Err(error.into());
     };
     let scene = scene::from_text(text).map(|(scene, _)| scene).map_err(|_| {
-        let message = format!("{}: this version of beamsim does not read the deck: run it again", folder.display());
-        Refusal::of(Status::Wrong, "deck", message)
+        let folder = folder.display();
+        CommandError::deck(format!("{folder}: this version of beamsim does not read the deck: run it again"))
     })?;
-    let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::name(&path));
-    // A history holds the nodes that were asked for; the shape is that of the same run once more.
+    let name = fs::canonicalize(folder).ok().map_or("results".into(), |path| load::folder_name(&path));
+    // The history holds only the requested nodes; the shapes come from another run of the deck.
     let film = filmed(&scene, &name)?;
     let path = out.map_or_else(|| folder.join("report.html"), Path::to_path_buf);
     write(&scene, &name, &record, film, folder, &path)
 }
 
-fn filmed(scene: &Scene, name: &str) -> Result<Film, Refusal> {
-    let beyond = Beyond { film: Some(Film::of(scene)), ..Beyond::default() };
-    let finished = simulate(scene, name, None, None, beyond, threads_of(scene, None));
-    if signals::caught().is_some() {
-        let status = finished.status();
-        return Err(Refusal::of(status, "interrupted", "stopped before the report was written".into()));
+fn filmed(scene: &Scene, name: &str) -> Result<Film, CommandError> {
+    let extras = RunExtras { film: Some(Film::of(scene)), ..RunExtras::default() };
+    let finished = simulate(scene, name, None, None, extras, threads_of(scene, None));
+    if let Some(signal) = signals::caught() {
+        let message = "stopped before the report was written".into();
+        return Err(CommandError::Stopped { signal, message });
     }
-    finished.film.ok_or_else(|| Refusal::of(Status::Io, "io", "nothing was filmed".into()))
+    finished.film.ok_or_else(|| CommandError::Io("no shapes were recorded".into()))
 }
 
-/// Writes the page, and says where.
+/// Writes the page and prints its path.
 pub fn write(
     scene: &Scene,
     name: &str,
@@ -61,11 +64,10 @@ pub fn write(
     film: Film,
     results: &Path,
     path: &Path,
-) -> Result<(), Refusal> {
+) -> Result<(), CommandError> {
     let title = scene.title.as_deref().unwrap_or(name);
-    let written = Report { title, record }.write(results, film, path);
-    written.map_err(Refusal::io)?;
-    say::line(&format!("  {}", path.display()));
+    Report { title, record }.write(results, film, path)?;
+    console::line(&format!("  {}", path.display()));
     json::wrote("report", path);
     Ok(())
 }

@@ -1,10 +1,10 @@
-//! `accuracy = …`: how large the estimated error of outputs may be.
+//! `accuracy = …`: the largest estimated errors of outputs.
 
 use super::reader::{Context, Table};
 use super::{Diagnostic, Spanned};
 use toml::de::DeValue;
 
-/// How large the errors of outputs may be, each over the largest value of its kind in the scene.
+/// Largest errors of outputs, each relative to the largest value of its kind in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Accuracy {
     /// Of all columns
@@ -13,11 +13,11 @@ pub enum Accuracy {
     Columns(Vec<(Spanned<String>, f64)>),
 }
 
-/// Errors below this are round-off.
+/// Smallest accuracy: errors below are round-off.
 const LEAST: f64 = 1e-12;
 
 impl Accuracy {
-    /// Refuses what is no accuracy.
+    /// Refuses numbers that are no accuracy.
     pub fn check(value: f64) -> Result<f64, String> {
         if (LEAST..1.0).contains(&value) {
             return Ok(value);
@@ -44,7 +44,7 @@ impl Accuracy {
         Some(Self::Columns(columns))
     }
 
-    /// What is wanted of a column; infinite where nothing is.
+    /// The largest error of a column; infinite where there is no bound.
     pub fn of(&self, column: &str) -> f64 {
         match self {
             Self::All(wanted) => *wanted,
@@ -55,7 +55,7 @@ impl Accuracy {
         }
     }
 
-    /// The smallest that is wanted of any column.
+    /// The smallest error bound of any column.
     pub fn least(&self) -> f64 {
         match self {
             Self::All(wanted) => *wanted,
@@ -63,14 +63,14 @@ impl Accuracy {
         }
     }
 
-    /// The columns that are named.
+    /// Columns with a bound of their own.
     pub fn columns(&self) -> impl Iterator<Item = &Spanned<String>> {
         let named: &[(Spanned<String>, f64)] = if let Self::Columns(columns) = self { columns } else { &[] };
         named.iter().map(|(name, _)| name)
     }
 }
 
-/// Whether a deck means a column by a name: `mode1.omega` is `stage2.mode1.omega` too.
+/// True if a name of the deck stands for a column: `mode1.omega` is `stage2.mode1.omega` too.
 pub fn is_named(column: &str, name: &str) -> bool {
     column == name || without_stage(column) == name
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a deck, where, and what was probably meant.
+//! Errors and warnings of a deck with their places, and help.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use beamsim_core::warning::WarningKind;
@@ -12,12 +12,12 @@ pub type Span = Range<usize>;
 pub struct Spanned<T> {
     /// The value
     pub value: T,
-    /// Where it stands
+    /// Its place in the text
     pub span: Span,
 }
 
 impl<T> Spanned<T> {
-    /// The same place with another value.
+    /// Replaces the value and keeps the place.
     pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Spanned<U> {
         Spanned { value: f(self.value), span: self.span }
     }
@@ -26,23 +26,23 @@ impl<T> Spanned<T> {
 /// One error or warning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
-    /// What is wrong
+    /// The message
     pub message: String,
-    /// Where
+    /// Its place; none: the deck as a whole
     pub span: Option<Span>,
-    /// What stands there
+    /// Text at the caret
     pub label: String,
-    /// Another place that has to do with it, and why
+    /// Another place that it refers to, with a label
     pub context: Option<(Span, String)>,
-    /// What to do
+    /// Advice
     pub help: Option<String>,
-    /// How bad it is
+    /// Severity
     pub severity: Severity,
-    /// The name that is not known, where that is what is wrong
+    /// The unknown name, for errors about one
     pub unknown: Option<String>,
 }
 
-/// How bad a diagnostic is.
+/// Severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The run goes on.
@@ -82,24 +82,24 @@ impl Diagnostic {
         Self { severity: Severity::Limit, ..Self::error(message, span) }
     }
 
-    /// Whether the run goes on.
+    /// True for warnings: the run goes on.
     pub fn is_warning(&self) -> bool {
         matches!(self.severity, Severity::Warning(_))
     }
 
-    /// With a word at the caret.
+    /// Sets the text at the caret.
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// With what to do.
+    /// Sets the advice.
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// With another place.
+    /// Sets another place.
     pub fn context(mut self, span: Span, label: impl Into<String>) -> Self {
         self.context = Some((span, label.into()));
         self
@@ -145,16 +145,6 @@ fn within(span: &Span, text: &str) -> Span {
     };
     let start = clamp(span.start);
     start..clamp(span.end).max(start)
-}
-
-/// The known word that was probably meant.
-pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let score = |candidate: &str| {
-        let (a, b) = (word.to_lowercase(), candidate.to_lowercase());
-        if a == b { 1.0 } else { strsim::jaro_winkler(&a, &b).max(strsim::normalized_damerau_levenshtein(&a, &b)) }
-    };
-    let best = known.into_iter().map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
-    best.filter(|(score, _)| *score > 0.72).map(|(_, k)| k)
 }
 
 /// `a`, `b` or `c`

@@ -1,66 +1,43 @@
-//! `[effects]`: what is forced on or off instead of letting the scene decide.
+//! `[effects]`: effects that are forced on or off instead of letting the scene decide.
 
 use super::reader::Table;
+use super::words::{Words, words};
 use super::{Span, Spanned};
 
-/// What can be forced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EffectWord {
-    /// Simulation in the plane of a planar scene
-    Planar,
-    /// Inertia of sections against rotation
-    RotaryInertia,
-    /// Forces that rotations have from their spin alone: gyroscopic and centrifugal ones
-    Gyroscopic,
-    /// Shear of sections against the centre line
-    Shear,
-    /// Stretch of the centre line
-    Extension,
-    /// Dampers of every kind
-    Damping,
-    /// Weight
-    Gravity,
-    /// What following loads bring to the tangent
-    FollowerTangent,
-    /// What stress brings to the tangent of beams
-    GeometricStiffness,
-    /// All that is not linear in the displacements
-    LargeRotations,
-}
-
-impl EffectWord {
-    /// All of them
-    pub const ALL: [Self; 10] = [
-        Self::Planar,
-        Self::RotaryInertia,
-        Self::Gyroscopic,
-        Self::Shear,
-        Self::Extension,
-        Self::Damping,
-        Self::Gravity,
-        Self::FollowerTangent,
-        Self::GeometricStiffness,
-        Self::LargeRotations,
-    ];
-
-    /// Its key
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Planar => "planar",
-            Self::RotaryInertia => "rotary_inertia",
-            Self::Gyroscopic => "gyroscopic",
-            Self::Shear => "shear",
-            Self::Extension => "extension",
-            Self::Damping => "damping",
-            Self::Gravity => "gravity",
-            Self::FollowerTangent => "follower_tangent",
-            Self::GeometricStiffness => "geometric_stiffness",
-            Self::LargeRotations => "large_rotations",
-        }
+words! {
+    /// Keys of `[effects]`.
+    pub enum EffectWord {
+        /// Simulation in the plane of a planar scene
+        Planar = "planar",
+        /// Inertia of sections against rotation
+        RotaryInertia = "rotary_inertia",
+        /// Forces that rotations have from their spin alone: gyroscopic and centrifugal ones
+        Gyroscopic = "gyroscopic",
+        /// Shear of sections against the centre line
+        Shear = "shear",
+        /// Stretch of the centre line
+        Extension = "extension",
+        /// Dampers of every kind
+        Damping = "damping",
+        /// Weight
+        Gravity = "gravity",
+        /// The tangent of following loads
+        FollowerTangent = "follower_tangent",
+        /// The tangent of stress in beams
+        GeometricStiffness = "geometric_stiffness",
+        /// All that is not linear in the displacements
+        LargeRotations = "large_rotations",
     }
 }
 
-/// What the table says.
+impl EffectWord {
+    /// The key of an effect.
+    pub fn key(self) -> &'static str {
+        self.word()
+    }
+}
+
+/// `[effects]`
 #[derive(Clone, Debug, Default)]
 pub struct Effects {
     forced: Vec<(EffectWord, Spanned<bool>)>,
@@ -69,21 +46,21 @@ pub struct Effects {
 impl Effects {
     pub(super) fn read(top: &Table) -> Self {
         let Some(item) = top.get("effects") else { return Self::default() };
-        let keys = EffectWord::ALL.map(EffectWord::key);
+        let keys: Vec<&'static str> = EffectWord::words().collect();
         let Some(table) = Table::new(top.context, item, "[effects]", &keys) else { return Self::default() };
         let forced = |word: EffectWord| {
-            let value = table.flag(word.key())?;
-            Some((word, Spanned { value, span: table.key_span(word.key()) }))
+            let value = table.flag(word.word())?;
+            Some((word, Spanned { value, span: table.key_span(word.word()) }))
         };
-        Self { forced: EffectWord::ALL.into_iter().filter_map(forced).collect() }
+        Self { forced: EffectWord::values().filter_map(forced).collect() }
     }
 
-    /// What is said of an effect, and where.
+    /// The value that the deck gives an effect, with its place; none where it leaves it out.
     pub fn said(&self, word: EffectWord) -> Option<&Spanned<bool>> {
         self.forced.iter().find(|(known, _)| *known == word).map(|(_, said)| said)
     }
 
-    /// Whether an effect is not switched off.
+    /// True unless an effect is switched off.
     pub fn allow(&self, word: EffectWord) -> bool {
         self.said(word).is_none_or(|said| said.value)
     }

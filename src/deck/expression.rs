@@ -1,7 +1,9 @@
 //! Arithmetic in decks: parsed once, evaluated with exact first and second derivatives over `t`.
 //!
-//! Functions come from the pure-Rust `libm`, so that a deck means the same numbers on every machine.
+//! Functions come from the pure-Rust `libm`, so that a deck means the same numbers on every
+//! machine.
 
+use super::words::{Words, words};
 use std::f64::consts::PI;
 
 /// A parsed expression.
@@ -9,20 +11,20 @@ use std::f64::consts::PI;
 pub enum Expression {
     /// A number
     Number(f64),
-    /// A name and where it stands
+    /// A name and its byte offset
     Name(String, usize),
     /// -a
     Negative(Box<Expression>),
     /// a (+ - * / ^) b
-    Binary(char, Box<Expression>, Box<Expression>),
+    Binary(Operator, Box<Expression>, Box<Expression>),
     /// f(a, …) of a known function with the right number of arguments
-    Call(&'static str, Vec<Expression>),
+    Call(Function, Vec<Expression>),
 }
 
-/// What is wrong with an expression, and at which byte of it.
+/// An error in an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpressionError {
-    /// What is wrong
+    /// The message
     pub message: String,
     /// Byte offset in the expression
     pub offset: usize,
@@ -31,26 +33,84 @@ pub struct ExpressionError {
 /// Value, first and second derivative over `t`.
 pub type Jet = [f64; 3];
 
-/// Names of the functions with their numbers of arguments.
-pub const FUNCTIONS: [(&str, usize); 17] = [
-    ("sin", 1),
-    ("cos", 1),
-    ("tan", 1),
-    ("asin", 1),
-    ("acos", 1),
-    ("atan", 1),
-    ("atan2", 2),
-    ("sinh", 1),
-    ("cosh", 1),
-    ("tanh", 1),
-    ("exp", 1),
-    ("log", 1),
-    ("log10", 1),
-    ("sqrt", 1),
-    ("abs", 1),
-    ("min", 2),
-    ("max", 2),
-];
+words! {
+    /// Operators of two numbers.
+    pub enum Operator {
+        /// a + b
+        Plus = "+",
+        /// a - b
+        Minus = "-",
+        /// a b
+        Times = "*",
+        /// a / b
+        Over = "/",
+        /// a to the power of b
+        Power = "^",
+    }
+}
+
+words! {
+    /// Functions.
+    pub enum Function {
+        /// Sine
+        Sin = "sin",
+        /// Cosine
+        Cos = "cos",
+        /// Tangent
+        Tan = "tan",
+        /// Inverse sine
+        Asin = "asin",
+        /// Inverse cosine
+        Acos = "acos",
+        /// Inverse tangent
+        Atan = "atan",
+        /// The angle of the vector (second argument, first argument)
+        Atan2 = "atan2",
+        /// Hyperbolic sine
+        Sinh = "sinh",
+        /// Hyperbolic cosine
+        Cosh = "cosh",
+        /// Hyperbolic tangent
+        Tanh = "tanh",
+        /// Exponential function
+        Exp = "exp",
+        /// Natural logarithm
+        Log = "log",
+        /// Decimal logarithm
+        Log10 = "log10",
+        /// Square root
+        Sqrt = "sqrt",
+        /// Magnitude
+        Abs = "abs",
+        /// The smaller argument
+        Min = "min",
+        /// The larger argument
+        Max = "max",
+    }
+}
+
+impl Function {
+    /// The number of arguments.
+    fn arguments(self) -> usize {
+        match self {
+            Self::Atan2 | Self::Min | Self::Max => 2,
+            Self::Sin
+            | Self::Cos
+            | Self::Tan
+            | Self::Asin
+            | Self::Acos
+            | Self::Atan
+            | Self::Sinh
+            | Self::Cosh
+            | Self::Tanh
+            | Self::Exp
+            | Self::Log
+            | Self::Log10
+            | Self::Sqrt
+            | Self::Abs => 1,
+        }
+    }
+}
 
 /// Names with a fixed meaning.
 pub const CONSTANTS: [(&str, f64); 2] = [("pi", PI), ("deg", PI / 180.0)];
@@ -88,12 +148,12 @@ impl Expression {
             }
             Self::Negative(a) => Ok(a.evaluate(lookup)?.map(|x| -x)),
             Self::Binary(operator, a, b) => Ok(binary(*operator, a.evaluate(lookup)?, b.evaluate(lookup)?)),
-            Self::Call(name, arguments) => {
+            Self::Call(function, arguments) => {
                 let mut values = [[0.0; 3]; 2];
                 for (value, argument) in values.iter_mut().zip(arguments) {
                     *value = argument.evaluate(lookup)?;
                 }
-                Ok(call(name, values[0], values[1]))
+                Ok(call(*function, values[0], values[1]))
             }
         }
     }
@@ -126,7 +186,7 @@ impl Parser<'_> {
             return Err(self.error("the expression is nested too deeply".into()));
         }
         let mut left = self.product()?;
-        while let Some(operator) = self.accept("+-") {
+        while let Some(operator) = self.operator("+-") {
             left = Expression::Binary(operator, Box::new(left), Box::new(self.product()?));
         }
         self.depth -= 1;
@@ -135,7 +195,7 @@ impl Parser<'_> {
 
     fn product(&mut self) -> Result<Expression, ExpressionError> {
         let mut left = self.signed()?;
-        while let Some(operator) = self.accept("*/") {
+        while let Some(operator) = self.operator("*/") {
             left = Expression::Binary(operator, Box::new(left), Box::new(self.signed()?));
         }
         Ok(left)
@@ -161,7 +221,7 @@ impl Parser<'_> {
         }
         let exponent = self.signed()?;
         self.depth -= 1;
-        Ok(Expression::Binary('^', Box::new(base), Box::new(exponent)))
+        Ok(Expression::Binary(Operator::Power, Box::new(base), Box::new(exponent)))
     }
 
     fn atom(&mut self) -> Result<Expression, ExpressionError> {
@@ -216,8 +276,8 @@ impl Parser<'_> {
             return Ok(Expression::Name(name.into(), start));
         }
         self.at += 1;
-        let Some(&(function, count)) = FUNCTIONS.iter().find(|(known, _)| *known == name) else {
-            let known = FUNCTIONS.map(|(name, _)| name).join(", ");
+        let Some(function) = Function::of(name) else {
+            let known = Function::words().collect::<Vec<_>>().join(", ");
             let message = format!("unknown function `{name}`; there are {known}");
             return Err(ExpressionError { message, offset: start });
         };
@@ -226,11 +286,16 @@ impl Parser<'_> {
             arguments.push(self.sum()?);
         }
         self.expect(')')?;
+        let count = function.arguments();
         if arguments.len() != count {
-            let message = format!("`{function}` takes {count} argument(s), not {}", arguments.len());
+            let message = format!("`{name}` takes {count} argument(s), not {}", arguments.len());
             return Err(ExpressionError { message, offset: start });
         }
         Ok(Expression::Call(function, arguments))
+    }
+
+    fn operator(&mut self, any_of: &str) -> Option<Operator> {
+        Operator::of(self.accept(any_of)?.encode_utf8(&mut [0; 4]))
     }
 
     fn accept(&mut self, any_of: &str) -> Option<char> {
@@ -265,17 +330,17 @@ impl Parser<'_> {
     }
 }
 
-fn binary(operator: char, a: Jet, b: Jet) -> Jet {
+fn binary(operator: Operator, a: Jet, b: Jet) -> Jet {
     match operator {
-        '+' => [0, 1, 2].map(|i| a[i] + b[i]),
-        '-' => [0, 1, 2].map(|i| a[i] - b[i]),
-        '*' => [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]],
-        '/' => {
+        Operator::Plus => [0, 1, 2].map(|i| a[i] + b[i]),
+        Operator::Minus => [0, 1, 2].map(|i| a[i] - b[i]),
+        Operator::Times => [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]],
+        Operator::Over => {
             let value = a[0] / b[0];
             let slope = (a[1] - value * b[1]) / b[0];
             [value, slope, (a[2] - 2.0 * slope * b[1] - value * b[2]) / b[0]]
         }
-        _ => power(a, b),
+        Operator::Power => power(a, b),
     }
 }
 
@@ -283,7 +348,7 @@ fn power(a: Jet, b: Jet) -> Jet {
     let value = libm::pow(a[0], b[0]);
     if b[1] != 0.0 || b[2] != 0.0 {
         // a^b = exp(b log a)
-        return chain(binary('*', b, call("log", a, a)), value, value, value);
+        return chain(binary(Operator::Times, b, call(Function::Log, a, a)), value, value, value);
     }
     if a[1] == 0.0 && a[2] == 0.0 {
         return [value, 0.0, 0.0];
@@ -301,63 +366,80 @@ fn chain(a: Jet, f: f64, slope: f64, bend: f64) -> Jet {
     [f, slope * a[1], bend * a[1] * a[1] + slope * a[2]]
 }
 
-fn call(name: &str, a: Jet, b: Jet) -> Jet {
+fn call(function: Function, a: Jet, b: Jet) -> Jet {
     let x = a[0];
-    match name {
-        "sin" => chain(a, libm::sin(x), libm::cos(x), -libm::sin(x)),
-        "cos" => chain(a, libm::cos(x), -libm::sin(x), -libm::cos(x)),
-        "tan" => {
+    match function {
+        Function::Sin => chain(a, libm::sin(x), libm::cos(x), -libm::sin(x)),
+        Function::Cos => chain(a, libm::cos(x), -libm::sin(x), -libm::cos(x)),
+        Function::Tan => {
             let f = libm::tan(x);
             chain(a, f, 1.0 + f * f, 2.0 * f * (1.0 + f * f))
         }
-        "asin" => {
+        Function::Asin => {
             let slope = 1.0 / (1.0 - x * x).sqrt();
             chain(a, libm::asin(x), slope, x * slope * slope * slope)
         }
-        "acos" => {
+        Function::Acos => {
             let slope = -1.0 / (1.0 - x * x).sqrt();
             chain(a, libm::acos(x), slope, x * slope * slope * slope)
         }
-        "atan" => {
+        Function::Atan => {
             let slope = 1.0 / (1.0 + x * x);
             chain(a, libm::atan(x), slope, -2.0 * x * slope * slope)
         }
-        "atan2" => {
-            // The derivatives of atan(y/x), in a form that holds for every quadrant: (y'x - y x')/(x^2 + y^2).
-            let (y, x) = (a, b);
+        Function::Atan2 => {
+            // The derivatives of atan(y/x), in a form that holds for every quadrant:
+            // (y'x - y x')/(x^2 + y^2).
+            let y = a;
+            let x = b;
             let r2 = x[0] * x[0] + y[0] * y[0];
             let cross = y[1] * x[0] - y[0] * x[1];
             let slope = cross / r2;
             let r2_slope = 2.0 * (x[0] * x[1] + y[0] * y[1]);
             [libm::atan2(y[0], x[0]), slope, (y[2] * x[0] - y[0] * x[2] - slope * r2_slope) / r2]
         }
-        "sinh" => chain(a, libm::sinh(x), libm::cosh(x), libm::sinh(x)),
-        "cosh" => chain(a, libm::cosh(x), libm::sinh(x), libm::cosh(x)),
-        "tanh" => {
+        Function::Sinh => chain(a, libm::sinh(x), libm::cosh(x), libm::sinh(x)),
+        Function::Cosh => chain(a, libm::cosh(x), libm::sinh(x), libm::cosh(x)),
+        Function::Tanh => {
             let f = libm::tanh(x);
             chain(a, f, 1.0 - f * f, -2.0 * f * (1.0 - f * f))
         }
-        "exp" => chain(a, libm::exp(x), libm::exp(x), libm::exp(x)),
-        "log" => chain(a, libm::log(x), 1.0 / x, -1.0 / (x * x)),
-        "log10" => {
+        Function::Exp => chain(a, libm::exp(x), libm::exp(x), libm::exp(x)),
+        Function::Log => chain(a, libm::log(x), 1.0 / x, -1.0 / (x * x)),
+        Function::Log10 => {
             let scale = std::f64::consts::LOG10_E;
             chain(a, libm::log10(x), scale / x, -scale / (x * x))
         }
-        "sqrt" => {
+        Function::Sqrt => {
             let f = x.sqrt();
             chain(a, f, 0.5 / f, -0.25 / (f * x))
         }
-        "abs" if falls_below(a, [0.0; 3]) => a.map(|v| -v),
-        "abs" => a,
-        "min" if falls_below(b, a) => b,
-        "min" => a,
-        _ if falls_below(a, b) => b,
-        _ => a,
+        Function::Abs => {
+            if falls_below(a, [0.0; 3]) {
+                a.map(|v| -v)
+            } else {
+                a
+            }
+        }
+        Function::Min => {
+            if falls_below(b, a) {
+                b
+            } else {
+                a
+            }
+        }
+        Function::Max => {
+            if falls_below(a, b) {
+                b
+            } else {
+                a
+            }
+        }
     }
 }
 
-/// Whether one is less than another, or where they meet, is so right after that: what depends on it has the derivatives of what comes then, as
-/// tables have, whatever the order of its arguments.
+/// True if a is less than b, or becomes so where they meet: `min`, `max` and `abs` then have the
+/// derivatives of the later branch, as tables have, in any order of arguments.
 fn falls_below(a: Jet, b: Jet) -> bool {
     (0..3).find(|&k| a[k] != b[k]).is_some_and(|k| a[k] < b[k])
 }
@@ -395,7 +477,8 @@ mod tests {
         assert!(Expression::parse(&"(".repeat(1000)).is_err());
     }
 
-    /// A ramp and what holds it would add up at their corner if each took its side by the order of its arguments.
+    /// A ramp and what holds it would add up at their corner if each took its side by the order of
+    /// its arguments.
     #[test]
     fn corners_have_the_derivatives_of_what_follows() {
         let at_corner = |text: &str| {
@@ -446,8 +529,11 @@ mod tests {
         for text in texts {
             let parsed = Expression::parse(text).unwrap();
             let at = |t: f64| parsed.evaluate(&mut |name| (name == "t").then_some([t, 1.0, 0.0])).unwrap();
-            let (t, h) = (0.7, 1e-5);
-            let (before, here, after) = (at(t - h), at(t), at(t + h));
+            let t = 0.7;
+            let h = 1e-5;
+            let before = at(t - h);
+            let here = at(t);
+            let after = at(t + h);
             assert!((here[1] - (after[0] - before[0]) / (2.0 * h)).abs() < 1e-8, "{text}");
             assert!((here[2] - (after[1] - before[1]) / (2.0 * h)).abs() < 1e-8, "{text}");
         }

@@ -1,4 +1,5 @@
-//! Tables beside the deck: `{ csv = "spine.csv" }` is replaced by what stands in the file, so that whatever follows has one whole text.
+//! Tables beside the deck: `{ csv = "spine.csv" }` is replaced by the rows of the file, so that all
+//! later steps have one whole text.
 
 use super::Diagnostic;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
@@ -9,7 +10,8 @@ const MOST_ROWS: usize = 1_000_000;
 /// Gives the text of a file that a deck names.
 pub type Open<'o> = &'o dyn Fn(&str) -> Result<String, String>;
 
-/// The text of a deck with everything that it imports. Lines stay where they are; sections of a table follow at the end.
+/// The text of a deck with everything that it imports. Lines keep their numbers; sections of a
+/// table follow at the end.
 pub fn import(text: &str, open: Open) -> Result<String, Vec<Diagnostic>> {
     if !text.contains("csv") {
         return Ok(text.into());
@@ -86,7 +88,7 @@ impl Importer<'_> {
         }
     }
 
-    /// What a file holds; what is wrong with it is told at its name.
+    /// Reads a file; errors are reported at its name.
     fn table<T>(&mut self, path: &str, of: impl Fn(&Csv) -> Result<T, String>) -> Option<T> {
         self.imported = true;
         let read = (self.open)(path).and_then(|content| Csv::read(&content)).and_then(|table| of(&table));
@@ -116,7 +118,8 @@ impl Csv {
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(content.as_bytes());
-        let (mut names, mut rows) = (Vec::new(), Vec::new());
+        let mut names = Vec::new();
+        let mut rows = Vec::new();
         for (number, record) in reader.records().enumerate() {
             let record = record.map_err(|error| error.to_string())?;
             let line = record.position().map_or(number as u64 + 1, csv::Position::line);
@@ -246,7 +249,9 @@ const RESULTANTS: [&str; 10] = ["EA", "GA2", "GA3", "GJ", "EI2", "EI3", "rhoA", 
 /// Row and column of `C12`, `M45`.
 fn entry(name: &str) -> Option<(char, usize, usize)> {
     let mut letters = name.chars();
-    let (letter, i, j) = (letters.next()?, letters.next()?.to_digit(10)?, letters.next()?.to_digit(10)?);
+    let letter = letters.next()?;
+    let i = letters.next()?.to_digit(10)?;
+    let j = letters.next()?.to_digit(10)?;
     let fits = ['C', 'M'].contains(&letter) && (1..=6).contains(&i) && (1..=6).contains(&j) && letters.next().is_none();
     fits.then_some((letter, i as usize - 1, j as usize - 1))
 }

@@ -1,47 +1,75 @@
-//! The language of the deck: text in, words with their places out. It knows no mechanics.
+//! The language of the deck: from text to tables whose values have their places in the text. It
+//! knows no mechanics.
 //!
-//! Everything that is wrong is gathered, each with file, line and column; one struct stands for one table.
+//! All errors are collected, each with file, line and column. One file a table, with its struct,
+//! its keys and its reader.
 
 mod accuracy;
-mod action;
+mod axes;
+mod beam;
+mod body;
 mod cost;
+mod damping;
 mod diagnostic;
 mod effects;
+mod expect;
 mod expression;
-mod geometry;
+mod hints;
+mod history;
 mod import;
-mod looked_at;
+mod initial;
+mod joint;
+mod load;
+mod material;
+mod motion;
+mod observable;
+mod output;
 mod overrides;
 mod parameters;
-mod procedure;
+mod point;
 mod reader;
 mod resolved;
 mod schema;
+mod scheme;
+mod section;
+mod spring;
+mod stage;
+mod support;
 mod sweep;
+mod units;
+mod words;
 
 pub use accuracy::{Accuracy, is_named, without_stage};
-pub use action::{
-    Axes, Body, Frame, HistoryBody, HistoryTable, HistoryUse, Initial, InitialTarget, Joint, JointKind, JointParts,
-    Load, LoadTarget, LoadVector, Motion, MotionWhat, Spring, SpringBody, Support,
-};
+pub use axes::Axes;
+pub use beam::{Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Path};
+pub use body::Body;
 pub use cost::{Cost, NormWord};
-pub use diagnostic::{Diagnostic, Severity, Span, Spanned, nearest, one_of};
+pub use diagnostic::{Diagnostic, Severity, Span, Spanned, one_of};
 pub use effects::{EffectWord, Effects};
+pub use expect::{Expect, ExpectBody, Instant, Reduce, Reduction, Target};
 pub use expression::{Expression, Jet};
-pub use geometry::{
-    Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Material, Path, PointRef, Section, SectionBody, Shape,
-};
+pub use hints::{hint, nearest};
+pub use history::{HistoryBody, HistoryTable, HistoryUse};
 pub use import::import;
-pub use looked_at::{Looked, looking_at};
+pub use initial::{Initial, InitialTarget};
+pub use joint::{Joint, JointMotor, JointParts};
+pub use load::{Frame, Load, LoadTarget, LoadVector};
+pub use material::Material;
+pub use motion::{Motion, MotionWhat};
+pub use observable::{Looked, looking_at};
+pub use output::Output;
 pub use overrides::apply;
 pub use parameters::Parameters;
-pub use procedure::{
-    Expect, ExpectBody, FAILURES, Instant, MOST_STEPS, Output, Reduce, RotatingFrame, SchemeWord, Stage, StageBody,
-    Until,
-};
-
+pub use point::PointRef;
 pub use schema::{Entry, SCHEMA, entries, explain};
+pub use scheme::{SchemeName, SchemeWord};
+pub use section::{Section, SectionBody, Shape};
+pub use spring::{Spring, SpringBody};
+pub use stage::{MOST_STEPS, RotatingFrame, STEP_TOLERANCE, Stage, StageBody, Until};
+pub use support::Support;
 pub use sweep::{SweepFile, VaryBody, VaryTable};
+pub use words::Words;
+pub(crate) use words::words;
 
 use reader::{Context, Table};
 use std::cell::RefCell;
@@ -50,10 +78,8 @@ use toml::de::{DeTable, DeValue};
 /// A deck as it stands in the text.
 #[derive(Clone, Debug, Default)]
 pub struct Deck {
-    /// What it is about
+    /// Title
     pub title: Option<String>,
-    /// Labels of the units: length, force, time
-    pub units: Option<[String; 3]>,
     /// Acceleration of gravity
     pub gravity: Option<Spanned<[f64; 3]>>,
     /// Named places
@@ -72,7 +98,7 @@ pub struct Deck {
     pub joints: Vec<Joint>,
     /// Rigid bodies
     pub bodies: Vec<Body>,
-    /// Springs to ground
+    /// Springs and cables
     pub springs: Vec<Spring>,
     /// Loads
     pub loads: Vec<Load>,
@@ -86,17 +112,17 @@ pub struct Deck {
     pub stages: Vec<Stage>,
     /// Effects forced on or off
     pub effects: Effects,
-    /// What is written
+    /// Written nodes, columns and rows
     pub output: Output,
-    /// What a study of accuracy and time varies
+    /// Variants of a study of accuracy and time
     pub cost: Cost,
-    /// How large the errors of outputs may be
+    /// Largest estimated errors of outputs
     pub accuracy: Option<Accuracy>,
     /// Expectations
     pub expects: Vec<Expect>,
     /// The values of `[param]`
     pub parameters: Parameters,
-    /// How many stages stand in the text
+    /// Number of stages in the text
     pub stage_count: usize,
     /// Names of tables that could not be read: they are not unknown
     pub broken: Vec<String>,
@@ -104,13 +130,14 @@ pub struct Deck {
     pub resolved: serde_json::Value,
 }
 
-const KEYS: [&str; 21] = [
+/// Keys of a deck.
+const KEYS: [&str; 23] = [
     "title", "units", "gravity", "param", "point", "material", "section", "beam", "support", "motion", "joint", "body",
-    "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy",
+    "spring", "load", "initial", "history", "stage", "effects", "output", "cost", "accuracy", "damping", "expect",
 ];
 
-/// Reads a deck. What is wrong with it comes beside it, so that the scene can tell what else is; `Err` where the text is no
-/// TOML.
+/// Reads a deck. Errors and warnings are returned beside it, so that the scene can add its own;
+/// `Err` where the text is not TOML.
 pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (document, syntax) = DeTable::parse_recoverable(text);
     if !syntax.is_empty() {
@@ -137,7 +164,8 @@ pub fn read(text: &str) -> Result<(Deck, Vec<Diagnostic>), Vec<Diagnostic>> {
     Ok((deck, context.diagnostics.take()))
 }
 
-/// The first syntax error, and keys that stand twice; the parser's other errors are mostly consequences of the first.
+/// The first syntax error, and keys that stand twice; the parser's other errors are mostly
+/// consequences of the first.
 fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
     let describe = |error: &toml::de::Error| {
         let mut diagnostic = Diagnostic::whole(error.message().trim().replace('\n', "; "));
@@ -149,15 +177,14 @@ fn describe_syntax(errors: &[toml::de::Error]) -> Vec<Diagnostic> {
 }
 
 fn read_tables(context: &Context, document: &DeTable) -> Deck {
-    let keys: Vec<&str> = KEYS.into_iter().chain(["damping", "expect"]).collect();
-    let top = Table::top(context, document, "the deck", &keys);
-    let points = geometry::read_points(&top);
-    let materials = named(&top, "material", geometry::read_material);
-    let sections = named(&top, "section", geometry::read_section);
-    let beams = listed(&top, "beam", geometry::read_beam);
-    let joints = listed(&top, "joint", action::read_joint);
-    let bodies = listed(&top, "body", action::read_body);
-    let histories = named(&top, "history", action::read_history);
+    let top = Table::top(context, document, "the deck", &KEYS);
+    let points = point::read_points(&top);
+    let materials = named(&top, "material", material::read_material);
+    let sections = named(&top, "section", section::read_section);
+    let beams = listed(&top, "beam", beam::read_beam);
+    let joints = listed(&top, "joint", joint::read_joint);
+    let bodies = listed(&top, "body", body::read_body);
+    let histories = named(&top, "history", history::read_history);
     let read: Vec<&str> = [
         points.iter().map(|(name, _)| name.value.as_str()).collect::<Vec<_>>(),
         materials.iter().map(|m| m.name.value.as_str()).collect(),
@@ -167,31 +194,31 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     ]
     .concat();
     let broken = defined_names(document).into_iter().filter(|name| !read.contains(&name.as_str())).collect();
+    units::check_units(&top);
     let deck = Deck {
         broken,
         stage_count: 0,
         title: top.text("title").map(|t| t.value),
-        units: procedure::read_units(&top),
         gravity: top.vector("gravity"),
         points,
         materials,
         sections,
         beams,
-        supports: listed(&top, "support", action::read_support),
-        motions: listed(&top, "motion", action::read_motion),
+        supports: listed(&top, "support", support::read_support),
+        motions: listed(&top, "motion", motion::read_motion),
         joints,
         bodies,
-        springs: listed(&top, "spring", action::read_spring),
-        loads: listed(&top, "load", action::read_load),
-        damping: action::read_damping(&top),
-        initials: listed(&top, "initial", action::read_initial),
+        springs: listed(&top, "spring", spring::read_spring),
+        loads: listed(&top, "load", load::read_load),
+        damping: damping::read_damping(&top),
+        initials: listed(&top, "initial", initial::read_initial),
         histories,
-        stages: listed(&top, "stage", procedure::read_stage),
+        stages: listed(&top, "stage", stage::read_stage),
         effects: Effects::read(&top),
-        output: procedure::read_output(&top),
+        output: output::read_output(&top),
         cost: cost::Cost::read(&top),
         accuracy: Accuracy::read(&top),
-        expects: listed(&top, "expect", procedure::read_expect),
+        expects: listed(&top, "expect", expect::read_expect),
         parameters: Parameters::default(),
         resolved: serde_json::Value::Null,
     };
@@ -199,7 +226,7 @@ fn read_tables(context: &Context, document: &DeTable) -> Deck {
     deck
 }
 
-/// Every name that the text defines, whether its table can be read or not.
+/// Every name that the text defines, also those of tables that cannot be read.
 fn defined_names(document: &DeTable) -> Vec<String> {
     let table = |key: &str| document.get(key).and_then(|item| item.get_ref().as_table());
     let named = ["point", "material", "section", "history"].into_iter().filter_map(table);

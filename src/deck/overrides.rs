@@ -1,12 +1,13 @@
 //! `--set key=value`: changes a deck before it is read.
 
-use super::procedure::COEFFICIENTS;
+use super::scheme::{COEFFICIENTS, SchemeName};
+use super::words::Words;
 use toml_edit::{DocumentMut, Item, Key, Table, TableLike, Value};
 
 /// Applies `key=value` pairs to the text of a deck and gives the changed text.
 ///
-/// Keys are paths as in TOML; arrays of tables are indexed by number (`stage.0.step`). A value is read as TOML, and as a
-/// text where that fails.
+/// Keys are paths as in TOML; arrays of tables are indexed by number (`stage.0.step`). A value is
+/// read as TOML, and as a text where that fails.
 pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
     if settings.is_empty() {
         return Ok(text.to_string());
@@ -34,7 +35,8 @@ pub fn apply(text: &str, settings: &[String]) -> Result<String, String> {
     Ok(document.to_string())
 }
 
-/// Takes the coefficients of the scheme that a stage had before out of it, unless they are given as well.
+/// Takes the coefficients of the scheme that a stage had before out of it, unless they are given as
+/// well.
 fn drop_coefficients(document: &mut DocumentMut, number: &str, is_given: impl Fn(&str) -> bool) {
     let Ok(number) = number.parse::<usize>() else { return };
     let stage: Option<&mut dyn TableLike> = match document.get_mut("stage") {
@@ -46,12 +48,10 @@ fn drop_coefficients(document: &mut DocumentMut, number: &str, is_given: impl Fn
     };
     let Some(stage) = stage else { return };
     let Some(scheme) = stage.get("scheme").and_then(Item::as_str).map(str::to_string) else { return };
-    // A scheme that there is not is told when the deck is read.
-    let known = COEFFICIENTS.iter().any(|(_, owners)| owners.contains(&scheme.as_str()));
-    for (key, owners) in COEFFICIENTS {
-        if known && !owners.contains(&scheme.as_str()) && !is_given(key) {
-            stage.remove(key);
-        }
+    // An unknown scheme is reported when the deck is read.
+    let Some(scheme) = SchemeName::of(&scheme) else { return };
+    for key in COEFFICIENTS.into_iter().filter(|key| !scheme.coefficients().contains(key) && !is_given(key)) {
+        stage.remove(key);
     }
 }
 

@@ -51,7 +51,7 @@ impl Parameters {
         self.values.keys().map(String::as_str)
     }
 
-    /// Whether an expression uses a parameter that has been reported as wrong.
+    /// True if an expression uses a parameter that has been reported as wrong.
     pub fn is_broken(&self, text: &str) -> bool {
         let mut broken = false;
         if let Ok(expression) = Expression::parse(text) {
@@ -132,7 +132,7 @@ impl Parameters {
     }
 }
 
-/// Why a name cannot be a parameter.
+/// The reason why a name cannot be a parameter.
 fn unusable(name: &str) -> Option<String> {
     let fixed = CONSTANTS.iter().map(|(known, _)| *known).chain(["t"]);
     if fixed.into_iter().any(|known| known == name) {

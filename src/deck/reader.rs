@@ -1,22 +1,26 @@
-//! Reads typed values out of TOML tables, each with its place, and collects everything that is wrong.
+//! Reads typed values out of TOML tables, each with its place, and collects everything that is
+//! wrong.
 
-use super::diagnostic::{Diagnostic, Span, Spanned, nearest, one_of};
+use super::diagnostic::{Diagnostic, Span, Spanned, one_of};
 use super::expression::Expression;
+use super::hints::{self, nearest};
 use super::parameters::Parameters;
+use super::words::Words;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use toml::de::{DeTable, DeValue};
 
 /// A value of the deck with its place.
 pub type Item<'a> = toml::Spanned<DeValue<'a>>;
 
-/// What reading needs and gathers.
+/// Parameters and stages that readers refer to, and the diagnostics that they collect.
 pub struct Context {
     /// The values of `[param]`
     pub parameters: Parameters,
-    /// How many stages the deck has
+    /// Number of stages of the deck
     pub stage_count: usize,
-    /// What is wrong so far
+    /// Errors and warnings so far
     pub diagnostics: RefCell<Vec<Diagnostic>>,
     /// The numbers that strings stood for, by the start of the string
     pub resolved: RefCell<BTreeMap<usize, f64>>,
@@ -128,6 +132,20 @@ impl Context {
         }
     }
 
+    /// One of a few words; `key` is named in messages.
+    pub fn word<W: Words>(&self, item: &Item, key: &str) -> Option<Spanned<W>> {
+        let text = self.text(item)?;
+        if let Some(value) = W::of(&text.value) {
+            return Some(Spanned { value, span: text.span });
+        }
+        let message = format!("`{key}` is {}, not `{}`", one_of(W::words()), text.value);
+        let mut diagnostic = Diagnostic::error(message, text.span);
+        let known: Vec<&str> = W::words().collect();
+        diagnostic.help = hints::for_word(key, &text.value, &known).help();
+        self.report(diagnostic);
+        None
+    }
+
     /// A list of texts.
     pub fn texts(&self, item: &Item) -> Option<Vec<Spanned<String>>> {
         match item.get_ref() {
@@ -150,7 +168,7 @@ pub fn literal(value: &DeValue) -> Option<f64> {
     }
 }
 
-/// What a value is, in the words of TOML.
+/// The kind of a TOML value, for messages.
 pub fn kind_of(value: &DeValue) -> &'static str {
     match value {
         DeValue::String(_) => "a text",
@@ -164,20 +182,25 @@ pub fn kind_of(value: &DeValue) -> &'static str {
 
 /// One table of the deck.
 pub struct Table<'a> {
-    /// What reading needs
+    /// Parameters and diagnostics
     pub context: &'a Context,
-    /// What it is called in messages: `[[beam]]`
+    /// Its name in messages: `[[beam]]`
     pub what: String,
-    /// Where it stands
+    /// Place of the table
     pub span: Span,
     entries: &'a DeTable<'a>,
-    /// Keys that unknown ones were probably meant to be: that they are missing has been said.
+    /// Known keys that misspelt ones stand for: they are not reported as missing again.
     misspelt: Vec<String>,
 }
 
 impl<'a> Table<'a> {
     /// The table `item`; keys that are not in `keys` are errors.
-    pub fn new(context: &'a Context, item: &'a Item<'a>, what: impl Into<String>, keys: &[&str]) -> Option<Self> {
+    pub fn new(
+        context: &'a Context,
+        item: &'a Item<'a>,
+        what: impl Into<String>,
+        keys: &[&'static str],
+    ) -> Option<Self> {
         let mut table = Self::of_names(context, item, what)?;
         table.refuse_unknown(keys);
         Some(table)
@@ -193,30 +216,27 @@ impl<'a> Table<'a> {
     }
 
     /// The top level of a file.
-    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, what: &str, keys: &[&str]) -> Self {
+    pub fn top(context: &'a Context, entries: &'a DeTable<'a>, what: &str, keys: &[&'static str]) -> Self {
         let mut table = Self { context, what: what.into(), span: 0..0, entries, misspelt: Vec::new() };
         table.refuse_unknown(keys);
         table
     }
 
-    fn refuse_unknown(&mut self, keys: &[&str]) {
+    fn refuse_unknown(&mut self, keys: &[&'static str]) {
         for key in self.entries.keys() {
             let name: &str = key.get_ref();
             if !keys.contains(&name) {
-                let mut diagnostic = Diagnostic::error(format!("unknown key `{name}` in {}", self.what), key.span());
-                diagnostic.help = Some(match nearest(name, keys.iter().copied()) {
-                    Some(meant) => {
-                        self.misspelt.push(meant.into());
-                        format!("did you mean `{meant}`?")
-                    }
-                    None => format!("{} knows {}", self.what, one_of(keys.iter().copied())),
-                });
-                self.context.report(diagnostic);
+                let hint = hints::for_key(&self.what, name, keys);
+                self.misspelt.extend(hint.meant().map(str::to_string));
+                let list = || format!("{} knows {}", self.what, one_of(keys.iter().copied()));
+                let message = format!("unknown key `{name}` in {}", self.what);
+                let help = hint.help().unwrap_or_else(list);
+                self.context.report(Diagnostic::error(message, key.span()).help(help));
             }
         }
     }
 
-    /// Whether a key stands in the table.
+    /// True if the table has a key.
     pub fn has(&self, key: &str) -> bool {
         self.entries.contains_key(key)
     }
@@ -226,7 +246,7 @@ impl<'a> Table<'a> {
         self.entries.get(key)
     }
 
-    /// Where a key stands.
+    /// The place of a key; that of the table where it has none.
     pub fn key_span(&self, key: &str) -> Span {
         self.entries.keys().find(|k| k.get_ref().as_ref() == key).map_or(self.span.clone(), |k| k.span())
     }
@@ -260,19 +280,41 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// One of a few words.
-    pub fn word(&self, key: &str, words: &[&'static str]) -> Option<Spanned<&'static str>> {
-        let text = self.context.text(self.get(key)?)?;
-        choose(self.context, &text, key, words)
+    /// Reports an error at the table; returns nothing, for use in a tail position.
+    pub fn wrong<T>(&self, message: impl Into<String>) -> Option<T> {
+        self.context.wrong(self.span.clone(), message)
     }
 
-    /// A positive number.
-    pub fn positive(&self, key: &str) -> Option<Spanned<f64>> {
-        let number = self.context.number(self.get(key)?)?;
-        if number.value > 0.0 {
-            return Some(number);
+    /// Reports an error at a key; returns nothing, for use in a tail position.
+    pub fn wrong_key<T>(&self, key: &str, message: impl Into<String>) -> Option<T> {
+        self.context.wrong(self.key_span(key), message)
+    }
+
+    /// Reports an error at a key if the table has it.
+    pub fn refuse(&self, key: &str, message: impl Into<String>) {
+        if self.has(key) {
+            self.wrong_key::<()>(key, message);
         }
-        self.context.wrong(number.span, format!("`{key}` must be positive, found {}", number.value))
+    }
+
+    /// The value of a key that may be left out: `Some(None)` where it is, `None` where the value is
+    /// wrong.
+    pub fn optional<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&'a Context, &'a Item<'a>) -> Option<T>,
+    ) -> Option<Option<T>> {
+        self.get(key).map_or(Some(None), |item| read(self.context, item).map(Some))
+    }
+
+    /// One of a few words.
+    pub fn word<W: Words>(&self, key: &str) -> Option<Spanned<W>> {
+        self.context.word(self.get(key)?, key)
+    }
+
+    /// One of a few words, or `default` where the key is left out.
+    pub fn word_or<W: Words>(&self, key: &str, default: W) -> Option<W> {
+        Some(self.optional(key, |context, item| context.word(item, key))?.map_or(default, |word| word.value))
     }
 
     /// A number.
@@ -280,14 +322,83 @@ impl<'a> Table<'a> {
         self.context.number(self.get(key)?)
     }
 
+    /// A number that must be there.
+    pub fn required_number(&self, key: &str) -> Option<Spanned<f64>> {
+        self.context.number(self.required(key)?)
+    }
+
+    /// A positive number.
+    pub fn positive(&self, key: &str) -> Option<Spanned<f64>> {
+        let number = self.number(key)?;
+        if number.value > 0.0 {
+            return Some(number);
+        }
+        self.context.wrong(number.span, format!("`{key}` must be positive, found {}", number.value))
+    }
+
+    /// A positive number that must be there.
+    pub fn required_positive(&self, key: &str) -> Option<Spanned<f64>> {
+        self.required(key)?;
+        self.positive(key)
+    }
+
+    /// A positive number, or `default` where the key is left out.
+    pub fn positive_or(&self, key: &str, default: f64) -> Option<f64> {
+        Some(self.optional(key, |_, _| self.positive(key))?.map_or(default, |number| number.value))
+    }
+
+    /// A number that is not negative.
+    pub fn non_negative(&self, key: &str) -> Option<Spanned<f64>> {
+        let number = self.number(key)?;
+        if number.value >= 0.0 {
+            return Some(number);
+        }
+        self.context.wrong(number.span, format!("`{key}` must not be negative, found {}", number.value))
+    }
+
+    /// A number that is not negative, or `default` where the key is left out.
+    pub fn non_negative_or(&self, key: &str, default: f64) -> Option<f64> {
+        Some(self.optional(key, |_, _| self.non_negative(key))?.map_or(default, |number| number.value))
+    }
+
+    /// A whole number in a range, or `default` where the key is left out.
+    pub fn whole_or(&self, key: &str, range: RangeInclusive<usize>, default: usize) -> Option<usize> {
+        let whole = self.optional(key, |context, item| context.whole(item, *range.start(), *range.end()));
+        Some(whole?.map_or(default, |number| number.value))
+    }
+
     /// A vector of N numbers.
     pub fn vector<const N: usize>(&self, key: &str) -> Option<Spanned<[f64; N]>> {
         self.context.vector(self.get(key)?)
     }
 
+    /// A vector of N numbers, or `default` where the key is left out.
+    pub fn vector_or<const N: usize>(&self, key: &str, default: [f64; N]) -> Option<[f64; N]> {
+        Some(self.optional(key, |_, _| self.vector(key))?.map_or(default, |vector| vector.value))
+    }
+
+    /// A vector of N numbers, none of which is negative.
+    pub fn non_negative_vector<const N: usize>(&self, key: &str) -> Option<Spanned<[f64; N]>> {
+        let vector = self.vector(key)?;
+        match vector.value.iter().find(|&&value| value < 0.0) {
+            Some(value) => self.context.wrong(vector.span, format!("`{key}` must not be negative, found {value}")),
+            None => Some(vector),
+        }
+    }
+
+    /// A vector of N numbers, none of which is negative, or `default` where the key is left out.
+    pub fn non_negative_vector_or<const N: usize>(&self, key: &str, default: [f64; N]) -> Option<[f64; N]> {
+        Some(self.optional(key, |_, _| self.non_negative_vector(key))?.map_or(default, |vector| vector.value))
+    }
+
     /// A text.
     pub fn text(&self, key: &str) -> Option<Spanned<String>> {
         self.context.text(self.get(key)?)
+    }
+
+    /// A text that must be there.
+    pub fn required_text(&self, key: &str) -> Option<Spanned<String>> {
+        self.context.text(self.required(key)?)
     }
 
     /// True or false.
@@ -298,21 +409,27 @@ impl<'a> Table<'a> {
             other => self.context.wrong(item.span(), format!("`{key}` is true or false, found {}", kind_of(other))),
         }
     }
+
+    /// True or false, or `default` where the key is left out.
+    pub fn flag_or(&self, key: &str, default: bool) -> Option<bool> {
+        Some(self.optional(key, |_, _| self.flag(key))?.unwrap_or(default))
+    }
 }
 
-/// The word that a text is, out of a few.
-pub fn choose(
-    context: &Context,
-    text: &Spanned<String>,
-    key: &str,
-    words: &[&'static str],
-) -> Option<Spanned<&'static str>> {
-    if let Some(word) = words.iter().find(|w| **w == text.value) {
-        return Some(Spanned { value: word, span: text.span.clone() });
+/// One list of keys from several.
+pub const fn joined<const N: usize>(lists: &[&[&'static str]]) -> [&'static str; N] {
+    let mut all = [""; N];
+    let mut count = 0;
+    let mut list = 0;
+    while list < lists.len() {
+        let mut key = 0;
+        while key < lists[list].len() {
+            all[count] = lists[list][key];
+            count += 1;
+            key += 1;
+        }
+        list += 1;
     }
-    let message = format!("`{key}` is {}, not `{}`", one_of(words.iter().copied()), text.value);
-    let mut diagnostic = Diagnostic::error(message, text.span.clone());
-    diagnostic.help = nearest(&text.value, words.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
-    context.report(diagnostic);
-    None
+    assert!(count == N, "the length of the joined list");
+    all
 }

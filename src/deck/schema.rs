@@ -1,6 +1,6 @@
-//! What is said of each key: the JSON Schema of the deck, which is the one source of words about keys.
+//! Descriptions of keys: the JSON Schema of the deck is their one source.
 
-use super::diagnostic::nearest;
+use super::hints::{nearest, synonymous_key};
 use serde_json::Value;
 
 /// The JSON Schema (draft 7).
@@ -11,26 +11,26 @@ pub const SCHEMA: &str = include_str!("schema.json");
 pub struct Entry {
     /// `beam.elements`
     pub path: String,
-    /// Where it stands: `[[beam]]`, `the deck`
+    /// Its table: `[[beam]]`, `the deck`
     pub table: String,
-    /// What it means
+    /// Meaning
     pub description: String,
-    /// What it takes
+    /// Kinds of values, or words
     pub kinds: String,
-    /// Its unit, where it has one
+    /// Unit, if it has one
     pub unit: Option<String>,
-    /// What it is where it is left out, as TOML
+    /// Default, as TOML
     pub default: Option<String>,
-    /// As TOML
+    /// Examples, as TOML
     pub examples: Vec<String>,
     /// Keys of a table
     pub keys: Vec<String>,
-    /// Whether its table needs it
+    /// True if its table needs it
     pub required: bool,
 }
 
-/// What is known of a word: a key (`elements`, in all tables that have it), `beam.elements`, or a table (`[[beam]]`, `beam`).
-/// `Err` with what was probably meant.
+/// Entries of a word: a key (`elements`, in all tables that have it), `beam.elements`, or a table
+/// (`[[beam]]`, `beam`). `Err` with the nearest known word.
 pub fn explain(word: &str) -> Result<Vec<Entry>, Option<String>> {
     let path = word.trim().trim_matches(['[', ']']).replace(".NAME", "");
     let all = entries();
@@ -48,7 +48,7 @@ pub fn explain(word: &str) -> Result<Vec<Entry>, Option<String>> {
     }
     let keys = all.iter().filter_map(|entry| entry.path.rsplit('.').next());
     let known: Vec<&str> = all.iter().map(|entry| entry.path.as_str()).chain(keys).collect();
-    Err(nearest(&path, known).map(str::to_string))
+    Err(synonymous_key(&path, &known).or_else(|| nearest(&path, known)).map(str::to_string))
 }
 
 /// The deck itself, whose keys are its tables.
@@ -78,16 +78,17 @@ fn walk(table: &Value, path: &str, name: &str, all: &mut Vec<Entry>) {
     }
 }
 
-/// The table that a key holds, or the one of which it holds several; and what that is called.
+/// The table that a key holds, or the one of which it holds several; with its name in messages.
 fn inside<'a>(node: &'a Value, path: &str, key: &str) -> (&'a Value, String) {
     let top = !path.contains('.');
-    match () {
-        () if node["items"]["properties"].is_object() => (&node["items"], format!("[[{key}]]")),
-        () if node["additionalProperties"]["properties"].is_object() => {
-            (&node["additionalProperties"], format!("[{key}.NAME]"))
-        }
-        () if top => (node, format!("[{key}]")),
-        () => (node, format!("`{path}`")),
+    if node["items"]["properties"].is_object() {
+        (&node["items"], format!("[[{key}]]"))
+    } else if node["additionalProperties"]["properties"].is_object() {
+        (&node["additionalProperties"], format!("[{key}.NAME]"))
+    } else if top {
+        (node, format!("[{key}]"))
+    } else {
+        (node, format!("`{path}`"))
     }
 }
 
@@ -136,7 +137,7 @@ fn kinds(node: &Value) -> String {
     listed.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-/// As it stands in a deck.
+/// A value of JSON as TOML.
 fn to_toml(value: &Value) -> String {
     match value {
         Value::Array(all) => format!("[{}]", all.iter().map(to_toml).collect::<Vec<_>>().join(", ")),
@@ -151,41 +152,131 @@ fn to_toml(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deck;
+    use crate::deck::{self, EffectWord, Frame, InterpolationWord, NormWord, Reduction, SchemeName, Words};
+    use beamsim_core::effect::joint::JointKind;
+    use beamsim_core::failure::FailureKind;
+    use beamsim_core::warning::WarningKind;
 
-    /// The keys that the reader says a table knows.
-    fn known(text: &str, table: &str) -> Vec<String> {
-        let found = match deck::read(text) {
-            Ok((_, found)) | Err(found) => found,
-        };
-        let help = found.iter().find_map(|d| d.message.contains("zzzzzzzzzzzz").then(|| d.help.clone()).flatten());
-        let help = help.unwrap_or_else(|| panic!("{table}: {found:?}"));
-        let (_, listed) = help.split_once(" knows ").unwrap();
-        let mut keys: Vec<String> = listed.split('`').skip(1).step_by(2).map(str::to_string).collect();
-        keys.sort();
-        keys
+    /// Keys of every table with a fixed set of them, by the path of the table in the schema.
+    fn tables() -> Vec<(&'static str, Vec<&'static str>)> {
+        vec![
+            ("", deck::KEYS.to_vec()),
+            ("beam", deck::beam::KEYS.to_vec()),
+            ("beam.history", deck::history::USE_KEYS.to_vec()),
+            ("beam.section", vec!["csv"]),
+            ("beam.through", vec!["csv"]),
+            ("body", deck::body::KEYS.to_vec()),
+            ("cost", deck::cost::KEYS.to_vec()),
+            ("damping", deck::damping::KEYS.to_vec()),
+            ("effects", EffectWord::words().collect()),
+            ("expect", deck::expect::KEYS.to_vec()),
+            ("expect.at", deck::expect::AT_KEYS.to_vec()),
+            ("history", deck::history::KEYS.to_vec()),
+            ("initial", deck::initial::KEYS.to_vec()),
+            ("joint", deck::joint::KEYS.to_vec()),
+            ("joint.history", deck::history::USE_KEYS.to_vec()),
+            ("load", deck::load::KEYS.to_vec()),
+            ("load.history", deck::history::USE_KEYS.to_vec()),
+            ("material", deck::material::KEYS.to_vec()),
+            ("motion", deck::motion::KEYS.to_vec()),
+            ("motion.history", deck::history::USE_KEYS.to_vec()),
+            ("output", deck::output::KEYS.to_vec()),
+            ("section", deck::section::KEYS.to_vec()),
+            ("spring", deck::spring::KEYS.to_vec()),
+            ("stage", deck::stage::KEYS.to_vec()),
+            ("stage.frame", deck::stage::FRAME_KEYS.to_vec()),
+            ("stage.until", deck::stage::UNTIL_KEYS.to_vec()),
+            ("support", deck::support::KEYS.to_vec()),
+            ("units", deck::units::KEYS.to_vec()),
+        ]
+    }
+
+    fn words<W: Words>() -> Vec<String> {
+        W::words().map(str::to_string).collect()
+    }
+
+    /// Words of every key with a fixed set of them, by the path of the key in the schema.
+    fn words_of_keys() -> Vec<(&'static str, Vec<String>)> {
+        let warnings = WarningKind::ALL.iter().map(|kind| kind.name().to_string());
+        vec![
+            ("beam.interpolation", words::<InterpolationWord>()),
+            ("cost.interpolation", words::<InterpolationWord>()),
+            ("cost.norm", words::<NormWord>()),
+            ("cost.scheme", words::<SchemeName>()),
+            ("expect.fails", words::<FailureKind>()),
+            ("expect.reduce", words::<Reduction>()),
+            ("expect.warns", warnings.chain(["false".to_string()]).collect()),
+            ("joint.kind", words::<JointKind>()),
+            ("load.frame", words::<Frame>()),
+            ("section.shape", words::<deck::section::ShapeWord>()),
+            ("stage.control", words::<deck::stage::ControlWord>()),
+            ("stage.kind", words::<deck::stage::StageWord>()),
+            ("stage.scheme", words::<SchemeName>()),
+            ("support.fix", words::<deck::support::DirectionWord>()),
+        ]
+    }
+
+    fn sorted<T: Ord>(mut list: Vec<T>) -> Vec<T> {
+        list.sort();
+        list
+    }
+
+    /// Visits every node of the schema that stands for a table or a key: its path, and the node of
+    /// its entries.
+    fn visit(node: &Value, path: &str, see: &mut dyn FnMut(&str, &Value)) {
+        let (inner, _) = inside(node, path, path);
+        see(path, inner);
+        for (key, below) in inner["properties"].as_object().into_iter().flatten() {
+            let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+            visit(below, &path, see);
+        }
     }
 
     #[test]
-    fn the_schema_has_the_keys_that_the_reader_has() {
+    fn the_schema_has_the_keys_of_every_reader() {
         let schema: Value = serde_json::from_str(SCHEMA).unwrap();
-        let sorted = |table: &Value| {
-            let mut keys: Vec<String> = table["properties"].as_object().unwrap().keys().cloned().collect();
-            keys.sort();
-            keys
+        let mut tables = tables();
+        visit(&schema, "", &mut |path, node| {
+            let Some(properties) = node["properties"].as_object() else { return };
+            let found = tables.iter().position(|(table, _)| *table == path);
+            let (_, keys) = tables.swap_remove(found.unwrap_or_else(|| panic!("no reader has the table `{path}`")));
+            let keys: Vec<String> = keys.into_iter().map(str::to_string).collect();
+            assert_eq!(sorted(properties.keys().cloned().collect()), sorted(keys), "`{path}`");
+        });
+        assert!(tables.is_empty(), "tables that the schema lacks: {tables:?}");
+    }
+
+    #[test]
+    fn the_schema_has_the_words_of_every_reader() {
+        let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+        let mut all = words_of_keys();
+        // Columns are words of the scene.
+        all.push(("output.columns", Vec::new()));
+        visit(&schema, "", &mut |path, node| {
+            let listed = node["enum"].as_array().or(node["items"]["enum"].as_array());
+            let Some(listed) = listed else { return };
+            let plain = |word: &Value| word.as_str().map_or(word.to_string(), str::to_string);
+            let listed: Vec<String> = listed.iter().map(plain).collect();
+            let found = all.iter().position(|(key, _)| *key == path);
+            let (_, words) = all.swap_remove(found.unwrap_or_else(|| panic!("no reader has words for `{path}`")));
+            assert!(words.is_empty() || sorted(listed) == sorted(words), "the words of `{path}`");
+        });
+        assert!(all.is_empty(), "keys whose words the schema lacks: {all:?}");
+    }
+
+    /// Words that may stand alone or in a list are in a pattern, too.
+    #[test]
+    fn patterns_of_words_are_those_of_the_readers() {
+        let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+        let alternatives = |words: Vec<String>| format!("^({})$", words.join("|"));
+        let pattern = |table: &str, key: &str| {
+            let (table, _) = inside(&schema["properties"][table], table, table);
+            table["properties"][key]["pattern"].as_str().unwrap_or_default().to_string()
         };
-        assert_eq!(known("zzzzzzzzzzzz = 1", ""), sorted(&schema));
-        let mut tables = 0;
-        for (key, node) in schema["properties"].as_object().unwrap() {
-            let (inner, name) = inside(node, key, key);
-            if inner["properties"].is_object() {
-                let head = name.replace("NAME", "n");
-                let kind = if key == "stage" { "kind = \"static\"\n" } else { "" };
-                assert_eq!(known(&format!("{head}\n{kind}zzzzzzzzzzzz = 1\n"), &name), sorted(inner), "{name}");
-                tables += 1;
-            }
-        }
-        assert!(tables >= 15, "{tables}");
+        let fix = [words::<deck::support::DirectionsWord>(), words::<deck::support::DirectionWord>()].concat();
+        assert_eq!(pattern("support", "fix"), alternatives(fix));
+        assert_eq!(pattern("cost", "scheme"), alternatives(words::<SchemeName>()));
+        assert_eq!(pattern("cost", "interpolation"), alternatives(words::<InterpolationWord>()));
     }
 
     #[test]
@@ -198,6 +289,7 @@ mod tests {
         assert!(one("[[stage]]").keys.contains(&"until".into()) && one("until.below").path == "stage.until.below");
         assert!(["moment", "history"].into_iter().all(|word| explain(word).is_ok_and(|all| !all.is_empty())));
         assert_eq!(explain("elemnts"), Err(Some("elements".into())));
+        assert_eq!(explain("dt"), Err(Some("step".into())));
         assert_eq!(explain("qqqqqqqqqqqqqq"), Err(None));
     }
 

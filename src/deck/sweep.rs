@@ -1,4 +1,4 @@
-//! `sweep.toml`: what `beamsim sweep` varies, in a file.
+//! `sweep.toml`: the file of `beamsim sweep`.
 
 use super::parameters::Parameters;
 use super::reader::{Context, Item, Table, kind_of, literal};
@@ -13,17 +13,17 @@ pub struct SweepFile {
     pub deck: String,
     /// Changes to the deck for all points, as in `--set`
     pub set: Vec<String>,
-    /// What is varied, in order
+    /// Varied keys, in order
     pub vary: Vec<VaryTable>,
-    /// Whether the first values of all keys make the first point, and so on
+    /// True where the first values of all keys make the first point, and so on
     pub zip: bool,
-    /// How many samples are drawn
+    /// Number of samples
     pub sample: Option<usize>,
-    /// What random numbers begin with
+    /// Random seed
     pub seed: Option<u64>,
-    /// What is looked at
+    /// Observables
     pub outputs: Vec<String>,
-    /// Whether errors of these are estimated
+    /// True where errors of these are estimated
     pub error_bars: bool,
 }
 
@@ -47,25 +47,29 @@ pub enum VaryBody {
         from: f64,
         /// The last
         to: f64,
-        /// How many; none: samples are drawn
+        /// Number of values; none: samples are drawn
         count: Option<usize>,
-        /// Whether equal steps are equal factors
+        /// True where equal steps are equal factors
         log: bool,
     },
 }
 
+/// Keys of a sweep file.
 const KEYS: [&str; 8] = ["deck", "vary", "set", "zip", "sample", "seed", "outputs", "error_bars"];
+/// Keys of a range of values.
+const RANGE_KEYS: [&str; 4] = ["from", "to", "count", "log"];
+/// Most samples of a sweep, and most values of a key.
 const MOST_SAMPLES: usize = 10_000_000;
-/// Whole numbers of TOML and floats agree up to here.
+/// Largest seed: floats hold whole numbers exactly up to here.
 const LARGEST_SEED: usize = 1 << 53;
 
 impl SweepFile {
-    /// Whether a text is one: it names a deck.
+    /// True if a text is a sweep: it names a deck.
     pub fn is_one(text: &str) -> bool {
         DeTable::parse(text).is_ok_and(|document| document.get_ref().contains_key("deck"))
     }
 
-    /// Reads one.
+    /// Reads a sweep.
     pub fn read(text: &str) -> Result<Self, Vec<Diagnostic>> {
         let (document, syntax) = DeTable::parse_recoverable(text);
         if !syntax.is_empty() {
@@ -107,14 +111,14 @@ fn read_vary<'a>(context: &'a Context, key: Spanned<String>, item: &'a Item<'a>)
             VaryBody::List(values.iter().map(|value| as_toml(context, value)).collect::<Option<_>>()?)
         }
         DeValue::Table(_) => {
-            let table = Table::new(context, item, format!("`{}`", key.value), &["from", "to", "count", "log"])?;
-            let number = |key: &str| context.number(table.required(key)?).map(|number| number.value);
-            let (from, to) = (number("from"), number("to"));
-            let count = table.get("count").map(|item| context.whole(item, 1, MOST_SAMPLES));
+            let table = Table::new(context, item, format!("`{}`", key.value), &RANGE_KEYS)?;
+            let from = table.required_number("from");
+            let to = table.required_number("to");
+            let count = table.optional("count", |context, item| context.whole(item, 1, MOST_SAMPLES));
             VaryBody::Range {
-                from: from?,
-                to: to?,
-                count: count.map_or(Some(None), |count| Some(Some(count?.value)))?,
+                from: from?.value,
+                to: to?.value,
+                count: count?.map(|count| count.value),
                 log: table.flag("log").unwrap_or(false),
             }
         }

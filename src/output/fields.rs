@@ -1,44 +1,54 @@
-//! fields.pvd and a .vtu file a row, for ParaView and everything else that reads VTK: the whole shape with its axes, strains and resultants.
+//! fields.pvd and one .vtu file per row, for ParaView and other readers of VTK: the whole shape
+//! with its axes, strains and resultants.
 //!
-//! Elements are cells of their own order, so that curved ones are curved. Numbers stand raw behind the XML ("appended").
+//! Elements are cells of their own order, so that curved elements look curved. Numbers follow the
+//! XML as raw bytes ("appended").
 
-use super::Row;
-use super::files::{PartFile, about};
+use super::files::PartFile;
+use super::{OutputError, Row};
 use beamsim_core::probe::{Figure, Look};
 use beamsim_core::run::{Moment, Snapshot};
 use beamsim_core::system::State;
 use std::fmt::Write;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
-/// VTK's cells of two, three and four nodes on a line, and of one.
+/// VTK's cell types of lines with two, three and four nodes.
 const LINES: [u8; 3] = [3, 21, 35];
+/// VTK's cell type of a single node.
 const VERTEX: u8 = 1;
+
+/// A file of a row.
+struct FieldFile {
+    name: String,
+    /// The time for ParaView
+    time: f64,
+}
 
 /// Writes the fields of a run.
 pub struct FieldsWriter {
     folder: PathBuf,
     part: PathBuf,
     figure: Figure,
-    /// Whether time alone tells rows apart
+    /// True if every row has its own time, because all stages advance it
     timed: bool,
-    /// Files so far, with what ParaView takes for their time
-    written: Vec<(String, f64)>,
+    /// The files so far
+    written: Vec<FieldFile>,
     /// A row that is written only if no other follows
     pending: Option<(Moment, State)>,
 }
 
 impl FieldsWriter {
-    /// In the folder of results. `timed`: no row stands still in time.
-    pub fn create(folder: &Path, figure: Figure, timed: bool) -> io::Result<Self> {
+    /// Creates the fields in a folder of results. `timed` is true if all stages advance time;
+    /// otherwise rows are numbered for ParaView.
+    pub fn create(folder: &Path, figure: Figure, timed: bool) -> Result<Self, OutputError> {
         let part = folder.join(format!("fields.{}.part", std::process::id()));
-        fs::create_dir_all(&part).map_err(|error| about(&part, &error))?;
+        fs::create_dir_all(&part).map_err(|error| OutputError::file(&part, error))?;
         Ok(Self { folder: folder.into(), part, figure, timed, written: Vec::new(), pending: None })
     }
 
-    /// Takes a converged state; writes it if its row is wanted.
-    pub fn row(&mut self, at: &Snapshot, row: Row) -> io::Result<()> {
+    /// Takes a converged state, and writes it if its row is wanted.
+    pub fn row(&mut self, at: &Snapshot, row: Row) -> Result<(), OutputError> {
         let time = if self.timed { at.state.time } else { row.number as f64 };
         self.pending = None;
         let moment = Moment { stage: at.stage, time, load: at.state.load };
@@ -49,33 +59,33 @@ impl FieldsWriter {
         Ok(())
     }
 
-    /// `at` is what ParaView takes for the time.
-    fn write(&mut self, at: Moment, state: &State) -> io::Result<()> {
+    /// Writes a file; the time of `at` is the one for ParaView.
+    fn write(&mut self, at: Moment, state: &State) -> Result<(), OutputError> {
         let content = grid(&self.figure, at.stage, state);
         let name = format!("{:06}.vtu", self.written.len());
         let path = self.part.join(&name);
-        fs::write(&path, content).map_err(|error| about(&path, &error))?;
-        self.written.push((name, at.time));
+        fs::write(&path, content).map_err(|error| OutputError::file(&path, error))?;
+        self.written.push(FieldFile { name, time: at.time });
         Ok(())
     }
 
     /// Gives the fields their names: `fields`, or `fields.partial` where the run failed.
-    pub fn finish(mut self, finished: bool) -> io::Result<()> {
+    pub fn finish(mut self, finished: bool) -> Result<(), OutputError> {
         if let Some((moment, state)) = self.pending.take() {
             self.write(moment, &state)?;
         }
         remove_fields(&self.folder)?;
         let name = if finished { "fields" } else { "fields.partial" };
         let place = self.folder.join(name);
-        // What is not empty there is not ours.
-        fs::rename(&self.part, &place).map_err(|error| about(&place, &error))?;
+        // This fails on a folder with other files in it, which are not of beamsim.
+        fs::rename(&self.part, &place).map_err(|error| OutputError::file(&place, error))?;
         let index = index(name, &self.written);
         PartFile::write(&self.folder, &format!("{name}.pvd"), index.as_bytes())
     }
 }
 
-/// Those of an earlier run, which belong to another history: the files that its index lists, and nothing else.
-pub fn remove_fields(folder: &Path) -> io::Result<()> {
+/// Removes the fields of an earlier run: the files that its index lists, and nothing else.
+pub fn remove_fields(folder: &Path) -> Result<(), OutputError> {
     for name in ["fields", "fields.partial"] {
         let index = format!("{name}.pvd");
         let Ok(listed) = fs::read_to_string(folder.join(&index)) else { continue };
@@ -92,22 +102,22 @@ pub fn remove_fields(folder: &Path) -> io::Result<()> {
 
 impl Drop for FieldsWriter {
     fn drop(&mut self) {
-        // Of a run whose results could not be written.
+        // The folder is still there only if the results could not be written.
         let _ = fs::remove_dir_all(&self.part);
     }
 }
 
-fn index(folder: &str, written: &[(String, f64)]) -> String {
+fn index(folder: &str, written: &[FieldFile]) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n",
     );
-    for (name, time) in written {
+    for FieldFile { name, time } in written {
         let _ = writeln!(text, "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{folder}/{name}\"/>");
     }
     text + "</Collection>\n</VTKFile>\n"
 }
 
-/// The XML of a file, and the numbers behind it.
+/// The XML of a file, and the raw numbers after it.
 #[derive(Default)]
 struct Grid {
     xml: String,
@@ -176,7 +186,7 @@ fn point_data(grid: &mut Grid, looks: &[Look]) {
     grid.floats("strain_energy_per_length", 1, looks.iter().map(|look| look.energy));
 }
 
-/// Three numbers along the section axes, and three about them.
+/// Adds two arrays: three numbers along the section axes, and three about them.
 fn six(grid: &mut Grid, names: [&str; 2], looks: &[Look], of: fn(&Look) -> &[f64; 6]) {
     for (half, name) in names.into_iter().enumerate() {
         grid.floats(name, 3, looks.iter().flat_map(|look| of(look)[3 * half..][..3].iter().copied()));
@@ -200,7 +210,7 @@ impl Cells {
             let order = line.order;
             for element in 0..(line.points.len() - 1) / order {
                 let start = first + element * order;
-                // VTK names both ends before what lies between.
+                // VTK lists both end nodes before the inner ones.
                 let inner = (1..order).map(|k| start + k);
                 cells.push([start, start + order].into_iter().chain(inner), LINES[order - 1], number as i32);
             }

@@ -1,10 +1,11 @@
-//! Files that are written under another name and renamed when they are whole.
+//! Files that are written under a temporary name and renamed when they are complete.
 
+use super::OutputError;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A file in the making: `name.<process>.part` beside its final place.
+/// An incomplete file: `name.<process>.part` beside its final place.
 #[derive(Debug)]
 pub struct PartFile {
     folder: PathBuf,
@@ -12,57 +13,53 @@ pub struct PartFile {
 }
 
 impl PartFile {
-    /// Creates the folder, and in it the part.
-    pub fn create(folder: &Path, name: &str) -> io::Result<(Self, File)> {
-        fs::create_dir_all(folder).map_err(|e| about(folder, &e))?;
-        // Two runs at once must not write into each other's parts.
+    /// Creates the folder, and in it the incomplete file.
+    pub fn create(folder: &Path, name: &str) -> Result<(Self, File), OutputError> {
+        fs::create_dir_all(folder).map_err(|error| OutputError::file(folder, error))?;
+        // Two processes must not write into the same file.
         let part = folder.join(format!("{name}.{}.part", std::process::id()));
-        let file = File::create(&part).map_err(|e| about(&part, &e))?;
+        let file = File::create(&part).map_err(|error| OutputError::file(&part, error))?;
         Ok((Self { folder: folder.into(), part }, file))
     }
 
-    /// A part with all its content, still without its name.
-    pub fn written(folder: &Path, name: &str, content: &[u8]) -> io::Result<(Self, File)> {
+    /// Writes the whole content, still under the temporary name.
+    pub fn written(folder: &Path, name: &str, content: &[u8]) -> Result<(Self, File), OutputError> {
         let (part, mut file) = Self::create(folder, name)?;
-        io::Write::write_all(&mut file, content).map_err(|e| about(&part.part, &e))?;
+        file.write_all(content).map_err(|error| OutputError::file(&part.part, error))?;
         Ok((part, file))
     }
 
-    /// A whole file at once.
-    pub fn write(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
+    /// Writes a whole file.
+    pub fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), OutputError> {
         let (part, file) = Self::written(folder, name, content)?;
         part.finish(&file, name)
     }
 
-    /// A whole file at a path that a user names.
-    pub fn write_to(path: &Path, content: &[u8]) -> io::Result<()> {
-        let name = path.file_name().ok_or_else(|| about(path, &io::Error::other("this names no file")))?;
+    /// Writes a whole file at a path of the command line.
+    pub fn write_to(path: &Path, content: &[u8]) -> Result<(), OutputError> {
+        let name = path.file_name().ok_or_else(|| OutputError::NoFileName(path.into()))?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Self::write(folder, &name.to_string_lossy(), content)
     }
 
-    /// Gives the part, which must be flushed, its final name, when it is safe on the disk.
-    pub fn finish(self, file: &File, name: &str) -> io::Result<()> {
-        file.sync_all().map_err(|e| about(&self.part, &e)).and_then(|()| self.rename(name))
+    /// Gives the file, which must be flushed, its final name when its content is safe on the disk.
+    pub fn finish(self, file: &File, name: &str) -> Result<(), OutputError> {
+        file.sync_all().map_err(|error| OutputError::file(&self.part, error)).and_then(|()| self.rename(name))
     }
 
-    /// Gives the part its final name at once: for what can be made again if the machine loses it.
-    pub fn rename(self, name: &str) -> io::Result<()> {
+    /// Gives the file its final name at once: for content that can be made again if the machine
+    /// loses it.
+    pub fn rename(self, name: &str) -> Result<(), OutputError> {
         let done = self.folder.join(name);
-        fs::rename(&self.part, &done).map_err(|e| about(&done, &e))
+        fs::rename(&self.part, &done).map_err(|error| OutputError::file(&done, error))
     }
 }
 
-/// Removes a file of an earlier run.
-pub fn remove_if_there(folder: &Path, name: &str) -> io::Result<()> {
+/// Removes a file of an earlier run, if it exists.
+pub fn remove_if_there(folder: &Path, name: &str) -> Result<(), OutputError> {
     let path = folder.join(name);
     match fs::remove_file(&path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(about(&path, &error)),
-        _ => Ok(()),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(OutputError::file(&path, error)),
+        Ok(()) | Err(_) => Ok(()),
     }
-}
-
-/// The same error with the name of the file.
-pub(super) fn about(path: &Path, error: &io::Error) -> io::Error {
-    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }

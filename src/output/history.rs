@@ -1,5 +1,6 @@
-//! history.csv: one row a load level or time step, one column a number.
+//! history.csv: one row per load level or time step, one column per number.
 
+use super::OutputError;
 use super::files::{PartFile, remove_if_there};
 use beamsim_core::probe::clocks;
 use beamsim_core::run::Moment;
@@ -8,12 +9,13 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Which rows are written: each n-th, or those at multiples of a time; the last one always.
+/// The rows that are written: every n-th, or those at multiples of a time interval, and always the
+/// last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rows {
-    /// Each n-th
+    /// Every n-th row
     pub every: usize,
-    /// At multiples of this time
+    /// The time interval; it takes precedence in stages that advance time
     pub interval: Option<f64>,
 }
 
@@ -30,30 +32,31 @@ impl Rows {
     }
 }
 
-/// Counts converged states, for all that is written of them.
+/// Numbers converged states, and decides which rows are written.
 pub struct RowCounter {
     rows: Rows,
     seen: u64,
 }
 
-/// A converged state among others.
+/// The row of a converged state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Its number, from 0
     pub number: u64,
-    /// Whether it is written whatever follows; the last always is
+    /// True for a row that is always written; any other is written only if it turns out to be the
+    /// last
     pub wanted: bool,
-    /// Whether time passes in its stage
+    /// True if its stage advances time
     pub dynamic: bool,
 }
 
 impl RowCounter {
-    /// Of these rows.
+    /// Counts from 0.
     pub fn new(rows: Rows) -> Self {
         Self { rows, seen: 0 }
     }
 
-    /// The next.
+    /// The row of the next converged state.
     pub fn next(&mut self, dynamic: bool, time: f64) -> Row {
         let number = self.seen;
         self.seen += 1;
@@ -61,14 +64,15 @@ impl RowCounter {
     }
 }
 
-/// What stands beside the columns of a history: numbers about them, row by row.
-pub trait Beside: Send {
-    /// The names of its columns, beside these
+/// Additional columns of a history that are computed from its rows, such as error bars.
+pub trait SideColumns: Send {
+    /// The names of the additional columns, given the names of the others
     fn names(&self, columns: &[String]) -> Vec<String>;
-    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor. Whether all is known that stands beside the
-    /// rows before: else they wait for a later row.
+    /// Takes the row of a stage (from 1) and clock: the time, or in static stages the load factor.
+    /// Returns true when the additional numbers of all rows so far are known; rows are held back
+    /// until then.
     fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool;
-    /// What stands beside the rows that wait, as far as is known
+    /// The additional numbers of the rows that are held back, as far as they are known
     fn numbers(&self) -> Vec<f64>;
 }
 
@@ -78,38 +82,44 @@ pub struct HistoryWriter {
     part: PartFile,
     writer: csv::Writer<File>,
     names: Vec<String>,
-    beside: Option<Box<dyn Beside>>,
+    side_columns: Option<Box<dyn SideColumns>>,
     text: String,
     record: csv::ByteRecord,
-    /// Whether the last row was not wanted, and so is not written yet
+    /// True if the last row is written only if no other follows
     pending: bool,
-    /// Wanted rows that wait for what stands beside them
-    waiting: Vec<csv::ByteRecord>,
+    /// Wanted rows whose additional numbers are not known yet
+    held_back: Vec<csv::ByteRecord>,
 }
 
 impl HistoryWriter {
-    /// Begins a history in `folder` with columns of these names.
-    pub fn create(folder: &Path, names: Vec<String>, beside: Option<Box<dyn Beside>>) -> io::Result<Self> {
+    /// Creates the history in a folder, with columns of these names.
+    pub fn create(
+        folder: &Path,
+        names: Vec<String>,
+        side_columns: Option<Box<dyn SideColumns>>,
+    ) -> Result<Self, OutputError> {
         let (part, file) = PartFile::create(folder, "history.csv")?;
         let mut writer = csv::Writer::from_writer(file);
-        let others = beside.as_ref().map_or(Vec::new(), |beside| beside.names(&names));
-        let all = clocks().map(String::from).chain(names.iter().cloned()).chain(others);
-        writer.write_record(all).map_err(io::Error::from)?;
+        let others = side_columns.as_ref().map_or(Vec::new(), |side| side.names(&names));
+        let mut header: Vec<&str> = clocks().collect();
+        header.extend(names.iter().chain(&others).map(String::as_str));
+        writer.write_record(header)?;
         Ok(Self {
             folder: folder.into(),
             part,
             writer,
             names,
-            beside,
+            side_columns,
             text: String::new(),
             record: csv::ByteRecord::new(),
             pending: false,
-            waiting: Vec::new(),
+            held_back: Vec::new(),
         })
     }
 
-    /// Takes the numbers of a converged state; writes them if its row is wanted. Gives the name of a column that is not finite, if one is.
-    pub fn row(&mut self, at: Moment, values: &[f64], row: Row) -> io::Result<Option<String>> {
+    /// Takes the numbers of a converged state, and writes them if its row is wanted. Returns the
+    /// name of a column that is not finite, if there is one.
+    pub fn row(&mut self, at: Moment, values: &[f64], row: Row) -> Result<Option<String>, OutputError> {
         let clocks = [at.time, at.load];
         if let Some(k) = clocks.iter().chain(values).position(|value| !value.is_finite()) {
             let name = k.checked_sub(clocks.len()).and_then(|k| self.names.get(k));
@@ -120,49 +130,50 @@ impl HistoryWriter {
         push(&mut self.record, &mut self.text, &clocks);
         push(&mut self.record, &mut self.text, values);
         self.pending = !row.wanted;
-        if self.beside.is_some() {
-            self.wait_for_what_stands_beside(at, values, row.dynamic)?;
+        if self.side_columns.is_some() {
+            self.hold_back(at, values, row.dynamic)?;
         } else if !self.pending {
             self.writer.write_byte_record(&self.record)?;
         }
         Ok(None)
     }
 
-    fn wait_for_what_stands_beside(&mut self, at: Moment, values: &[f64], dynamic: bool) -> io::Result<()> {
+    fn hold_back(&mut self, at: Moment, values: &[f64], dynamic: bool) -> Result<(), OutputError> {
         let clock = if dynamic { at.time } else { at.load };
-        if self.beside.as_mut().is_some_and(|beside| beside.take(at.stage, clock, values)) {
-            self.write_waiting()?;
+        if self.side_columns.as_mut().is_some_and(|side| side.take(at.stage, clock, values)) {
+            self.write_held_back()?;
         }
         if !self.pending {
-            self.waiting.push(self.record.clone());
+            self.held_back.push(self.record.clone());
         }
         Ok(())
     }
 
-    fn write_waiting(&mut self) -> io::Result<()> {
-        let beside = self.beside.as_ref().map_or(Vec::new(), |beside| beside.numbers());
-        for mut record in self.waiting.drain(..) {
-            push(&mut record, &mut self.text, &beside);
+    fn write_held_back(&mut self) -> Result<(), OutputError> {
+        let numbers = self.side_columns.as_ref().map_or(Vec::new(), |side| side.numbers());
+        for mut record in self.held_back.drain(..) {
+            push(&mut record, &mut self.text, &numbers);
             self.writer.write_byte_record(&record)?;
         }
         Ok(())
     }
 
-    /// Ends the history: `history.csv` if the run finished, else `history.partial.csv`.
-    pub fn finish(mut self, finished: bool) -> io::Result<()> {
+    /// Gives the file its name: `history.csv` if the run finished, else `history.partial.csv`.
+    pub fn finish(mut self, finished: bool) -> Result<(), OutputError> {
         if self.pending {
-            self.waiting.push(std::mem::take(&mut self.record));
+            self.held_back.push(std::mem::take(&mut self.record));
         }
-        self.write_waiting()?;
+        self.write_held_back()?;
         let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
-        let (name, other) =
-            if finished { ("history.csv", "history.partial.csv") } else { ("history.partial.csv", "history.csv") };
+        let name = if finished { "history.csv" } else { "history.partial.csv" };
+        let other = if finished { "history.partial.csv" } else { "history.csv" };
         self.part.finish(&file, name)?;
         remove_if_there(&self.folder, other)
     }
 }
 
-/// Debug formatting is the shortest text that reads back to the same float, with an exponent where shorter.
+/// Adds numbers to a record. Debug formatting is the shortest text that reads back to the same
+/// float, with an exponent where shorter.
 fn push(record: &mut csv::ByteRecord, text: &mut String, values: &[f64]) {
     for value in values {
         text.clear();
@@ -174,23 +185,24 @@ fn push(record: &mut csv::ByteRecord, text: &mut String, values: &[f64]) {
 /// A stored history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HistoryReader {
-    /// Names of the columns
+    /// The names of the columns
     pub names: Vec<String>,
-    /// Row by row
+    /// The numbers, row by row
     pub rows: Vec<Vec<f64>>,
 }
 
 impl HistoryReader {
-    /// Where the history in a folder of results is, whole or of a run that failed.
+    /// The path of the history in a folder of results: of a run that finished, or of one that
+    /// failed.
     pub fn of_results(folder: &Path) -> Option<PathBuf> {
         let names = ["history.csv", "history.partial.csv"];
         names.map(|name| folder.join(name)).into_iter().find(|path| path.exists())
     }
 
-    /// Reads a table of numbers with a line of names above.
-    pub fn read(path: &Path) -> io::Result<Self> {
-        let wrong = |message: String| io::Error::other(format!("{}: {message}", path.display()));
-        let file = File::open(path).map_err(|e| wrong(e.to_string()))?;
+    /// Reads a table of numbers whose first line holds the names.
+    pub fn read(path: &Path) -> Result<Self, OutputError> {
+        let wrong = |message: String| OutputError::content(path, message);
+        let file = File::open(path).map_err(|error| OutputError::file(path, error))?;
         let mut reader = csv::Reader::from_reader(file);
         let names = reader.headers().map_err(|e| wrong(e.to_string()))?.iter().map(str::to_string).collect();
         let mut rows = Vec::new();
@@ -199,7 +211,7 @@ impl HistoryReader {
             let parse = |field: &str| {
                 field.trim().parse::<f64>().map_err(|_| wrong(format!("row {}: `{field}` is not a number", number + 1)))
             };
-            rows.push(record.iter().map(parse).collect::<io::Result<_>>()?);
+            rows.push(record.iter().map(parse).collect::<Result<_, _>>()?);
         }
         Ok(Self { names, rows })
     }

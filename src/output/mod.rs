@@ -1,19 +1,23 @@
-//! What a run leaves on disk. Files appear whole: a finished name never holds half a result.
+//! The files of results. A file gets its name when it is complete: no name ever stands for half a
+//! result.
 
-mod curves;
+mod error;
 mod fields;
 mod files;
 mod history;
+pub(crate) mod json;
 mod modes;
 mod plot;
+mod quantities;
 mod record;
 mod report;
 
-pub use curves::{Curve, Curves};
+pub use error::OutputError;
 pub use fields::{FieldsWriter, remove_fields};
 pub use files::{PartFile, remove_if_there};
-pub use history::{Beside, HistoryReader, HistoryWriter, Row, RowCounter, Rows};
+pub use history::{HistoryReader, HistoryWriter, Row, RowCounter, Rows, SideColumns};
 pub use modes::ModesWriter;
-pub use plot::{LinePlots, NamedLine};
-pub use record::{Outcome, Reached, Record, warnings};
+pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
+pub use quantities::{Units, quantity_of};
+pub use record::{FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, WarningRecord};
 pub use report::{Film, Report};

@@ -1,33 +1,47 @@
-//! modes.csv and buckling.csv: what modal and buckling stages find.
+//! modes.csv and buckling.csv: results of modal and buckling stages.
 
+use super::OutputError;
 use super::files::{PartFile, remove_if_there};
-use beamsim_core::run::{CriticalLoad, Mode};
-use std::io;
+use beamsim_core::run::{CriticalLoad, Mode, StageResult};
 use std::path::Path;
 
 /// Collects modes and critical loads, and writes them when the run has ended.
 #[derive(Clone, Debug, Default)]
 pub struct ModesWriter {
-    modes: Vec<(usize, usize, Mode)>,
-    loads: Vec<(usize, usize, CriticalLoad)>,
+    modes: Vec<Numbered<Mode>>,
+    loads: Vec<Numbered<CriticalLoad>>,
+}
+
+/// A result of a stage.
+#[derive(Clone, Copy, Debug)]
+struct Numbered<T> {
+    /// Stage, from 1
+    stage: usize,
+    /// Number within the stage, from 1
+    number: usize,
+    result: T,
+}
+
+fn numbered<T: Copy>(stage: usize, results: &[T]) -> impl Iterator<Item = Numbered<T>> {
+    results.iter().enumerate().map(move |(k, &result)| Numbered { stage, number: k + 1, result })
 }
 
 impl ModesWriter {
-    /// The modes of a stage (from 1).
-    pub fn push_modes(&mut self, stage: usize, modes: &[Mode]) {
-        self.modes.extend(modes.iter().enumerate().map(|(k, &mode)| (stage, k + 1, mode)));
+    /// Adds the result of a stage (from 1).
+    pub fn push(&mut self, stage: usize, result: &StageResult) {
+        match result {
+            StageResult::Modes(modes) => self.modes.extend(numbered(stage, modes)),
+            StageResult::CriticalLoads(loads) => self.loads.extend(numbered(stage, loads)),
+        }
     }
 
-    /// The critical loads of a stage (from 1).
-    pub fn push_loads(&mut self, stage: usize, loads: &[CriticalLoad]) {
-        self.loads.extend(loads.iter().enumerate().map(|(k, &load)| (stage, k + 1, load)));
-    }
-
-    /// Writes the files that have rows, and removes those that an earlier run has left.
-    pub fn finish(&self, folder: &Path) -> io::Result<()> {
+    /// Writes the files that have rows, and removes those of an earlier run.
+    pub fn finish(&self, folder: &Path) -> Result<(), OutputError> {
         // Debug formatting is the shortest text that reads back to the same float.
-        let mode = |(stage, number, m): &(usize, usize, Mode)| format!("{stage},{number},{:?},{:?}", m.omega, m.growth);
-        let load = |(stage, number, CriticalLoad { load, kind }): &(usize, usize, CriticalLoad)| {
+        let mode = |Numbered { stage, number, result: Mode { omega, growth, .. } }: &Numbered<Mode>| {
+            format!("{stage},{number},{omega:?},{growth:?}")
+        };
+        let load = |Numbered { stage, number, result: CriticalLoad { load, kind } }: &Numbered<CriticalLoad>| {
             format!("{stage},{number},{load:?},{}", kind.name())
         };
         let modes: Vec<String> = self.modes.iter().map(mode).collect();
@@ -37,7 +51,7 @@ impl ModesWriter {
     }
 }
 
-fn write(folder: &Path, name: &str, head: &str, rows: &[String]) -> io::Result<()> {
+fn write(folder: &Path, name: &str, head: &str, rows: &[String]) -> Result<(), OutputError> {
     if rows.is_empty() {
         return remove_if_there(folder, name);
     }

@@ -1,251 +1,504 @@
-//! run.json: what was simulated, what it took, how it ended.
+//! run.json: the deck of a run, its work, its findings and how it ended.
 
-use crate::scene::Scene;
-use beamsim_core::integrate::Largest;
+use super::json::{Entries, Number};
+use super::{OutputError, Units};
+use crate::scene::{Reason, Scene};
 use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability, StageTimeError, Warning};
-use serde_json::{Map, Value, json};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::fmt::{self, Display, Formatter};
+use std::fs;
 use std::path::Path;
-use std::{fs, io};
 
-/// How a run ended.
-pub struct Outcome<'a> {
-    /// The failure, if it was one
+/// A run that has ended.
+pub struct FinishedRun<'a> {
+    /// Success, or why it failed
     pub result: &'a Result<(), Failure>,
-    /// The work done
+    /// The work it took, and its findings
     pub counters: &'a Counters,
     /// Wall-clock seconds of the run
     pub seconds: f64,
-    /// The threads that it ran on
+    /// The number of threads
     pub threads: usize,
-    /// The accuracy that was reached, where one was wanted
-    pub reached: Option<&'a Reached>,
-    /// The deck as it was read
-    pub text: &'a str,
+    /// The wanted accuracy and how far it was reached
+    pub accuracy: Option<ReachedAccuracy>,
+    /// The text of the deck
+    pub text: String,
 }
 
-/// An accuracy that was wanted, and what was reached.
-pub struct Reached {
-    /// Columns with what was wanted of each and the estimated error, over the largest value of its kind
-    pub columns: Vec<(String, f64, f64)>,
-    /// Whether all estimates are what was wanted
+/// A wanted accuracy, and what was reached.
+pub struct ReachedAccuracy {
+    /// The columns of which an accuracy was wanted
+    pub columns: Vec<ReachedColumn>,
+    /// True if all estimates are at most the wanted errors
     pub is_reached: bool,
-    /// What was set in the deck for it
+    /// The settings of the deck (`KEY=VALUE`) that reach it
     pub settings: Vec<String>,
-    /// Runs that it took to find
+    /// The runs of the search
     pub runs: usize,
-    /// Wall-clock seconds of these
+    /// Wall-clock seconds of the search
     pub seconds: f64,
 }
 
-/// The content of run.json.
-#[derive(Clone, Debug)]
-pub struct Record(Value);
+/// The accuracy of a column. Errors are relative to the largest value of the column's kind.
+pub struct ReachedColumn {
+    /// The name of the column
+    pub name: String,
+    /// The wanted error
+    pub wanted: f64,
+    /// The estimated error
+    pub estimate: f64,
+}
+
+/// The content of run.json. Keys that an older version has not written are read as their defaults.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Record {
+    version: String,
+    status: String,
+    deck: Value,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    text: Option<String>,
+    #[serde(flatten)]
+    findings: Findings,
+}
+
+/// The part of run.json that does not repeat the deck.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Findings {
+    effects: Vec<EffectRecord>,
+    counters: CountersRecord,
+    events: Vec<EventRecord>,
+    stability: Vec<StabilityRecord>,
+    time_errors: Vec<TimeErrorRecord>,
+    warnings: Vec<WarningRecord>,
+    threads: usize,
+    seconds: SecondsRecord,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    accuracy: Option<AccuracyRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    failure: Option<Value>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct EffectRecord {
+    name: String,
+    active: bool,
+    reason: String,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct CountersRecord {
+    steps: u64,
+    cutbacks: u64,
+    uncertainty: Number,
+    iterations: u64,
+    factorisations: u64,
+    chart_switches: u64,
+    mixed_elements: u64,
+    evaluations: Entries<u64>,
+    linear_solvers: Vec<String>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct EventRecord {
+    stage: usize,
+    load: Number,
+    kind: String,
+    negative_pivots: Option<usize>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct StabilityRecord {
+    stage: usize,
+    verdict: String,
+    negative: Option<usize>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct TimeErrorRecord {
+    stage: usize,
+    displacement: Number,
+    rotation: Number,
+    moved: Number,
+}
+
+/// A warning in run.json and in the summaries for scripts. A warning about a deck has no stage,
+/// time and load.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct WarningRecord {
+    name: String,
+    about: String,
+    stage: Option<usize>,
+    time: Option<f64>,
+    load: Option<f64>,
+    message: String,
+}
+
+/// Wall-clock seconds.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+struct SecondsRecord {
+    total: f64,
+    evaluation: f64,
+    solve: f64,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct AccuracyRecord {
+    reached: bool,
+    /// The wanted and the estimated error of each column
+    columns: Entries<[Number; 2]>,
+    settings: Vec<String>,
+    runs: usize,
+    seconds: f64,
+}
+
+/// A failure: its name and message, and the numbers that its kind has. It is only written: a record
+/// that is read keeps the failure as it stands.
+#[derive(Serialize)]
+struct FailureRecord {
+    name: String,
+    message: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hint: Option<String>,
+    #[serde(flatten)]
+    at: Option<MomentRecord>,
+    #[serde(flatten)]
+    place: Option<PlaceRecord>,
+    #[serde(flatten)]
+    numbers: Option<FailureNumbers>,
+}
+
+#[derive(Serialize)]
+struct MomentRecord {
+    stage: usize,
+    time: Number,
+    load: Number,
+}
+
+/// The unknown that a failure names.
+#[derive(Serialize)]
+struct PlaceRecord {
+    node: String,
+    direction: [Number; 3],
+    unknown: String,
+}
+
+/// The numbers of the kinds of failures.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum FailureNumbers {
+    NotConverged { residual: Number, force: Number, iterations: usize, residual_history: Vec<Number>, cutbacks: u64 },
+    TurnsTooFar { node: String, angle: Number },
+    LimitPoint { goal: Number, arc_length_increments: u64, end: Number },
+    StepTooSmall { error: Number, share: Number },
+    NonFinite { effect: Option<String>, node: String },
+    MeshTooCoarse { nodes: [String; 2], relative_rotation: Number },
+    EnergyGrowth { grown: Number, largest: Number },
+    Interrupted { signal: i32 },
+}
+
+/// The summary of a run for scripts: run.json with paths in the place of the deck.
+#[derive(Serialize)]
+pub struct RunSummary<'a> {
+    version: &'a str,
+    status: &'a str,
+    deck: String,
+    results: String,
+    #[serde(flatten)]
+    findings: &'a Findings,
+}
+
+impl<'a> RunSummary<'a> {
+    /// The summary of a record, with the path of the deck and that of the results.
+    pub fn of(record: &'a Record, deck: String, results: String) -> Self {
+        Self { version: &record.version, status: &record.status, deck, results, findings: &record.findings }
+    }
+}
 
 impl Record {
-    /// Of a run.
-    pub fn of(scene: &Scene, outcome: &Outcome) -> Self {
-        Self(run_record(scene, outcome))
-    }
-
-    /// That of the results in a folder.
-    pub fn read(folder: &Path) -> io::Result<Self> {
-        let path = folder.join("run.json");
-        let wrong = |why: String| io::Error::other(format!("{}: {why}", path.display()));
-        let bytes = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| wrong(error.to_string()))
-    }
-
-    /// The deck as it was read.
-    pub fn text(&self) -> Option<&str> {
-        self.0["text"].as_str()
-    }
-
-    /// Whether a signal ended the run.
-    pub fn is_interrupted(&self) -> bool {
-        self.0["status"] == "interrupted"
-    }
-
-    /// Without the deck.
-    pub fn bare(&self) -> Value {
-        let mut bare = self.0.clone();
-        if let Some(entries) = bare.as_object_mut() {
-            entries.remove("text");
+    /// The record of a run.
+    pub fn of(scene: &Scene, run: FinishedRun) -> Self {
+        let FinishedRun { result, counters, seconds, threads, accuracy, text } = run;
+        let found = &counters.findings;
+        let warnings = scene.warnings.iter().chain(&found.warnings);
+        let findings = Findings {
+            effects: scene.reasons.iter().map(EffectRecord::from).collect(),
+            counters: CountersRecord::from(counters),
+            events: found.events.iter().map(EventRecord::from).collect(),
+            stability: found.stability.iter().map(StabilityRecord::from).collect(),
+            time_errors: found.time_errors.iter().map(TimeErrorRecord::from).collect(),
+            warnings: warnings.map(WarningRecord::from).collect(),
+            threads,
+            seconds: SecondsRecord {
+                total: seconds,
+                evaluation: counters.work.evaluation_seconds,
+                solve: counters.work.solve_seconds,
+            },
+            accuracy: accuracy.map(AccuracyRecord::from),
+            failure: result.as_ref().err().and_then(|failure| failure_of(failure, scene)),
+        };
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            status: result.as_ref().map_or_else(Failure::name, |()| "finished").into(),
+            deck: scene.resolved.clone(),
+            text: Some(text),
+            findings,
         }
-        bare
+    }
+
+    /// Reads run.json of a folder of results.
+    pub fn read(folder: &Path) -> Result<Self, OutputError> {
+        let path = folder.join("run.json");
+        let bytes = fs::read(&path).map_err(|error| OutputError::file(&path, error))?;
+        serde_json::from_slice(&bytes).map_err(|error| OutputError::content(&path, error))
+    }
+
+    /// The text of the deck.
+    pub fn text(&self) -> Option<&str> {
+        self.text.as_deref()
+    }
+
+    /// The title of the deck.
+    pub fn title(&self) -> Option<&str> {
+        self.deck["title"].as_str()
+    }
+
+    /// Labels of the units of the deck.
+    pub fn units(&self) -> Units {
+        Units::of_deck(&self.deck)
+    }
+
+    /// True if a signal ended the run.
+    pub fn is_interrupted(&self) -> bool {
+        self.status == "interrupted"
+    }
+
+    /// The record without the text of the deck.
+    pub fn bare(&self) -> Self {
+        Self { text: None, ..self.clone() }
     }
 }
 
+/// The text of the file.
 impl Display for Record {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        writeln!(f, "{:#}", self.0)
+        let text = serde_json::to_string_pretty(self).map_err(|_| fmt::Error)?;
+        writeln!(f, "{text}")
     }
 }
 
-fn run_record(scene: &Scene, outcome: &Outcome) -> Value {
-    let effects: Vec<Value> =
-        scene.reasons.iter().map(|r| json!({ "name": r.name, "active": r.active, "reason": r.reason })).collect();
-    let status = outcome.result.as_ref().map_or_else(Failure::name, |()| "finished");
-    let mut record = json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "status": status,
-        "deck": scene.resolved,
-        "text": outcome.text,
-        "effects": effects,
-        "counters": counters(outcome.counters),
-        "events": events(outcome.counters),
-        "stability": stability(outcome.counters),
-        "time_errors": time_errors(outcome.counters),
-        "warnings": warnings(scene.warnings.iter().chain(&outcome.counters.findings.warnings)),
-        "threads": outcome.threads,
-        "seconds": {
-            "total": outcome.seconds,
-            "evaluation": outcome.counters.work.evaluation_seconds,
-            "solve": outcome.counters.work.solve_seconds,
-        },
-    });
-    if let Some(Reached { columns, is_reached, settings, runs, seconds }) = outcome.reached {
-        let column = |(name, wanted, estimate): &(String, f64, f64)| (name.clone(), json!([wanted, estimate]));
-        let columns: Map<String, Value> = columns.iter().map(column).collect();
-        record["accuracy"] = json!({
-            "reached": is_reached,
-            "columns": columns,
-            "settings": settings,
-            "runs": runs,
-            "seconds": seconds,
-        });
+impl From<&Reason> for EffectRecord {
+    fn from(reason: &Reason) -> Self {
+        Self { name: reason.name.into(), active: reason.active, reason: reason.reason.clone() }
     }
-    if let Err(failure) = outcome.result {
-        record["failure"] = numbers(failure, scene);
+}
+
+impl From<&Counters> for CountersRecord {
+    fn from(counters: &Counters) -> Self {
+        let evaluations = counters.evaluations.iter().map(|&(name, count)| (name.to_string(), count));
+        Self {
+            steps: counters.steps,
+            cutbacks: counters.cutbacks,
+            uncertainty: Number(counters.work.uncertainty),
+            iterations: counters.work.iterations,
+            factorisations: counters.work.factorisations,
+            chart_switches: counters.work.chart_switches,
+            mixed_elements: counters.mixed_elements,
+            evaluations: Entries(evaluations.collect()),
+            linear_solvers: counters.linear_solvers.iter().map(ToString::to_string).collect(),
+        }
     }
-    record
 }
 
-/// Limit, turning and branch points.
-fn events(counters: &Counters) -> Value {
-    let event = |event: &Event| {
-        json!({
-            "stage": event.at.stage,
-            "load": event.at.load,
-            "kind": event.kind.name(),
-            "negative_pivots": event.negative_pivots,
-        })
-    };
-    counters.findings.events.iter().map(event).collect()
-}
-
-/// Of each static stage that came to its end.
-fn stability(counters: &Counters) -> Value {
-    let one = |found: &StageStability| json!({ "stage": found.stage, "verdict": found.verdict.name(), "negative": found.negative });
-    counters.findings.stability.iter().map(one).collect()
-}
-
-/// Of each dynamic stage of fixed steps, as far as it came.
-fn time_errors(counters: &Counters) -> Value {
-    let one = |&StageTimeError { stage, largest: Largest { displacement, rotation, moved } }: &StageTimeError| json!({ "stage": stage, "displacement": displacement, "rotation": rotation, "moved": moved });
-    counters.findings.time_errors.iter().map(one).collect()
-}
-
-/// Warnings with their names; those about a deck have no moment.
-pub fn warnings<'a>(given: impl Iterator<Item = &'a Warning>) -> Value {
-    let one = |warning: &Warning| {
-        json!({
-            "name": warning.kind.name(),
-            "about": warning.kind.about().name(),
-            "stage": warning.at.map(|at| at.stage),
-            "time": warning.at.map(|at| at.time),
-            "load": warning.at.map(|at| at.load),
-            "message": warning.message,
-        })
-    };
-    given.map(one).collect()
-}
-
-fn counters(counters: &Counters) -> Value {
-    let evaluations: Map<String, Value> =
-        counters.evaluations.iter().map(|&(name, n)| (name.into(), json!(n))).collect();
-    json!({
-        "steps": counters.steps,
-        "cutbacks": counters.cutbacks,
-        "uncertainty": counters.work.uncertainty,
-        "iterations": counters.work.iterations,
-        "factorisations": counters.work.factorisations,
-        "chart_switches": counters.work.chart_switches,
-        "mixed_elements": counters.mixed_elements,
-        "evaluations": evaluations,
-        "linear_solvers": counters.linear_solvers,
-    })
-}
-
-/// The numbers of a failure.
-fn numbers(failure: &Failure, scene: &Scene) -> Value {
-    let mut record = json!({ "name": failure.name(), "message": failure.to_string() });
-    if let Some(hint) = failure.hint(&scene.plan) {
-        record["hint"] = json!(hint);
+impl From<&Event> for EventRecord {
+    fn from(event: &Event) -> Self {
+        Self {
+            stage: event.at.stage,
+            load: Number(event.at.load),
+            kind: event.kind.name().into(),
+            negative_pivots: event.negative_pivots,
+        }
     }
-    let when = |at: &Moment, record: &mut Value| {
-        record["stage"] = json!(at.stage);
-        record["time"] = json!(at.time);
-        record["load"] = json!(at.load);
+}
+
+impl From<&StageStability> for StabilityRecord {
+    fn from(found: &StageStability) -> Self {
+        Self { stage: found.stage, verdict: found.verdict.name().into(), negative: found.negative }
+    }
+}
+
+impl From<&StageTimeError> for TimeErrorRecord {
+    fn from(found: &StageTimeError) -> Self {
+        Self {
+            stage: found.stage,
+            displacement: Number(found.largest.displacement),
+            rotation: Number(found.largest.rotation),
+            moved: Number(found.largest.moved),
+        }
+    }
+}
+
+impl From<&Warning> for WarningRecord {
+    fn from(warning: &Warning) -> Self {
+        Self {
+            name: warning.kind.name().into(),
+            about: warning.kind.about().name().into(),
+            stage: warning.at.map(|at| at.stage),
+            time: warning.at.map(|at| at.time),
+            load: warning.at.map(|at| at.load),
+            message: warning.message.clone(),
+        }
+    }
+}
+
+impl From<ReachedAccuracy> for AccuracyRecord {
+    fn from(reached: ReachedAccuracy) -> Self {
+        let entry = |column: ReachedColumn| (column.name, [Number(column.wanted), Number(column.estimate)]);
+        Self {
+            reached: reached.is_reached,
+            columns: Entries(reached.columns.into_iter().map(entry).collect()),
+            settings: reached.settings,
+            runs: reached.runs,
+            seconds: reached.seconds,
+        }
+    }
+}
+
+impl From<&Moment> for MomentRecord {
+    fn from(at: &Moment) -> Self {
+        Self { stage: at.stage, time: Number(at.time), load: Number(at.load) }
+    }
+}
+
+impl From<&Place> for PlaceRecord {
+    fn from(place: &Place) -> Self {
+        Self {
+            node: place.node.clone(),
+            direction: place.direction.0.map(Number),
+            unknown: format!("{:?}", place.kind).to_lowercase(),
+        }
+    }
+}
+
+/// A failure as JSON; texts and numbers cannot fail to be converted.
+fn failure_of(failure: &Failure, scene: &Scene) -> Option<Value> {
+    let record = FailureRecord {
+        name: failure.name().into(),
+        message: failure.to_string(),
+        hint: failure.hint(&scene.plan),
+        at: moment_of(failure).map(MomentRecord::from),
+        place: place_of(failure).map(PlaceRecord::from),
+        numbers: numbers_of(failure),
     };
-    let place = |place: &Place, record: &mut Value| {
-        record["node"] = json!(place.node);
-        record["direction"] = json!(place.direction.0);
-        record["unknown"] = json!(format!("{:?}", place.kind).to_lowercase());
-    };
+    serde_json::to_value(record).ok()
+}
+
+fn moment_of(failure: &Failure) -> Option<&Moment> {
     match failure {
-        Failure::NotConverged { at, place: node, residual, force, history, tried } => {
-            when(at, &mut record);
-            place(node, &mut record);
-            record["residual"] = json!(residual);
-            record["force"] = json!(force);
-            record["iterations"] = json!(history.len().saturating_sub(1));
-            record["residual_history"] = json!(history);
-            record["cutbacks"] = json!(tried.cutbacks);
-        }
-        Failure::TurnsTooFar { at, node, angle } => {
-            when(at, &mut record);
-            record["node"] = json!(node);
-            record["angle"] = json!(angle);
-        }
-        Failure::LimitPoint { at, goal, increments, end } => {
-            when(at, &mut record);
-            record["goal"] = json!(goal);
-            record["arc_length_increments"] = json!(increments);
-            record["end"] = json!(end.load);
-        }
-        Failure::StepTooSmall { at, place: node, error, share } => {
-            when(at, &mut record);
-            place(node, &mut record);
-            record["error"] = json!(error);
-            record["share"] = json!(share);
-        }
-        Failure::Singular { at, place: node } => {
-            when(at, &mut record);
-            if let Some(node) = node {
-                place(node, &mut record);
-            }
-        }
-        Failure::NonFinite { at, effect, node } => {
-            when(at, &mut record);
-            record["effect"] = json!(effect);
-            record["node"] = json!(node);
-        }
-        Failure::MeshTooCoarse { at, nodes, relative_rotation } => {
-            when(at, &mut record);
-            record["nodes"] = json!(nodes);
-            record["relative_rotation"] = json!(relative_rotation);
-        }
-        Failure::EnergyGrowth { at, grown, largest } => {
-            when(at, &mut record);
-            record["grown"] = json!(grown);
-            record["largest"] = json!(largest);
-        }
-        Failure::Interrupted { at, signal } => {
-            when(at, &mut record);
-            record["signal"] = json!(signal);
-        }
-        Failure::Deck(_) | Failure::Limit(_) | Failure::Io(_) => {}
+        Failure::NotConverged { at, .. }
+        | Failure::TurnsTooFar { at, .. }
+        | Failure::LimitPoint { at, .. }
+        | Failure::StepTooSmall { at, .. }
+        | Failure::Singular { at, .. }
+        | Failure::NonFinite { at, .. }
+        | Failure::MeshTooCoarse { at, .. }
+        | Failure::EnergyGrowth { at, .. }
+        | Failure::Interrupted { at, .. } => Some(at),
+        Failure::Deck(_) | Failure::Limit(_) | Failure::Io(_) => None,
     }
-    record
+}
+
+fn place_of(failure: &Failure) -> Option<&Place> {
+    match failure {
+        Failure::NotConverged { place, .. } | Failure::StepTooSmall { place, .. } => Some(place),
+        Failure::Singular { place, .. } => place.as_ref(),
+        Failure::TurnsTooFar { .. }
+        | Failure::LimitPoint { .. }
+        | Failure::NonFinite { .. }
+        | Failure::MeshTooCoarse { .. }
+        | Failure::EnergyGrowth { .. }
+        | Failure::Interrupted { .. }
+        | Failure::Deck(_)
+        | Failure::Limit(_)
+        | Failure::Io(_) => None,
+    }
+}
+
+fn numbers_of(failure: &Failure) -> Option<FailureNumbers> {
+    let numbers = match failure {
+        Failure::NotConverged { residual, force, history, tried, .. } => FailureNumbers::NotConverged {
+            residual: Number(*residual),
+            force: Number(*force),
+            iterations: history.len().saturating_sub(1),
+            residual_history: history.iter().copied().map(Number).collect(),
+            cutbacks: tried.cutbacks,
+        },
+        Failure::TurnsTooFar { node, angle, .. } => {
+            FailureNumbers::TurnsTooFar { node: node.clone(), angle: Number(*angle) }
+        }
+        Failure::LimitPoint { goal, increments, end, .. } => FailureNumbers::LimitPoint {
+            goal: Number(*goal),
+            arc_length_increments: *increments,
+            end: Number(end.load),
+        },
+        Failure::StepTooSmall { error, share, .. } => {
+            FailureNumbers::StepTooSmall { error: Number(*error), share: Number(*share) }
+        }
+        Failure::NonFinite { effect, node, .. } => {
+            FailureNumbers::NonFinite { effect: effect.map(String::from), node: node.clone() }
+        }
+        Failure::MeshTooCoarse { nodes, relative_rotation, .. } => {
+            FailureNumbers::MeshTooCoarse { nodes: nodes.clone(), relative_rotation: Number(*relative_rotation) }
+        }
+        Failure::EnergyGrowth { grown, largest, .. } => {
+            FailureNumbers::EnergyGrowth { grown: Number(*grown), largest: Number(*largest) }
+        }
+        Failure::Interrupted { signal, .. } => FailureNumbers::Interrupted { signal: *signal },
+        Failure::Singular { .. } | Failure::Deck(_) | Failure::Limit(_) | Failure::Io(_) => return None,
+    };
+    Some(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RECORD: &str = r#"{
+        "version": "0.1.0", "status": "singular", "deck": { "param": { "L": 1.0 }, "beam": [{ "elements": 4 }] },
+        "text": "a deck", "effects": [{ "name": "shear", "active": true, "reason": "GA" }],
+        "counters": {
+            "steps": 1, "cutbacks": 0, "uncertainty": 1e-12, "iterations": 3, "factorisations": 3,
+            "chart_switches": 0, "mixed_elements": 0, "evaluations": { "z": 2, "a": 1 },
+            "linear_solvers": ["blocks"]
+        },
+        "events": [{ "stage": 1, "load": 0.5, "kind": "limit_point", "negative_pivots": null }],
+        "stability": [{ "stage": 1, "verdict": "unstable", "negative": 2 }],
+        "time_errors": [{ "stage": 2, "displacement": null, "rotation": 0.1, "moved": 3.0 }],
+        "warnings": [{
+            "name": "unstable", "about": "stability", "stage": null, "time": null, "load": null, "message": "m"
+        }],
+        "threads": 2, "seconds": { "total": 0.1, "evaluation": 0.2, "solve": 0.3 },
+        "accuracy": { "reached": true, "columns": { "tip.ux": [0.1, null] }, "settings": [], "runs": 3, "seconds": 1.0 },
+        "failure": { "name": "singular", "message": "m", "stage": 1, "time": 0.0, "load": 0.0, "node": "a" }
+    }"#;
+
+    #[test]
+    fn records_are_written_as_they_were_read() {
+        let record: Record = serde_json::from_str(RECORD).unwrap();
+        let compact = |value: &Value| value.to_string();
+        let written: Value = serde_json::from_str(&record.to_string()).unwrap();
+        // Texts show the order of keys, which a comparison of values does not.
+        assert_eq!(compact(&written), compact(&serde_json::from_str(RECORD).unwrap()));
+        assert!(record.bare().text().is_none() && !record.bare().to_string().contains("a deck"));
+    }
+
+    #[test]
+    fn records_of_older_versions_lack_keys() {
+        let record: Record = serde_json::from_str(r#"{ "status": "interrupted", "text": "a deck" }"#).unwrap();
+        assert!(record.is_interrupted() && record.text() == Some("a deck"));
+    }
 }

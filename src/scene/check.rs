@@ -1,4 +1,4 @@
-//! What can be said of a deck before its mechanics is built.
+//! Checks of a deck before its mechanics is built.
 
 use super::compose::Composition;
 use super::mesh::Mesh;
@@ -58,8 +58,7 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Inertia and gravity need mass: of beams, or of bodies that massless beams carry.
 fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let inertia =
-        |s: &deck::Stage| matches!(s.body, StageBody::Dynamic { .. } | StageBody::Modal { .. }) || s.frame.is_some();
+    let inertia = |s: &deck::Stage| s.body.needs_inertia() || s.frame.is_some();
     let dynamic = deck.stages.iter().any(inertia);
     let weighed = deck.gravity.as_ref().is_some_and(|g| g.value != [0.0; 3]);
     if !dynamic && !weighed {
@@ -86,11 +85,11 @@ fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// What a section without mass lacks.
+/// The missing mass of a section.
 struct Missing {
     /// The key
     key: &'static str,
-    /// How a deck says that there is none
+    /// The key with which a deck states that there is none
     zero: &'static str,
 }
 
@@ -102,7 +101,7 @@ fn missing_mass(deck: &Deck, section: &deck::Section) -> Option<Missing> {
             let material = deck.materials.iter().find(|m| m.name.value == material.value)?;
             material.density.is_none().then_some(Missing { key: "a material with `rho`", zero: "`rho = 0`" })
         }
-        _ => None,
+        SectionBody::Resultants { mass: Some(_), .. } | SectionBody::Full { mass: Some(_), .. } => None,
     }
 }
 
@@ -127,8 +126,11 @@ fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 }
 
 fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let dynamic = deck.stages.iter().any(|s| matches!(s.body, StageBody::Dynamic { .. }));
-    if let (Some(initial), false) = (deck.initials.first(), dynamic || deck.stages.is_empty()) {
+    let dynamic = deck.stages.iter().any(|s| s.body.advances_time());
+    if dynamic || deck.stages.is_empty() {
+        return;
+    }
+    if let Some(initial) = deck.initials.first() {
         let message = "[[initial]] needs a dynamic stage: this deck has none";
         diagnostics.push(Diagnostic::error(message, initial.span.clone()));
     }
@@ -140,7 +142,7 @@ fn refuse_histories_on_paths(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
         let what = match stage.body {
             StageBody::Path { .. } => "control = \"arc_length\"",
             StageBody::Buckling { .. } => "a buckling stage",
-            _ => continue,
+            StageBody::Static { .. } | StageBody::Modal { .. } | StageBody::Dynamic { .. } => continue,
         };
         for history in histories_in(deck, number + 1) {
             let message = format!("{what} refuses histories: its load factor may go back");
@@ -155,13 +157,14 @@ pub fn histories_in(deck: &Deck, stage: usize) -> impl Iterator<Item = &Spanned<
     let acts = move |stages: &Option<Vec<usize>>| stages.as_ref().is_none_or(|stages| stages.contains(&stage));
     let loads = deck.loads.iter().filter(move |l| acts(&l.stages)).filter_map(|l| l.history.as_ref());
     let motions = deck.motions.iter().filter(move |m| acts(&m.stages)).filter_map(|m| m.history.as_ref());
-    let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|(_, history)| history.as_ref());
+    let motors = deck.joints.iter().filter_map(|j| j.motor.as_ref()).filter_map(|motor| motor.history.as_ref());
     let strains = deck.beams.iter().filter_map(|b| b.free_strain.as_ref()).filter_map(|f| f.history.as_ref());
     let all = loads.chain(motions).chain(motors).chain(strains);
     all.filter(move |history| history.goes_on_in(stage)).map(|history| &history.name)
 }
 
-/// The rotation-aware scheme has no total rotation vectors to interpolate, nor to clamp one component of.
+/// Refuses total interpolation and single held rotation components under the rotation-aware scheme,
+/// which has no total rotation vectors.
 fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let incremental = |stage: &deck::Stage| {
         matches!(stage.body, StageBody::Dynamic { scheme: deck::SchemeWord::LieGeneralizedAlpha(_), .. })
@@ -183,7 +186,8 @@ fn refuse_vectors_where_there_are_increments(deck: &Deck, diagnostics: &mut Vec<
     }
 }
 
-/// Under a rule without dissipation multipliers and accelerations oscillate from step to step, larger than their values.
+/// Warns of joints with multipliers under a scheme without dissipation: multipliers and
+/// accelerations oscillate from step to step.
 pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diagnostics: &mut Vec<Diagnostic>) {
     if composition.multipliers.is_empty() {
         return;
@@ -206,8 +210,8 @@ pub fn warn_of_undamped_multipliers(deck: &Deck, composition: &Composition, diag
     }
 }
 
-/// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither inertia nor a spring nor a
-/// constraint touches are held, so that the tangent stays regular.
+/// A point mass on no beam has no rotation to speak of. Directions of its rotation that neither
+/// inertia nor a spring nor a constraint touches are held, so that the tangent stays regular.
 pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held: &[Support]) -> Vec<Support> {
     let Composition { bodies, springs, jointed, .. } = composition;
     let on_beams: HashSet<usize> = mesh.beams.iter().flat_map(|beam| beam.nodes.iter().copied()).collect();
@@ -234,7 +238,8 @@ pub fn loose_rotations(deck: &Deck, mesh: &Mesh, composition: &Composition, held
     supports
 }
 
-/// A moment about an axis that nothing holds, and that has no inertia either, has no answer; `loose`: see [`loose_rotations`].
+/// A moment about an axis that nothing holds, and that has no inertia either, has no answer;
+/// `loose`: see [`loose_rotations`].
 pub fn refuse_moments(deck: &Deck, mesh: &Mesh, loose: &[Support], diagnostics: &mut Vec<Diagnostic>) {
     let axes = |node: &str| {
         let slot = mesh.points.get(node).map(|&node| mesh.nodes[node].node.p);
@@ -261,17 +266,4 @@ fn untouched(m: Mat3) -> Vec<Vec3> {
     let eigen = SymmetricEigen::new(Matrix3::from_fn(|i, j| m.0[i][j]));
     let empty = (0..3).filter(|&k| eigen.eigenvalues[k].abs() < 1e-12);
     empty.map(|k| Vec3([0, 1, 2].map(|i| eigen.eigenvectors[(i, k)]))).collect()
-}
-
-/// The diagonal of the box around the scene, or 1.
-pub fn diagonal(mesh: &Mesh) -> f64 {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for node in &mesh.nodes {
-        for k in 0..3 {
-            low[k] = low[k].min(node.place.0[k]);
-            high[k] = high[k].max(node.place.0[k]);
-        }
-    }
-    let diagonal = Vec3([0, 1, 2].map(|k| high[k] - low[k])).norm();
-    if diagonal.is_finite() && diagonal > 0.0 { diagonal } else { 1.0 }
 }

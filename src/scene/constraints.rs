@@ -5,7 +5,8 @@ use super::joints::FoundJoint;
 use super::mesh::Mesh;
 use super::names;
 use crate::deck::{self, Axes, Deck, Diagnostic, Expression, HistoryBody, HistoryUse, MotionWhat, Span};
-use beamsim_core::model::{History, Motion, MotionKind, Reading, StageSet, Support, Table};
+use beamsim_core::effect::joint::FreeCoordinate;
+use beamsim_core::model::{Amplitude, History, Motion, MotionKind, Reading, StageSet, Support, Table};
 use beamsim_core::run::Driven;
 use beamsim_core::system::{Direction, Node, Slot};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -15,7 +16,8 @@ use std::sync::Arc;
 /// Three directions as columns; the deck gives the first two.
 pub fn axes(axes: Option<Axes>) -> Mat3 {
     let Some([a, b]) = axes else { return Mat3::IDENTITY };
-    let (a, b) = (Vec3(a), Vec3(b));
+    let a = Vec3(a);
+    let b = Vec3(b);
     Mat3::from_columns(a, b, a.cross(b))
 }
 
@@ -81,7 +83,8 @@ pub fn constraints(
             Err(diagnostic) => diagnostics.push(diagnostic),
         }
     }
-    let (mut motions, mut driven) = (Vec::new(), Vec::new());
+    let mut motions = Vec::new();
+    let mut driven = Vec::new();
     let table = |number: usize, what: &'static str, span: &Span, history: Option<&HistoryUse>| DrivenTable {
         drives: Driven::Motion(number),
         what,
@@ -90,15 +93,16 @@ pub fn constraints(
     };
     for connection in connections.iter().filter(|connection| connection.is_support()) {
         let Some(node) = connection.nodes[1].map(|node| mesh.nodes[node].node) else { continue };
-        let directions = directions(connection.held(), connection.axes, node.u, node.p);
+        let directions = directions(connection.joint.kind.ground.components, connection.axes, node.u, node.p);
         note(&mut held, &directions, &StageSet::default(), &connection.joint.span, "joint to ground");
         supports.push(Support { directions, stages: StageSet::default() });
         match ground_motor(deck, histories, connection, node) {
             Ok(None) => {}
             Ok(Some(motor)) => {
-                let (span, history) = (&connection.joint.span, connection.joint.motor.as_ref());
-                note(&mut held, &motor.directions(), &motor.stages, span, "motion");
-                driven.push(table(motions.len(), "motor", span, history.and_then(|(_, history)| history.as_ref())));
+                let span = &connection.joint.span;
+                let history = connection.joint.motor.as_ref().and_then(|motor| motor.history.as_ref());
+                note(&mut held, &motor.directions(), motor.amplitude.stages(), span, "motion");
+                driven.push(table(motions.len(), "motor", span, history));
                 motions.push(motor);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -108,7 +112,7 @@ pub fn constraints(
         match read_motion(deck, mesh, histories, motion) {
             Ok(found) => {
                 driven.push(table(motions.len(), "motion", &motion.span, motion.history.as_ref()));
-                note(&mut held, &found.directions(), &found.stages, &motion.span, "motion");
+                note(&mut held, &found.directions(), found.amplitude.stages(), &motion.span, "motion");
                 motions.push(found);
             }
             Err(diagnostic) => diagnostics.push(diagnostic),
@@ -118,7 +122,7 @@ pub fn constraints(
     SceneConstraints { supports, motions, driven }
 }
 
-/// What acts on the state instead of the forces.
+/// The constraints of a scene on the unknowns of its nodes.
 pub struct SceneConstraints {
     /// Supports
     pub supports: Vec<Support>,
@@ -135,14 +139,18 @@ fn ground_motor(
     connection: &FoundJoint,
     node: Node,
 ) -> Result<Option<Motion>, Diagnostic> {
-    let Some((value, name)) = &connection.joint.motor else { return Ok(None) };
-    let history = find_history(deck, histories, name.as_ref())?;
+    let Some(motor) = &connection.joint.motor else { return Ok(None) };
+    let history = find_history(deck, histories, motor.history.as_ref())?;
     let axis = connection.axes.column(0);
-    let (kind, slot) = match connection.joint.kind {
-        deck::JointKind::Prismatic => (MotionKind::Translation, node.u),
-        _ => (MotionKind::Rotation, node.p),
+    let motion = |(kind, slot): (MotionKind, Slot)| {
+        let amplitude = Amplitude::of_motion(motor.value, history, StageSet::default());
+        Motion { kind, slot, axis, amplitude }
     };
-    Ok(Some(Motion::new(kind, slot, axis, *value, history, StageSet::default())))
+    let driven = connection.joint.kind.driven.map(|coordinate| match coordinate {
+        FreeCoordinate::Angle => (MotionKind::Rotation, node.p),
+        FreeCoordinate::Slide => (MotionKind::Translation, node.u),
+    });
+    Ok(driven.map(motion))
 }
 
 /// The history that a table names.
@@ -181,18 +189,28 @@ fn read_motion(
     Ok(match motion.what {
         MotionWhat::Displacement { direction, value } => {
             let axis = axes(motion.axes).column(direction);
-            Motion::new(MotionKind::Translation, node.u, axis, value, history, stages)
+            Motion {
+                kind: MotionKind::Translation,
+                slot: node.u,
+                axis,
+                amplitude: Amplitude::of_motion(value, history, stages),
+            }
         }
         MotionWhat::Rotation { axis, angle } => {
             let Some(axis) = (axes(motion.axes) * Vec3(axis)).normalized() else {
                 return Err(Diagnostic::error("`rotate` is an axis and must not be zero", motion.span.clone()));
             };
-            Motion::new(MotionKind::Rotation, node.p, axis, angle, history, stages)
+            Motion {
+                kind: MotionKind::Rotation,
+                slot: node.p,
+                axis,
+                amplitude: Amplitude::of_motion(angle, history, stages),
+            }
         }
     })
 }
 
-/// Whether earlier tables hold all three directions of the slot, whenever this one holds its own.
+/// Earlier tables hold all three directions of the slot, whenever this one holds its own.
 fn spanned(earlier: &[Held], b: &Held) -> bool {
     let always = |a: &&Held| a.direction.slot == b.direction.slot && (a.stages.0.is_none() || a.stages == b.stages);
     let axes: Vec<Vec3> = earlier.iter().filter(always).map(|a| a.direction.axis).collect();

@@ -1,23 +1,23 @@
 //! The shape of a scene, for pictures.
 
 use super::mesh::{Mesh, MeshBeam};
-use beamsim_core::effect::beam_elasticity::StressField;
-use beamsim_core::effect::link;
-use beamsim_core::effect::rigid_body::Body;
+use beamsim_core::effect::elasticity::StressField;
+use beamsim_core::effect::inertia::Body;
+use beamsim_core::effect::spring::Link;
 use beamsim_core::probe::{BeamPoint, Figure, Line, LinePoint, Place};
 use beamsim_core::tensor::Mat3;
 use nalgebra::Matrix6;
 use std::sync::Arc;
 
 /// Every node of every beam, the rigid bodies, and the ends of what joins two nodes.
-pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[link::Instance], elasticity: &[Arc<dyn StressField>]) -> Figure {
+pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[Link], elasticity: &[Arc<dyn StressField>]) -> Figure {
     let line = |beam: &MeshBeam| Line {
         name: beam.name.clone(),
         order: beam.order,
         points: (0..beam.nodes.len()).map(|k| point(mesh, beam, k, elasticity)).collect(),
     };
     let bare = |node, place| Place { nodes: vec![(node, place, 1.0)], frame: Mat3::IDENTITY, relative: false };
-    let ends = |link: &link::Instance| [0, 1].map(|k| bare(link.nodes[k], link.places[k]));
+    let ends = |link: &Link| [0, 1].map(|k| bare(link.nodes[k], link.places[k]));
     Figure {
         lines: mesh.beams.iter().map(line).collect(),
         bodies: bodies.iter().map(|body| bare(body.node, body.place)).collect(),
@@ -26,14 +26,16 @@ pub fn figure(mesh: &Mesh, bodies: &[Body], links: &[link::Instance], elasticity
 }
 
 fn point(mesh: &Mesh, beam: &MeshBeam, k: usize, elasticity: &[Arc<dyn StressField>]) -> LinePoint {
-    let (node, fraction) = (&mesh.nodes[beam.nodes[k]], beam.fractions[k]);
+    let node = &mesh.nodes[beam.nodes[k]];
+    let fraction = beam.fractions[k];
     let frame = beam.frame(fraction);
     // Between two elements both have their say.
     let side = |element: usize, at: usize| {
         let number = beam.elements.start + element;
         beam.elements.contains(&number).then_some((number as u32, 2.0 * at as f64 / beam.order as f64 - 1.0))
     };
-    let (element, at) = (k / beam.order, k % beam.order);
+    let element = k / beam.order;
+    let at = k % beam.order;
     let before = (at == 0 && element > 0).then(|| side(element - 1, beam.order)).flatten();
     let sides = before.into_iter().chain(side(element, at)).collect();
     let stiffness = beam.section.at(fraction).stiffness;

@@ -1,11 +1,11 @@
 //! Joints: which nodes they connect, and whether a node's own unknowns hold it or multipliers do.
 //!
-//! A joint to ground that sits at its node needs no multipliers: it is a support, and its motor a prescribed motion.
+//! A joint to ground that sits at its node needs no multipliers: it is a support, and its motor a
+//! prescribed motion.
 
 use super::mesh::Mesh;
 use super::names;
-use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use beamsim_core::effect::joint::Kind;
+use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 /// A joint as found on the mesh.
@@ -18,36 +18,14 @@ pub struct FoundJoint<'a> {
     pub arms: [Vec3; 2],
     /// e_1 (the axis), e_2, e_3 as columns
     pub axes: Mat3,
-    /// Where it sits
+    /// Its place at the start
     pub place: Vec3,
 }
 
 impl FoundJoint<'_> {
-    /// Whether a support and a motion of the one node do.
+    /// It joins one node to ground without an arm: a support and a motion of this node do its work.
     pub fn is_support(&self) -> bool {
         self.nodes[0].is_none() && self.arms[1] == Vec3::ZERO
-    }
-
-    /// What it holds.
-    pub fn kind(&self) -> Kind {
-        match self.joint.kind {
-            JointKind::Spherical => Kind::SPHERICAL,
-            JointKind::Revolute => Kind::REVOLUTE,
-            JointKind::Universal => Kind::UNIVERSAL,
-            JointKind::Prismatic => Kind::PRISMATIC,
-            JointKind::Rigid => Kind::RIGID,
-        }
-    }
-
-    /// Which of the displacements along e_1, e_2, e_3 and the rotations about them a joint to ground holds by itself.
-    /// Two held components of a rotation vector make a hinge; a universal joint needs a multiplier.
-    pub fn held(&self) -> [bool; 6] {
-        match self.joint.kind {
-            JointKind::Spherical | JointKind::Universal => [true, true, true, false, false, false],
-            JointKind::Revolute => [true, true, true, false, true, true],
-            JointKind::Prismatic => [false, true, true, true, true, true],
-            JointKind::Rigid => [true; 6],
-        }
     }
 }
 
@@ -66,7 +44,7 @@ pub fn find<'a>(deck: &'a Deck, mesh: &Mesh, diagnostics: &mut Vec<Diagnostic>) 
     found
 }
 
-/// Where the mesh could not part the beams it has said so.
+/// `None` where the mesh could not part the beams, which it has reported.
 fn between_beams<'a>(
     mesh: &Mesh,
     joint: &'a deck::Joint,
@@ -78,7 +56,7 @@ fn between_beams<'a>(
     let nodes = match beams {
         [first, second] => [Some(own(first)), Some(own(second))],
         [only] => [None, Some(own(only))],
-        _ => return None,
+        [] | [_, _, _, ..] => return None,
     };
     if nodes[0] == nodes[1] {
         return None;

@@ -3,50 +3,13 @@
 use super::names;
 use super::path::{self, CentreLine};
 use super::section::{self, SectionCourse};
-use crate::deck::{self, Deck, Diagnostic, JointKind, JointParts, PointRef, Spanned};
-use beamsim_core::kernel::{MAX_NODES, shape};
+use crate::deck::{self, Deck, Diagnostic, JointParts, PointRef, Spanned};
 use beamsim_core::model::Names;
+use beamsim_core::model::beam_element::{ElementGeometry, PlacedNode, Rule, Station, shape_at};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
-
-/// A node of the mesh.
-#[derive(Clone, Debug)]
-pub struct MeshNode {
-    /// Its slots
-    pub node: Node,
-    /// Its initial place
-    pub place: Vec3,
-}
-
-/// An integration point of an element.
-#[derive(Clone, Debug)]
-pub struct Station {
-    /// Shape functions, as many as the element has nodes
-    pub shape: [f64; MAX_NODES],
-    /// Their derivatives over arc length
-    pub slope: [f64; MAX_NODES],
-    /// Gauss weight times ds/dxi
-    pub weight: f64,
-    /// Fraction of the beam's length
-    pub fraction: f64,
-    /// The section axes of the interpolated line as columns; the first is its tangent
-    pub axes: Mat3,
-    /// How far along its piece of the curve, from 0 to 1
-    along: f64,
-}
-
-/// Which points of an element are summed over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// For internal forces
-    Inner,
-    /// For mass and line loads
-    Volume,
-    /// At the nodes (Newton-Cotes), for what depends on rotations where these are not interpolated as vectors
-    Nodal,
-}
 
 /// An element and the beam that it belongs to.
 #[derive(Clone, Copy)]
@@ -62,19 +25,10 @@ pub struct BeamElement<'m> {
 }
 
 impl BeamElement<'_> {
-    /// Its integration points.
-    pub fn stations(&self, rule: Rule) -> Vec<Station> {
-        let points = match rule {
-            Rule::Inner => shape::gauss(self.nodes.len() - 1),
-            Rule::Volume => shape::gauss(self.nodes.len()),
-            Rule::Nodal => shape::newton_cotes(self.nodes.len()),
-        };
-        points.iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
-    }
-
     fn station(&self, xi: f64, gauss_weight: f64) -> Station {
         let Part { piece, number, count } = self.beam.part_of_line(self.number);
-        let (line, (shape, slope)) = (&self.beam.line, shape_at(self.nodes.len(), xi));
+        let line = &self.beam.line;
+        let (shape, slope) = shape_at(self.nodes.len(), xi);
         let (tangent, jacobian) = line.pieces[piece].slope(self.between(&slope), count);
         let t = (number as f64 + 0.5 * (xi + 1.0)) / count as f64;
         let fraction = line.fraction(piece, t);
@@ -90,37 +44,38 @@ impl BeamElement<'_> {
 
     /// The section axes of the exact curve at an integration point.
     pub fn exact_axes(&self, station: &Station) -> Mat3 {
-        let (Part { piece, .. }, line) = (self.beam.part_of_line(self.number), &self.beam.line);
+        let Part { piece, .. } = self.beam.part_of_line(self.number);
+        let line = &self.beam.line;
         line.axes(piece, line.pieces[piece].tangent(station.along), station.fraction)
     }
+}
 
-    /// The initial place of its first node.
-    pub fn place(&self) -> Vec3 {
-        self.mesh.nodes[self.nodes[0]].place
+impl ElementGeometry for BeamElement<'_> {
+    fn number(&self) -> usize {
+        self.number
     }
 
-    /// The initial places of its nodes.
-    fn places<const N: usize>(&self) -> [Vec3; N] {
-        std::array::from_fn(|i| self.mesh.nodes[self.nodes[i]].place)
+    fn count(&self) -> usize {
+        self.nodes.len()
     }
 
-    /// The initial places of its nodes as seen from the first.
-    pub fn arms<const N: usize>(&self) -> [Vec3; N] {
+    fn node(&self, i: usize) -> PlacedNode {
+        self.mesh.nodes[self.nodes[i]]
+    }
+
+    fn arms<const N: usize>(&self) -> [Vec3; N] {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        self.beam.line.pieces[piece].arms(self.places(), count)
+        self.beam.line.pieces[piece].arms(std::array::from_fn(|i| self.node(i).place), count)
     }
 
-    /// How much longer it is than others on its piece, by round-off.
-    pub fn rounding(&self) -> f64 {
+    fn rounding(&self) -> f64 {
         let Part { piece, count, .. } = self.beam.part_of_line(self.number);
-        let place = |node: usize| self.mesh.nodes[node].place;
-        self.beam.line.pieces[piece].rounding(place(self.nodes[self.nodes.len() - 1]) - place(self.nodes[0]), count)
+        let chord = self.node(self.count() - 1).place - self.node(0).place;
+        self.beam.line.pieces[piece].rounding(chord, count)
     }
 
-    /// The places of its nodes, weighed.
-    pub fn between(&self, weights: &[f64; MAX_NODES]) -> Vec3 {
-        let places = self.nodes.iter().map(|&node| self.mesh.nodes[node].place);
-        places.zip(weights).fold(Vec3::ZERO, |sum, (x, &n)| sum + x * n)
+    fn stations(&self, rule: Rule) -> Vec<Station> {
+        rule.points(self.nodes.len()).iter().map(|&(xi, weight)| self.station(xi, weight)).collect()
     }
 }
 
@@ -137,11 +92,12 @@ pub struct MeshBeam {
     pub numbered: Option<Vec<f64>>,
     /// The numbers of its elements
     pub elements: Range<usize>,
-    /// Where those on each piece of its centre line begin, counted from its first, and at last their number
+    /// First element of each piece of its centre line, counted from that of the beam, and at last
+    /// their number
     piece_starts: Vec<usize>,
     /// Nodes of an element, less one
     pub order: usize,
-    /// How rotations are interpolated
+    /// Interpolation of rotations
     pub interpolation: deck::InterpolationWord,
     /// Strain without stress
     pub free_strain: Option<deck::FreeStrain>,
@@ -158,18 +114,20 @@ impl MeshBeam {
         &self.nodes[first..=first + self.order]
     }
 
-    /// The piece of the centre line at a fraction of the length, and the part of its elements before that.
+    /// The piece of the centre line at a fraction of the length, and the part of its elements
+    /// before that.
     pub fn along(&self, fraction: f64) -> (usize, f64) {
         let (element, xi) = self.element_at(fraction);
         let Part { piece, number, count } = self.part_of_line(element);
         (piece, (number as f64 + 0.5 * (xi + 1.0)) / count as f64)
     }
 
-    /// Where on the centre line an element lies.
+    /// The part of the centre line on which an element lies.
     fn part_of_line(&self, element: usize) -> Part {
         let number = element - self.elements.start;
         let piece = self.piece_starts.partition_point(|&start| start <= number) - 1;
-        let (start, end) = (self.piece_starts[piece], self.piece_starts[piece + 1]);
+        let start = self.piece_starts[piece];
+        let end = self.piece_starts[piece + 1];
         Part { piece, number: number - start, count: end - start }
     }
 }
@@ -186,7 +144,7 @@ struct Part {
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// The nodes
-    pub nodes: Vec<MeshNode>,
+    pub nodes: Vec<PlacedNode>,
     /// The beams
     pub beams: Vec<MeshBeam>,
     /// The number of elements, beam after beam
@@ -195,13 +153,14 @@ pub struct Mesh {
     pub points: HashMap<String, usize>,
     /// The node of a point for beams that a joint parted there
     pub parted: HashMap<(String, String), usize>,
-    /// What nodes are called: after their points, or by beam and number
+    /// Names of nodes: those of their points, or beam and number
     pub names: Names,
     slots: u32,
 }
 
 impl Mesh {
-    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to `diagnostics`.
+    /// Meshes all beams of the deck, and makes nodes of the points of bodies. What is wrong goes to
+    /// `diagnostics`.
     pub fn new(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let mut mesh = Self::default();
         mesh.part_joints(deck, diagnostics);
@@ -236,7 +195,8 @@ impl Mesh {
         self.names.of(self.nodes[node].node.p)
     }
 
-    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name is that of its first slot.
+    /// Adds a node with slots of its own, or one that shares the displacement of another. Its name
+    /// is that of its first slot.
     fn add_node(&mut self, place: Vec3, shares: Option<usize>) -> usize {
         let mut slot = || {
             self.slots += 1;
@@ -244,7 +204,7 @@ impl Mesh {
         };
         let u = shares.map_or_else(&mut slot, |other| self.nodes[other].node.u);
         let node = Node { u, p: slot() };
-        self.nodes.push(MeshNode { node, place });
+        self.nodes.push(PlacedNode { node, place });
         self.nodes.len() - 1
     }
 
@@ -283,7 +243,7 @@ impl Mesh {
                 }
                 // The first beam may have been parted from the point before.
                 let first = beams.first().and_then(|first| self.parted.get(&(first.value.clone(), point.clone())));
-                let shares = (joint.kind != JointKind::Prismatic).then_some(first.copied().unwrap_or(main));
+                let shares = joint.kind.shares_displacement().then_some(first.copied().unwrap_or(main));
                 self.names.give(self.slots, &format!("{point} ({})", second.value));
                 let node = self.add_node(place, shares);
                 self.parted.insert(key, node);
@@ -383,7 +343,8 @@ impl Mesh {
             named_between(&beam.path, &line, |piece| count(piece) * beam.order, &|name| names::point(deck, name));
         let first_element = self.element_count;
         let all = (0..line.pieces.len()).map(count).sum::<usize>() * beam.order + 1;
-        let (mut nodes, mut fractions) = (Vec::with_capacity(all), Vec::with_capacity(all));
+        let mut nodes = Vec::with_capacity(all);
+        let mut fractions = Vec::with_capacity(all);
         for piece in 0..line.pieces.len() {
             let steps = count(piece) * beam.order;
             for step in usize::from(piece > 0)..=steps {
@@ -398,7 +359,8 @@ impl Mesh {
                 fractions.push(line.fraction(piece, t));
             }
         }
-        let (mut first_node, mut piece_starts) = (0, vec![0]);
+        let mut first_node = 0;
+        let mut piece_starts = vec![0];
         for piece in 0..line.pieces.len() {
             piece_starts.push(piece_starts[piece] + count(piece));
             for _ in 0..count(piece) {
@@ -448,18 +410,6 @@ impl Mesh {
     }
 }
 
-/// Shape functions and their derivatives over xi, for 2, 3 or 4 nodes.
-pub fn shape_at(nodes: usize, xi: f64) -> ([f64; MAX_NODES], [f64; MAX_NODES]) {
-    fn padded<const N: usize>(values: [f64; N]) -> [f64; MAX_NODES] {
-        std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
-    }
-    match nodes {
-        2 => (padded(shape::values::<2>(xi)), padded(shape::derivatives::<2>(xi))),
-        3 => (padded(shape::values::<3>(xi)), padded(shape::derivatives::<3>(xi))),
-        _ => (shape::values::<4>(xi), shape::derivatives::<4>(xi)),
-    }
-}
-
 /// The fractions of the length where the pieces of a line are cut into so many equal parts, from start to end.
 fn fractions_of(line: &CentreLine, parts: &[usize]) -> Vec<f64> {
     let inner = (0..line.pieces.len()).flat_map(|piece| {
@@ -495,7 +445,7 @@ fn named_between<'a>(
     ((at - at.round()).abs() < 1e-9).then(|| (name.as_str(), at.round() as usize))
 }
 
-/// Whether the path of a beam names a point.
+/// True if the path of a beam names a point.
 fn passes(deck: &Deck, beam: &str, point: &str) -> bool {
     let found = deck.beams.iter().find(|b| b.name.value == beam);
     found.is_some_and(|b| match &b.path {

@@ -4,7 +4,6 @@ mod check;
 mod compose;
 mod constraints;
 mod figure;
-mod forced;
 mod joints;
 mod mesh;
 mod names;
@@ -13,22 +12,23 @@ mod path;
 mod planar;
 mod rehearsal;
 mod section;
+mod switches;
 
 pub use compose::Reason;
-pub use mesh::{Mesh, MeshBeam, Rule};
+pub use mesh::{Mesh, MeshBeam};
 pub use names::Spot;
-pub use section::{MassPerLength, SectionMatrices};
 
 use crate::deck::{
-    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody,
+    self, Deck, Diagnostic, ExpectBody, Instant, PointRef, Reduce, SchemeWord, Severity, Spanned, StageBody, Target,
+    Words, words,
 };
-use beamsim_core::effect::beam_elasticity::StressField;
-use beamsim_core::effect::link;
-use beamsim_core::effect::rigid_body::Body;
+use beamsim_core::effect::elasticity::StressField;
+use beamsim_core::effect::inertia::Body;
+use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
-use beamsim_core::model::{Charted, ElementInfo, Model, SlotKind, StageKind};
+use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
 use beamsim_core::probe::{Figure, Need, Probe};
-use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, Until, Warning};
+use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
@@ -38,31 +38,31 @@ use std::sync::Arc;
 
 /// A deck made ready to run.
 pub struct Scene {
-    /// What it is about
+    /// Title of the deck
     pub title: Option<String>,
-    /// What is to be done
+    /// Model and stages
     pub plan: Plan,
     /// The columns of the history
     pub probes: Vec<Probe>,
     /// Each n-th row is written.
     pub every: usize,
-    /// Whether fields are written
+    /// True if fields are written for ParaView
     pub vtk: bool,
-    /// What is expected
+    /// Expectations
     pub expectations: Vec<Expectation>,
     /// Warnings about the deck itself, where the scene was built by [`from_deck`]
     pub warnings: Vec<Warning>,
-    /// Which effects act, and why
+    /// Effects that act, and those that do not, with the reason
     pub reasons: Vec<Reason>,
     /// Nodes, beams, elements
     pub mesh: Mesh,
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables between nodes
-    pub links: Vec<link::Instance>,
+    pub links: Vec<Link>,
     /// The deck with expressions replaced by numbers
     pub resolved: serde_json::Value,
-    /// What knows of resultants
+    /// Beam elasticity, the source of stress resultants
     elasticity: Vec<Arc<dyn StressField>>,
 }
 
@@ -73,14 +73,14 @@ impl Scene {
     }
 }
 
-/// What is expected of a run.
+/// An expected number, failure or warning of a run.
 #[derive(Clone)]
 pub struct Expectation {
     /// The column, failure or warning as it stands in the deck
     pub name: String,
-    /// What is expected
+    /// Kind, with bounds
     pub kind: ExpectationKind,
-    /// Where the number comes from
+    /// Origin of the number
     pub source: Option<String>,
 }
 
@@ -100,8 +100,8 @@ pub enum ExpectationKind {
     },
     /// Of a counter of the run
     Counter {
-        /// Its name, without `run.`
-        name: String,
+        /// The counter
+        counter: RunCounter,
         /// In which bounds
         bounds: Bounds,
     },
@@ -122,35 +122,50 @@ pub enum ExpectationKind {
     Quiet,
 }
 
-/// A number of a mode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ModeQuantity {
-    /// Imaginary part
-    Omega,
-    /// Real part
-    Growth,
-    /// Critical load factor
-    Load,
+words! {
+    /// A number of a mode.
+    pub enum ModeQuantity {
+        /// Imaginary part
+        Omega = "omega",
+        /// Real part
+        Growth = "growth",
+        /// Critical load factor
+        Load = "load",
+    }
 }
 
 /// The bounds of an expected number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// value, atol, rtol
-    pub value: Option<(f64, f64, f64)>,
+    /// Value with its tolerances
+    pub value: Option<Target>,
     /// Upper bound
     pub below: Option<f64>,
     /// Lower bound
     pub above: Option<f64>,
 }
 
-/// Counters that an expectation can look at.
-pub const RUN_COUNTERS: [&str; 5] = ["steps", "iterations", "cutbacks", "chart_switches", "mixed_elements"];
+words! {
+    /// Counters of a run, as `run.steps` in expectations.
+    pub enum RunCounter {
+        /// Load levels, increments and time steps
+        Steps = "steps",
+        /// Iterations of Newton's method
+        Iterations = "iterations",
+        /// Steps that failed and were taken in smaller ones
+        Cutbacks = "cutbacks",
+        /// Changes of rotation charts
+        ChartSwitches = "chart_switches",
+        /// Elements across charts
+        MixedElements = "mixed_elements",
+    }
+}
 
-/// Messages beyond this many help nobody.
+/// Most diagnostics that are reported.
 const MOST_DIAGNOSTICS: usize = 200;
 
-/// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything that is wrong.
+/// Builds a scene from the text of a deck; the second part holds warnings. `Err` holds everything
+/// that is wrong.
 pub fn from_text(text: &str) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
     let (deck, found) = deck::read(text)?;
     from_deck(&deck, found)
@@ -161,7 +176,8 @@ pub fn from_deck(deck: &Deck, mut diagnostics: Vec<Diagnostic>) -> Result<(Scene
     let mut found = Vec::new();
     let scene = build(deck, &mut found);
     if !diagnostics.iter().all(Diagnostic::is_warning) {
-        // Of a deck that could be read in part only what is said about names is no consequence of that.
+        // Where tables could not be read only errors about names are kept: all others may follow
+        // from the missing tables.
         found.retain(|d| d.unknown.as_ref().is_some_and(|name| !deck.broken.iter().any(|b| about(name, b))));
     }
     diagnostics.append(&mut found);
@@ -193,22 +209,22 @@ fn before_the_run(diagnostic: &Diagnostic) -> Option<Warning> {
     Some(Warning { kind, at: None, message })
 }
 
-/// Whether a name speaks of a table: `arm`, `arm@end`, `arm:3`.
+/// True if a name refers to a table: `arm`, `arm@end`, `arm:3`.
 fn about(name: &str, table: &str) -> bool {
     name.split(['@', ':']).next() == Some(table)
 }
 
-/// Builds a scene from a deck that was read or made; what is wrong, and warnings, go to `diagnostics`. `None` where something is so
-/// wrong that there is no scene.
+/// Builds a scene from a deck that was read or made; errors and warnings go to `diagnostics`.
+/// `None` where errors leave no scene.
 pub fn build(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
     check::deck(deck, diagnostics);
-    forced::refuse_impossible(deck, diagnostics);
+    switches::refuse_impossible(deck, diagnostics);
     let mesh = Mesh::new(deck, diagnostics);
     build_on(deck, mesh, diagnostics)
 }
 
 fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Option<Scene> {
-    let deck = &*forced::deck(deck);
+    let deck = &*switches::deck(deck);
     let complete = mesh.beams.len() == deck.beams.len();
     let histories = constraints::histories(deck);
     let mut found = Vec::new();
@@ -221,44 +237,33 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let stages = stages(deck, &columns, &mut found);
     let expectations = expectations(deck, &columns, &mut found);
     let initial = deck.initials.iter().rev().filter_map(|i| initial(deck, &mesh, i, &mut found)).collect::<Vec<_>>();
-    // Where a beam could not be meshed, points may seem to be no nodes; names that are unknown are so all the same.
+    // Where a beam could not be meshed, points may seem to be no nodes: only errors about unknown
+    // names are kept.
     diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
-    let first_multiplier = mesh.slots() as u32;
-    let multipliers = composition.multipliers.len();
-    let rotating = Arc::new(charted(&mesh));
-    let (mut kinds, mut names) = (kinds(&mesh), mesh.names.clone());
-    for (kind, name) in composition.multipliers {
-        names.give(kinds.len() as u32, &name);
-        kinds.push(kind);
-    }
-    let mut model = Model {
-        kinds: Arc::new(kinds),
-        names: Arc::new(names),
-        multipliers: (first_multiplier..first_multiplier + multipliers as u32).collect(),
-        angles: composition.angles,
-        sprung: composition.springs.iter().filter(|s| s.rotation != Mat3::ZERO).map(|s| s.node.p).collect(),
+    let is_sprung = |spring: &&GroundSpring| spring.rotation != Mat3::ZERO;
+    let parts = ModelParts {
+        names: mesh.names.clone(),
+        multipliers: composition.multipliers,
+        elements: mesh.beams.iter().flat_map(|beam| element_infos(&mesh, beam)).collect(),
+        sprung: composition.springs.iter().filter(is_sprung).map(|spring| spring.node.p).collect(),
         sprung_joints: composition.sprung_joints,
-        elements: mesh.element_count,
-        charted: rotating.clone(),
-        rotating,
         effects: composition.effects,
         amplitudes: composition.amplitudes,
         supports: [supports, loose, composition.idle_multipliers].concat(),
         motions,
-        plane: None,
         linear: !deck.effects.allow(deck::EffectWord::LargeRotations),
-        length: check::diagonal(&mesh),
     };
+    let mut model = parts.assemble(&mesh.nodes);
     let initial: Vec<InitialMotion> = initial.into_iter().rev().collect();
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
     let plan = Plan {
         energy: output::needs(deck, Need::EnergyAccount),
         continued: output::needs(deck, Need::ContinuedRotations),
-        model,
+        model: Arc::new(model),
         initial,
         places: places(&mesh, &stages),
         stages,
@@ -285,7 +290,7 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     })
 }
 
-/// Where a point is that stands in a deck by its name or its coordinates.
+/// The coordinates of a point that a deck gives by its name or its coordinates.
 pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Option<Vec3> {
     names::place(deck, point).ok()
 }
@@ -297,24 +302,11 @@ fn places(mesh: &Mesh, stages: &[Stage]) -> Vec<(Node, Vec3)> {
     mesh.nodes.iter().filter(|_| wanted).map(|node| (node.node, node.place)).collect()
 }
 
-/// The rotations of all nodes, and the elements beam by beam.
-fn charted(mesh: &Mesh) -> Charted {
-    let info = |beam: &MeshBeam, number: usize| {
-        let rotations = beam.nodes_of(number).iter().map(|&n| mesh.nodes[n].node.p);
-        ElementInfo::new(rotations, beam.interpolation == deck::InterpolationWord::Total)
-    };
-    let of = |beam: &MeshBeam| beam.elements.clone().map(|number| info(beam, number)).collect::<Vec<_>>();
-    Charted {
-        rotations: mesh.nodes.iter().map(|n| n.node.p).collect(),
-        elements: mesh.beams.iter().flat_map(of).collect(),
-    }
-}
-
-/// What each slot of the mesh holds.
-fn kinds(mesh: &Mesh) -> Vec<SlotKind> {
-    let mut kinds = vec![SlotKind::Displacement; mesh.slots()];
-    mesh.nodes.iter().for_each(|node| kinds[node.node.p as usize] = SlotKind::Rotation);
-    kinds
+/// The elements of a beam as changes of chart see them.
+fn element_infos(mesh: &Mesh, beam: &MeshBeam) -> impl Iterator<Item = ElementInfo> {
+    let in_one_chart = beam.interpolation == deck::InterpolationWord::Total;
+    let rotations = |number: usize| beam.nodes_of(number).iter().map(|&node| mesh.nodes[node].node.p);
+    beam.elements.clone().map(move |number| ElementInfo::new(rotations(number), in_one_chart))
 }
 
 fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> Vec<Stage> {
@@ -336,7 +328,8 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
         });
         let work = match stage.body {
             StageBody::Static { steps, adaptive } => {
-                // Along a path the load factor goes back: only what is linear in it may be followed there.
+                // Along a path the load factor goes back: only what is linear in it may be followed
+                // there.
                 let linear = stage.frame.is_none() && check::histories_in(deck, stages.len() + 1).next().is_none();
                 let approach = match (adaptive, linear) {
                     (false, _) => Approach::Straight,
@@ -349,10 +342,12 @@ fn stages(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic>) -> 
             StageBody::Modal { modes } => StageWork::Modal { modes },
             StageBody::Buckling { modes } => StageWork::Buckling { modes },
             StageBody::Dynamic { end, step, scheme, step_tolerance, energy_limit } => {
-                StageWork::Dynamic { end, step, scheme: coefficients(scheme), adaptive: step_tolerance, energy_limit }
+                let scheme = coefficients(scheme);
+                StageWork::Dynamic(TimeStepping { end, step, scheme, adaptive: step_tolerance, energy_limit })
             }
         };
-        let (tolerance, max_iterations) = (stage.tolerance, stage.max_iterations);
+        let tolerance = stage.tolerance;
+        let max_iterations = stage.max_iterations;
         stages.push(Stage { work, tolerance, max_iterations, until, rotating: stage.frame.is_some() });
     }
     stages
@@ -372,8 +367,8 @@ fn expectations(deck: &Deck, columns: &Columns, diagnostics: &mut Vec<Diagnostic
     for expect in &deck.expects {
         let source = expect.source.clone();
         match &expect.body {
-            ExpectBody::Fails(name) => {
-                found.push(Expectation { name: name.value.clone(), kind: ExpectationKind::Fails, source });
+            ExpectBody::Fails(failure) => {
+                found.push(Expectation { name: failure.word().into(), kind: ExpectationKind::Fails, source });
             }
             ExpectBody::Warns(kind) => {
                 found.push(Expectation { name: kind.name().into(), kind: ExpectationKind::Warns(*kind), source });
@@ -400,21 +395,28 @@ fn expected_column(
     columns: &Columns,
 ) -> Result<ExpectationKind, Diagnostic> {
     if let Some(counter) = column.value.strip_prefix("run.") {
-        if !RUN_COUNTERS.contains(&counter) {
+        let Some(counter) = RunCounter::of(counter) else {
             let name = Spanned { value: counter.to_string(), span: column.span.clone() };
-            return Err(names::unknown("counter", &name, RUN_COUNTERS.into_iter()));
-        }
+            return Err(names::unknown("counter", &name, RunCounter::words()));
+        };
         if reduce != Reduce::At(Instant::End) {
             let message = "a counter is looked at at the end of the run";
             return Err(Diagnostic::error(message, column.span.clone()));
         }
-        return Ok(ExpectationKind::Counter { name: counter.into(), bounds });
+        return Ok(ExpectationKind::Counter { counter, bounds });
     }
     if let Some((quantity, number)) = mode_quantity(&column.value) {
         let wanted = |stage: &deck::Stage| match (quantity, stage.body) {
             (ModeQuantity::Load, StageBody::Buckling { modes }) => modes,
             (ModeQuantity::Omega | ModeQuantity::Growth, StageBody::Modal { modes }) => modes,
-            _ => 0,
+            (
+                ModeQuantity::Omega | ModeQuantity::Growth | ModeQuantity::Load,
+                StageBody::Static { .. }
+                | StageBody::Path { .. }
+                | StageBody::Dynamic { .. }
+                | StageBody::Modal { .. }
+                | StageBody::Buckling { .. },
+            ) => 0,
         };
         let known = columns.deck.stages.iter().map(wanted).max().unwrap_or(0);
         if number >= known {
@@ -432,14 +434,13 @@ fn expected_column(
 }
 
 /// `mode1.omega`, `mode1.growth`, `buckling1.load`: the quantity and the number of the mode from 0.
-pub fn mode_quantity(name: &str) -> Option<(ModeQuantity, usize)> {
+fn mode_quantity(name: &str) -> Option<(ModeQuantity, usize)> {
     let (mode, quantity) = name.split_once('.')?;
-    let (quantity, digits) = match quantity {
-        "omega" => (ModeQuantity::Omega, mode.strip_prefix("mode")?),
-        "growth" => (ModeQuantity::Growth, mode.strip_prefix("mode")?),
-        "load" => (ModeQuantity::Load, mode.strip_prefix("buckling")?),
-        _ => return None,
-    };
+    let quantity = ModeQuantity::of(quantity)?;
+    let digits = mode.strip_prefix(match quantity {
+        ModeQuantity::Omega | ModeQuantity::Growth => "mode",
+        ModeQuantity::Load => "buckling",
+    })?;
     Some((quantity, digits.parse::<usize>().ok()?.checked_sub(1)?))
 }
 

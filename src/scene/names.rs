@@ -1,11 +1,12 @@
 //! From names in the deck to nodes and places of the mesh.
 
-use super::mesh::{Mesh, MeshBeam, shape_at};
+use super::mesh::{Mesh, MeshBeam};
 use crate::deck::{Deck, Diagnostic, InterpolationWord, PointRef, Spanned, nearest, one_of};
+use beamsim_core::model::beam_element::shape_at;
 use beamsim_core::probe::Place;
 use beamsim_core::tensor::{Mat3, Vec3};
 
-/// What a name stands for.
+/// The node or place of a name.
 #[derive(Clone, Debug)]
 pub enum Found {
     /// A node of the mesh, and where it was named on a beam: beam and fraction of its length
@@ -19,7 +20,7 @@ pub fn point(deck: &Deck, name: &str) -> Option<Vec3> {
     deck.points.iter().find(|(known, _)| known.value == name).map(|(_, x)| Vec3(*x))
 }
 
-/// Where a point is that stands in the deck by its name or its coordinates.
+/// The coordinates of a point that the deck gives by its name or its coordinates.
 pub fn place(deck: &Deck, point: &Spanned<PointRef>) -> Result<Vec3, Diagnostic> {
     match &point.value {
         PointRef::Coordinates(x) => Ok(Vec3(*x)),
@@ -48,7 +49,7 @@ pub fn unknown<'a>(kind: &str, name: &Spanned<String>, known: impl Iterator<Item
     }
 }
 
-/// Where a name lies on a beam.
+/// A named place on a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
     /// The number of the beam
@@ -57,12 +58,12 @@ pub struct Spot {
     pub piece: usize,
     /// The part of the nodes of that piece that lie before it, from 0 to 1
     pub along: f64,
-    /// Whether it is a node
+    /// True if it is a node
     pub is_node: bool,
 }
 
 impl Mesh {
-    /// Where the name of a place on a beam lies; `None` for other names.
+    /// The place of a name on a beam; `None` for other names.
     pub fn spot(&self, deck: &Deck, name: &str) -> Option<Spot> {
         let name = Spanned { value: name.to_string(), span: 0..0 };
         let (beam, fraction, is_node) = match self.find(deck, &name).ok()? {
@@ -186,7 +187,8 @@ impl Mesh {
         }
     }
 
-    /// The section axes at a name: of the beam it was named on, else of the first beam there, else the global ones.
+    /// The section axes at a name: of the beam it was named on, else of the first beam there, else
+    /// the global ones.
     fn frame(&self, found: &Found, on: Option<(usize, f64)>) -> Mat3 {
         let on = on.or_else(|| self.beams_at(found).into_iter().next());
         on.map_or(Mat3::IDENTITY, |(beam, fraction)| self.beams[beam].frame(fraction))
@@ -224,7 +226,7 @@ impl MeshBeam {
     }
 }
 
-/// How many elements would put a node at a fraction of the length.
+/// Advice: the number of elements that puts a node at a fraction of the length.
 pub fn propose(beam: &MeshBeam, fraction: f64) -> String {
     let (piece, t) = beam.line.locate(fraction);
     let whole = |n: &usize| {

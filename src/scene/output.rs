@@ -2,8 +2,8 @@
 
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
-use crate::deck::{Deck, Diagnostic, ExpectBody, Spanned, nearest};
-use beamsim_core::effect::beam_elasticity::StressField;
+use crate::deck::{Deck, Diagnostic, ExpectBody, Spanned, hint, nearest, one_of};
+use beamsim_core::effect::elasticity::StressField;
 use beamsim_core::probe::{
     BeamPoint, COLUMNS, ColumnGroup, Need, Place, Probe, Reading, Source, clocks, find_column, group,
 };
@@ -48,7 +48,7 @@ impl Columns<'_> {
         let mut known: Vec<&'static ColumnGroup> = Vec::new();
         for key in keys {
             let Some(group) = group(&key.value) else {
-                diagnostics.push(unknown("group of columns", key, group_keys()));
+                diagnostics.push(unknown_group(key));
                 continue;
             };
             if known.iter().any(|other| other.key == group.key) {
@@ -176,6 +176,15 @@ fn no_column(name: &Spanned<String>) -> Diagnostic {
 /// Keys of the groups that a deck may ask for.
 fn group_keys() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().map(|group| group.key).filter(|key| clocks().all(|clock| clock != *key))
+}
+
+fn unknown_group(key: &Spanned<String>) -> Diagnostic {
+    let known: Vec<&'static str> = group_keys().collect();
+    let diagnostic = unknown("group of columns", key, known.iter().copied());
+    match hint("columns", &key.value, &known) {
+        Some(help) => diagnostic.help(help),
+        None => diagnostic.help(format!("groups are {}", one_of(known))),
+    }
 }
 
 #[cfg(test)]

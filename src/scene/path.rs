@@ -72,9 +72,9 @@ impl Piece {
         }
     }
 
-    /// The unit tangent of one of so many equal elements and its length over that of xi, where its nodes, weighed, give `stretch`. On a
-    /// straight piece all elements are one: what round-off in the places of nodes makes of each would keep them from sharing what they have in
-    /// common.
+    /// The unit tangent of one of so many equal elements and its length over that of xi; `stretch`:
+    /// derivative of the interpolated line over xi. On a straight piece all elements have the same,
+    /// without the round-off in the places of their nodes, so that they can share data.
     pub fn slope(&self, stretch: Vec3, elements: usize) -> (Vec3, f64) {
         match &self.curve {
             Curve::Line => (self.tangent(0.0), 0.5 * self.length / elements as f64),
@@ -82,7 +82,8 @@ impl Piece {
         }
     }
 
-    /// How much longer than that an element with this chord is by the round-off in the places of its nodes.
+    /// The chord of one of so many equal elements relative to its part of a straight piece: 1 but
+    /// for round-off in the places of its nodes.
     pub fn rounding(&self, chord: Vec3, elements: usize) -> f64 {
         match &self.curve {
             Curve::Line => chord.norm() * elements as f64 / self.length,
@@ -90,7 +91,8 @@ impl Piece {
         }
     }
 
-    /// The way from the first node of one of so many equal elements to the next ones, where these stand at `places`.
+    /// The way from the first node of one of so many equal elements to the next ones, where these
+    /// stand at `places`.
     pub fn arms<const N: usize>(&self, places: [Vec3; N], elements: usize) -> [Vec3; N] {
         let straight = |i: usize| (self.end - self.start) * (i as f64 / ((N - 1) * elements) as f64);
         match &self.curve {
@@ -99,7 +101,8 @@ impl Piece {
         }
     }
 
-    /// The section axes for the unit tangent `e1`, before twist: E3 is the part of axis3 normal to it, E2 = E3 x E1.
+    /// The section axes for the unit tangent `e1`, before twist: E3 is the part of axis3 normal to
+    /// it, E2 = E3 x E1.
     pub fn untwisted_axes(&self, e1: Vec3) -> Mat3 {
         let normal = self.axis3 - e1 * self.axis3.dot(e1);
         let e3 = normal.normalized().unwrap_or(self.axis3);
@@ -119,14 +122,16 @@ impl CentreLine {
         Self { pieces, length, before, twist }
     }
 
-    /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the beam's length.
+    /// The section axes on the piece `piece` for the unit tangent `e1`, at the fraction `s` of the
+    /// beam's length.
     pub fn axes(&self, piece: usize, e1: Vec3, s: f64) -> Mat3 {
         let axes = self.pieces[piece].untwisted_axes(e1);
         let angle = self.twist[0] + (self.twist[1] - self.twist[0]) * s;
         if angle == 0.0 {
             return axes;
         }
-        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let sin = libm::sin(angle);
+        let cos = libm::cos(angle);
         let [e1, e2, e3] = [0, 1, 2].map(|k| axes.column(k));
         Mat3::from_columns(e1, e2 * cos + e3 * sin, e3 * cos - e2 * sin)
     }
@@ -150,7 +155,8 @@ impl CentreLine {
             let t = match &piece.curve {
                 Curve::Line => (place - piece.start).dot(piece.tangent(0.0)) / piece.length,
                 Curve::Arc { centre, e, f, angle, .. } => {
-                    let (x, y) = ((place - *centre).dot(*e), (place - *centre).dot(*f));
+                    let x = (place - *centre).dot(*e);
+                    let y = (place - *centre).dot(*f);
                     libm::atan2(y, x).rem_euclid(2.0 * PI) / angle
                 }
             };
@@ -217,7 +223,8 @@ fn arc(
     axis3: Option<&Spanned<Vec3>>,
     span: &Span,
 ) -> Result<Piece, Diagnostic> {
-    let (u, v) = (b - a, c - a);
+    let u = b - a;
+    let v = c - a;
     let cross = u.cross(v);
     let sizes = u.norm() * v.norm();
     if sizes.is_nan() || cross.norm() <= 1e-9 * sizes || (c - b).norm() <= 1e-12 * v.norm() || sizes == 0.0 {
@@ -226,7 +233,8 @@ fn arc(
     }
     let normal = cross * (1.0 / cross.norm());
     let to_centre = (cross.cross(u) * v.squared() + v.cross(cross) * u.squared()) * (0.5 / cross.squared());
-    let (centre, radius) = (a + to_centre, to_centre.norm());
+    let centre = a + to_centre;
+    let radius = to_centre.norm();
     let e = (a - centre) * (1.0 / radius);
     let f = normal.cross(e);
     let angle = libm::atan2((c - centre).dot(f), (c - centre).dot(e)).rem_euclid(2.0 * PI);
@@ -276,7 +284,8 @@ mod tests {
         let quarter = piece([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]]);
         let line = CentreLine::new(vec![quarter], [0.0, PI / 2.0]);
         let e1 = line.pieces[0].tangent(1.0);
-        let (plain, turned) = (line.pieces[0].untwisted_axes(e1), line.axes(0, e1, 1.0));
+        let plain = line.pieces[0].untwisted_axes(e1);
+        let turned = line.axes(0, e1, 1.0);
         assert!((plain.column(0).cross(plain.column(1)) - plain.column(2)).norm() < 1e-15);
         assert!((turned.column(1) - plain.column(2)).norm() < 1e-15);
     }

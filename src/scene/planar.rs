@@ -1,4 +1,4 @@
-//! Whether a scene is simulated in a plane, and why.
+//! The plane of planar scenes, or the reason why a scene has none.
 
 use super::compose::Reason;
 use super::mesh::Mesh;

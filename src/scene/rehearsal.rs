@@ -1,4 +1,5 @@
-//! What can be told of a deck's stages before anything is computed, with the places in its text.
+//! Errors and warnings about stages that are found before anything is computed, with their places
+//! in the deck.
 
 use super::compose::DrivenTable;
 use crate::deck::{Deck, Diagnostic, HistoryBody, HistoryTable, Span};
@@ -44,7 +45,9 @@ fn place<'t>(error: &StageError, tables: &'t [DrivenTable]) -> Option<&'t Span> 
     let driven = match error {
         StageError::Jump(jump) => Driven::Motion(jump.motion),
         StageError::MotorJump(jump) => Driven::Motor(jump.slot),
-        _ => return None,
+        StageError::Conflict(_) | StageError::TurnedHinge(_) | StageError::NothingGrows(_) | StageError::NoMass => {
+            return None;
+        }
     };
     tables.iter().find(|table| table.drives == driven).map(|table| &table.span)
 }
@@ -74,7 +77,7 @@ impl Teller<'_> {
 
     /// Motors that jump into a dynamic stage are refused, not warned of.
     fn concerns(&self, jump: &HistoryJump, table: &DrivenTable) -> bool {
-        let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage) == StageKind::Dynamic;
+        let jumps = matches!(jump.how, JumpKind::Value { .. }) && self.kind(jump.stage).advances_time();
         !(jumps && self.is_motor(table))
     }
 
@@ -85,7 +88,8 @@ impl Teller<'_> {
 
     fn diagnostic(&self, told: &Warned) -> Diagnostic {
         let Warned { jump: HistoryJump { stage, how, .. }, table, history, others } = told;
-        let (number, what) = (stage + 1, table.what);
+        let number = stage + 1;
+        let what = table.what;
         let name = history.map_or(String::new(), |name| format!(" `{name}`"));
         let more = match others {
             0 => String::new(),
@@ -128,7 +132,7 @@ impl Teller<'_> {
         }
     }
 
-    /// What takes the kinks out of a history.
+    /// Advice on histories with kinks.
     fn help_of_kinks(&self, history: Option<&str>) -> &'static str {
         let named = |table: &&HistoryTable| Some(table.name.value.as_str()) == history;
         let Some(HistoryBody::Table { values, .. }) = self.deck.histories.iter().find(named).map(|table| &table.body)
@@ -139,11 +143,11 @@ impl Teller<'_> {
         if values.windows(3).any(goes_on) { SAMPLED } else { SMOOTH }
     }
 
-    /// What makes a history go on where the stage before has left it.
+    /// Advice on histories that jump from one stage to the next.
     fn help(&self, told: &Warned) -> String {
         let Warned { jump: HistoryJump { stage, .. }, table, history, .. } = told;
         let own_stages = table.history.as_ref().is_some_and(|history| history.stages.is_some());
-        let before = (0..*stage).rev().find(|&k| matches!(self.kind(k), StageKind::Static | StageKind::Dynamic));
+        let before = (0..*stage).rev().find(|&k| self.kind(k).advances_state());
         let before = before.unwrap_or_default();
         match (own_stages, self.kind(*stage) == self.kind(before)) {
             (true, _) => "a static stage reads it over the load factor from 0 to 1: let it begin where the stage before has left it".into(),

@@ -1,31 +1,10 @@
 //! Sections as matrices in their local axes, from resultants, full matrices, or shape and material.
 
 use crate::deck::{self, Diagnostic, EffectWord, Effects, SectionBody, Shape, Span, Spanned};
-use beamsim_core::kernel::elastic::Stiffness;
-use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::model::{MassPerLength, SectionMatrices};
 use beamsim_core::tensor::{Mat3, Vec3};
 use nalgebra::{Matrix6, SymmetricEigen};
 use std::f64::consts::PI;
-
-/// Stiffness and mass of a section, local axes, order Gamma1 Gamma2 Gamma3 K1 K2 K3.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SectionMatrices {
-    /// Stiffness
-    pub stiffness: [[f64; 6]; 6],
-    /// Mass per length, where given
-    pub mass: Option<MassPerLength>,
-}
-
-/// Mass properties per length, local axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassPerLength {
-    /// Mass
-    pub mass: f64,
-    /// Mass centre in the section
-    pub offset: Vec3,
-    /// Inertia about the centre line
-    pub about_line: Mat3,
-}
 
 /// The section of a beam from its start to its end.
 #[derive(Clone, Debug)]
@@ -45,7 +24,7 @@ pub enum SectionCourse {
     Blended([SectionMatrices; 2]),
     /// From station to station
     Stations {
-        /// Where these are, from 0 to 1
+        /// Places of the stations, from 0 to 1
         fractions: Vec<f64>,
         /// Between each two
         courses: Vec<SectionCourse>,
@@ -54,11 +33,11 @@ pub enum SectionCourse {
     Rigid(Box<SectionCourse>, [bool; 6]),
 }
 
-/// How much stiffer a strain is made that shall vanish: a hundredth of it is left. Much stiffer, and time steps that resolve everything else
-/// would not resolve it.
+/// Factor on the stiffness of strains that are switched off, of which a hundredth is left. A much
+/// larger one would need shorter time steps than all else.
 const RIGID: f64 = 1e2;
 
-/// Lengths of tables and of beams agree to this part: both are measured, and rounded.
+/// Relative difference of lengths in tables and of beams that is taken for rounding.
 const SAME_LENGTH: f64 = 1e-3;
 
 impl SectionCourse {
@@ -77,12 +56,14 @@ impl SectionCourse {
             Self::Blended([a, b]) => blend(a, b, s),
             Self::Stations { fractions, courses } => {
                 let next = fractions.partition_point(|&station| station <= s).clamp(1, courses.len());
-                let (from, to) = (fractions[next - 1], fractions[next]);
+                let from = fractions[next - 1];
+                let to = fractions[next];
                 courses[next - 1].at(((s - from) / (to - from)).clamp(0.0, 1.0))
             }
             Self::Rigid(course, strains) => {
                 let section = course.at(s);
-                // D C D scales what the flexibility C^-1 has of these strains, and what it couples them with.
+                // D C D scales what the flexibility C^-1 has of these strains, and what it couples
+                // them with.
                 let scale = strains.map(|rigid| if rigid { RIGID.sqrt() } else { 1.0 });
                 let entry = |i: usize, j: usize| section.stiffness[i][j] * scale[i] * scale[j];
                 let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
@@ -91,7 +72,8 @@ impl SectionCourse {
         }
     }
 
-    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the length.
+    /// With stations as fractions of the length; `Err` with the last where it is neither 1 nor the
+    /// length.
     pub fn along(self, length: f64) -> Result<Self, f64> {
         let Self::Stations { fractions, courses } = self else { return Ok(self) };
         let last = fractions.last().copied().unwrap_or(1.0);
@@ -103,7 +85,8 @@ impl SectionCourse {
 
     /// The course as `[effects]` wants it.
     pub fn forced(self, effects: &Effects) -> Self {
-        let (shear, extension) = (effects.allow(EffectWord::Shear), effects.allow(EffectWord::Extension));
+        let shear = effects.allow(EffectWord::Shear);
+        let extension = effects.allow(EffectWord::Extension);
         if shear && extension {
             return self;
         }
@@ -154,8 +137,7 @@ pub fn matrices(section: &deck::Section, materials: &[deck::Material]) -> Result
                     Some(MassPerLength { mass: mass.unwrap_or(0.0), offset: Vec3::ZERO, about_line: diagonal })
                 }
             };
-            let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { stiffness[i] } else { 0.0 }));
-            Ok(SectionMatrices { stiffness, mass })
+            Ok(SectionMatrices { mass, ..SectionMatrices::diagonal(*stiffness) })
         }
         SectionBody::Full { stiffness, mass } => full(section, stiffness, mass.as_ref(), span),
         SectionBody::Shaped { shape, material, shear_factor } => {
@@ -256,15 +238,15 @@ fn mass_properties(matrix: &[[f64; 6]; 6]) -> Result<MassPerLength, String> {
 fn shaped(shape: Shape, material: &deck::Material, shear_factor: Option<[f64; 2]>) -> SectionMatrices {
     let Geometry { area, bending, torsion, shear } = geometry(shape, material.poisson);
     let [k2, k3] = shear_factor.unwrap_or(shear);
-    let (e, g) = (material.young, material.shear);
+    let e = material.young;
+    let g = material.shear;
     let diagonal = [e * area, g * area * k2, g * area * k3, g * torsion, e * bending[0], e * bending[1]];
-    let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { diagonal[i] } else { 0.0 }));
     let mass = material.density.map(|rho| MassPerLength {
         mass: rho * area,
         offset: Vec3::ZERO,
         about_line: Mat3::diagonal([bending[0] + bending[1], bending[0], bending[1]].map(|i| rho * i)),
     });
-    SectionMatrices { stiffness, mass }
+    SectionMatrices { mass, ..SectionMatrices::diagonal(diagonal) }
 }
 
 fn cube(x: f64) -> f64 {
@@ -316,36 +298,14 @@ fn geometry(shape: Shape, nu: f64) -> Geometry {
     }
 }
 
-/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art. 109):
-/// a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
+/// Saint-Venant torsion constant of a rectangle (Timoshenko & Goodier, Theory of Elasticity, art.
+/// 109): a b^3 [1/3 - (64/pi^5)(b/a) sum tanh(n pi a / 2b)/n^5] over odd n, with a >= b.
 fn rectangle_torsion(width: f64, height: f64) -> f64 {
-    let (a, b) = (width.max(height), width.min(height));
+    let a = width.max(height);
+    let b = width.min(height);
     let term = |n: f64| libm::tanh(n * PI * a / (2.0 * b)) / (n * fourth(n));
     let sum: f64 = (0..200).map(|k| term(2.0 * f64::from(k) + 1.0)).sum();
     a * cube(b) * (1.0 / 3.0 - 64.0 / (PI * fourth(PI)) * (b / a) * sum)
-}
-
-impl SectionMatrices {
-    /// The stiffness in global components, for section axes R0.
-    pub fn stiffness_in(&self, r0: Mat3) -> Stiffness {
-        let block = |row: usize, column: usize| {
-            Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| self.stiffness[3 * row + i][3 * column + j])))
-        };
-        let turned = |m: Mat3| r0 * m * r0.transpose();
-        let coupling = block(0, 1);
-        Stiffness {
-            cn: turned(block(0, 0)),
-            cm: turned(block(1, 1)),
-            cc: (coupling != Mat3::ZERO).then(|| turned(coupling)),
-        }
-    }
-}
-
-impl MassPerLength {
-    /// The mass properties in global components.
-    pub fn turned(&self, r0: Mat3) -> Inertia {
-        Inertia { mass: self.mass, offset: r0 * self.offset, about_node: r0 * self.about_line * r0.transpose() }
-    }
 }
 
 #[cfg(test)]
@@ -369,7 +329,9 @@ mod tests {
 
     #[test]
     fn mass_matrices_of_rigid_sections_are_understood() {
-        let (m, d, j) = (2.0, Vec3([0.0, 0.1, -0.2]), Mat3::diagonal([3.0, 2.0, 1.5]));
+        let m = 2.0;
+        let d = Vec3([0.0, 0.1, -0.2]);
+        let j = Mat3::diagonal([3.0, 2.0, 1.5]);
         let coupling = d.skew() * m;
         let mut matrix = [[0.0; 6]; 6];
         for i in 0..3 {

@@ -1,5 +1,6 @@
-//! A history against a stored one, column by column.
+//! Compares a history with a stored one, column by column.
 
+use super::error::ComparisonError;
 use crate::output::HistoryReader;
 
 /// The worst cell of a column.
@@ -7,7 +8,7 @@ use crate::output::HistoryReader;
 pub struct Comparison {
     /// The column
     pub column: String,
-    /// Number of the worst row, from 1
+    /// The number of the worst row, from 1
     pub row: usize,
     /// The value of the first history there
     pub came: f64,
@@ -17,21 +18,30 @@ pub struct Comparison {
     pub ratio: f64,
 }
 
+/// The comparison of two histories.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparedHistories {
+    /// The worst cell of each column of the stored history
+    pub columns: Vec<Comparison>,
+    /// The names of columns that the stored history lacks
+    pub extra: Vec<String>,
+}
+
 /// Compares the columns that `stored` has; a column or row that `came` lacks is an error.
 ///
-/// A cell passes where |came - stored| <= atol + rtol |stored|, and where error bars of either history (`tip.ux.err`) stand beside it, by these
-/// more; they are no columns of their own. Columns that are only in `came` are returned by name.
+/// A cell passes where |came - stored| <= atol + rtol |stored|. The error bars of both histories
+/// (`tip.ux.err`) are added to the right side; they are not compared themselves.
 pub fn compare(
     came: &HistoryReader,
     stored: &HistoryReader,
     rtol: f64,
     atol: f64,
-) -> Result<(Vec<Comparison>, Vec<String>), String> {
+) -> Result<ComparedHistories, ComparisonError> {
     if came.rows.len() != stored.rows.len() {
-        return Err(format!("{} rows against {} stored ones", came.rows.len(), stored.rows.len()));
+        return Err(ComparisonError::Rows { rows: came.rows.len(), stored: stored.rows.len() });
     }
     if stored.rows.is_empty() || stored.names.is_empty() {
-        return Err("the stored history has no rows: nothing would be compared".into());
+        return Err(ComparisonError::Empty);
     }
     let mut table = Vec::new();
     for (k, column) in stored.names.iter().enumerate().filter(|(_, name)| !is_bar(name)) {
@@ -40,13 +50,13 @@ pub fn compare(
             bars.iter().map(|(history, place)| place.map_or(0.0, |k| history.rows[row][k])).sum()
         };
         let Some(other) = came.names.iter().position(|name| name == column) else {
-            return Err(format!("the column `{column}` is missing"));
+            return Err(ComparisonError::MissingColumn(column.clone()));
         };
         let cells = came.rows.iter().zip(&stored.rows).map(|(a, b)| (a[other], b[k]));
         let judged = cells.enumerate().map(|(row, (came, stored))| {
             let allowed = atol + rtol * stored.abs() + bar(row);
             let difference = (came - stored).abs();
-            // Equal cells pass whatever the tolerance; cells that are no numbers never do, unless both are none.
+            // Equal cells pass with any tolerance. NaN equals NaN, and no number.
             let same = came == stored || (came.is_nan() && stored.is_nan());
             let ratio = if same { 0.0 } else { difference / allowed };
             let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
@@ -55,10 +65,10 @@ pub fn compare(
         table.extend(judged.max_by(|a, b| a.ratio.total_cmp(&b.ratio)));
     }
     let extra = came.names.iter().filter(|name| !stored.names.contains(name) && !is_bar(name)).cloned().collect();
-    Ok((table, extra))
+    Ok(ComparedHistories { columns: table, extra })
 }
 
-/// The name of the column of error bars of another.
+/// The name of the error bars of a column.
 fn bar_of(column: &str) -> String {
     format!("{column}.err")
 }
@@ -80,7 +90,7 @@ mod tests {
     fn the_worst_cell_of_each_column_is_told() {
         let a = history(&[[0.0, 1.0], [1.0, 2.0 + 1e-6], [2.0, 3.0]]);
         let b = history(&[[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
-        let (table, extra) = compare(&a, &b, 1e-9, 0.0).unwrap();
+        let ComparedHistories { columns: table, extra } = compare(&a, &b, 1e-9, 0.0).unwrap();
         assert!(extra.is_empty());
         assert_eq!(table[0].ratio, 0.0);
         assert_eq!(table[1].row, 2);
@@ -93,7 +103,8 @@ mod tests {
         assert!(compare(&a, &b, 1.0, 1.0).is_err());
         let mut c = history(&[[0.0, 1.0]]);
         c.names[1] = "v".into();
-        assert!(compare(&a, &c, 1.0, 1.0).unwrap_err().contains("`v`"));
+        c.names[1] = "v".into();
+        assert_eq!(compare(&a, &c, 1.0, 1.0), Err(ComparisonError::MissingColumn("u".into())));
     }
 
     #[test]
@@ -105,7 +116,7 @@ mod tests {
             a.rows.iter_mut().for_each(|row| row.truncate(2));
             a.rows.iter_mut().for_each(|row| row.push(error));
             for (one, other) in [(&a, &b), (&b, &a)] {
-                let (table, extra) = compare(one, other, 0.0, 1e-12).unwrap();
+                let ComparedHistories { columns: table, extra } = compare(one, other, 0.0, 1e-12).unwrap();
                 assert_eq!((table.len(), table[1].ratio <= 1.0, extra.len()), (2, passes, 0));
             }
         }
@@ -114,6 +125,6 @@ mod tests {
     #[test]
     fn nan_never_equals_a_number() {
         let (a, b) = (history(&[[0.0, f64::NAN]]), history(&[[0.0, 1.0]]));
-        assert_eq!(compare(&a, &b, 1.0, 1.0).unwrap().0[1].ratio, f64::INFINITY);
+        assert_eq!(compare(&a, &b, 1.0, 1.0).unwrap().columns[1].ratio, f64::INFINITY);
     }
 }

@@ -1,110 +1,116 @@
-//! Error bars: the history of a run beside those of two others, one of half its elements and one of half its step.
+//! Error bars: the history of a run is compared with those of two others, one with half its
+//! elements and one with half its step.
 //!
-//! What is told at a row is the largest estimate so far, and up to the next row that all have: an error does not vanish where two histories
-//! cross, and one that begins to grow shows in them late. See [`super::accuracy`] for the estimate.
+//! The bar of a row is the largest estimate so far, up to the next row that all histories have: an
+//! error does not vanish where two histories cross, and a growing error shows in them late. See
+//! [`super::accuracy`] for the estimate.
 
+use super::StudyError;
 use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
-use super::cost::{Family, Mesher, Pace, Patience, Point, Refusal, Sampler, dynamic_stages, trial};
-use super::outcome::{Outcome, Presence};
+use super::cost::{Companion, Family, Mesher, Original, Pace, Patience, Sampler, Variant, dynamic_stages, trial};
+use super::outcome::{Outcome, Presence, StageClock};
 use crate::deck::{Deck, Diagnostic, Path, PointRef, Spanned, StageBody};
-use crate::output::Beside;
+use crate::output::SideColumns;
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
 use beamsim_core::tensor::Vec3;
 use beamsim_core::threads;
 use std::thread::{self, ScopedJoinHandle};
 
-/// The step tolerance of a companion whose steps adapt, over that of the run.
+/// The step tolerance of a companion with adaptive steps, over that of the run.
 const LOOSER: f64 = 10.0;
 
-/// Bars over estimates: factors of safety as in the grid convergence index (Roache, Annu. Rev. Fluid Mech. 29, 1997, DOI
-/// 10.1146/annurev.fluid.29.1.123, three grids), chosen on random motions with a twentieth of a period as their step, so that nearly all
-/// errors are inside. A finer run tells the error itself, a coarser one only what it would be if all were smooth.
+/// Bars over estimates: factors of safety as in the grid convergence index (Roache, Annu. Rev.
+/// Fluid Mech. 29, 1997, DOI 10.1146/annurev.fluid.29.1.123, three grids), chosen on random motions
+/// with a twentieth of a period as their step, so that nearly all errors are inside. A finer run
+/// shows the error itself, a coarser one only what it would be for smooth solutions.
 const SAFETY_FINER: f64 = 1.5;
 const SAFETY_COARSER: f64 = 2.5;
 
-/// Pieces of a straight line that stand for a curve turn by less than this from one to the next, in radians.
-const BEND: f64 = 0.55;
-/// And by more than this.
-const STRAIGHT: f64 = 1e-6;
+/// Straight pieces may stand for a curve if the angle between neighbours, in radians, is between
+/// these bounds.
+const SMALLEST_BEND: f64 = 1e-6;
+const LARGEST_BEND: f64 = 0.55;
 
-/// A run beside the one that is told about.
-struct Companion {
+/// A run with another mesh or step.
+struct CompanionRun {
     outcome: Outcome,
-    /// By what differences of columns are divided to be errors of the run
+    /// For each column: a difference over this is an error
     divisors: Vec<f64>,
-    /// The first row that was not compared yet
+    /// The row that was compared last
     next: usize,
 }
 
 /// Errors of a history, row by row.
 pub struct ErrorBars {
     sampler: Sampler,
-    companions: Vec<Companion>,
-    /// Of each column, the largest estimate of each companion so far
+    companions: Vec<CompanionRun>,
+    /// The largest estimates so far, for each companion and column
     largest: Vec<Vec<f64>>,
-    /// Of each column, the largest value of its kind so far
+    /// The largest value so far of each column's kind
     values: Vec<f64>,
-    /// What Newton's method leaves of them
+    /// The relative error from the tolerance of Newton's method
     tolerance: f64,
 }
 
-/// A variant that errors are told from, with what differences of columns to it are divided by to be bars.
-type Beneath = (Point, Vec<f64>);
+/// A variant from which errors are estimated.
+struct Comparison {
+    variant: Variant,
+    /// For each column: a difference over this is an error bar
+    divisors: Vec<f64>,
+}
 
-/// Runs the companions of a deck, whose text is `text`, beside each other. `interrupted` tells of signals.
+/// Runs the companions of a deck, whose text is `text`, in parallel. `interrupted` gives the signal
+/// that was caught.
 pub fn error_bars(
     text: &str,
     deck: &Deck,
     scene: &Scene,
     interrupted: &(dyn Fn() -> Option<i32> + Sync),
-) -> Result<ErrorBars, Refusal> {
-    refuse_paths(deck).map_err(Refusal::Deck)?;
+) -> Result<ErrorBars, StudyError> {
+    refuse_paths(deck)?;
+    let original = Original { text, deck };
     let sampler = Sampler::of_rows(deck, scene, Vec::new(), Pace::Timeless);
-    let sources = companions(text, deck, &sampler);
-    let run = |source: Vec<Beneath>| {
-        first_that_ends(source, &|point| {
-            trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted)
+    let sources = companions(original, &sampler);
+    let run = |source: Vec<Comparison>| {
+        first_that_finishes(source, &|variant| {
+            trial::simulate(deck, &variant.changes(original), &sampler, Patience::LONG, interrupted)
         })
     };
-    let outcomes: Vec<Result<(Outcome, Vec<f64>), Failure>> = thread::scope(|scope| {
+    let runs: Vec<Result<CompanionRun, Failure>> = thread::scope(|scope| {
         let started: Vec<_> = sources.into_iter().map(|source| threads::beside(scope, || run(source))).collect();
         let broken = |why: String| Err(Failure::Limit(format!("no error bars: {why}")));
         let join = |thread: ScopedJoinHandle<_>| thread.join().unwrap_or(broken("a run broke off".into()));
         started.into_iter().map(|thread| thread.map_or_else(|error| broken(error.to_string()), join)).collect()
     });
-    let mut found = Vec::new();
-    for outcome in outcomes {
-        let (outcome, divisors) = outcome.map_err(Refusal::Failure)?;
-        found.push(Companion { outcome, divisors, next: 0 });
-    }
+    let companions = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     let columns = scene.probes.iter().map(|probe| probe.names.len()).sum();
     let tolerance = left_by_newton(deck);
-    let largest = vec![vec![0.0; columns]; found.len()];
-    Ok(ErrorBars { sampler, largest, values: vec![0.0; columns], tolerance, companions: found })
+    let largest = vec![vec![0.0; columns]; companions.len()];
+    Ok(ErrorBars { sampler, largest, values: vec![0.0; columns], tolerance, companions })
 }
 
-/// Runs the variants of one source of errors until one comes to its end.
-fn first_that_ends(
-    variants: Vec<Beneath>,
-    run: &dyn Fn(&Point) -> Result<Outcome, String>,
-) -> Result<(Outcome, Vec<f64>), Failure> {
+/// Runs the variants of one source of errors until one finishes.
+fn first_that_finishes(
+    comparisons: Vec<Comparison>,
+    run: &dyn Fn(&Variant) -> Result<Outcome, StudyError>,
+) -> Result<CompanionRun, Failure> {
     let mut why = String::new();
-    for (point, divisors) in variants {
-        match run(&point) {
+    for Comparison { variant, divisors } in comparisons {
+        match run(&variant) {
             Ok(outcome) => match &outcome.ended {
-                Ok(()) => return Ok((outcome, divisors)),
-                // No other mesh or step mends these.
+                Ok(()) => return Ok(CompanionRun { outcome, divisors, next: 0 }),
+                // These fail with every mesh and step.
                 Err(failure @ (Failure::Interrupted { .. } | Failure::Singular { .. })) => return Err(failure.clone()),
                 Err(failure) => why = format!("{}: {failure}", failure.name()),
             },
-            Err(refused) => why = refused,
+            Err(error) => why = error.to_string(),
         }
     }
-    Err(Failure::Limit(format!("no error bars: a run with another mesh or step failed, {why}")))
+    Err(Failure::Limit(format!("no error bars: a comparison run with another mesh or step failed: {why}")))
 }
 
-/// Errors of what a deck expects, whatever its values, from the same companions; `came` is what came of the run.
+/// Estimated errors of the expectations of a deck; `came` holds their values in the run.
 pub fn of_expected(
     text: &str,
     deck: &Deck,
@@ -114,10 +120,12 @@ pub fn of_expected(
 ) -> Result<Vec<f64>, Failure> {
     let (sampler, _) = Sampler::of_expectations(deck, scene);
     let mut errors: Vec<f64> = came.iter().map(|value| left_by_newton(deck) * value.abs()).collect();
-    for source in companions(text, deck, &sampler) {
-        let run =
-            |point: &Point| trial::simulate(text, &point.settings(deck, text), &sampler, Patience::LONG, interrupted);
-        let (outcome, divisors) = first_that_ends(source, &run)?;
+    let original = Original { text, deck };
+    for source in companions(original, &sampler) {
+        let run = |variant: &Variant| {
+            trial::simulate(deck, &variant.changes(original), &sampler, Patience::LONG, interrupted)
+        };
+        let CompanionRun { outcome, divisors, .. } = first_that_finishes(source, &run)?;
         for (((error, a), b), divisor) in errors.iter_mut().zip(came).zip(&outcome.expected).zip(&divisors) {
             *error += (a - b).abs() / divisor;
         }
@@ -125,48 +133,57 @@ pub fn of_expected(
     Ok(errors)
 }
 
-/// The variants that errors are told from, for mesh and steps; of each the one that tells most, and others for where it fails.
-fn companions(text: &str, deck: &Deck, sampler: &Sampler) -> Vec<Vec<Beneath>> {
-    let mesher = Mesher { text, deck, sampler, interpolation: None, keeps_places: true };
+/// The variants from which errors are estimated, for mesh and steps: for each the most informative
+/// one, and others in case it fails.
+fn companions(original: Original, sampler: &Sampler) -> Vec<Vec<Comparison>> {
+    let deck = original.deck;
+    let mesher = Mesher { original, sampler, interpolation: None, keeps_places: true };
     let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
     let safety = |ratio: f64| if ratio < 1.0 { SAFETY_FINER } else { SAFETY_COARSER };
     let mut found = Vec::new();
     if let Some(order) = deck.beams.iter().map(|beam| beam.order).min() {
         let between = mesher.between(None, &own);
-        let with = |(other, ratio): (Vec<Vec<usize>>, f64)| {
+        let with = |Companion { elements, ratio }: Companion| {
             let divisors = divisors_in_space(ratio, order, &sampler.columns, &between);
             let divisors = divisors.into_iter().map(|divisor| divisor / safety(ratio)).collect();
-            (Point::new(Family::default(), other, Pace::Timeless), divisors)
+            Comparison { variant: Variant::new(Family::default(), elements, Pace::Timeless), divisors }
         };
         let first = mesher.companion(None, &own);
-        let finer =
-            (first.1 > 1.0).then(|| (own.iter().map(|beam| beam.iter().map(|n| 2 * n).collect()).collect(), 0.5));
+        let finer = (first.ratio > 1.0).then(|| Companion {
+            elements: own.iter().map(|beam| beam.iter().map(|n| 2 * n).collect()).collect(),
+            ratio: 0.5,
+        });
         found.push(std::iter::once(first).chain(finer).map(with).collect());
     }
     let all = |divisor| vec![divisor; sampler.columns.len()];
     let adapts = |(_, body)| if let StageBody::Dynamic { step_tolerance, .. } = body { step_tolerance } else { None };
     if let Some(tolerance) = dynamic_stages(deck).find_map(adapts) {
-        let point = Point::new(Family::default(), own, Pace::Adapts(LOOSER * tolerance));
-        found.push(vec![(point, all(1.0 / SAFETY_FINER))]);
+        let variant = Variant::new(Family::default(), own, Pace::Adapts(LOOSER * tolerance));
+        found.push(vec![Comparison { variant, divisors: all(1.0 / SAFETY_FINER) }]);
     } else if dynamic_stages(deck).next().is_some() {
-        let with = |factor| Point::new(Family::default(), own.clone(), Pace::Steps(factor));
-        let step = |point: &Point| point.step(deck).unwrap_or(1.0);
-        let ratio = |point: &Point| step(point) / step(&with(1.0));
-        // An interval may have cut the deck's own.
+        let with = |factor| Variant::new(Family::default(), own.clone(), Pace::Steps(factor));
+        let step = |variant: &Variant| variant.step(deck).unwrap_or(1.0);
+        let ratio = |variant: &Variant| step(variant) / step(&with(1.0));
+        // The step of the deck may be reduced to a whole part of an interval.
         let cut = dynamic_stages(deck).find_map(|(_, body)| match body {
             StageBody::Dynamic { step: wanted, .. } => Some(step(&with(1.0)) / wanted),
-            _ => None,
+            StageBody::Static { .. }
+            | StageBody::Path { .. }
+            | StageBody::Modal { .. }
+            | StageBody::Buckling { .. } => None,
         });
         let others = [0.5 * cut.unwrap_or(1.0), 2.0].map(with).into_iter().filter(|other| ratio(other) != 1.0);
         let divisor = |ratio: f64| divisor_in_time(ratio) / safety(ratio);
-        found.push(others.map(|other| (other.clone(), all(divisor(ratio(&other))))).collect());
+        let compared = |variant: Variant| Comparison { divisors: all(divisor(ratio(&variant))), variant };
+        found.push(others.map(compared).collect());
     }
     found
 }
 
-/// What no bar tells: beams whose straight pieces may stand for a curve.
+/// Messages about beams whose straight pieces may stand for a curve: no error bar contains that
+/// error.
 pub fn polylines(deck: &Deck) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut messages = Vec::new();
     for beam in &deck.beams {
         let Path::Through(points) = &beam.path else { continue };
         let place = |point: &Spanned<PointRef>| crate::scene::place(deck, point);
@@ -175,35 +192,39 @@ pub fn polylines(deck: &Deck) -> Vec<String> {
         let angle = |pair: &[Vec3]| pair[0].cross(pair[1]).norm().atan2(pair[0].dot(pair[1]));
         let angles: Vec<f64> = ways.windows(2).map(angle).collect();
         let widest = angles.iter().fold(0.0, |widest: f64, &angle| widest.max(angle));
-        if angles.len() >= 2 && (STRAIGHT..BEND).contains(&widest) {
-            told.push(format!(
-                "beam {}: its {} straight pieces turn by up to {:.1}° from one to the next; if they stand for a curve, no estimate contains \
-                 what that changes (`arc`, or more points)",
+        if angles.len() >= 2 && (SMALLEST_BEND..LARGEST_BEND).contains(&widest) {
+            messages.push(format!(
+                "beam {}: its {} straight pieces meet at angles of up to {:.1}°; if they stand for a curve, the estimated errors do not include the \
+                 difference (use `arc`, or more points)",
                 beam.name.value,
                 ways.len(),
                 widest.to_degrees()
             ));
         }
     }
-    told
+    messages
 }
 
-/// Rows of paths lie where increments end, and those of steps that adapt where these do: nothing that two runs share.
+/// Refuses stages whose rows differ from run to run: paths, and adaptive steps without an output
+/// interval.
 pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
     for stage in &deck.stages {
         let message = match stage.body {
-            StageBody::Path { .. } => "error bars need rows that runs share: paths by arc length have none",
+            StageBody::Path { .. } => "error bars need runs with common rows: paths by arc length have none",
             StageBody::Dynamic { step_tolerance: Some(_), .. } if deck.output.interval.is_none() => {
-                "error bars need rows that runs share: steps adapt, so name instants by [output] interval"
+                "error bars need runs with common rows: steps adapt, so give [output] interval"
             }
-            _ => continue,
+            StageBody::Static { .. }
+            | StageBody::Dynamic { .. }
+            | StageBody::Modal { .. }
+            | StageBody::Buckling { .. } => continue,
         };
         return Err(Diagnostic::error(message, stage.span.clone()));
     }
     Ok(())
 }
 
-impl Beside for ErrorBars {
+impl SideColumns for ErrorBars {
     fn names(&self, columns: &[String]) -> Vec<String> {
         columns.iter().map(|column| format!("{column}.err")).collect()
     }
@@ -211,7 +232,7 @@ impl Beside for ErrorBars {
     fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool {
         let mut known = true;
         for (companion, largest) in self.companions.iter_mut().zip(&mut self.largest) {
-            let there = match companion.outcome.presence(companion.next, stage, clock) {
+            let there = match companion.outcome.presence(companion.next, StageClock { stage, clock }) {
                 Presence::Row(there) => there,
                 Presence::Between => {
                     known = false;

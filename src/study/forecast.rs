@@ -1,36 +1,39 @@
-//! How long a run will take, from its first moments on this machine.
+//! Predicts the duration of a run from its first moments on this machine.
 
 use crate::scene::Scene;
-use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, StageWork};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot};
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-/// What steps, levels, modes and critical loads take, in iterations, where none were seen.
-const ITERATIONS_OF_A_LEVEL: f64 = 6.0;
-const ITERATIONS_OF_A_STEP: f64 = 3.0;
-const ITERATIONS_OF_A_MODE: f64 = 10.0;
-const ITERATIONS_OF_A_CRITICAL_LOAD: f64 = 60.0;
-
-/// What is known of a run before it.
+/// The prediction for a run.
 pub struct Forecast {
     /// Wall-clock seconds of the whole run
     pub seconds: f64,
-    /// Seconds that it was watched
+    /// Wall-clock seconds of the trial run
     pub watched: f64,
-    /// How it ended within these, if it did
+    /// The end of the trial run, if it came to one
     pub ended: Option<Result<(), Failure>>,
-    /// Whether a state had been computed by then
+    /// True if the trial run did any iteration
     pub computed: bool,
-    /// Where it was then
+    /// The last moment of the trial run
     pub at: Moment,
 }
 
-/// Watches a run until the patience is over, or it ends, and tells how long all of it will take: a stage under way goes on as
-/// in the later half of what was seen of it, later ones take so many iterations as are usual.
-pub fn forecast(scene: &Scene, patience: Duration) -> Forecast {
+/// Runs a scene for a limited time and predicts the duration of the whole run: the running stage
+/// continues at the pace of the later half of its attempts so far, and later stages take the usual
+/// numbers of iterations.
+pub fn forecast(scene: &Scene, limit: Duration) -> Forecast {
     let at = Moment { stage: 1, time: 0.0, load: 0.0 };
-    let (begun, seen) = (Instant::now(), Vec::new());
-    let mut watch = Watch { scene, begun, patience, seen, at, under_way: 0.0, watched: None, row: String::new() };
+    let mut watch = Watch {
+        scene,
+        begun: Instant::now(),
+        limit,
+        seen: Vec::new(),
+        at,
+        under_way: 0.0,
+        until: None,
+        row: String::new(),
+    };
     let (result, counters) = Run::new(scene.plan.clone(), &mut watch).finish();
     let watched = watch.begun.elapsed().as_secs_f64();
     let gave_up = matches!(result, Err(Failure::Interrupted { .. }));
@@ -39,40 +42,53 @@ pub fn forecast(scene: &Scene, patience: Duration) -> Forecast {
     Forecast { seconds: watched + left, watched, ended: (!gave_up).then_some(result), computed, at: watch.at }
 }
 
-/// An attempt at a step or level begins.
+/// The beginning of an attempt at a step or level.
 struct Attempt {
-    /// Seconds from the start of the run
+    /// Wall-clock seconds from the start of the run
     elapsed: f64,
-    /// Stage, from 0
+    /// The stage, from 0
     stage: usize,
-    /// How much of the stage lies behind, from 0 to 1
+    /// The finished part of the stage, from 0 to 1
     done: f64,
 }
 
+/// Observer of the trial run.
 struct Watch<'a> {
     scene: &'a Scene,
     begun: Instant,
-    patience: Duration,
+    limit: Duration,
     seen: Vec<Attempt>,
     at: Moment,
-    /// How much of the stage will lie behind after the attempt under way
+    /// The part of the stage that will be finished after the present attempt
     under_way: f64,
-    /// What `until` of a stage watches: the stage, the value at its first row, and how far it has come from there to where it ends the stage
-    watched: Option<(usize, f64, f64)>,
+    /// The progress of the stage towards the end that `until` defines
+    until: Option<UntilProgress>,
     row: String,
 }
 
+/// The progress of a stage towards the bound of its `until`.
+#[derive(Clone, Copy)]
+struct UntilProgress {
+    /// The stage, from 0
+    stage: usize,
+    /// The watched value at its first row
+    first: f64,
+    /// The part of the way from there to the bound, from 0 to 1
+    done: f64,
+}
+
 impl Watch<'_> {
-    /// Seconds from now to the end.
+    /// Predicted seconds from now to the end.
     fn left(&self, watched: f64, counters: &Counters) -> f64 {
         let Some(last) = self.seen.last() else { return 0.0 };
         let of_stage: Vec<&Attempt> = self.seen.iter().filter(|attempt| attempt.stage == last.stage).collect();
-        let (first, middle) = (of_stage[0], of_stage[of_stage.len() / 2]);
-        // What comes before the first attempt is done once.
+        let first = of_stage[0];
+        let middle = of_stage[of_stage.len() / 2];
+        // The preparation before the first attempt is not repeated.
         let an_iteration = (watched - self.seen[0].elapsed) / counters.work.iterations.max(1) as f64;
         let pace = |from: &Attempt| (last.elapsed - from.elapsed) / (last.done - from.done);
-        // Searches for critical loads begin slowly and end fast.
-        let searches = matches!(self.scene.plan.stages[last.stage].work, StageWork::Buckling { .. });
+        // Searches for critical loads are slow at first and fast at the end.
+        let searches = self.scene.plan.stages[last.stage].work.speeds_up();
         let from = if searches { [first, middle] } else { [middle, first] };
         let of_this = from.into_iter().map(pace).find(|pace| pace.is_finite() && *pace > 0.0);
         let of_this = of_this.unwrap_or(an_iteration * self.iterations(last.stage));
@@ -84,28 +100,22 @@ impl Watch<'_> {
         let stage = at.stage - 1;
         let Some(until) = &self.scene.plan.stages[stage].until else { return };
         let value = (until.column)(at);
-        let first = self.watched.filter(|(watched, ..)| *watched == stage).map_or(value, |(_, first, _)| first);
-        let come = |bound: f64| if bound == first { 0.0 } else { ((value - first) / (bound - first)).clamp(0.0, 1.0) };
-        let come = [until.below, until.above].into_iter().flatten().map(come).fold(0.0, f64::max);
-        self.watched = Some((stage, first, come));
+        let first = self.until.filter(|until| until.stage == stage).map_or(value, |until| until.first);
+        let part = |bound: f64| if bound == first { 0.0 } else { ((value - first) / (bound - first)).clamp(0.0, 1.0) };
+        let done = [until.below, until.above].into_iter().flatten().map(part).fold(0.0, f64::max);
+        self.until = Some(UntilProgress { stage, first, done });
     }
 
-    /// Those that a stage usually takes.
+    /// The usual number of iterations of a stage.
     fn iterations(&self, stage: usize) -> f64 {
-        let end = |work: &StageWork| if let StageWork::Dynamic { end, .. } = work { Some(*end) } else { None };
-        let start = || self.scene.plan.stages[..stage].iter().rev().find_map(|s| end(&s.work)).unwrap_or(0.0);
-        match self.scene.plan.stages[stage].work {
-            StageWork::Static { steps, .. } => steps as f64 * ITERATIONS_OF_A_LEVEL,
-            StageWork::Path { max_steps, .. } => max_steps as f64 * ITERATIONS_OF_A_LEVEL,
-            StageWork::Dynamic { end, step, .. } => (end - start()) / step * ITERATIONS_OF_A_STEP,
-            StageWork::Modal { modes } => modes as f64 * ITERATIONS_OF_A_MODE,
-            StageWork::Buckling { modes } => modes as f64 * ITERATIONS_OF_A_CRITICAL_LOAD,
-        }
+        let before = self.scene.plan.stages[..stage].iter().rev();
+        let start = before.filter_map(|stage| stage.work.end()).next().unwrap_or(0.0);
+        self.scene.plan.stages[stage].work.usual_iterations(start)
     }
 }
 
 impl Observer for Watch<'_> {
-    /// Writes the row as a run would, but to nowhere.
+    /// Formats the row as a run would, without writing it.
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
         let mut values = Vec::new();
         self.scene.probes.iter().for_each(|probe| probe.read(at, &mut values));
@@ -122,11 +132,12 @@ impl Observer for Watch<'_> {
         let stages = self.scene.plan.stages.len() as f64;
         let stage = at.stage - 1;
         self.at = at;
-        let come = self.watched.filter(|(watched, ..)| *watched == stage).map_or(0.0, |(.., come)| come);
+        let until = self.until.filter(|until| until.stage == stage).map_or(0.0, |until| until.done);
         let begins = self.seen.last().is_none_or(|last| last.stage != stage);
-        let (tried, next) = (self.under_way, done * stages - stage as f64);
+        let tried = self.under_way;
+        let next = done * stages - stage as f64;
         let before = self.seen.last().map_or(0.0, |last| last.done);
-        // An attempt that is followed by one that goes less far has failed.
+        // An attempt has failed if the next one ends at an earlier point.
         let behind = if begins {
             0.0
         } else if next > tried {
@@ -135,10 +146,10 @@ impl Observer for Watch<'_> {
             before
         };
         self.under_way = next;
-        // At least one attempt is seen to its end.
+        // At least one attempt is timed completely.
         let is_over =
-            self.seen.first().is_some_and(|first| elapsed.as_secs_f64() - first.elapsed > self.patience.as_secs_f64());
-        self.seen.push(Attempt { elapsed: elapsed.as_secs_f64(), stage, done: behind.max(come) });
+            self.seen.first().is_some_and(|first| elapsed.as_secs_f64() - first.elapsed > self.limit.as_secs_f64());
+        self.seen.push(Attempt { elapsed: elapsed.as_secs_f64(), stage, done: behind.max(until) });
         if is_over { Err(Failure::Interrupted { at, signal: 0 }) } else { Ok(()) }
     }
 }

@@ -1,18 +1,22 @@
-//! What is done with whole runs.
+//! Studies: whole runs of a scene and its variants.
 
-pub mod ablation;
 pub mod accuracy;
+mod built;
+mod change;
 mod compare;
 pub mod cost;
-mod crowd;
+pub mod effects;
+mod error;
 pub mod error_bars;
 pub mod forecast;
 mod outcome;
+mod parallel;
 mod scale;
 pub mod sweep;
-mod variant;
 mod verify;
 
-pub use compare::{Comparison, compare};
+pub use change::Change;
+pub use compare::{ComparedHistories, Comparison, compare};
+pub use error::{ComparisonError, StudyError, SweepError};
 pub use outcome::Outcome;
 pub use verify::{Judgement, Recorder, expected_failure, expected_values, judge};

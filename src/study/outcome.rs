@@ -1,47 +1,56 @@
-//! A run of a scene: all its outputs, and what they took.
+//! A run of a scene with all its outputs.
 
 use crate::deck::{Diagnostic, Spanned, is_named, nearest};
 use crate::output::{HistoryReader, ModesWriter};
 use crate::scene::Scene;
 use crate::study::Recorder;
-use beamsim_core::model::StageKind;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Moment, Observer, Run, Snapshot, Stage, StageWork};
+use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, Stage, StageResult};
 use std::time::Instant;
 
-/// The outputs of a run, and what it took.
+/// The clock of a row in its stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::study) struct StageClock {
+    /// The stage, from 1
+    pub stage: usize,
+    /// The time, or in static stages the load factor
+    pub clock: f64,
+}
+
+/// The outputs of a run, and the work it took.
 #[derive(Clone)]
 pub struct Outcome {
-    /// How it ended
+    /// Success, or why it failed
     pub ended: Result<(), Failure>,
-    /// For each stage whether its clock is the time
+    /// For each stage: true if its clock is the time
     dynamic: Vec<bool>,
-    /// When each row was
+    /// The moment of each row
     moments: Vec<Moment>,
-    /// Row by row
+    /// The columns of the history, row by row
     pub(in crate::study) rows: Vec<Vec<f64>>,
-    /// Modes and critical loads as they were found
+    /// Modes and critical loads, for their files
     pub found: ModesWriter,
-    /// Modes and critical loads, by the columns behind those of the rows
+    /// Modes and critical loads, for the columns after those of the history
     pub(in crate::study) modes: Vec<f64>,
-    /// Expected numbers, where they were asked for
+    /// The values of expectations, where a recorder was given
     pub(in crate::study) expected: Vec<f64>,
-    /// Steps and levels tried
+    /// Attempts at steps and levels
     pub(in crate::study) attempts: u64,
-    /// Work done
+    /// The work it took
     pub counters: Counters,
     /// Wall-clock seconds
     pub seconds: f64,
 }
 
 impl Outcome {
-    /// Runs a scene; more than `most_attempts` at steps end it with a failure. With a recorder what is expected is looked at too.
+    /// Runs a scene. It fails after more than `most_attempts` attempts at steps and levels. A
+    /// recorder follows the expectations of the deck.
     pub(in crate::study) fn of(
         scene: &Scene,
         recorder: Option<Recorder>,
         most_attempts: u64,
         interrupted: &dyn Fn() -> Option<i32>,
     ) -> Self {
-        let mut columns = Columns {
+        let mut collector = OutputCollector {
             scene,
             recorder,
             moments: Vec::new(),
@@ -53,9 +62,9 @@ impl Outcome {
             interrupted,
         };
         let start = Instant::now();
-        let (ended, counters) = Run::new(scene.plan.clone(), &mut columns).finish();
+        let (ended, counters) = Run::new(scene.plan.clone(), &mut collector).finish();
         let seconds = start.elapsed().as_secs_f64();
-        let Columns { recorder, moments, rows, found, modes, attempts, .. } = columns;
+        let OutputCollector { recorder, moments, rows, found, modes, attempts, .. } = collector;
         let expected = recorder.map_or(Vec::new(), |recorder| recorder.values());
         let dynamic = are_dynamic(scene);
         Self { ended, dynamic, moments, rows, found, modes, expected, attempts, counters, seconds }
@@ -66,17 +75,17 @@ impl Outcome {
         self.moments.iter().zip(&self.rows).map(|(&at, row)| (at, &row[..]))
     }
 
-    /// The stage and clock of a row: the time, or in static stages the load factor.
-    pub(in crate::study) fn clock(&self, row: usize) -> (usize, f64) {
+    /// The clock of a row.
+    pub(in crate::study) fn clock(&self, row: usize) -> StageClock {
         self.clock_at(&self.moments[row])
     }
 
-    fn clock_at(&self, &Moment { stage, time, load }: &Moment) -> (usize, f64) {
-        (stage, if self.is_dynamic(stage) { time } else { load })
+    fn clock_at(&self, &Moment { stage, time, load }: &Moment) -> StageClock {
+        StageClock { stage, clock: if self.is_dynamic(stage) { time } else { load } }
     }
 
-    /// Those of all rows.
-    pub(in crate::study) fn clocks(&self) -> impl Iterator<Item = (usize, f64)> {
+    /// The clocks of all rows.
+    pub(in crate::study) fn clocks(&self) -> impl Iterator<Item = StageClock> {
         self.moments.iter().map(|at| self.clock_at(at))
     }
 
@@ -84,46 +93,47 @@ impl Outcome {
         self.dynamic.get(stage.wrapping_sub(1)) == Some(&true)
     }
 
-    /// How many numbers it holds, with clocks and lists.
+    /// Its size in numbers, with clocks and lists.
     pub(in crate::study) fn size(&self) -> usize {
         self.rows.len() * (12 + self.rows.first().map_or(0, Vec::len))
     }
 }
 
-/// Instants that lie closer, relative to their size, are the same.
+/// Clocks that differ relatively by less than this are equal.
 const SAME: f64 = 1e-9;
 
+/// The absolute tolerance of a clock.
 fn slack(clock: f64) -> f64 {
     SAME * clock.abs().max(SAME)
 }
 
-/// What a run has at an instant of a stage.
+/// The rows of a run at an instant of a stage.
 pub(in crate::study) enum Presence {
-    /// The row with this number
+    /// A row at the instant, by its number
     Row(usize),
-    /// No row, but later ones
+    /// No row at the instant, but later ones
     Between,
-    /// The stage is over
+    /// The stage ended before the instant
     Over,
 }
 
 impl Outcome {
-    /// The number of the row of a stage (from 1) and clock, not before row `from`.
-    pub(in crate::study) fn row_at(&self, from: usize, stage: usize, clock: f64) -> Option<usize> {
-        let hit = |at: &Moment| at.stage == stage && (self.clock_at(at).1 - clock).abs() <= slack(clock);
+    /// The number of the row at a clock, not before row `from`.
+    pub(in crate::study) fn row_at(&self, from: usize, StageClock { stage, clock }: StageClock) -> Option<usize> {
+        let hit = |at: &Moment| at.stage == stage && (self.clock_at(at).clock - clock).abs() <= slack(clock);
         self.moments[from..].iter().position(hit).map(|after| from + after)
     }
 
-    /// What there is of a stage (from 1) at a clock, not before row `from`.
-    pub(in crate::study) fn presence(&self, from: usize, stage: usize, clock: f64) -> Presence {
+    /// The rows at a clock, not before row `from`.
+    pub(in crate::study) fn presence(&self, from: usize, StageClock { stage, clock }: StageClock) -> Presence {
         let first = from + self.moments[from..].partition_point(|at| at.stage < stage);
         let end = first + self.moments[first..].partition_point(|at| at.stage == stage);
-        // Times only rise; load factors may fall on a detour.
+        // Times only rise, while load factors may fall along a path.
         let rises = self.is_dynamic(stage);
-        let before = |at: &Moment| rises && self.clock_at(at).1 < clock - slack(clock);
+        let before = |at: &Moment| rises && self.clock_at(at).clock < clock - slack(clock);
         let begin = first + self.moments[first..end].partition_point(before);
         let last = if rises { end.min(begin + 1) } else { end };
-        let here = |at: &Moment| (self.clock_at(at).1 - clock).abs() <= slack(clock);
+        let here = |at: &Moment| (self.clock_at(at).clock - clock).abs() <= slack(clock);
         match self.moments[begin..last].iter().position(here) {
             Some(after) => Presence::Row(begin + after),
             None if begin < end => Presence::Between,
@@ -131,7 +141,7 @@ impl Outcome {
         }
     }
 
-    /// A stored history as the outcome of a run: columns of the scene that it lacks are NaN.
+    /// A stored history as the outcome of a run. Columns of the scene that it lacks are NaN.
     pub(in crate::study) fn of_table(scene: &Scene, table: &HistoryReader) -> Self {
         let find = |name: &str| table.names.iter().position(|known| known == name);
         let places: Vec<Option<usize>> = columns(scene).iter().map(|name| find(name)).collect();
@@ -157,12 +167,13 @@ impl Outcome {
     }
 }
 
-/// For each stage whether its clock is the time.
+/// For each stage: true if its clock is the time.
 fn are_dynamic(scene: &Scene) -> Vec<bool> {
-    scene.plan.stages.iter().map(|stage| stage.work.kind() == StageKind::Dynamic).collect()
+    scene.plan.stages.iter().map(|stage| stage.work.kind().advances_time()).collect()
 }
 
-/// The names of all outputs: the columns of the history, then modes and critical loads, stage by stage.
+/// The names of all outputs: the columns of the history, then modes and critical loads, stage by
+/// stage.
 pub(in crate::study) fn columns(scene: &Scene) -> Vec<String> {
     let mut columns: Vec<String> = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
     columns.extend(scene.plan.stages.iter().enumerate().flat_map(|(k, stage)| columns_of(k + 1, stage)));
@@ -180,23 +191,18 @@ pub(in crate::study) fn find_column(columns: &[String], name: &Spanned<String>) 
     })
 }
 
-/// How many of these are columns of the history.
+/// The number of columns of the history.
 pub(in crate::study) fn columns_of_history(scene: &Scene) -> usize {
     scene.probes.iter().map(|probe| probe.names.len()).sum()
 }
 
-/// Those of a stage, which has this number.
+/// The columns of the modes or critical loads of a stage (from 1).
 fn columns_of(number: usize, stage: &Stage) -> Vec<String> {
-    let mode = |mode: usize| ["omega", "growth"].map(|quantity| format!("stage{number}.mode{mode}.{quantity}"));
-    match stage.work {
-        StageWork::Modal { modes } => (1..=modes).flat_map(mode).collect(),
-        StageWork::Buckling { modes } => (1..=modes).map(|mode| format!("stage{number}.buckling{mode}.load")).collect(),
-        _ => Vec::new(),
-    }
+    stage.work.results().into_iter().map(|result| format!("stage{number}.{result}")).collect()
 }
 
-/// Collects the columns of every row.
-struct Columns<'a> {
+/// Observer that collects all outputs.
+struct OutputCollector<'a> {
     scene: &'a Scene,
     recorder: Option<Recorder>,
     moments: Vec<Moment>,
@@ -208,15 +214,15 @@ struct Columns<'a> {
     interrupted: &'a dyn Fn() -> Option<i32>,
 }
 
-impl Columns<'_> {
-    /// As many numbers as a stage (from 1) has columns, NaN for modes that it did not find.
+impl OutputCollector<'_> {
+    /// Adds a number for each mode column of a stage (from 1), NaN for modes that were not found.
     fn take_modes(&mut self, stage: usize, mut found: Vec<f64>) {
         found.resize(columns_of(stage, &self.scene.plan.stages[stage - 1]).len(), f64::NAN);
         self.modes.extend(found);
     }
 }
 
-impl Observer for Columns<'_> {
+impl Observer for OutputCollector<'_> {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
         let mut row = Vec::new();
         self.scene.probes.iter().for_each(|probe| probe.read(at, &mut row));
@@ -226,18 +232,10 @@ impl Observer for Columns<'_> {
         Ok(())
     }
 
-    fn modes(&mut self, stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.modes(modes));
-        self.found.push_modes(stage, modes);
-        let found = modes.iter().flat_map(|mode| [mode.omega, mode.growth]);
-        self.take_modes(stage, found.collect());
-        Ok(())
-    }
-
-    fn buckling(&mut self, stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.recorder.iter_mut().for_each(|recorder| recorder.buckling(loads));
-        self.found.push_loads(stage, loads);
-        self.take_modes(stage, loads.iter().map(|critical| critical.load).collect());
+    fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
+        self.found.push(stage, result);
+        self.take_modes(stage, result.values());
         Ok(())
     }
 
@@ -246,7 +244,7 @@ impl Observer for Columns<'_> {
         match (self.interrupted)() {
             Some(signal) => Err(Failure::Interrupted { at, signal }),
             None if self.attempts > self.most_attempts => Err(Failure::Limit(format!(
-                "given up at {at} after {} attempts at steps, more than the whole scene should take",
+                "given up at {at} after {} attempts at steps, far more than the scene should need",
                 self.most_attempts
             ))),
             None => Ok(()),

@@ -1,53 +1,55 @@
-//! Expectations held against a run.
+//! Compares the results of a run with the expectations of its deck.
 
-use crate::deck::{Instant, Reduce};
-use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, Scene};
+use crate::deck::{Instant, Reduce, Reduction, Target, Words};
+use crate::scene::{Bounds, Expectation, ExpectationKind, ModeQuantity, RunCounter, Scene};
 use beamsim_core::probe::Probe;
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Mode, Snapshot, Warning};
+use beamsim_core::run::{Counters, Failure, Mode, Snapshot, StageResult, Warning};
+use serde::Serialize;
 
-/// Follows the expected columns through every converged state.
+/// Records the expected columns of every converged state.
 pub struct Recorder {
     expectations: Vec<Expectation>,
-    rows: Vec<Vec<Row>>,
-    /// What is read in each state; several expectations may be about one quantity
+    rows: Vec<Vec<ExpectedRow>>,
+    /// The probes that are read in each state; several expectations may share one
     probes: Vec<Probe>,
-    /// Of each expectation that has a column, its place among the columns of all probes
+    /// For each expectation of a column, the number of that column among those of all probes
     places: Vec<Option<usize>>,
     scratch: Vec<f64>,
-    /// Of the last stages that had some
+    /// Modes and critical loads of the last stages that had some
     modes: Vec<Mode>,
     critical: Vec<f64>,
-    /// About the deck
+    /// Warnings about the deck
     warnings: Vec<Warning>,
 }
 
+/// The value of a column in one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Row {
+struct ExpectedRow {
     stage: usize,
     time: f64,
     load: f64,
     value: f64,
 }
 
-/// What became of an expectation.
-#[derive(Clone, Debug, PartialEq)]
+/// The judgement of an expectation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Judgement {
-    /// Column, counter, failure or warnings, and where it was looked at
+    /// The column with its rows, the counter, the failure or the warnings
     pub what: String,
-    /// What was expected
+    /// The expected value
     pub expected: String,
-    /// What came
+    /// The value of the run
     pub came: String,
-    /// The departure from the expected value, where there is one
+    /// The difference from the expected value, where there is one
     pub error: Option<f64>,
-    /// The departure over the allowed one, where there is one
+    /// The difference over the allowed one, where there is one
     pub ratio: Option<f64>,
-    /// Whether it holds
+    /// True if the expectation holds
     pub holds: bool,
 }
 
 impl Recorder {
-    /// For the expectations of a scene.
+    /// A recorder for the expectations of a scene.
     pub fn new(scene: &Scene) -> Self {
         let expectations = scene.expectations.clone();
         let rows = vec![Vec::new(); expectations.len()];
@@ -65,14 +67,12 @@ impl Recorder {
         }
     }
 
-    /// Takes the modes of a stage.
-    pub fn modes(&mut self, modes: &[Mode]) {
-        self.modes = modes.to_vec();
-    }
-
-    /// Takes the critical loads of a stage.
-    pub fn buckling(&mut self, loads: &[CriticalLoad]) {
-        self.critical = loads.iter().map(|critical| critical.load).collect();
+    /// Takes the result of an analysis.
+    pub fn found(&mut self, result: &StageResult) {
+        match result {
+            StageResult::Modes(modes) => self.modes.clone_from(modes),
+            StageResult::CriticalLoads(loads) => self.critical = loads.iter().map(|critical| critical.load).collect(),
+        }
     }
 
     fn mode(&self, quantity: ModeQuantity, number: usize) -> Option<f64> {
@@ -83,7 +83,7 @@ impl Recorder {
         }
     }
 
-    /// What came of each expectation that has a value, NaN where it was not reached; in the order of [`expected_values`].
+    /// The values of the expectations of [`expected_values`], NaN where they were not reached.
     pub fn values(&self) -> Vec<f64> {
         let came = self.expectations.iter().zip(&self.rows).filter_map(|(expectation, rows)| match &expectation.kind {
             ExpectationKind::Column { reduce: how, bounds, .. } => bounds.value.map(|_| reduce(rows, *how)),
@@ -102,7 +102,7 @@ impl Recorder {
         for probe in &self.probes {
             probe.read(at, &mut self.scratch);
         }
-        let moment = |value| Row { stage: at.stage, time: at.state.time, load: at.state.load, value };
+        let moment = |value| ExpectedRow { stage: at.stage, time: at.state.time, load: at.state.load, value };
         for ((place, rows), expectation) in self.places.iter().zip(&mut self.rows).zip(&self.expectations) {
             if matches!(expectation.kind, ExpectationKind::Column { reduce: Reduce::At(Instant::End), .. }) {
                 rows.clear();
@@ -112,7 +112,8 @@ impl Recorder {
     }
 }
 
-/// The place of an expectation's column among those of all probes, to which its own is added where it is not there.
+/// The number of an expectation's column among those of all probes. Its probe is added if it is
+/// missing.
 fn place(expectation: &Expectation, probes: &mut Vec<Probe>) -> Option<usize> {
     let ExpectationKind::Column { probe, component, .. } = &expectation.kind else { return None };
     let known = probes.iter().position(|known| known.names == probe.names);
@@ -123,13 +124,13 @@ fn place(expectation: &Expectation, probes: &mut Vec<Probe>) -> Option<usize> {
     Some(probes[..number].iter().map(|before| before.names.len()).sum::<usize>() + component)
 }
 
-/// What is expected of a run, and the values: of those expectations that name one, but for counters.
+/// The names and values of the expectations that have a value, counters excepted.
 pub fn expected_values(expectations: &[Expectation]) -> Vec<(String, f64)> {
     let expected = expectations.iter().filter_map(|expectation| match &expectation.kind {
         ExpectationKind::Column { reduce: how, bounds, .. } => {
-            Some((format!("{} {}", expectation.name, describe(how)), bounds.value?.0))
+            Some((format!("{} {}", expectation.name, describe(how)), bounds.value?.value))
         }
-        ExpectationKind::Mode { bounds, .. } => Some((expectation.name.clone(), bounds.value?.0)),
+        ExpectationKind::Mode { bounds, .. } => Some((expectation.name.clone(), bounds.value?.value)),
         ExpectationKind::Counter { .. }
         | ExpectationKind::Fails
         | ExpectationKind::Warns(_)
@@ -138,7 +139,7 @@ pub fn expected_values(expectations: &[Expectation]) -> Vec<(String, f64)> {
     expected.collect()
 }
 
-/// Judges every expectation; a failure that nobody expected is judged too.
+/// Judges every expectation, and a failure that is not expected.
 pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Counters) -> Vec<Judgement> {
     let came = result.as_ref().map_or_else(Failure::name, |()| "finished");
     let mut judgements: Vec<Judgement> = Vec::new();
@@ -163,8 +164,8 @@ pub fn judge(recorder: &Recorder, result: &Result<(), Failure>, counters: &Count
             ExpectationKind::Quiet => {
                 expected_warning(expectation, &warnings, !warnings.iter().any(|warning| warning.is_doubt()))
             }
-            ExpectationKind::Counter { name, bounds } => {
-                hold(expectation.name.clone(), bounds, Some(counter(counters, name) as f64))
+            ExpectationKind::Counter { counter: of, bounds } => {
+                hold(expectation.name.clone(), bounds, Some(counter(counters, *of) as f64))
             }
             ExpectationKind::Mode { quantity, number, bounds } => {
                 hold(expectation.name.clone(), bounds, recorder.mode(*quantity, *number))
@@ -189,7 +190,7 @@ pub fn expected_failure(expected: &str, came: &str) -> Judgement {
     }
 }
 
-/// The judgement of expected warnings, or of none.
+/// The judgement of expected warnings, or of their absence.
 fn expected_warning(expectation: &Expectation, given: &[&Warning], holds: bool) -> Judgement {
     let mut names: Vec<&str> = given.iter().map(|warning| warning.kind.name()).collect();
     names.sort_unstable();
@@ -204,13 +205,13 @@ fn expected_warning(expectation: &Expectation, given: &[&Warning], holds: bool) 
     }
 }
 
-fn counter(counters: &Counters, name: &str) -> u64 {
-    match name {
-        "steps" => counters.steps,
-        "iterations" => counters.work.iterations,
-        "cutbacks" => counters.cutbacks,
-        "chart_switches" => counters.work.chart_switches,
-        _ => counters.mixed_elements,
+fn counter(counters: &Counters, of: RunCounter) -> u64 {
+    match of {
+        RunCounter::Steps => counters.steps,
+        RunCounter::Iterations => counters.work.iterations,
+        RunCounter::Cutbacks => counters.cutbacks,
+        RunCounter::ChartSwitches => counters.work.chart_switches,
+        RunCounter::MixedElements => counters.mixed_elements,
     }
 }
 
@@ -219,15 +220,17 @@ fn describe(reduce: &Reduce) -> String {
         Reduce::At(Instant::End) => "at the end".into(),
         Reduce::At(Instant::Time(time)) => format!("at time {time}"),
         Reduce::At(Instant::Load(load)) => format!("at load {load}"),
-        how => how.word().into(),
+        Reduce::Over(reduction) => reduction.word().into(),
     }
 }
 
 fn hold(what: String, bounds: &Bounds, came: Option<f64>) -> Judgement {
     let mut expected = Vec::new();
-    let (mut holds, mut error, mut ratio) = (true, None, None);
+    let mut holds = true;
+    let mut error = None;
+    let mut ratio = None;
     let value = came.unwrap_or(f64::NAN);
-    if let Some((wanted, atol, rtol)) = bounds.value {
+    if let Some(Target { value: wanted, atol, rtol }) = bounds.value {
         expected.push(format!("{wanted}"));
         let departure = (value - wanted).abs();
         let allowed = atol + rtol * wanted.abs();
@@ -247,26 +250,26 @@ fn hold(what: String, bounds: &Bounds, came: Option<f64>) -> Judgement {
     Judgement { what, expected: expected.join(" and "), came, error, ratio, holds }
 }
 
-fn reduce(rows: &[Row], how: Reduce) -> Option<f64> {
+fn reduce(rows: &[ExpectedRow], how: Reduce) -> Option<f64> {
     let first = rows.first()?.value;
-    // A value that is not a number must not be passed over.
+    // The result is NaN if any value is.
     let fold = |pick: fn(f64, f64) -> f64, of: &dyn Fn(f64) -> f64| {
         rows.iter().map(|row| of(row.value)).reduce(|a, b| if a.is_nan() || b.is_nan() { f64::NAN } else { pick(a, b) })
     };
     match how {
-        Reduce::Max => fold(f64::max, &|v| v),
-        Reduce::Min => fold(f64::min, &|v| v),
-        Reduce::AbsMax => fold(f64::max, &f64::abs),
-        Reduce::Drift => fold(f64::max, &|v| (v - first).abs()),
-        Reduce::Mean => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
+        Reduce::Over(Reduction::Max) => fold(f64::max, &|v| v),
+        Reduce::Over(Reduction::Min) => fold(f64::min, &|v| v),
+        Reduce::Over(Reduction::AbsMax) => fold(f64::max, &f64::abs),
+        Reduce::Over(Reduction::Drift) => fold(f64::max, &|v| (v - first).abs()),
+        Reduce::Over(Reduction::Mean) => Some(rows.iter().map(|row| row.value).sum::<f64>() / rows.len() as f64),
         Reduce::At(Instant::End) => rows.last().map(|row| row.value),
         Reduce::At(Instant::Time(time)) => at_time(rows, time),
         Reduce::At(Instant::Load(load)) => at_load(rows, load),
     }
 }
 
-/// The last row at that time, or between the two rows around it.
-fn at_time(rows: &[Row], time: f64) -> Option<f64> {
+/// The value at a time: of the last row there, or interpolated.
+fn at_time(rows: &[ExpectedRow], time: f64) -> Option<f64> {
     let slack = 1e-12 * time.abs();
     let before = rows.iter().rev().find(|row| row.time <= time + slack)?;
     if (before.time - time).abs() <= slack {
@@ -276,20 +279,20 @@ fn at_time(rows: &[Row], time: f64) -> Option<f64> {
     Some(between(time, (before.time, before.value), (after.time, after.value)))
 }
 
-/// The first crossing of a load factor within a stage, from below or above.
-fn at_load(rows: &[Row], load: f64) -> Option<f64> {
+/// The value where the load factor first crosses a value within a stage, from below or above.
+fn at_load(rows: &[ExpectedRow], load: f64) -> Option<f64> {
     let slack = 1e-12 * load.abs().max(1.0);
-    let hit = |row: &Row| (row.load - load).abs() <= slack;
+    let hit = |row: &ExpectedRow| (row.load - load).abs() <= slack;
     let first = rows.first().filter(|row| hit(row)).map(|row| row.value);
-    let crossing = |pair: &[Row]| {
+    let crossing = |pair: &[ExpectedRow]| {
         let [before, after] = [pair[0], pair[1]];
         let crosses = (before.load - load) * (after.load - load) < 0.0;
-        match hit(&after) {
-            true => Some(after.value),
-            false => crosses.then(|| between(load, (before.load, before.value), (after.load, after.value))),
+        if hit(&after) {
+            return Some(after.value);
         }
+        crosses.then(|| between(load, (before.load, before.value), (after.load, after.value)))
     };
-    // From one stage to the next the load factor jumps; what stands at that moment is no crossing.
+    // The jump of the load factor between stages is no crossing.
     let pairs = rows.windows(2).filter(|pair| pair[0].stage == pair[1].stage || hit(&pair[1]));
     first.or_else(|| pairs.into_iter().find_map(crossing))
 }
@@ -302,19 +305,19 @@ fn between(x: f64, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> f64 {
 mod tests {
     use super::*;
 
-    fn rows() -> Vec<Row> {
-        let row = |(time, load, value)| Row { stage: 1, time, load, value };
+    fn rows() -> Vec<ExpectedRow> {
+        let row = |(time, load, value)| ExpectedRow { stage: 1, time, load, value };
         [(0.0, 0.0, 1.0), (0.0, 0.5, 3.0), (0.0, 1.0, 4.0), (1.0, 1.0, -6.0), (3.0, 1.0, 0.0)].map(row).to_vec()
     }
 
     #[test]
     fn rows_are_reduced_as_the_deck_says() {
         let value = |how| reduce(&rows(), how).unwrap();
-        assert_eq!(value(Reduce::Max), 4.0);
-        assert_eq!(value(Reduce::Min), -6.0);
-        assert_eq!(value(Reduce::AbsMax), 6.0);
-        assert_eq!(value(Reduce::Mean), 0.4);
-        assert_eq!(value(Reduce::Drift), 7.0);
+        assert_eq!(value(Reduce::Over(Reduction::Max)), 4.0);
+        assert_eq!(value(Reduce::Over(Reduction::Min)), -6.0);
+        assert_eq!(value(Reduce::Over(Reduction::AbsMax)), 6.0);
+        assert_eq!(value(Reduce::Over(Reduction::Mean)), 0.4);
+        assert_eq!(value(Reduce::Over(Reduction::Drift)), 7.0);
         assert_eq!(value(Reduce::At(Instant::End)), 0.0);
     }
 
@@ -332,7 +335,7 @@ mod tests {
 
     #[test]
     fn loads_are_crossed_from_above_too_but_not_between_stages() {
-        let row = |(stage, load, value)| Row { stage, time: 0.0, load, value };
+        let row = |(stage, load, value)| ExpectedRow { stage, time: 0.0, load, value };
         let rows = [(1, 0.0, 1.0), (1, 1.0, 5.0), (2, 0.2, 9.0), (2, -0.2, 7.0)].map(row);
         assert_eq!(at_load(&rows, 0.5), Some(3.0));
         assert_eq!(at_load(&rows, 0.0), Some(1.0));
@@ -342,7 +345,7 @@ mod tests {
 
     #[test]
     fn nan_holds_nothing() {
-        let bounds = Bounds { value: Some((1.0, 10.0, 0.0)), below: None, above: None };
+        let bounds = Bounds { value: Some(Target { value: 1.0, atol: 10.0, rtol: 0.0 }), below: None, above: None };
         assert!(!hold("x".into(), &bounds, Some(f64::NAN)).holds);
         assert!(!hold("x".into(), &bounds, None).holds);
         assert!(hold("x".into(), &bounds, Some(2.0)).holds);

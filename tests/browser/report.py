@@ -179,7 +179,7 @@ return sum;
 """
 
 VALUES_SHOWN = """
-return Object.fromEntries([...document.querySelectorAll("#node-values [data-column]")].map((cell) => [cell.dataset.column, cell.textContent]));
+return [...document.querySelectorAll("#node-values [data-column]")].map((cell) => [cell.dataset.column, cell.textContent, cell.title]);
 """
 
 
@@ -227,7 +227,10 @@ def check_playing(browser):
 def check_scrubbing(browser, names, rows):
     """Asks for a few values of the axis; the row that is shown must be the nearest among the frames."""
     axis = browser.run("return window.report.axis")
-    numbers = [float(row[names.index(axis)]) if axis != "row" else k for k, row in enumerate(rows)]
+    numbers = [float(row[names.index(axis)]) if axis in names else k for k, row in enumerate(rows)]
+    if axis == "stages":
+        # Load factors from 0 to 1, stage after stage.
+        numbers = [float(row[names.index("stage")]) - 1 + float(row[names.index("load")]) for row in rows]
     for share in (0.0, 0.31, 0.5, 0.77, 1.0):
         wanted = numbers[0] + share * (numbers[-1] - numbers[0])
         browser.run("window.report.seek(arguments[0])", wanted)
@@ -244,7 +247,7 @@ def check_scrubbing(browser, names, rows):
 
 
 def check_values(browser, names, rows):
-    """Every node in the list, at the first, a middle and the last frame: equal to the text of the CSV."""
+    """Every node in the list, at the first, a middle and the last frame: five digits of the CSV, and its text on hover."""
     nodes = browser.run("return [...document.querySelectorAll('#node-select option')].map((option) => option.value)")
     frames = browser.run("return window.report.frames")
     compared = 0
@@ -254,12 +257,36 @@ def check_values(browser, names, rows):
         for frame in sorted({0, frames // 3, frames - 1}):
             browser.run("window.report.goToFrame(arguments[0])", frame)
             row = browser.run("return window.report.row")
-            for column, text in browser.run(VALUES_SHOWN).items():
+            for column, text, whole in browser.run(VALUES_SHOWN):
                 stored = rows[row][names.index(column)]
-                if text != stored:
-                    raise AssertionError(f"{column} in row {row}: shown {text}, stored {stored}")
+                if whole != stored or abs(float(text) - float(stored)) > 0.5001e-4 * abs(float(stored)):
+                    raise AssertionError(f"{column} in row {row}: shown {text} ({whole}), stored {stored}")
                 compared += 1
-    check(compared > 0, f"{compared} values shown equal the text of the CSV")
+    check(compared > 0, f"{compared} values shown are those of the CSV")
+    beside = [node for node in nodes if node in ("", "energy", "momentum")]
+    check(not beside, f"the list of nodes holds nodes {beside or ''}".strip())
+
+
+def check_plots(browser):
+    """Displacements of what moves come first; texts of ticks are their values."""
+    plots = browser.run("return window.report.plots")
+    ticks = [tick for plot in plots for tick in plot["ticks"]]
+    wrong = [tick for tick in ticks if float(tick["text"]) != tick["value"]]
+    check(plots and len(ticks) > 3 and not wrong, f"{len(ticks)} ticks stand where their texts say {wrong or ''}".strip())
+    axes = browser.run("return [...document.querySelectorAll('#axis option')].map((option) => option.textContent)")
+    for k in range(len(axes)):
+        choose = "const s = document.querySelector('#axis'); s.value = arguments[0]; s.dispatchEvent(new Event('change')); return window.report.plots"
+        ticks = [tick for plot in browser.run(choose, k) for tick in plot["ticks"]]
+        check(all(float(tick["text"]) == tick["value"] for tick in ticks), f"so they do over {axes[k]}")
+    browser.run(choose, 0)
+    print("ok: plots " + "; ".join(plot["title"] for plot in plots) + f" over {axes[0]}")
+
+
+def check_told(browser, expected):
+    """Titles of plots and of their horizontal axis, as the caller expects them."""
+    plots = browser.run("return window.report.plots")
+    told = [plots[0]["axis"]] + [plot["title"] for plot in plots]
+    check(told == expected, f"titles {told} are {expected}")
 
 
 DISTANCE = """
@@ -334,7 +361,7 @@ if (!frames.checked) frames.click();
 """
 
 
-def check_report(browser, report, history, pictures):
+def check_report(browser, report, history, pictures, titles):
     names, rows = read_history(history)
     browser.screen(1280, 800, 1, False)
     browser.open(report.resolve().as_uri())
@@ -346,6 +373,9 @@ def check_report(browser, report, history, pictures):
         check_scrubbing(browser, names, rows)
         check_values(browser, names, rows)
         check_choosing(browser)
+        check_plots(browser)
+        if titles:
+            check_told(browser, titles)
     if pictures:
         browser.open(report.resolve().as_uri())
         until(lambda: browser.run("return !!window.report"), 120, "the report starts again")
@@ -363,6 +393,7 @@ def main():
     parser.add_argument("report", type=pathlib.Path)
     parser.add_argument("history", type=pathlib.Path)
     parser.add_argument("--pictures", type=pathlib.Path, help="a folder for screenshots")
+    parser.add_argument("--titles", nargs="+", help="expected titles: of the horizontal axis, then of each plot")
     arguments = parser.parse_args()
     chromium, driver = found(BROWSERS), found(["chromedriver"])
     if not chromium or not driver:
@@ -371,7 +402,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="report-browser-", ignore_cleanup_errors=True) as folder:
         browser = Browser(chromium, driver, folder)
         try:
-            check_report(browser, arguments.report, arguments.history, arguments.pictures)
+            check_report(browser, arguments.report, arguments.history, arguments.pictures, arguments.titles)
         except AssertionError as failure:
             print(f"failed: {failure}", file=sys.stderr)
             return 1

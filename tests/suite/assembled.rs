@@ -5,8 +5,9 @@ use crate::random::Random;
 use beamsim::scene;
 use beamsim_core::integrate::{Increments, Method, Scheme, Step};
 use beamsim_core::kernel::Weights;
-use beamsim_core::model::{Assembly, Model, StageKind, charts};
+use beamsim_core::model::{Assembly, Model, Schedule, StageKind, charts};
 use beamsim_core::system::State;
+use std::sync::Arc;
 
 const SECTION: &str = r#"
 [point]
@@ -83,13 +84,14 @@ at = "tip"
 moment = [0.1, 0.3, 0.2]
 "#;
 
-fn scene_of(text: &str) -> (Model, State, Assembly) {
+fn scene_of(text: &str) -> (Arc<Model>, State, Assembly) {
     let (scene, _) = scene::from_text(text).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
-    let mut model = scene.plan.model;
+    let model = scene.plan.model;
     let mut state = model.rest();
-    let dof_map = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
+    let mut schedule = Schedule::new(&model);
+    let dof_map = schedule.begin_stage(&model, 0, StageKind::Dynamic, &state).unwrap();
     let assembly = Assembly::new(&scene.plan.stages[0].context(0), dof_map, &model);
-    model.set_clock(&mut state, 0.3, 1.0);
+    schedule.set_clock(&model, &mut state, 0.3, 1.0);
     (model, state, assembly)
 }
 
@@ -125,11 +127,11 @@ fn tangent_holds(text: &str, incremental: bool, seed: u64) {
         scatter(&assembly, &x, field, 1.0);
     }
     assert!(state.unwrapped.is_empty(), "rotations that no chart has changed are unwrapped as they are");
-    charts::freeze(&mut state, &model.charted.elements);
+    charts::freeze(&mut state, &model.charted(StageKind::Dynamic).elements);
     // Over increments, accelerations and velocities of rotations are functions of the unknown of the step.
     let step = Step { scheme: Scheme::lie_generalized_alpha(0.6), length: 0.8 };
     let combinations = if incremental {
-        let increments = Increments::new(&model, &assembly.system.pattern.dof_map);
+        let increments = Increments::new(&model, StageKind::Dynamic, &assembly.system.pattern.dof_map);
         step.scheme.start(&mut state);
         increments.start(&mut state);
         increments.begin(&mut state, &step, 0.5);

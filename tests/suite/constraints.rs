@@ -3,11 +3,12 @@
 use crate::random::Random;
 use beamsim::scene;
 use beamsim_core::kernel::Weights;
-use beamsim_core::model::{Assembly, Model, SlotKind};
+use beamsim_core::model::{Assembly, Model, Schedule, SlotKind};
 use beamsim_core::solve::{LinearSolver, Tangent};
 use beamsim_core::system::{State, System};
 use beamsim_core::tensor::Vec3;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// The eigenvalues on the space that the constraints leave, of unknowns that are scaled so that they compare.
 fn eigenvalues_between_constraints(system: &System, model: &Model) -> DVector<f64> {
@@ -33,11 +34,12 @@ fn eigenvalues_between_constraints(system: &System, model: &Model) -> DVector<f6
     projected.symmetric_eigenvalues()
 }
 
-fn assembled(deck: &str) -> (Model, Assembly) {
+fn assembled(deck: &str) -> (Arc<Model>, Assembly) {
     let Ok((scene, _)) = scene::from_text(deck) else { panic!("the deck is good: {deck}") };
-    let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+    let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
     let rest = model.rest();
-    let Ok(dof_map) = model.begin_stage(0, stage.kind, &rest) else { panic!("the stage begins") };
+    let mut schedule = Schedule::new(&model);
+    let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &rest) else { panic!("the stage begins") };
     let assembly = Assembly::new(&stage, dof_map, &model);
     (model, assembly)
 }
@@ -56,7 +58,7 @@ fn count(assembly: &mut Assembly, model: &Model, state: &State) -> (Option<usize
 fn negative_pivots_are_negative_eigenvalues_between_constraints() {
     let mut random = Random::new(17);
     let (mut judged, mut unstable) = (0, 0);
-    for kind in ["rigid", "revolute", "universal", "prismatic"] {
+    for kind in ["rigid", "revolute", "universal", "prismatic", "cylindrical"] {
         for unit in [1e-3, 1.0, 1e3] {
             for _ in 0..4 {
                 let (deck, length) = (bars(kind, unit, &mut random), 3.0 * unit);

@@ -1,9 +1,10 @@
 //! The study of what accuracy costs.
 
-use beamsim::deck::{self, Accuracy, Deck, Spanned};
+use beamsim::deck::{self, Accuracy, Deck, SchemeName, Spanned, Words};
 use beamsim::scene::{self, Scene};
+use beamsim::study::StudyError;
 use beamsim::study::accuracy::{Found, reach};
-use beamsim::study::cost::{Against, Expected, Journal, Knob, Options, Pace, Refusal, Run, Study, study};
+use beamsim::study::cost::{Against, CostRun, CostStudy, Expected, Journal, Limit, Pace, StudyOptions, study};
 use beamsim::study::error_bars::error_bars;
 use beamsim_core::run::Failure;
 use std::path::Path;
@@ -21,22 +22,22 @@ fn stopped(
     threads: usize,
     most: usize,
     journal: &mut Journal,
-) -> (Result<Study, Refusal>, usize) {
+) -> (Result<CostStudy, StudyError>, usize) {
     let (deck, scene) = read(text);
     let count = std::sync::atomic::AtomicUsize::new(0);
     let interrupted = || (count.load(std::sync::atomic::Ordering::Relaxed) > most).then_some(2);
     let mut tell = |_: usize, _: usize| {
         count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     };
-    let options = Options { threads, budget: None, interrupted: &interrupted, tell: &mut tell, journal };
+    let options = StudyOptions { threads, budget: None, interrupted: &interrupted, progress: &mut tell, journal };
     let found = study(text, &deck, &scene, against, options);
     (found, count.into_inner())
 }
 
-fn costs(text: &str, against: &Against, threads: usize) -> Study {
+fn costs(text: &str, against: &Against, threads: usize) -> CostStudy {
     match stopped(text, against, threads, usize::MAX, &mut Journal::default()).0 {
         Ok(study) => study,
-        Err(Refusal::Failure(failure)) => panic!("{failure}"),
+        Err(StudyError::Failure(failure)) => panic!("{failure}"),
         Err(_) => panic!("refused"),
     }
 }
@@ -67,7 +68,7 @@ fn errors_against_the_own_reference_are_those_against_the_exact_solution() {
     let exact = costs(&text, &Against::Expectations, 2);
     assert!(own.reference.uncertainty < 1e-8, "{:e}", own.reference.uncertainty);
     for (a, b) in own.runs.iter().zip(&exact.runs) {
-        assert_eq!(a.settings, b.settings);
+        assert_eq!(a.settings(), b.settings());
         assert!((a.error - b.error).abs() <= own.reference.uncertainty + 1e-12, "{} against {}", a.error, b.error);
     }
     assert!(own.runs.iter().any(|run| run.error > 1e-3) && own.runs.iter().any(|run| run.error < 1e-8));
@@ -98,10 +99,10 @@ fn steps_cost_accuracy_of_the_second_order_and_are_told_where_they_limit() {
         assert!((time.observed.unwrap() - 2.0).abs() < 0.4, "{time:?}");
     }
     let frontier = || found.runs.iter().filter(|run| run.frontier);
-    assert!(frontier().any(|run| run.limit == Some(Knob::Step)));
+    assert!(frontier().any(|run| run.limit == Some(Limit::Step)));
     // The cheapest run of all has the longest step, and the most accurate one the shortest.
     let best = frontier().min_by(|a, b| a.error.total_cmp(&b.error)).unwrap();
-    assert_eq!(best.point.pace, Pace::Steps(0.25));
+    assert_eq!(best.variant.pace, Pace::Steps(0.25));
 }
 
 /// What must be the same whenever a study is made.
@@ -113,9 +114,9 @@ struct Exact {
     errors: Vec<u64>,
 }
 
-fn exact(run: &Run) -> Exact {
+fn exact(run: &CostRun) -> Exact {
     Exact {
-        settings: run.settings.clone(),
+        settings: run.settings(),
         status: run.trial.as_ref().map(|t| t.status.clone()),
         counts: run.trial.as_ref().map(|t| [t.steps, t.iterations, t.factorisations]),
         errors: run.errors.iter().map(|e| e.to_bits()).collect(),
@@ -136,15 +137,15 @@ fn errors_and_counters_are_the_same_each_time_and_on_any_number_of_threads() {
 fn the_lines_of_a_run_give_its_error_again() {
     let text = quarter(TIP);
     let found = costs(&text, &Against::Expectations, 2);
-    let frontier: Vec<&Run> = found.runs.iter().filter(|run| run.frontier).collect();
+    let frontier: Vec<&CostRun> = found.runs.iter().filter(|run| run.frontier).collect();
     assert!(frontier.len() > 3);
     for run in frontier {
-        let pasted = deck::apply(&text, &run.settings).unwrap();
-        let (order, word) = (run.point.family.order.unwrap(), run.point.family.interpolation.unwrap().word());
+        let pasted = deck::apply(&text, &run.settings()).unwrap();
+        let (order, word) = (run.variant.family.order.unwrap(), run.variant.family.interpolation.unwrap().word());
         let alone = format!("{pasted}[cost]\nelements = 1\norder = {order}\ninterpolation = \"{word}\"\n");
         let again = costs(&alone, &Against::Expectations, 1);
         assert_eq!(again.runs.len(), 1);
-        assert!(again.runs[0].settings.is_empty(), "{:?}", again.runs[0].settings);
+        assert!(again.runs[0].settings().is_empty(), "{:?}", again.runs[0].settings());
         assert_eq!(again.runs[0].error, run.error);
     }
 }
@@ -154,9 +155,9 @@ fn numbers_of_nodes_keep_their_places_on_other_meshes() {
     let by_number = costs(&quarter("[output]\nnodes = [\"b:1\"]\ncolumns = [\"u\"]\n"), &Against::Finest, 2);
     let by_place = costs(&quarter("[output]\nnodes = [\"b@0.25\"]\ncolumns = [\"u\"]\n"), &Against::Finest, 2);
     for (a, b) in by_number.runs.iter().zip(&by_place.runs) {
-        assert_eq!(a.error, b.error, "{:?}", a.settings);
-        let moved = a.settings.iter().any(|s| s.starts_with("beam.0.elements") || s.starts_with("beam.0.order"));
-        assert_eq!(moved, a.settings.iter().any(|s| s == "beam.0.numbering=4"), "{:?}", a.settings);
+        assert_eq!(a.error, b.error, "{:?}", a.settings());
+        let moved = a.settings().iter().any(|s| s.starts_with("beam.0.elements") || s.starts_with("beam.0.order"));
+        assert_eq!(moved, a.settings().iter().any(|s| s == "beam.0.numbering=4"), "{:?}", a.settings());
     }
     assert!(by_number.runs.iter().any(|run| run.error < 1e-4));
 }
@@ -168,7 +169,7 @@ fn a_study_that_was_stopped_goes_on() {
     let text = quarter(TIP);
     let open = |identity: &str| Journal::open(&folder, identity).unwrap();
     let (found, _) = stopped(&text, &Against::Finest, 1, 10, &mut open("a"));
-    assert!(matches!(found, Err(Refusal::Failure(_))));
+    assert!(matches!(found, Err(StudyError::Failure(_))));
 
     let mut journal = open("a");
     let known = journal.len();
@@ -230,10 +231,15 @@ fn a_reference_that_ends_early_is_refused() {
         let table = beamsim::output::HistoryReader { names: names.clone(), rows };
         let (deck, scene) = read(&text);
         let mut journal = Journal::default();
-        let options =
-            Options { threads: 1, budget: None, interrupted: &|| None, tell: &mut |_, _| {}, journal: &mut journal };
+        let options = StudyOptions {
+            threads: 1,
+            budget: None,
+            interrupted: &|| None,
+            progress: &mut |_, _| {},
+            journal: &mut journal,
+        };
         let refused = study(&text, &deck, &scene, &Against::Table(table), options);
-        let Err(Refusal::Deck(diagnostic)) = refused else { panic!("not refused") };
+        let Err(StudyError::Deck(diagnostic)) = refused else { panic!("not refused") };
         assert!(diagnostic.message.contains("before the deck does") && diagnostic.span.is_some());
     }
 }
@@ -246,8 +252,8 @@ fn meshes_keep_nodes_where_something_acts() {
     let found = costs(&text, &Against::Finest, 2);
     assert!(found.runs.iter().all(|run| run.trial.as_ref().unwrap().status == "finished"));
     for run in &found.runs {
-        let intervals = run.point.count() * run.point.family.order.unwrap();
-        assert_eq!(intervals % 4, 0, "{:?}", run.settings);
+        let intervals = run.variant.count() * run.variant.family.order.unwrap();
+        assert_eq!(intervals % 4, 0, "{:?}", run.settings());
     }
     assert!(found.runs.iter().any(|run| run.error < 1e-6));
 }
@@ -255,12 +261,15 @@ fn meshes_keep_nodes_where_something_acts() {
 #[test]
 fn runs_that_fail_are_told_and_the_others_stay() {
     // One of the schemes has no total vectors to interpolate.
-    let schemes = ["newmark", "lie_generalized_alpha"];
-    let text = format!("{SWINGING}[cost]\norder = 1\ninterpolation = \"total\"\nscheme = {schemes:?}\n");
+    let schemes = [SchemeName::Newmark, SchemeName::LieGeneralizedAlpha];
+    let text = format!(
+        "{SWINGING}[cost]\norder = 1\ninterpolation = \"total\"\nscheme = {:?}\n",
+        schemes.map(SchemeName::word)
+    );
     let found = costs(&text, &Against::Finest, 2);
     let (failed, rest): (Vec<_>, Vec<_>) =
-        found.runs.iter().partition(|run| run.point.family.scheme == Some(schemes[1]));
-    let status = |run: &Run| run.trial.as_ref().unwrap().status.clone();
+        found.runs.iter().partition(|run| run.variant.family.scheme == Some(schemes[1]));
+    let status = |run: &CostRun| run.trial.as_ref().unwrap().status.clone();
     assert!(
         failed.len() == 16 && failed.iter().all(|run| status(run) == "deck" && run.error.is_nan() && !run.frontier)
     );
@@ -268,13 +277,13 @@ fn runs_that_fail_are_told_and_the_others_stay() {
     assert!(found.to_csv().is_ok_and(|table| !String::from_utf8(table).unwrap().contains("NaN")));
 }
 
-fn reached(text: &str, wanted: &Accuracy) -> Result<Found, Refusal> {
+fn reached(text: &str, wanted: &Accuracy) -> Result<Found, StudyError> {
     let (deck, scene) = read(text);
-    let options = Options {
+    let options = StudyOptions {
         threads: 2,
         budget: None,
         interrupted: &|| None,
-        tell: &mut |_, _| (),
+        progress: &mut |_, _| (),
         journal: &mut Journal::default(),
     };
     reach(text, &deck, &scene, wanted, options)
@@ -282,9 +291,9 @@ fn reached(text: &str, wanted: &Accuracy) -> Result<Found, Refusal> {
 
 /// The error of a deck with settings, against what it expects, or a finer run.
 fn error_with(text: &str, found: &Found, against: &Against) -> f64 {
-    let (family, pasted) = (&found.point.family, deck::apply(text, &found.settings).unwrap());
+    let (family, pasted) = (&found.variant.family, deck::apply(text, &found.settings()).unwrap());
     let (order, word) = (family.order.unwrap(), family.interpolation.unwrap().word());
-    let step = if matches!(found.point.pace, Pace::Steps(_)) { "step = 1\n" } else { "" };
+    let step = if matches!(found.variant.pace, Pace::Steps(_)) { "step = 1\n" } else { "" };
     let alone = format!("{pasted}[cost]\nelements = 1\norder = {order}\ninterpolation = \"{word}\"\n{step}");
     let study = costs(&alone, against, 2);
     assert_eq!(study.runs.len(), 1);
@@ -310,11 +319,11 @@ fn only_outputs_that_are_named_must_be_accurate() {
     let name = |name: &str| Spanned { value: name.to_string(), span: 3..7 };
     let of = |names: &[(&str, f64)]| Accuracy::Columns(names.iter().map(|(n, a)| (name(n), *a)).collect());
     let nodes = |wanted: &Accuracy| match reached(SWINGING, wanted) {
-        Ok(found) => found.point.count() * found.point.family.order.unwrap(),
+        Ok(found) => found.variant.count() * found.variant.family.order.unwrap(),
         Err(_) => panic!("refused"),
     };
     assert!(nodes(&of(&[("tip.ux", 1e-5)])) > nodes(&of(&[("tip.ux", 1e-2)])));
-    let Err(Refusal::Deck(diagnostic)) = reached(SWINGING, &of(&[("tip.vx", 1e-2)])) else { panic!("not refused") };
+    let Err(StudyError::Deck(diagnostic)) = reached(SWINGING, &of(&[("tip.vx", 1e-2)])) else { panic!("not refused") };
     assert_eq!(diagnostic.span, Some(3..7));
 }
 
@@ -329,7 +338,7 @@ fn a_mechanism_is_told_by_its_own_name_and_place() {
         error_bars(&text, &deck, &scene, &|| None).err(),
     ];
     for refusal in refusals {
-        let Some(Refusal::Failure(failure)) = refusal else { panic!("not refused") };
+        let Some(StudyError::Failure(failure)) = refusal else { panic!("not refused") };
         let own = ["b:1", "root", "tip"].iter().any(|node| failure.to_string().contains(&format!("\"{node}\"")));
         assert!(failure.name() == "singular" && own, "{failure}");
     }
@@ -343,7 +352,7 @@ fn scenes_whose_outputs_stay_zero_are_refused() {
         stopped(&text, &Against::Finest, 1, usize::MAX, &mut Journal::default()).0.err(),
     ];
     for refusal in refusals {
-        let Some(Refusal::Deck(diagnostic)) = refusal else { panic!("not refused") };
+        let Some(StudyError::Deck(diagnostic)) = refusal else { panic!("not refused") };
         assert!(diagnostic.message.contains("zero from beginning to end"), "{}", diagnostic.message);
     }
 }
@@ -359,7 +368,7 @@ fn a_search_that_is_stopped_tells_the_best_so_far() {
         tried.store(done, std::sync::atomic::Ordering::Relaxed);
     };
     let journal = &mut Journal::default();
-    let options = Options { threads: 1, budget: None, interrupted: &interrupted, tell: &mut tell, journal };
+    let options = StudyOptions { threads: 1, budget: None, interrupted: &interrupted, progress: &mut tell, journal };
     let Ok(found) = reach(SWINGING, &deck, &scene, &Accuracy::All(1e-6), options) else { panic!("nothing is told") };
     assert!(!found.reached && found.runs == 3 && found.ratio.is_finite());
     assert!(matches!(found.stopped, Some(Failure::Interrupted { signal: 2, .. })), "{:?}", found.stopped);
@@ -371,7 +380,7 @@ fn modes_are_named_as_expectations_name_them() {
         format!("{}[[stage]]\nkind = \"modal\"\nmodes = 2\n", quarter(TIP).replace("EI = 100", "EI = 100\nrhoA = 1"));
     let wanted = |name: &str| Accuracy::Columns(vec![(Spanned { value: name.into(), span: 0..1 }, 1e-3)]);
     let [short, long] = ["mode1.omega", "stage2.mode1.omega"].map(|name| match reached(&text, &wanted(name)) {
-        Ok(found) => (found.reached, found.settings),
+        Ok(found) => (found.reached, found.settings()),
         Err(_) => panic!("{name}: refused"),
     });
     assert!(short.0 && short == long);
@@ -424,16 +433,16 @@ fn steps_that_an_interval_cuts_are_told_apart() {
 fn scenes_whose_steps_adapt_can_be_as_accurate_as_asked_for() {
     let text = SWINGING.replace("step = 0.01", "step = 0.01\nadaptive = true\nstep_tolerance = 1e-3");
     let Ok(found) = reached(&text, &Accuracy::All(1e-3)) else { panic!("refused") };
-    assert!(found.reached && found.settings.iter().any(|s| s == "stage.0.adaptive=false"));
+    assert!(found.reached && found.settings().iter().any(|s| s == "stage.0.adaptive=false"));
     // And they are studied by their tolerances.
     let study = costs(
         &format!("{text}interval = 0.05\n[cost]\norder = 2\ninterpolation = \"relative\"\n"),
         &Against::Finest,
         2,
     );
-    let finished = |run: &&Run| run.trial.as_ref().unwrap().status == "finished";
+    let finished = |run: &&CostRun| run.trial.as_ref().unwrap().status == "finished";
     assert!(study.runs.iter().filter(finished).count() == study.runs.len() && !study.ends_only);
-    assert!(study.runs.iter().any(|run| run.point.pace == Pace::Adapts(1e-5) && run.error < 1e-2));
+    assert!(study.runs.iter().any(|run| run.variant.pace == Pace::Adapts(1e-5) && run.error < 1e-2));
 }
 
 #[test]

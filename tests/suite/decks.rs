@@ -2,7 +2,7 @@
 
 use beamsim::scene;
 use beamsim::study::{Recorder, judge};
-use beamsim_core::run::{CriticalLoad, Failure, Mode, Observer, Run, Snapshot};
+use beamsim_core::run::{Failure, Observer, Run, Snapshot, StageResult};
 use std::path::{Path, PathBuf};
 
 struct Watcher(Recorder);
@@ -13,13 +13,8 @@ impl Observer for Watcher {
         Ok(())
     }
 
-    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.0.modes(modes);
-        Ok(())
-    }
-
-    fn buckling(&mut self, _stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.0.buckling(loads);
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        self.0.found(result);
         Ok(())
     }
 }

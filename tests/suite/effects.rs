@@ -2,8 +2,8 @@
 
 use beamsim::deck::{self, EffectWord};
 use beamsim::scene;
-use beamsim::study::ablation::{Ablation, ablate};
-use beamsim_core::run::{Counters, CriticalLoad, Failure, Observer, Run, Snapshot, Warning};
+use beamsim::study::effects::{EffectStudy, study_effects};
+use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::tensor::Vec3;
 
 /// The state of the last node, row by row.
@@ -149,24 +149,24 @@ fn tangents_change_iterations_and_no_answer() {
     }
 }
 
-fn study(text: &str, tolerance: f64) -> Ablation {
+fn study(text: &str, tolerance: f64) -> EffectStudy {
     let (scene, _) = scene::from_text(text).unwrap();
     let (deck, _) = deck::read(text).unwrap();
-    let Ok(found) = ablate(&deck, &scene, tolerance, &|| None, &mut |_| ()) else { panic!("the scene runs") };
+    let Ok(found) = study_effects(&deck, &scene, tolerance, &|| None, &mut |_| ()) else { panic!("the scene runs") };
     found
 }
 
 #[test]
 fn a_study_tells_what_each_effect_changes() {
     let found = study(&cantilever(&format!("{}{STATIC}", force(0.0, 0.01))), 1e-3);
-    let without = |word: EffectWord| found.variants.iter().find(|variant| variant.without == [word]).unwrap();
+    let without = |word: EffectWord| found.reduced.iter().find(|variant| variant.without == [word]).unwrap();
     // A hundredth of a degree: shear makes a third of the displacement, and the rest is linear.
     let (change, column) = without(EffectWord::Shear).largest();
     close(change, 0.99 * 2.0 / 60.0 / (8.0 / (3.0 * 40.0) + 2.0 / 60.0), 1e-3);
     assert_eq!(found.columns[column], "tip.uy");
     assert!(without(EffectWord::LargeRotations).largest().0 < 1e-3);
     assert!(without(EffectWord::Planar).largest().0 < 1e-10);
-    assert_eq!(found.variants[0].without, [EffectWord::Shear], "what changes most stands first");
+    assert_eq!(found.reduced[0].without, [EffectWord::Shear], "what changes most stands first");
     assert!(found.absent.contains(&EffectWord::Gravity) && found.absent.contains(&EffectWord::Gyroscopic));
     assert!(found.cheapest.largest().0 <= 1e-3 && !found.cheapest.without.contains(&EffectWord::Shear));
     let csv = String::from_utf8(found.to_csv().unwrap()).unwrap();
@@ -210,7 +210,7 @@ fn what_is_switched_off_is_told() {
 fn the_linear_theory_needs_no_plane() {
     let text = cantilever(&format!("{}{STATIC}[effects]\nplanar = true\n", force(0.0, 1.0)));
     let found = study(&text, 1e-3);
-    let linear = found.variants.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
+    let linear = found.reduced.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
     assert!(linear.outcome().is_some() && linear.largest().0 > 1e-6, "{}", linear.failure());
 }
 
@@ -223,7 +223,7 @@ fn a_variant_that_fails_is_a_result() {
         force(0.0, 3.0)
     ));
     let found = study(&text, 1e-3);
-    let linear = found.variants.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
+    let linear = found.reduced.iter().find(|variant| variant.without == [EffectWord::LargeRotations]).unwrap();
     assert!(linear.largest().0.is_infinite() && linear.failure().contains("arc_length"));
     assert!(String::from_utf8(found.to_csv().unwrap()).unwrap().contains("large_rotations,failed"));
 }
@@ -368,8 +368,10 @@ impl Observer for Loads {
         Ok(())
     }
 
-    fn buckling(&mut self, _stage: usize, loads: &[CriticalLoad]) -> Result<(), Failure> {
-        self.loads.extend(loads.iter().map(|critical| critical.load));
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        if let StageResult::CriticalLoads(loads) = result {
+            self.loads.extend(loads.iter().map(|critical| critical.load));
+        }
         Ok(())
     }
 

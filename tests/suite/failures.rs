@@ -2,7 +2,7 @@
 
 use crate::scenes::attempt;
 use beamsim::scene;
-use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot};
+use beamsim_core::run::{Failure, Observer, Run, Snapshot, StageResult};
 
 const ARM: &str = r#"
 [point]
@@ -166,8 +166,10 @@ impl Observer for Frequencies {
         Ok(())
     }
 
-    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.0.extend(modes.iter().map(|mode| mode.omega));
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        if let StageResult::Modes(modes) = result {
+            self.0.extend(modes.iter().map(|mode| mode.omega));
+        }
         Ok(())
     }
 }

@@ -2,16 +2,18 @@
 
 use crate::dual::{Dual, values, variables, with_room};
 use crate::random::Random;
+use crate::scenes::simulate;
 use crate::tangents::{agree, symmetric};
-use beamsim_core::effect::link;
+use beamsim_core::effect::joint::{FreeCoordinate, Joint, JointKind};
+use beamsim_core::effect::spring::Link;
 use beamsim_core::kernel::inertia::{Derivatives, Inertia, Spin, body, drag, steadily_turned};
-use beamsim_core::kernel::joint::{End, add_along, add_between, block, cosine, slides};
+use beamsim_core::kernel::joint::{DirectionPair, End, GapFactors, add_along, add_between, block, cosine, slides};
 use beamsim_core::kernel::turn::{Carrier, Start, StepCoefficients, Turn};
 use beamsim_core::kernel::volume::VolumeForce;
 use beamsim_core::kernel::{ElementSystem, Weights};
 use beamsim_core::rotation::Rotation;
 use beamsim_core::scalar::Real;
-use beamsim_core::system::Node;
+use beamsim_core::system::{Node, State};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 /// u_A, P_A, u_B, P_B and two times three multipliers.
@@ -19,22 +21,46 @@ type Wide = Dual<18>;
 
 const BASES: [f64; 4] = [0.0, 1.2, 3.0, 5.5];
 
+/// A joint of a kind between two nodes, or between ground and a node.
 struct Scene {
-    axes: Mat3,
-    arms: [Vec3; 2],
+    joint: Joint,
     fields: [Vec3; 6],
 }
 
 impl Scene {
-    fn new(random: &mut Random, base: f64) -> Self {
-        let axes = Rotation::new(random.vector(1.0)).r;
+    fn new(kind: JointKind, to_ground: bool, arms: [Vec3; 2], random: &mut Random, base: f64) -> Self {
+        let node = |k: u32| Node { u: 2 * k, p: 2 * k + 1 };
+        let joint = Joint {
+            held: kind.held,
+            normal: kind.normal,
+            nodes: [(!to_ground).then_some(node(0)), Some(node(1))],
+            places: [random.cube(1.0), random.cube(1.0)],
+            arms,
+            axes: Rotation::new(random.vector(1.0)).r,
+            along: Some(4),
+            between: Some(5),
+            drive: None,
+            angle: None,
+        };
         let p = [random.vector(base), random.vector(base)];
-        let fields = [random.cube(1.0), p[0], random.cube(1.0), p[1], random.cube(2.0), random.cube(2.0)];
-        Self { axes, arms: [random.cube(0.5), random.cube(0.5)], fields }
+        let mut fields = [random.cube(1.0), p[0], random.cube(1.0), p[1], random.cube(2.0), random.cube(2.0)];
+        if to_ground {
+            fields[0] = Vec3::ZERO;
+            fields[1] = Vec3::ZERO;
+        }
+        // Multipliers that are not used stay at zero.
+        for slot in [4, 5] {
+            let used = joint.used(slot);
+            (0..3).filter(|&k| !used[k]).for_each(|k| fields[slot as usize].0[k] = 0.0);
+        }
+        Self { joint, fields }
     }
 
     fn ends<T: Real>(&self, fields: &[Vec3<T>; 6]) -> [End<T>; 2] {
-        let end = |k: usize| End { place: fields[2 * k], rotation: Rotation::new(fields[2 * k + 1]) };
+        let end = |k: usize| End {
+            place: fields[2 * k] + Vec3::constant(self.joint.places[k]),
+            rotation: Rotation::new(fields[2 * k + 1]),
+        };
         [end(0), end(1)]
     }
 
@@ -42,31 +68,56 @@ impl Scene {
         std::array::from_fn(|k| variables(self.fields[k], 3 * k))
     }
 
+    /// The directions that stay normal.
+    fn pairs<T: Real>(&self) -> Vec<DirectionPair<T>> {
+        let e = |k: usize| Vec3::constant(self.joint.axes.column(k));
+        self.joint.normal.iter().map(|&(i, j)| DirectionPair { a: e(i), b: e(j) }).collect()
+    }
+
     /// lambda . gaps, in the order of the blocks.
     fn lagrangian<T: Real>(&self, fields: &[Vec3<T>; 6]) -> T {
         let [a, b] = self.ends(fields);
-        let along = slides(&self.axes, &self.arms, &a, &b);
-        let mut sum = along.dot(fields[4]);
-        for (k, (i, j)) in [(0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
-            let e = |k: usize| Vec3::constant(self.axes.column(k));
-            sum += cosine((e(i), e(j)), &a, &b) * fields[5].0[k];
+        let along = slides(&self.joint.axes, &self.joint.arms, &a, &b);
+        let mut sum = T::constant(0.0);
+        for k in (0..3).filter(|&k| self.joint.held[k]) {
+            sum += along.0[k] * fields[4].0[k];
+        }
+        for (k, pair) in self.pairs().into_iter().enumerate() {
+            sum += cosine(pair, &a, &b) * fields[5].0[k];
         }
         sum
     }
 
-    fn system<T: Real>(&self, fields: &[Vec3<T>; 6], weight: f64) -> ElementSystem<T> {
+    /// Forces on the nodes and gaps, from the kernels.
+    fn forces<T: Real>(&self, fields: &[Vec3<T>; 6]) -> ElementSystem<T> {
         let mut out = ElementSystem::new(block::COUNT);
         let ends = self.ends(fields);
-        add_along(&self.axes, &self.arms, &ends, fields[4], (weight, weight), &mut out);
-        out.add_force(block::ALONG, slides(&self.axes, &self.arms, &ends[0], &ends[1]));
-        let mut gaps = Vec3::zero();
-        for (k, (i, j)) in [(0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
-            let e = |k: usize| Vec3::constant(self.axes.column(k));
-            add_between((e(i), e(j)), &ends, fields[5].0[k], (weight, weight), k, &mut out);
-            gaps.0[k] = cosine((e(i), e(j)), &ends[0], &ends[1]);
+        add_along(&self.joint.axes, &self.joint.arms, &ends, fields[4], GapFactors::NONE, &mut out);
+        let mut along = slides(&self.joint.axes, &self.joint.arms, &ends[0], &ends[1]);
+        (0..3).filter(|&k| !self.joint.held[k]).for_each(|k| along.0[k] = T::constant(0.0));
+        out.add_force(block::ALONG, along);
+        let mut between = Vec3::zero();
+        for (k, pair) in self.pairs().into_iter().enumerate() {
+            add_between(pair, &ends, fields[5].0[k], GapFactors::NONE, k, &mut out);
+            between.0[k] = cosine(pair, &ends[0], &ends[1]);
         }
-        out.add_force(block::BETWEEN, gaps);
+        out.add_force(block::BETWEEN, between);
         out
+    }
+
+    /// Forces, gaps and tangent, as the effect adds them.
+    fn system(&self) -> ElementSystem {
+        let mut state = State::rest(6, 0, 0, 0);
+        state.q.copy_from_slice(&self.fields);
+        let mut out = ElementSystem::new(block::COUNT);
+        self.joint.system(&state, Weights::STIFFNESS, &mut out);
+        out
+    }
+
+    /// Which unknowns the joint has: those of its nodes, and the multipliers that it uses.
+    fn used(&self) -> Vec<bool> {
+        let node = |k: usize| [self.joint.nodes[k].is_some(); 6];
+        [&node(0)[..], &node(1), &self.joint.used(4), &self.joint.used(5)].concat()
     }
 }
 
@@ -74,23 +125,136 @@ fn exact(force: &[Wide]) -> Vec<f64> {
     force.iter().flat_map(|f| f.partials.to_vec()).collect()
 }
 
+/// The rows and columns of a square matrix that are used.
+fn used_part(matrix: &[f64], used: &[bool]) -> Vec<f64> {
+    let size = used.len();
+    (0..size * size).filter(|k| used[k / size] && used[k % size]).map(|k| matrix[k]).collect()
+}
+
+/// Joints of every kind, between nodes and to ground, with and without arms, in random orientations.
 #[test]
 fn joints_are_derivatives_of_their_gaps() {
     with_room(|| {
         let mut random = Random::new(1200);
         for base in BASES {
-            for _ in 0..5 {
-                let scene = Scene::new(&mut random, base);
-                let system = scene.system(&scene.fields, 1.0);
-                let energy = scene.lagrangian(&scene.lifted());
-                let what = format!("joint around |P| = {base}");
-                agree(&format!("forces, {what}"), system.force(), &energy.partials, 1e-12);
-                let force = scene.system(&scene.lifted(), 0.0);
-                agree(&format!("tangent, {what}"), &system.tangent(), &exact(force.force()), 1e-12);
-                symmetric(&what, &system.tangent(), 1e-12);
+            for kind in JointKind::ALL {
+                for (to_ground, has_arms) in [(false, true), (false, false), (true, true), (true, false)] {
+                    let arms = if has_arms { [random.cube(0.5), random.cube(0.5)] } else { [Vec3::ZERO; 2] };
+                    let scene = Scene::new(kind, to_ground, arms, &mut random, base);
+                    let what = format!("{kind:?} joint around |P| = {base}, {to_ground} to ground");
+                    let (system, used) = (scene.system(), scene.used());
+                    let gradient = scene.lagrangian(&scene.lifted()).partials;
+                    agree(&format!("forces, {what}"), system.force(), &gradient, 1e-12);
+                    let exact = exact(scene.forces(&scene.lifted()).force());
+                    let tangent = used_part(&system.tangent(), &used);
+                    agree(&format!("tangent, {what}"), &tangent, &used_part(&exact, &used), 1e-12);
+                    symmetric(&what, &tangent, 1e-12);
+                }
             }
         }
     });
+}
+
+/// A body on a cylindrical joint, held by a spring along each axis and about the joint's, under a force and a moment: it slides
+/// by F.n/k and turns until moments balance, whatever the arm from its node to the joint.
+#[test]
+fn cylindrical_joints_slide_along_their_axis_and_turn_about_it() {
+    let (stiffness, turning) = (3.0, 2.0);
+    let text = |v: Vec3| format!("{:?}", v.0);
+    let mut random = Random::new(1210);
+    for number in 0..12 {
+        let q = Rotation::new(random.vector(3.0)).r;
+        let axis = q.column(0);
+        let arm = if number % 2 == 0 { Vec3::ZERO } else { q.column(1) * 0.3 + q.column(2) * 0.2 + axis * 0.4 };
+        let (force, moment) = (random.cube(1.0), axis * random.range(-1.5, 1.5));
+        let nodes = if number % 3 == 0 { "[\"mover\"]" } else { "[\"anchor\", \"mover\"]" };
+        let place = random.cube(1.0);
+        let deck = format!(
+            r#"
+[point]
+anchor = [0.2, -0.1, 0.4]
+mover = {mover}
+[[body]]
+at = "anchor"
+mass = 1
+[[support]]
+at = "anchor"
+fix = "all"
+[[body]]
+at = "mover"
+mass = 1
+[[joint]]
+kind = "cylindrical"
+nodes = {nodes}
+at = {joint}
+axis = {axis}
+[[spring]]
+at = "mover"
+stiffness = [{stiffness}, {stiffness}, {stiffness}, {turning}, 0, 0]
+axes = [{axis}, {second}]
+[[load]]
+at = "mover"
+force = {force}
+moment = {moment}
+[[stage]]
+kind = "static"
+steps = 4
+[output]
+nodes = ["mover"]
+columns = ["u", "r"]
+"#,
+            mover = text(place),
+            joint = text(place + arm),
+            axis = text(axis),
+            second = text(q.column(1)),
+            force = text(force),
+            moment = text(moment),
+        );
+        let end = simulate(&deck);
+        let (u, r) = (Vec3(end.vector("mover.u")), Vec3(end.vector("mover.r")));
+        assert!((r - axis * axis.dot(r)).norm() < 1e-9, "{r:?} is not about {axis:?}\n{deck}");
+        assert!((axis.dot(u) - axis.dot(force) / stiffness).abs() < 1e-9, "slides by {u:?}\n{deck}");
+        // The joint's point of the body stays on the axis.
+        let seat = Rotation::new(r).r * arm;
+        let aside = u + seat - arm;
+        assert!((aside - axis * axis.dot(aside)).norm() < 1e-9, "{aside:?} aside\n{deck}");
+        // Moments about the axis, with the node at the end of -seat.
+        let resultant = moment + (-seat).cross(force - u * stiffness);
+        assert!((axis.dot(resultant) - turning * axis.dot(r)).abs() < 1e-8, "{r:?}\n{deck}");
+    }
+}
+
+/// The JSON Schema lists the kinds of joints in their order, and asks of each the keys that the reader asks for.
+#[test]
+fn the_schema_knows_the_rows_of_all_joints() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/deck/schema.json");
+    let schema: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let joint = &schema["properties"]["joint"]["items"];
+    let words: Vec<&str> = JointKind::ALL.iter().map(|kind| kind.word).collect();
+    assert_eq!(joint["properties"]["kind"]["enum"], serde_json::json!(words));
+    for kind in JointKind::ALL {
+        let is_of_kind = |rule: &&serde_json::Value| {
+            let of = &rule["if"]["properties"]["kind"];
+            of["const"] == kind.word || of["enum"].as_array().is_some_and(|words| words.iter().any(|w| w == kind.word))
+        };
+        let rules: Vec<_> = joint["then"]["allOf"].as_array().unwrap().iter().filter(is_of_kind).collect();
+        let is_required = |key: &str| {
+            let required = rules.iter().filter_map(|rule| rule["then"]["required"].as_array());
+            required.flatten().any(|word| word == key)
+        };
+        let is_refused = |key: &str| rules.iter().any(|rule| rule["then"]["properties"][key]["not"].is_object());
+        for (key, axes) in [("axis", 1), ("axes", 2)] {
+            assert_eq!(is_required(key), kind.axes == axes, "`{key}` of {kind:?} joints");
+            assert!(is_refused(key) || kind.axes == axes, "`{key}` of {kind:?} joints");
+        }
+        for key in ["stiffness", "damping", "history"] {
+            assert_eq!(is_refused(key), kind.driven.is_none(), "`{key}` of {kind:?} joints");
+        }
+        for coordinate in [FreeCoordinate::Angle, FreeCoordinate::Slide] {
+            let key = coordinate.word();
+            assert_eq!(is_refused(key), kind.driven != Some(coordinate), "`{key}` of {kind:?} joints");
+        }
+    }
 }
 
 #[test]
@@ -100,7 +264,7 @@ fn cables_pull_along_themselves() {
     for tension_only in [false, true] {
         for _ in 0..20 {
             let length = random.range(0.2, 1.6);
-            let link = link::Instance {
+            let link = Link {
                 nodes: [node, node],
                 places: [Vec3::ZERO; 2],
                 stiffness: 3.0,

@@ -16,6 +16,7 @@ mod failures;
 mod folder;
 mod invariance;
 mod joints;
+mod laws;
 mod layers;
 mod masses;
 mod mechanics;

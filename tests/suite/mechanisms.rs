@@ -71,7 +71,7 @@ fn support(at: &str, fix: &str, q: Mat3) -> String {
 
 const STAGE: &str = "[[stage]]\nkind = \"static\"\nsteps = 1\n";
 
-/// One of ten kinds, in a random orientation, on a random mesh.
+/// One of eleven kinds, in a random orientation, on a random mesh.
 fn mechanism(kind: usize, random: &mut Random) -> Mechanism {
     let q = Rotation::new(random.vector(3.0)).r;
     let pick = |choices: &[usize], random: &mut Random| choices[random.range(0.0, choices.len() as f64) as usize];
@@ -122,6 +122,11 @@ fn mechanism(kind: usize, random: &mut Random) -> Mechanism {
             let rest = format!("[[joint]]\nkind = \"prismatic\"\nnodes = [\"a\"]\naxis = {}\n", text(q.column(2)));
             (rest, all, vec![slides(2)])
         }
+        // A cylindrical joint to ground.
+        10 => {
+            let rest = format!("[[joint]]\nkind = \"cylindrical\"\nnodes = [\"a\"]\naxis = {}\n", text(q.column(1)));
+            (rest, all, vec![turns(origin, 1), slides(1)])
+        }
         // Springs hold the displacements of one end only.
         _ => {
             let rest = "[[spring]]\nat = \"a\"\nstiffness = [5, 6, 7, 0, 0, 0]\n".to_string();
@@ -144,16 +149,16 @@ fn place_of(node: &str, deck: &str) -> Vec3 {
 }
 
 #[test]
-fn fifty_mechanisms_are_named_by_node_and_direction() {
+fn mechanisms_are_named_by_node_and_direction() {
     let mut random = Random::new(4);
-    for number in 0..50 {
-        let Mechanism { deck, parts, free } = mechanism(number % 10, &mut random);
+    for (number, kind) in (0..50).map(|number| number % 10).chain([10; 5]).enumerate() {
+        let Mechanism { deck, parts, free } = mechanism(kind, &mut random);
         let failure = attempt(&deck).result.expect_err(&deck);
         let Failure::Singular { place: Some(place), .. } = &failure else { panic!("{number}: {failure}\n{deck}") };
         assert!(parts.iter().any(|part| place.node.starts_with(part)), "{number}: {failure}\n{deck}");
         let at = place_of(&place.node, &deck);
         // Of three joints in a row each half turns about its own end.
-        let own = match (number % 10, place.node.starts_with(['n', 'c'])) {
+        let own = match (kind, place.node.starts_with(['n', 'c'])) {
             (6, false) => &free[..3],
             (6, true) => &free[3..],
             _ => &free[..],

@@ -3,15 +3,16 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::dual::Dual;
+use crate::laws::stiffening;
 use crate::random::Random;
 use crate::tangents::{agree, symmetric};
 use beamsim::scene::{self, Scene};
 use beamsim_core::kernel::beam::StiffnessPoint;
-use beamsim_core::kernel::elastic::{Stiffness, Strain};
 use beamsim_core::kernel::inertia::{Inertia, Spin, body};
+use beamsim_core::kernel::law::{Linear, PlanarLinear, PlanarStiffness, Stiffness, StoredLaw, Strain};
 use beamsim_core::kernel::planar::{PlanarBody, PlanarNode, PlanarPoint, flattened};
 use beamsim_core::kernel::{ElementSystem, NodeMotion, PlanarSystem, Weights, shape};
-use beamsim_core::model::Assembly;
+use beamsim_core::model::{Assembly, Schedule};
 use beamsim_core::run::{Counters, Failure, Observer, Run, Snapshot, Warning};
 use beamsim_core::scalar::Real;
 use beamsim_core::system::Plane;
@@ -36,21 +37,21 @@ fn points<const N: usize>(plane: &Plane) -> Vec<StiffnessPoint<N>> {
         slope: shape::derivatives::<N>(xi),
         weight,
         tangent: axes * Vec3([0.8, 0.6, 0.0]),
-        stiffness: Stiffness { cn, cm, cc },
+        law: Linear { stiffness: Stiffness { cn, cm, cc } },
         free: Some(free),
     };
     shape::gauss(N - 1).iter().map(point).collect()
 }
 
 fn lifted<T: Real, const N: usize>(point: &PlanarPoint<N>) -> PlanarPoint<N, T> {
+    let PlanarStiffness { cn, cm, cc } = point.law.stiffness;
+    let (cn, cc) = (cn.map(T::constant), cc.map(|cc| cc.map(T::constant)));
     PlanarPoint {
         shape: point.shape.map(T::constant),
         slope: point.slope.map(T::constant),
         weight: T::constant(point.weight),
         tangent: point.tangent.map(T::constant),
-        cn: point.cn.map(T::constant),
-        cm: T::constant(point.cm),
-        cc: point.cc.map(|cc| cc.map(T::constant)),
+        law: PlanarLinear { stiffness: PlanarStiffness { cn, cm: T::constant(cm), cc } },
         free: point.free.map(|free| free.map(T::constant)),
     }
 }
@@ -91,11 +92,22 @@ fn tangent<const N: usize>(system: &PlanarSystem<N>) -> Vec<f64> {
 }
 
 fn kernel_is_that_of_space<const N: usize>() {
-    let (mut random, plane) = (Random::new(11), Plane::normal_to(TILTED).unwrap());
+    let plane = Plane::normal_to(TILTED).unwrap();
     let points = points::<N>(&plane);
+    points_are_those_of_space(&plane, &points);
+    let stiffening: Vec<_> = points.iter().map(stiffening).collect();
+    points_are_those_of_space(&plane, &stiffening);
+}
+
+fn points_are_those_of_space<L: StoredLaw, const N: usize>(plane: &Plane, points: &[StiffnessPoint<N, f64, L>]) {
+    let mut random = Random::new(11);
     for base in [0.0, 1.3, 3.0, 5.5] {
-        let (unknowns, motions) = nodes::<N>(&mut random, &plane, base);
-        let planar = in_plane(&points, &plane, &unknowns.map(|[x, y, angle]| PlanarNode { u: [x, y], angle }), 1.0);
+        let (unknowns, motions) = nodes::<N>(&mut random, plane, base);
+        let planar_nodes = unknowns.map(|[x, y, angle]| PlanarNode { u: [x, y], angle });
+        let mut planar = PlanarSystem::zero();
+        for point in points {
+            PlanarPoint::new(point, plane.axes()).add(&planar_nodes, 0.7, None, 1.0, &mut planar);
+        }
         let mut in_space = ElementSystem::new(2 * N);
         points.iter().for_each(|point| point.add_elastic(&motions, 0.7, None, 1.0, &mut in_space));
         // Displacements keep to the first two axes, rotations to the third.
@@ -112,10 +124,10 @@ fn kernel_is_that_of_space<const N: usize>() {
         symmetric("tangent", &tangent(&planar), 1e-15);
         let change: [[f64; 3]; N] = from_fn(|_| random.cube(0.1).0);
         let (du, dp) = (change.map(|[x, y, _]| axes * Vec3([x, y, 0.0])), change.map(|c| plane.normal() * c[2]));
-        for point in &points {
+        for point in points {
             let exact = point.extrapolated_stress(&motions, 0.7, |i| du[i], |i| dp[i]);
             let here = PlanarPoint::new(point, &axes).extrapolated_stress(
-                &unknowns.map(|[x, y, angle]| PlanarNode { u: [x, y], angle }),
+                &planar_nodes,
                 0.7,
                 &change.map(|[x, y, angle]| PlanarNode { u: [x, y], angle }),
             );
@@ -343,14 +355,15 @@ fn supports_joints_and_curved_beams_act_as_in_space() {
 /// What increments that are prescribed push the rest with, and the forces of a shaken frame, along all free directions of the plane.
 fn pushes(text: &str, normal: Vec3) -> Vec<f64> {
     let plan = scene_of(text).plan;
-    let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+    let (model, stage) = (plan.model, plan.stages[0].context(0));
     let (mut state, mut random) = (model.rest(), Random::new(11));
     let mut in_plane = |slot: usize| {
         let v = random.vector(0.1);
         let along = normal * normal.dot(v);
         if slot.is_multiple_of(2) { v - along } else { along }
     };
-    let dof_map = model.begin_stage(0, stage.kind, &state).unwrap();
+    let mut schedule = Schedule::new(&model);
+    let dof_map = schedule.begin_stage(&model, 0, stage.kind, &state).unwrap();
     let mut prescribed_increment = state.q.clone();
     for field in [&mut state.q[..], &mut state.v, &mut state.a, &mut prescribed_increment] {
         field.iter_mut().enumerate().for_each(|(slot, value)| *value = in_plane(slot));

@@ -20,7 +20,7 @@ fn histories_of_several_runs_and_a_reference_stand_on_one_axis() {
     let words = ["plot", "fine", "coarse", "--column", "tip.uz", "--reference", "stored.csv", "--out", "p.svg"];
     assert_eq!(status(&folder.beamsim(&words)), 0);
     let picture = fs::read_to_string(folder.0.join("p.svg")).unwrap();
-    for word in [">fine<", ">coarse<", ">stored<", ">tip.uz<", ">load<", "stroke-dasharray"] {
+    for word in [">fine<", ">coarse<", ">stored<", ">tip.uz<", ">load factor<", "stroke-dasharray"] {
         assert!(picture.contains(word), "{word}");
     }
     assert!(picture.starts_with("<svg") && !picture.contains("NaN"));
@@ -31,6 +31,100 @@ fn histories_of_several_runs_and_a_reference_stand_on_one_axis() {
     assert_eq!(status(&folder.beamsim(&["plot", "fine"])), 0);
     let picture = fs::read_to_string(folder.0.join("fine/plot.svg")).unwrap();
     assert!(picture.contains("tip.ux") && !picture.contains("tip.rx"));
+}
+
+/// Texts of a class in a picture.
+fn texts(folder: &Folder, name: &str, class: &str) -> Vec<String> {
+    let picture = fs::read_to_string(folder.0.join(name)).unwrap();
+    let begins = format!("<text class=\"{class} ");
+    let all = picture.lines().filter(|line| line.starts_with(&begins));
+    all.map(|line| line.split_once('>').unwrap().1.trim_end_matches("</text>").to_string()).collect()
+}
+
+#[test]
+fn axes_have_the_units_of_the_deck() {
+    let folder = Folder::new("plot_units");
+    let units = "units = { length = \"mm\", force = \"N\", time = \"s\" }\n";
+    let columns = "columns = [\"u\", \"r\", \"reaction\"]\n";
+    folder.write("arm.toml", &format!("title = \"An arm & a tip\"\n{units}{DECK}{columns}"));
+    let dynamic = DECK.replace("kind = \"static\"\nsteps = 4", "kind = \"dynamic\"\nend = 0.2\nstep = 0.1");
+    folder.write("swing.toml", &format!("{units}{dynamic}"));
+    folder.write("metres.toml", &format!("{}{DECK}", units.replace("mm", "m")));
+    for deck in ["arm.toml", "swing.toml", "metres.toml"] {
+        assert_eq!(status(&folder.beamsim(&["run", deck])), 0);
+    }
+    for (results, words, axes, legend) in [
+        ("arm", &["--column", "tip.uz"][..], ["load factor", "tip.uz [mm]"], &["tip.uz"][..]),
+        ("swing", &["--column", "tip.uz"], ["time [s]", "tip.uz [mm]"], &["tip.uz"]),
+        ("arm", &[], ["load factor", "displacement [mm]"], &["tip.ux", "tip.uz"]),
+        ("arm", &["--column", "tip.ry", "--x", "tip.uz"], ["tip.uz [mm]", "tip.ry [rad]"], &["tip.ry"]),
+        ("arm", &["--column", "tip.my", "--column", "tip.uz"], ["load factor", ""], &["tip.my [N·mm]", "tip.uz [mm]"]),
+    ] {
+        let path = format!("results/{results}");
+        assert_eq!(status(&folder.beamsim(&[&["plot", &path, "--out", "p.svg"], words].concat())), 0);
+        let shown =
+            [texts(&folder, "p.svg", "x-title"), texts(&folder, "p.svg", "y-title")].map(|title| title.join(" "));
+        assert_eq!(shown, axes, "{words:?}");
+        assert_eq!(texts(&folder, "p.svg", "legend"), legend, "{words:?}");
+        let title = if results == "arm" { "An arm &amp; a tip" } else { "swing" };
+        assert_eq!(texts(&folder, "p.svg", "title"), [title]);
+        for tick in [texts(&folder, "p.svg", "x-tick"), texts(&folder, "p.svg", "y-tick")].concat() {
+            assert!(tick.parse::<f64>().is_ok(), "{tick}");
+        }
+    }
+    let both = folder.beamsim(&["plot", "results/arm", "results/metres", "--column", "tip.uz", "--out", "p.svg"]);
+    assert!(status(&both) == 0 && last_line(&both).contains("different units"), "{}", last_line(&both));
+    assert_eq!(texts(&folder, "p.svg", "y-title"), ["tip.uz"]);
+}
+
+#[test]
+fn names_of_results_keep_their_dots() {
+    let folder = Folder::new("plot_dots");
+    for deck in ["arm2_0.004.toml", "arm2_0.001.toml"] {
+        folder.write(deck, DECK);
+    }
+    assert_eq!(status(&folder.beamsim(&["run", "arm2_0.004.toml", "arm2_0.001.toml"])), 0);
+    assert_eq!(folder.names("results"), ["arm2_0.001", "arm2_0.004"]);
+    let words =
+        ["plot", "results/arm2_0.004", "results/arm2_0.001/history.csv", "--column", "tip.uz", "--out", "p.svg"];
+    assert_eq!(status(&folder.beamsim(&words)), 0);
+    assert_eq!(texts(&folder, "p.svg", "legend"), ["arm2_0.004", "arm2_0.001"]);
+    assert_eq!(texts(&folder, "p.svg", "title"), ["arm2_0.004, arm2_0.001"]);
+    assert_eq!(status(&folder.beamsim(&["report", "results/arm2_0.004"])), 0);
+    let page = fs::read_to_string(folder.0.join("results/arm2_0.004/report.html")).unwrap();
+    assert!(page.contains("<title>arm2_0.004</title>"));
+
+    // Two results of one name are told apart by their paths.
+    assert_eq!(status(&folder.beamsim(&["run", "arm2_0.004.toml", "--out", "other/arm2_0.004"])), 0);
+    let words = ["plot", "results/arm2_0.004", "other/arm2_0.004", "--column", "tip.uz", "--out", "p.svg"];
+    assert_eq!(status(&folder.beamsim(&words)), 0);
+    assert_eq!(texts(&folder, "p.svg", "legend"), ["results/arm2_0.004", "other/arm2_0.004"]);
+}
+
+#[test]
+fn stages_follow_each_other_on_the_horizontal_axis() {
+    let folder = Folder::new("plot_stages");
+    folder.write(
+        "static.csv",
+        "stage,time,load,tip.uz\n1,0,0,0\n1,0,0.5,1\n1,0,1,2\n2,0,0.5,3\n2,0,1,4\n3,0,-0.5,3\n3,0,0.5,2\n",
+    );
+    assert_eq!(status(&folder.beamsim(&["plot", "static.csv", "--out", "s.svg"])), 0);
+    assert_eq!(texts(&folder, "s.svg", "x-title"), ["load factor, stage by stage"]);
+    assert_eq!(texts(&folder, "s.svg", "boundary"), ["stage 2", "stage 3"]);
+    let ticks = texts(&folder, "s.svg", "x-tick");
+    assert_eq!((ticks.first().unwrap().as_str(), ticks.last().unwrap().as_str()), ("0", "3.0"));
+    // Time where it advances in any stage: static stages take none of it.
+    folder.write("mixed.csv", "stage,time,load,tip.uz\n1,0,0,0\n1,0,1,2\n2,0.1,1,3\n2,0.2,1,4\n3,0.3,1,4\n");
+    assert_eq!(status(&folder.beamsim(&["plot", "mixed.csv", "--out", "m.svg"])), 0);
+    assert_eq!(texts(&folder, "m.svg", "x-title"), ["time"]);
+    assert_eq!(texts(&folder, "m.svg", "boundary"), ["stage 2", "stage 3"]);
+    // One stage has no boundaries, and its load factor may go back.
+    folder.write("path.csv", "stage,time,load,tip.uz\n1,0,0,0\n1,0,0.9,1\n1,0,0.5,2\n");
+    assert_eq!(status(&folder.beamsim(&["plot", "path.csv", "--out", "p.svg"])), 0);
+    assert_eq!(
+        (texts(&folder, "p.svg", "x-title"), texts(&folder, "p.svg", "boundary")),
+        (vec!["load factor".into()], vec![])
+    );
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! The relative interpolation: tangents against automatic differentiation, objectivity, indifference to charts.
 
 use crate::dual::{Dual, variables, with_room};
+use crate::laws::stiffening;
 use crate::random::Random;
 use crate::tangents::{agree, stiffness_points, symmetric};
 use beamsim_core::kernel::beam::StiffnessPoint;
-use beamsim_core::kernel::elastic::{Strain, Stress};
+use beamsim_core::kernel::law::{Linear, StoredLaw, Strain, Stress};
 use beamsim_core::kernel::relative::Relative;
 use beamsim_core::kernel::{ElementSystem, shape};
 use beamsim_core::rotation::{Rotation, complement, log};
@@ -15,9 +16,9 @@ use std::f64::consts::PI;
 
 type Wide = Dual<24>;
 
-struct Element<const N: usize> {
+struct Element<const N: usize, L = Linear> {
     places: [Vec3; N],
-    points: Vec<StiffnessPoint<N>>,
+    points: Vec<StiffnessPoint<N, f64, L>>,
 }
 
 /// Displacements and rotation vectors of the nodes.
@@ -28,7 +29,9 @@ impl<const N: usize> Element<N> {
         let places = from_fn(|i| random.cube(0.1) + Vec3([shape::node_coordinate(i, N), 0.3, -0.2]));
         Self { places, points: stiffness_points(random, true) }
     }
+}
 
+impl<const N: usize, L: StoredLaw> Element<N, L> {
     fn see<T: Real>(&self, nodes: &Nodes<N, T>) -> (Relative<N, T>, [Rotation<T>; N]) {
         let rotations = nodes.map(|(_, p)| Rotation::new(p));
         (Relative::new(&self.places.map(Vec3::constant), &nodes.map(|(u, _)| u), &rotations), rotations)
@@ -38,8 +41,7 @@ impl<const N: usize> Element<N> {
         let seen = self.see(nodes).0;
         let mut sum = T::zero();
         for point in &self.points {
-            let (strain, stress) = point.lifted().strain_and_stress(&seen.nodes, T::zero());
-            sum += (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)) * (0.5 * point.weight);
+            sum += point.lifted().energy(&seen.nodes, T::zero());
         }
         sum
     }
@@ -82,14 +84,24 @@ fn tangent_holds<const N: usize>() {
         let base = random.vector(base);
         let nodes: Nodes<N> = nodes_around(&mut random, base, spread);
         let what = format!("relative element of {N} nodes around {base:?}, {nodes:?}");
-        let system = element.system(&nodes, 1.0);
-        let energy = element.energy(&lifted(&nodes));
-        agree(&format!("force against energy, {what}"), system.force(), &energy.partials[..6 * N], 1e-12);
-        let force = element.system(&lifted(&nodes), 0.0);
-        let exact: Vec<f64> = force.force().iter().flat_map(|f| f.partials[..6 * N].to_vec()).collect();
-        agree(&format!("tangent, {what}"), &system.tangent(), &exact, 1e-12);
-        symmetric(&what, &system.tangent(), 1e-13);
+        element_holds(&what, &element, &nodes);
+        let points = element.points.iter().map(stiffening).collect();
+        element_holds(
+            &format!("{what}, with a law that stiffens"),
+            &Element { places: element.places, points },
+            &nodes,
+        );
     }
+}
+
+fn element_holds<L: StoredLaw, const N: usize>(what: &str, element: &Element<N, L>, nodes: &Nodes<N>) {
+    let system = element.system(nodes, 1.0);
+    let energy = element.energy(&lifted(nodes));
+    agree(&format!("force against energy, {what}"), system.force(), &energy.partials[..6 * N], 1e-12);
+    let force = element.system(&lifted(nodes), 0.0);
+    let exact: Vec<f64> = force.force().iter().flat_map(|f| f.partials[..6 * N].to_vec()).collect();
+    agree(&format!("tangent, {what}"), &system.tangent(), &exact, 1e-12);
+    symmetric(what, &system.tangent(), 1e-13);
 }
 
 #[test]
@@ -110,7 +122,7 @@ fn half_way_between_two_nodes_the_short_way_is_the_general_one() {
             let mut element = Element::<2>::new(&mut random);
             element.points[0].free = Some(Strain { gamma: random.cube(0.1), kappa: random.cube(0.2) });
             if !coupled {
-                element.points[0].stiffness.cc = None;
+                element.points[0].law.stiffness.cc = None;
             }
             let (point, base, free) = (element.points[0], random.vector(base), 0.7);
             let nodes: Nodes<2> = nodes_around(&mut random, base, spread);

@@ -150,17 +150,89 @@ fn modes_and_critical_loads_stand_in_the_page() {
 }
 
 #[test]
-fn a_browser_plays_scrubs_and_shows_the_numbers_of_the_history() {
-    let folder = Folder::new("report_browser");
-    folder.write("deck.toml", DECK);
+fn critical_loads_stand_in_the_page_with_their_kinds() {
+    let folder = Folder::new("report_buckling");
+    let deck = Path::new(env!("CARGO_MANIFEST_DIR")).join("decks/minimal/buckling.toml");
+    let deck = deck.to_string_lossy();
+    let run = folder.beamsim(&["run", &deck, "--report", "--out", "r"]);
+    assert_eq!(status(&run), 0, "{}", last_line(&run));
+    let found = &data(&fs::read_to_string(folder.0.join("r/report.html")).unwrap())["buckling"];
+    assert_eq!(found["columns"], json!(["stage", "mode", "load", "kind"]));
+    assert!(found["rows"][0][2].is_f64() && found["rows"][0][3] == "branch", "{found}");
+}
+
+#[test]
+fn numbers_of_a_page_have_the_units_of_the_deck() {
+    let folder = Folder::new("report_units");
+    let units = "units = { length = \"mm\", force = \"N\", time = \"s\" }\n";
+    folder.write("deck.toml", &format!("{units}{DECK}"));
     assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--report", "--error-bars", "--out", "r"])), 0);
+    let data = data(&fs::read_to_string(folder.0.join("r/report.html")).unwrap());
+    for (table, column, unit) in [
+        ("history", "time", json!("s")),
+        ("history", "load", json!(null)),
+        ("history", "tip.x", json!("mm")),
+        ("history", "tip.d1x", json!(null)),
+        ("history", "energy.total", json!("N·mm")),
+        ("bars", "tip.y", json!("mm")),
+    ] {
+        let place = data[table]["columns"].as_array().unwrap().iter().position(|known| known == column).unwrap();
+        assert_eq!(data[table]["units"][place], unit, "{column}");
+    }
+    let fields = data["scene"]["fields"].as_array().unwrap();
+    let unit = |name: &str| &fields.iter().find(|field| field["name"] == name).unwrap()["unit"];
+    assert_eq!((unit("N1"), unit("M2"), unit("energy")), (&json!("N"), &json!("N·mm"), &json!("N")));
+}
+
+/// Plays a page in a browser, where there is one; titles are expected of the horizontal axis and of the plots.
+fn play(folder: &Folder, results: &str, titles: &[&str]) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/report.py");
-    let [page, history] = ["r/report.html", "r/history.csv"].map(|name| folder.0.join(name));
-    let done = Command::new("python3").arg(script).args([page, history]).output().unwrap();
+    let [page, history] = ["report.html", "history.csv"].map(|name| folder.0.join(results).join(name));
+    let mut command = Command::new("python3");
+    command.arg(script).args([page, history]).arg("--titles").args(titles);
+    let done = command.output().unwrap();
     let told = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
     if let Some(why) = told.lines().find(|line| line.starts_with("skipped")) {
         // Past the test harness.
         let _ = writeln!(std::io::stderr(), "{why}");
     }
     assert!(done.status.success(), "{told}");
+}
+
+#[test]
+fn a_browser_plays_scrubs_and_shows_the_numbers_of_the_history() {
+    let folder = Folder::new("report_browser");
+    folder.write("deck.toml", DECK);
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--report", "--error-bars", "--out", "r"])), 0);
+    play(&folder, "r", &["time", "energy", "a@end: position", "tip: position", "b@0.1: position"]);
+}
+
+#[test]
+fn a_browser_shows_displacements_of_nodes_with_units_over_the_time() {
+    let folder = Folder::new("report_browser_units");
+    let units = "units = { length = \"mm\", force = \"N\", time = \"s\" }\n";
+    let columns = "columns = [\"resultant\", \"r\", \"u\", \"momentum\"]";
+    let rigid = DECK.replace("kind = \"spherical\"", "kind = \"rigid\"");
+    let deck = rigid
+        .replace("columns = [\"x\", \"d\", \"energy\"]", columns)
+        .replace("\"a@end\", \"tip\", \"b@0.1\"", "\"root\", \"tip\"");
+    let first = "[[stage]]\nkind = \"static\"\nsteps = 2\n[[stage]]\nkind = \"dynamic\"";
+    folder.write("deck.toml", &format!("{units}{}", deck.replace("[[stage]]\nkind = \"dynamic\"", first)));
+    assert_eq!(status(&folder.beamsim(&["run", "deck.toml", "--report", "--out", "r"])), 0);
+    play(&folder, "r", &["time [s]", "tip: displacement [mm]"]);
+}
+
+#[test]
+fn a_browser_shows_static_stages_one_after_the_other() {
+    let folder = Folder::new("report_browser_stages");
+    let rigid = DECK.replace("kind = \"spherical\"", "kind = \"rigid\"");
+    let columns = rigid.replace("columns = [\"x\", \"d\", \"energy\"]", "columns = [\"u\"]");
+    let stages = "[[stage]]\nkind = \"static\"\nsteps = 5\n".repeat(2);
+    let load = "[[load]]\nat = \"tip\"\nforce = [0, 0, 1]\nstages = [2]\n";
+    let deck = columns.replace("[[stage]]\nkind = \"dynamic\"\nend = 0.5\nstep = 0.01\n", &format!("{load}{stages}"));
+    folder.write("deck.toml", &deck.replace("every = 4", "every = 1"));
+    let run = folder.beamsim(&["run", "deck.toml", "--report", "--out", "r"]);
+    assert_eq!(status(&run), 0, "{}", last_line(&run));
+    let titles = ["a@end", "tip", "b@0.1"].map(|node| format!("{node}: displacement"));
+    play(&folder, "r", &["load factor, stage by stage", &titles[0], &titles[1], &titles[2]]);
 }

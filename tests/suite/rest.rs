@@ -3,7 +3,7 @@
 use crate::random::Random;
 use crate::scenes::{attempt, simulate};
 use beamsim_core::rotation::Rotation;
-use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot, StabilityVerdict};
+use beamsim_core::run::{Failure, Mode, Observer, Run, Snapshot, StabilityVerdict, StageResult};
 use beamsim_core::tensor::{Mat3, Vec3};
 use beamsim_core::warning::WarningKind;
 use std::f64::consts::PI;
@@ -266,8 +266,10 @@ impl Observer for Modes {
         Ok(())
     }
 
-    fn modes(&mut self, _stage: usize, modes: &[Mode]) -> Result<(), Failure> {
-        self.0 = modes.to_vec();
+    fn found(&mut self, _stage: usize, result: &StageResult) -> Result<(), Failure> {
+        if let StageResult::Modes(modes) = result {
+            self.0.clone_from(modes);
+        }
         Ok(())
     }
 }

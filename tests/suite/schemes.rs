@@ -4,7 +4,7 @@ use crate::scenes::{distance, simulate};
 use beamsim::scene;
 use beamsim_core::integrate::{Increments, Rotations, Scheme, Step};
 use beamsim_core::kernel::Weights;
-use beamsim_core::model::{Assembly, StageKind, charts};
+use beamsim_core::model::{Assembly, Schedule, StageKind, charts};
 use beamsim_core::rotation::Rotation;
 use beamsim_core::run::InitialMotion;
 use beamsim_core::solve::{Convergence, LinearSolver, Newton, Work};
@@ -104,15 +104,16 @@ fn set_in_motion(motions: &[InitialMotion], state: &mut State, assembly: &mut As
 /// The same for any scene that starts from rest without acceleration, or with spins of bodies.
 fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f64; 3] {
     let (scene, _) = scene::from_text(text).unwrap_or_else(|e| panic!("{e:?}"));
-    let mut model = scene.plan.model;
+    let model = scene.plan.model;
     let mut state = model.rest();
-    let dof_map = model.begin_stage(0, StageKind::Dynamic, &state).unwrap();
+    let mut schedule = Schedule::new(&model);
+    let dof_map = schedule.begin_stage(&model, 0, StageKind::Dynamic, &state).unwrap();
     let mut assembly = Assembly::new(&scene.plan.stages[0].context(0), dof_map, &model);
     let solver = LinearSolver::new(&assembly.system, &model.multipliers).unwrap();
     let total = scheme.rotations == Rotations::Totals;
-    let increments = (!total).then(|| Increments::new(&model, &assembly.system.pattern.dof_map));
+    let increments = (!total).then(|| Increments::new(&model, StageKind::Dynamic, &assembly.system.pattern.dof_map));
     let mut newton = Newton::new(Convergence { tolerance: 1e-12 }, 25, solver, &assembly.system);
-    model.set_clock(&mut state, 0.0, 1.0);
+    schedule.set_clock(&model, &mut state, 0.0, 1.0);
     if !scene.plan.initial.is_empty() {
         set_in_motion(&scene.plan.initial, &mut state, &mut assembly, &mut newton.solver);
     }
@@ -132,15 +133,15 @@ fn alternating_to(text: &str, scheme: Scheme, h: f64, end: f64, tip: &str) -> [f
             increments.begin(&mut state, &step, before);
         }
         step.predict(&mut state, before);
-        assert_eq!(model.set_clock(&mut state, time, 1.0), None);
+        assert_eq!(schedule.set_clock(&model, &mut state, time, 1.0), None);
         newton.solve(&model, &mut assembly, &mut state, &step, None, &mut work).unwrap();
         if let Some(increments) = &increments {
             increments.end(&mut state, &good);
         }
-        charts::wind(&mut state, &good, &model.charted.rotations);
+        charts::wind(&mut state, &good, &model.charted(StageKind::Dynamic).rotations);
         let lag = total.then_some(scheme.lag() * length);
-        charts::switch(&mut state, &model.charted.rotations, charts::DYNAMIC_BAND, lag);
-        charts::freeze(&mut state, &model.charted.elements);
+        charts::switch(&mut state, &model.charted(StageKind::Dynamic).rotations, charts::DYNAMIC_BAND, lag);
+        charts::freeze(&mut state, &model.charted(StageKind::Dynamic).elements);
         before = length;
     }
     let tip = scene.mesh.nodes[scene.mesh.points[tip]].node;

@@ -4,7 +4,7 @@ use crate::decks::decks;
 use crate::random::Random;
 use beamsim::scene;
 use beamsim_core::kernel::{ElementSystem, Weights};
-use beamsim_core::model::{Assembly, Model, SlotKind, StageContext, StageKind, charts};
+use beamsim_core::model::{Assembly, Model, Schedule, SlotKind, StageContext, StageKind, charts};
 use beamsim_core::solve::{BlockSolver, GeneralSolver, LinearSolver, Tangent, is_symmetric};
 use beamsim_core::system::{
     Category, Connectivity, Direction, DofMap, Layout, Leftover, Memory, NodeBlocks, Pattern, Plane, State, Symmetry,
@@ -295,9 +295,10 @@ fn tangents_are_used_up_where_that_loses_no_digits() {
              [effects]\nplanar = false\n"
         );
         let Ok((scene, _)) = scene::from_text(&deck) else { panic!("the deck is good: {deck}") };
-        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
         let rest = model.rest();
-        let Ok(dof_map) = model.begin_stage(0, stage.kind, &rest) else { panic!("the stage begins") };
+        let mut schedule = Schedule::new(&model);
+        let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &rest) else { panic!("the stage begins") };
         let mut assembly = Assembly::new(&stage, dof_map, &model);
         let mut solver = LinearSolver::new(&assembly.system, &[]).unwrap();
         let wanted: Vec<f64> = (0..assembly.system.pattern.dof_map.count()).map(|k| (k as f64).sin()).collect();
@@ -526,9 +527,10 @@ fn what_is_called_symmetric_is() {
     for path in ["decks", "decks/minimal", "decks/peers", "decks/hard", "decks/paths"].map(decks).concat() {
         let text = std::fs::read_to_string(&path).unwrap();
         let Ok((scene, _)) = scene::from_text(&text) else { continue };
-        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
         let mut state = model.rest();
-        let Ok(dof_map) = model.begin_stage(0, stage.kind, &state) else { continue };
+        let mut schedule = Schedule::new(&model);
+        let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &state) else { continue };
         if dof_map.count() == 0 || dof_map.count() > 600 {
             continue;
         }
@@ -537,7 +539,7 @@ fn what_is_called_symmetric_is() {
         if !symmetry.halves() {
             continue;
         }
-        model.set_clock(&mut state, 0.1, 0.7);
+        schedule.set_clock(&model, &mut state, 0.1, 0.7);
         for turned in [false, true] {
             shake(&model, &stage, turned, &mut state, &mut random);
             let weights = Weights { stiffness: 1.0, damping: 0.3, mass: 0.2 };
@@ -576,8 +578,8 @@ fn shake(model: &Model, stage: &StageContext, turned: bool, state: &mut State, r
             (state.v[slot], state.a[slot]) = (any(), any());
         }
     }
-    charts::switch(state, &model.charted.rotations, charts::DYNAMIC_BAND, None);
-    charts::freeze(state, &model.charted.elements);
+    charts::switch(state, &model.charted(stage.kind).rotations, charts::DYNAMIC_BAND, None);
+    charts::freeze(state, &model.charted(stage.kind).elements);
 }
 
 /// Blocks and entries on the diagonal are those that a search finds.
@@ -602,7 +604,7 @@ fn whole_tangent(assembly: &Assembly, model: &Model, stage: &StageContext, state
     let connectivity = effects.iter().map(|effect| effect.connectivity()).collect();
     let pattern = Pattern::new(dof_map.clone(), model.node_blocks(dof_map.layout()), connectivity, Symmetry::None);
     let mut system = System::new(pattern, model.slots(), &Category::ALL, &[]);
-    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
+    for (number, effect) in effects.into_iter().enumerate().filter(|(_, effect)| effect.tangent().exists()) {
         let mut sink = system.sink(number, effect.category(), true);
         match plane.and_then(|plane| effect.clone().in_plane(&plane)) {
             Some(planar) => planar.add(state, &Memory::default(), weights, &mut sink),
@@ -624,15 +626,18 @@ fn space_takes_over_the_order_of_a_plane() {
              [[support]]\nat = \"root\"\nfix = \"all\"\n[[load]]\nat = \"tip\"\nforce = [0, 5, 0]\n[[stage]]\n{stage}\n"
         );
         let Ok((scene, _)) = scene::from_text(&deck) else { panic!("the deck is good") };
-        let (mut model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
-        let Ok(dof_map) = model.begin_stage(0, stage.kind, &model.rest()) else { panic!("the stage begins") };
+        let (model, stage) = (scene.plan.model, scene.plan.stages[0].context(0));
+        let mut schedule = Schedule::new(&model);
+        let Ok(dof_map) = schedule.begin_stage(&model, 0, stage.kind, &model.rest()) else {
+            panic!("the stage begins")
+        };
         let plane = Assembly::new(&stage, dof_map, &model);
-        (model, stage, plane)
+        (model, schedule, stage, plane)
     };
     let (statics, dynamics) = ("kind = \"static\"\nsteps = 1", "kind = \"dynamic\"\nend = 1\nstep = 1");
     for (kind, symmetry) in [(statics, Symmetry::Whole), (dynamics, Symmetry::BetweenGroups)] {
-        let (model, stage, plane) = planar(9000, kind);
-        let Ok(dof_map) = model.number(0, None) else { panic!("so it does in space") };
+        let (model, schedule, stage, plane) = planar(9000, kind);
+        let Ok(dof_map) = schedule.dof_map(&model, None) else { panic!("so it does in space") };
         let mut space = Assembly::new(&stage, dof_map, &model);
         assert!(plane.system.pattern.width() < space.system.pattern.width());
         assert_eq!(plane.system.pattern.symmetry, Symmetry::Whole);
@@ -656,7 +661,7 @@ fn space_takes_over_the_order_of_a_plane() {
         };
         solves(&mut solver, &space.system);
         // Where others meet nothing is taken over.
-        let (model, _, mut other) = planar(7, kind);
+        let (model, _, _, mut other) = planar(7, kind);
         assert!(!space.system.pattern.is_like(&other.system.pattern));
         let mut solver = LinearSolver::beside(&own, &plane.system, &other.system, &[]).unwrap();
         other.evaluate(&model.rest(), Weights { stiffness: 1.0, damping: 2.0, mass: 4.0 }, None);

@@ -103,10 +103,10 @@ fn a_point_that_fails_is_a_row_and_stops_no_other() {
     // The same command has nothing left to do, but to say so again.
     let bytes = fs::read(&path).unwrap();
     let again = folder.beamsim(&sweep);
-    assert!(String::from_utf8_lossy(&again.stderr).contains("goes on after 6 points that are done"));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("continues, 6 points are done"));
     assert_eq!((status(&again), fs::read(&path).unwrap()), (3, bytes));
     let redone = folder.beamsim(&[&sweep[..], &["--redo"]].concat());
-    assert!(String::from_utf8_lossy(&redone.stderr).contains("goes on after 2 points that are done"));
+    assert!(String::from_utf8_lossy(&redone.stderr).contains("continues, 2 points are done"));
 }
 
 #[test]
@@ -178,8 +178,8 @@ fn wrong_words_for_a_sweep_are_told() {
     for (words, told) in [
         (&["--vary", "param.q=1,2"][..], "the deck has no parameter `q`"),
         (&["--vary", "sectoin.s.EA=1,2"], "the deck has no `sectoin`"),
-        (&["--vary", "param.L=1:2"], "say how many"),
-        (&["--vary", "param.L=1,2", "--vary", "param.F=1", "--zip"], "as many values"),
+        (&["--vary", "param.L=1:2"], "give the number of values"),
+        (&["--vary", "param.L=1,2", "--vary", "param.F=1", "--zip"], "equal numbers of values"),
         (&["--vary", "param.L=1,2", "--output", "tip.uq"], "there is no column `tip.uq`"),
         (&["--vary", "param.L=1,2", "--only", "3"], "points are numbers from 1 to 2"),
         (&["--vary", "param.L"], "expected KEY=V1,V2"),

@@ -3,11 +3,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::dual::{Dual, along, jacobian, values, variables, vector_rate, with_room};
+use crate::laws::stiffening;
 use crate::random::Random;
 use beamsim_core::effect::spring::rotational;
 use beamsim_core::kernel::beam::StiffnessPoint;
-use beamsim_core::kernel::elastic::Stiffness;
 use beamsim_core::kernel::inertia::{Eccentric, Inertia, Rotary, Spin};
+use beamsim_core::kernel::law::{Linear, Stiffness, StoredLaw};
 use beamsim_core::kernel::load::{force_on_complement, material_force, material_moment, offset_force, spatial_moment};
 use beamsim_core::kernel::seam::{Conversion, Converted, conversion};
 use beamsim_core::kernel::volume::VolumePoint;
@@ -97,12 +98,12 @@ fn exact_tangent(forces: &[Vec<Wide>; 3], weights: Weights, blocks: &[usize]) ->
 }
 
 /// The entries of several vectors in one list.
-fn flat(vectors: &[Vec3]) -> Vec<f64> {
+pub fn flat(vectors: &[Vec3]) -> Vec<f64> {
     vectors.iter().flat_map(|v| v.0).collect()
 }
 
 /// The entries of a tensor by rows.
-fn entries(m: Mat3) -> Vec<f64> {
+pub fn entries(m: Mat3) -> Vec<f64> {
     m.0.iter().flatten().copied().collect()
 }
 
@@ -150,10 +151,12 @@ pub fn stiffness_points<const N: usize>(random: &mut Random, coupled: bool) -> V
             slope: shape::derivatives::<N>(xi).map(|d| d / HALF),
             weight: weight * HALF,
             tangent: random.direction(),
-            stiffness: Stiffness {
-                cn: random.positive_definite(),
-                cm: random.positive_definite(),
-                cc: coupled.then_some(cc),
+            law: Linear {
+                stiffness: Stiffness {
+                    cn: random.positive_definite(),
+                    cm: random.positive_definite(),
+                    cc: coupled.then_some(cc),
+                },
             },
             free: None,
         });
@@ -169,8 +172,8 @@ fn volume_points<const N: usize, Q: Copy>(quantity: impl Fn() -> Q) -> Vec<Volum
     points
 }
 
-fn elastic<T: Real, const N: usize>(
-    points: &[StiffnessPoint<N>],
+fn elastic<T: Real, L: StoredLaw, const N: usize>(
+    points: &[StiffnessPoint<N, f64, L>],
     nodes: &[NodeMotion<T>; N],
     weight: f64,
 ) -> ElementSystem<T> {
@@ -205,12 +208,14 @@ fn body<T: Real, const N: usize>(
     out
 }
 
-/// The integral of (N . Gamma + M . K)/2.
-fn strain_energy<const N: usize>(points: &[StiffnessPoint<N>], nodes: &[NodeMotion<Wide>; N]) -> Wide {
+/// The strain energy of an element.
+fn strain_energy<L: StoredLaw, const N: usize>(
+    points: &[StiffnessPoint<N, f64, L>],
+    nodes: &[NodeMotion<Wide>; N],
+) -> Wide {
     let mut sum = Wide::zero();
     for point in points {
-        let (strain, stress) = point.lifted().strain_and_stress(nodes, Wide::zero());
-        sum += (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)) * (0.5 * point.weight);
+        sum += point.lifted().energy(nodes, Wide::zero());
     }
     sum
 }
@@ -262,23 +267,33 @@ fn elasticity_holds<const N: usize>() {
             let points = stiffness_points::<N>(&mut random, coupled);
             let center = random.vector(base);
             let nodes: [NodeMotion; N] = moving_nodes(&mut random, center);
-            let what = format!("elasticity, {N} nodes around |P| = {base}, coupled: {coupled}, nodes {nodes:?}");
-            let system = elastic(&points, &nodes, 1.0);
-            let moving = lift(&nodes, Over::Position);
-            let energy = strain_energy(&points, &moving);
-            agree(&format!("force against energy, {what}"), system.force(), &energy.partials[..6 * N], 1e-12);
-            let force = elastic(&points, &moving, 0.0).force().to_vec();
-            let mut exact: Vec<f64> = Vec::new();
-            for f in &force {
-                exact.extend_from_slice(&f.partials[..6 * N]);
-            }
-            agree(&format!("tangent, {what}"), &system.tangent(), &exact, 1e-12);
-            symmetric(&what, &system.tangent(), 1e-13);
-            let weighted = elastic(&points, &nodes, 0.25);
-            let quarter: Vec<f64> = exact.iter().map(|e| 0.25 * e).collect();
-            agree(&format!("weighted tangent, {what}"), &weighted.tangent(), &quarter, 1e-12);
+            let what = format!("{N} nodes around |P| = {base}, coupled: {coupled}, nodes {nodes:?}");
+            points_hold(&format!("elasticity, {what}"), &points, &nodes);
+            let points: Vec<_> = points.iter().map(stiffening).collect();
+            points_hold(&format!("elasticity that stiffens, {what}"), &points, &nodes);
         }
     }
+}
+
+fn points_hold<L: StoredLaw, const N: usize>(
+    what: &str,
+    points: &[StiffnessPoint<N, f64, L>],
+    nodes: &[NodeMotion; N],
+) {
+    let system = elastic(points, nodes, 1.0);
+    let moving = lift(nodes, Over::Position);
+    let energy = strain_energy(points, &moving);
+    agree(&format!("force against energy, {what}"), system.force(), &energy.partials[..6 * N], 1e-12);
+    let force = elastic(points, &moving, 0.0).force().to_vec();
+    let mut exact: Vec<f64> = Vec::new();
+    for f in &force {
+        exact.extend_from_slice(&f.partials[..6 * N]);
+    }
+    agree(&format!("tangent, {what}"), &system.tangent(), &exact, 1e-12);
+    symmetric(what, &system.tangent(), 1e-13);
+    let weighted = elastic(points, nodes, 0.25);
+    let quarter: Vec<f64> = exact.iter().map(|e| 0.25 * e).collect();
+    agree(&format!("weighted tangent, {what}"), &weighted.tangent(), &quarter, 1e-12);
 }
 
 #[test]

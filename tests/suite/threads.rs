@@ -3,7 +3,7 @@
 use crate::random::Random;
 use beamsim::scene;
 use beamsim_core::kernel::Weights;
-use beamsim_core::model::{Assembly, Model};
+use beamsim_core::model::{Assembly, Model, Schedule};
 use beamsim_core::run::{Failure, Ledger, Observer, Run, Snapshot};
 use beamsim_core::system::{Memory, State};
 use beamsim_core::tensor::Vec3;
@@ -119,9 +119,10 @@ fn regions_change_nothing_but_the_order_of_sums() {
         scenes.map(|(text, order)| deck(text, order, false)).into_iter().chain([loaded_at_a_node(), bodies_alone()])
     {
         let plan = model(&text).plan;
-        let (mut model, stage) = (plan.model, plan.stages[0].context(0));
+        let (model, stage) = (plan.model, plan.stages[0].context(0));
         let state = shaken(&model);
-        let dof_map = model.begin_stage(0, stage.kind, &state).unwrap();
+        let mut schedule = Schedule::new(&model);
+        let dof_map = schedule.begin_stage(&model, 0, stage.kind, &state).unwrap();
         let mut assembly = Assembly::new(&stage, dof_map, &model);
         assert!(assembly.system.is_cut());
         let weights = Weights { stiffness: 1.0, damping: 3.0, mass: 40.0 };
@@ -133,7 +134,7 @@ fn regions_change_nothing_but_the_order_of_sums() {
         let cut = (forces(&assembly), assembly.system.values.clone());
         assembly.system.clear(None);
         for (number, effect) in model.acting(&stage).iter().enumerate() {
-            let with_tangent = effect.has_tangent();
+            let with_tangent = effect.tangent().exists();
             let weights = if with_tangent { weights } else { Weights::NONE };
             let mut sink = assembly.system.sink(number, effect.category(), with_tangent);
             effect.add(&state, &Memory::default(), weights, &mut sink);

@@ -4,6 +4,7 @@ use crate::decks::decks;
 use crate::random::Random;
 use beamsim::deck::{self, Axes, Deck, Diagnostic, Frame, Load, MotionWhat, Path, PointRef, SectionBody, SpringBody};
 use beamsim::scene;
+use beamsim_core::model::StageKind;
 use beamsim_core::rotation::Rotation;
 use beamsim_core::run::{Failure, Observer, Run, Snapshot};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -25,7 +26,7 @@ struct Rows(Outcome);
 
 impl Observer for Rows {
     fn row(&mut self, at: &Snapshot) -> Result<(), Failure> {
-        let slots = &at.model.charted.rotations;
+        let slots = &at.model.charted(StageKind::Static).rotations;
         // The rotation of a node follows its displacement.
         let node = |&p: &u32| (at.state.q[p as usize - 1], Rotation::new(at.state.q[p as usize]).r);
         let nodes: Vec<(Vec3, Mat3)> = slots.iter().map(node).collect();
@@ -255,7 +256,7 @@ const SENSITIVE: [Sensitive; 13] = [
     // Axial stiffness 1e10 on a mass of 20: the round-off of forces alone is 3e-6.
     Sensitive { name: "d08_stiff_pendulum", until: 20.0, then: Some(1e-7) },
     Sensitive { name: "d08_stiff_pendulum_h01", until: 3.0, then: Some(1e-6) },
-    // Beyond the cliff of the trapezoidal rule
+    // RunExtras the cliff of the trapezoidal rule
     Sensitive { name: "d10_spin_up_newmark", until: 10.0, then: None },
     Sensitive { name: "d10_spin_up_rho_09", until: 15.0, then: None },
     // A double pendulum, in effect

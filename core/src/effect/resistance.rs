@@ -10,11 +10,11 @@
 //! along the forces, c dq/dt = -g (proximal point method: Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it
 //! stands beside the effects of a stage only while that looks for rest, and nothing is left of it in the balance that is found.
 
-use super::{Effect, one_by_one, own_part};
+use super::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::{Rotation, log};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, StageContext, State};
-use crate::tensor::Mat3;
+use crate::tensor::{Mat3, Vec3};
 
 /// At all slots of nodes; nothing without an anchor in the state.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ impl Effect for Resistance {
         "artificial resistance"
     }
 
-    /// What it takes is booked as damped.
+    /// The work that it takes is booked as damped.
     fn category(&self) -> Category {
         Category::Damping
     }
@@ -39,8 +39,8 @@ impl Effect for Resistance {
         one_by_one(&self.slots)
     }
 
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
     }
 
     fn acts(&self, _stage: &StageContext) -> bool {
@@ -71,13 +71,20 @@ impl Effect for Resistance {
             out.add(k, &system);
         }
     }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::rotation::complement;
-    use crate::tensor::Vec3;
 
     /// The moment over an increment of the rotation vector.
     fn moment(p: Vec3, base: Vec3) -> Vec3 {

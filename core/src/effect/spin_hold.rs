@@ -1,14 +1,14 @@
 //! Holds spins that nothing resists: a straight part between ball joints may spin about its own axis without any force, in statics
 //! always and in a dynamic stage without rotary inertia; then round-off alone would tell by how much.
 
-use super::{Effect, SomeIncrements};
+use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
-use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, StageKind, State};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, State};
 use crate::tensor::Vec3;
 
-/// One straight part: beams that are joined rigidly along a line.
+/// A straight part that may spin: beams that are joined rigidly along a line.
 #[derive(Clone, Debug)]
-pub struct Instance {
+pub struct SpinningPart {
     /// A node in the middle of a beam
     pub node: Node,
     /// All its nodes
@@ -23,7 +23,7 @@ pub struct Instance {
 /// beam that sags must not notice.
 const HOLD: f64 = 1e-3;
 
-/// The same where no mass stands beside it: modes must not notice at all.
+/// The hold where no mass stands beside it, as part of GJ/L: modes must not notice at all.
 const HOLD_IN_MODES: f64 = 1e-8;
 
 /// The stages in which spins are held.
@@ -35,15 +35,15 @@ pub enum HeldIn {
     Statics,
 }
 
-/// All such parts.
+/// The hold of all parts that may spin.
 ///
 /// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness against corrections
 /// t.T dP about the axis t, and keeps predictions from carrying spins on, so that what no force asks for does not happen.
 #[derive(Clone, Debug)]
 pub struct SpinHold {
     /// The parts
-    pub parts: Vec<Instance>,
-    /// Where
+    pub parts: Vec<SpinningPart>,
+    /// The stages that hold them
     pub held_in: HeldIn,
 }
 
@@ -65,42 +65,17 @@ impl Effect for SpinHold {
         connectivity
     }
 
-    fn is_symmetric(&self) -> bool {
-        true
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
     }
 
     fn acts(&self, stage: &StageContext) -> bool {
-        match stage.kind {
-            StageKind::Dynamic | StageKind::Modal => self.held_in == HeldIn::Motion,
-            StageKind::Static | StageKind::Buckling => self.held_in == HeldIn::Statics,
-        }
+        let held_in = if stage.kind.needs_inertia() { HeldIn::Motion } else { HeldIn::Statics };
+        self.held_in == held_in
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         self.parts.iter().for_each(|part| show(MirrorData::Line(part.axis)));
-    }
-
-    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
-        // A material spin about the axis of each node of a part: what has no inertia is no mode.
-        let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
-        for part in parts {
-            let spin = |node: &Node| (node.p, at.rotation(node.p).t_inverse() * part.axis);
-            show(&part.nodes.iter().map(spin).collect::<Vec<_>>());
-        }
-    }
-
-    fn steady(&self, at: &mut State) {
-        // What is held in statics may spin by its inertia.
-        let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
-        for part in parts {
-            for node in &part.nodes {
-                let (rotation, p) = (at.rotation(node.p), node.p as usize);
-                let about = rotation.t_inverse() * part.axis;
-                for rate in [&mut at.v[p], &mut at.a[p]] {
-                    *rate -= about * part.axis.dot(rotation.t * *rate);
-                }
-            }
-        }
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
@@ -116,6 +91,39 @@ impl Effect for SpinHold {
             let about = at.rotation(part.node.p).t.transpose_mul(part.axis);
             system.add_tangent(0, 0, about.outer(about).scale(part.stiffness * hold));
             out.add(k, &system);
+        }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { spins: Some(self), ..Roles::NONE }
+    }
+}
+
+impl FreeSpins for SpinHold {
+    fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
+        // A material spin about the axis of each node of a part: what has no inertia is no mode.
+        let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
+        for part in parts {
+            let spin = |node: &Node| (node.p, at.rotation(node.p).t_inverse() * part.axis);
+            show(&part.nodes.iter().map(spin).collect::<Vec<_>>());
+        }
+    }
+
+    fn steady(&self, at: &mut State) {
+        // Parts that are held in statics may spin by their inertia.
+        let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
+        for part in parts {
+            for node in &part.nodes {
+                let (rotation, p) = (at.rotation(node.p), node.p as usize);
+                let about = rotation.t_inverse() * part.axis;
+                for rate in [&mut at.v[p], &mut at.a[p]] {
+                    *rate -= about * part.axis.dot(rotation.t * *rate);
+                }
+            }
         }
     }
 }

@@ -20,7 +20,7 @@ pub struct VolumeElement<const N: usize, Q> {
     common: Arc<Common<N, Q>>,
 }
 
-/// What neighbours share.
+/// The data that neighbours share.
 #[derive(Debug, PartialEq)]
 struct Common<const N: usize, Q> {
     /// The initial places of the nodes as seen from the first
@@ -69,7 +69,7 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
         }
     }
 
-    /// Whether elements share their points.
+    /// All elements share their points.
     #[inline(always)]
     fn share(elements: [&Self; LANES]) -> bool {
         elements[1..].iter().all(|element| Arc::ptr_eq(&element.common, &elements[0].common))
@@ -99,7 +99,7 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
 pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, VolumeElement<4, Q>>;
 
 impl<Q: Copy> VolumeElements<Q> {
-    /// The slots that meet in each element; effects add no others than those that a sink takes.
+    /// The slots that meet in each element; effects add no others than those that an assembler takes.
     pub fn connectivity(&self, blocks: Blocks) -> Connectivity {
         let mut connectivity = Connectivity::divisible();
         for_each_batch!(self, |_first, batch| for element in batch {
@@ -158,7 +158,7 @@ impl<Q: Copy> VolumeElements<Q> {
         });
     }
 
-    /// Whether any point has a quantity of this kind.
+    /// Some point has a quantity of this kind.
     pub fn any(&self, is: impl Fn(&Q) -> bool) -> bool {
         let mut found = false;
         for_each_batch!(self, |_first, batch| {
@@ -198,7 +198,7 @@ fn add_batch<K, const N: usize>(
     out.take_back(systems);
 }
 
-/// The same for one element, whose nodes may sit in different charts.
+/// Adds force and tangent of one element, whose nodes may sit in different charts.
 #[inline(never)]
 fn add_alone<K: VolumeKernel, const N: usize>(
     kernel: &K,

@@ -7,8 +7,8 @@
 use super::Step;
 use crate::kernel::inertia::Inertia;
 use crate::kernel::turn::{Carrier, Start, Turn};
-use crate::model::Model;
 use crate::model::charts::DYNAMIC_BAND;
+use crate::model::{Model, StageKind};
 use crate::rotation::{Rotation, complement, log};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::{Mat3, Vec3};
@@ -32,8 +32,8 @@ pub struct Increments {
 }
 
 impl Increments {
-    /// For a stage with these equations.
-    pub fn new(model: &Model, dof_map: &DofMap) -> Self {
+    /// For a stage of this kind with these equations.
+    pub fn new(model: &Model, kind: StageKind, dof_map: &DofMap) -> Self {
         let bodies = bodies_by_rotation(model);
         let carrier = |&slot: &Slot| {
             // A hinge turns about a fixed axis: its spin has one component, its momentum three.
@@ -44,7 +44,7 @@ impl Increments {
             });
             (slot, carrier.unwrap_or(Carrier::SPIN))
         };
-        Self { carriers: model.charted.rotations.iter().map(carrier).collect() }
+        Self { carriers: model.charted(kind).rotations.iter().map(carrier).collect() }
     }
 
     /// At the start of a stage, after [`super::Scheme::start`]: the same of momenta.
@@ -141,8 +141,8 @@ pub struct Accelerations {
 /// What sits at each rotation, taken together, with the slot of its displacement.
 fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     let mut sums: BTreeMap<Slot, (Slot, Inertia)> = BTreeMap::new();
-    for effect in &model.effects {
-        effect.bodies(&mut |node, body| {
+    for masses in model.effects.iter().filter_map(|effect| effect.roles().masses) {
+        masses.bodies(&mut |node, body| {
             let sum = sums.entry(node.p).or_insert((node.u, Inertia::NONE));
             sum.1 = sum.1.with(body);
         });

@@ -1,13 +1,14 @@
 //! Beam elements of N nodes: interpolation, and the sums over Gauss points.
 
-use super::elastic::{Point, PointTangent, Stiffness, Strain, Stress};
+use super::elastic::{Point, PointTangent};
 use super::element::{ElementSystem, Placed};
+use super::law::{Linear, SectionLaw, Stiffness, StoredLaw, Strain, Stress};
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
-use crate::tensor::{Mat3, Vec3};
+use crate::tensor::Vec3;
 
 /// An integration point for internal forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StiffnessPoint<const N: usize, T = f64> {
+pub struct StiffnessPoint<const N: usize, T = f64, L = Linear<T>> {
     /// Shape functions
     pub shape: [T; N],
     /// Their derivatives over initial arc length
@@ -16,8 +17,8 @@ pub struct StiffnessPoint<const N: usize, T = f64> {
     pub weight: T,
     /// E1, the unit tangent of the initial centre line
     pub tangent: Vec3<T>,
-    /// The section in global components
-    pub stiffness: Stiffness<T>,
+    /// The law of the section in global components
+    pub law: L,
     /// The strain that makes no stress, where there is one (natural curvature, thermal strain), for an amplitude of one
     pub free: Option<Strain<T>>,
 }
@@ -32,11 +33,10 @@ pub fn interpolate<T: Real, const N: usize>(shape: &[T; N], value: impl Fn(usize
     sum
 }
 
-impl<const N: usize> StiffnessPoint<N> {
-    /// The same point for another scalar.
+impl<const N: usize, L: StoredLaw> StiffnessPoint<N, f64, L> {
+    /// This point, with constants of another scalar.
     #[inline(always)]
-    pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T> {
-        let Self { weight, tangent, stiffness, .. } = self;
+    pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T, L::Lifted<T>> {
         let (mut shape, mut slope) = ([T::zero(); N], [T::zero(); N]);
         for i in 0..N {
             (shape[i], slope[i]) = (T::constant(self.shape[i]), T::constant(self.slope[i]));
@@ -45,21 +45,19 @@ impl<const N: usize> StiffnessPoint<N> {
             None => None,
             Some(own) => Some(Strain { gamma: Vec3::constant(own.gamma), kappa: Vec3::constant(own.kappa) }),
         };
-        let cc = stiffness.cc.map(Mat3::constant);
-        let stiffness = Stiffness { cn: Mat3::constant(stiffness.cn), cm: Mat3::constant(stiffness.cm), cc };
         StiffnessPoint {
             shape,
             slope,
-            weight: T::constant(*weight),
-            tangent: Vec3::constant(*tangent),
-            stiffness,
+            weight: T::constant(self.weight),
+            tangent: Vec3::constant(self.tangent),
+            law: self.law.lifted(),
             free,
         }
     }
 }
 
-impl<const N: usize> Pack for StiffnessPoint<N> {
-    type Packed = StiffnessPoint<N, Lanes>;
+impl<const N: usize, L: StoredLaw> Pack for StiffnessPoint<N, f64, L> {
+    type Packed = StiffnessPoint<N, Lanes, L::Lifted<Lanes>>;
 
     #[inline(always)]
     fn pack(of: [&Self; LANES]) -> Self::Packed {
@@ -68,13 +66,13 @@ impl<const N: usize> Pack for StiffnessPoint<N> {
             slope: pack!(of.slope),
             weight: pack!(of.weight),
             tangent: pack!(of.tangent),
-            stiffness: pack!(of.stiffness),
+            law: pack!(of.law),
             free: pack!(of.free),
         }
     }
 }
 
-impl<const N: usize, T: Real> StiffnessPoint<N, T> {
+impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
     /// Takes the point to an element that is so many times as long.
     #[inline(always)]
     pub fn lengthen(&mut self, times: T) {
@@ -101,10 +99,22 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
         (strain, self.stress(&strain, free))
     }
 
+    /// The strain less its free part at this point; `free` is the amplitude of the free strain.
+    #[inline(always)]
+    pub fn elastic_strain(&self, nodes: &[impl Placed<T>; N], free: T) -> Strain<T> {
+        self.elastic_part(&self.configuration(nodes).strain(self.tangent), free)
+    }
+
+    /// The strain energy of this point, its weight included; `free` is the amplitude of the free strain.
+    #[inline(always)]
+    pub fn energy(&self, nodes: &[impl Placed<T>; N], free: T) -> T {
+        self.law.energy(&self.elastic_strain(nodes, free)) * self.weight
+    }
+
     /// The stress of a strain, less its free part.
     #[inline(always)]
     pub fn stress(&self, strain: &Strain<T>, free: T) -> Stress<T> {
-        self.stiffness.stress(&self.elastic_part(strain, free))
+        self.law.stress(&self.elastic_part(strain, free))
     }
 
     /// The strain less its free part.
@@ -128,7 +138,7 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
         at.strain_variation(slopes.0, slopes.1, interpolate(&self.shape, &dp))
     }
 
-    /// The stress that a correction of the nodes is expected to lead to: C (strain + B dq).
+    /// The stress that a correction of the nodes is expected to lead to: that of the strain and its variation, strain + B dq.
     #[inline(always)]
     pub fn extrapolated_stress(
         &self,
@@ -156,10 +166,11 @@ impl<const N: usize, T: Real> StiffnessPoint<N, T> {
         out: &mut ElementSystem<T>,
     ) {
         let at = self.configuration(nodes);
-        let stress = self.stress(&at.strain(self.tangent), free);
+        let elastic = self.elastic_part(&at.strain(self.tangent), free);
+        let stress = self.law.stress(&elastic);
         self.add_force(&at, &stress, out);
         if weight != 0.0 {
-            self.add_tangent(&at, &self.stiffness, geometric.unwrap_or(&stress), weight, out);
+            self.add_tangent(&at, &self.law.tangent(&elastic), geometric.unwrap_or(&stress), weight, out);
         }
     }
 

@@ -1,78 +1,12 @@
-//! Strains, stress resultants, internal force and stiffness at a point of the beam (section 3, equations (45)–(80)).
+//! Strains, internal force and stiffness at a point of the beam (section 3, equations (45)–(80)).
 //!
 //! All tensors are material, with global components: P is measured from the initial placement, so that
 //! K = T P' already is the change of curvature of an initially curved or twisted beam.
 
+use super::law::{Stiffness, Strain, Stress};
 use crate::rotation::Rotation;
-use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
-
-/// The stiffness of a section in global components: N = Cn Gamma + Cc K, M = Cc^T Gamma + Cm K.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stiffness<T = f64> {
-    /// Cn = R0 diag(EA, GA2, GA3) R0^T, force
-    pub cn: Mat3<T>,
-    /// Cm = R0 diag(GJ, EI2, EI3) R0^T, force times length squared
-    pub cm: Mat3<T>,
-    /// Cc, the coupling of strain and curvature, where there is one; force times length
-    pub cc: Option<Mat3<T>>,
-}
-
-/// Gamma (translational strain, 1) and K (change of curvature, 1/length), both material.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Strain<T = f64> {
-    /// Gamma = R^T x' - E1
-    pub gamma: Vec3<T>,
-    /// K = T P'
-    pub kappa: Vec3<T>,
-}
-
-/// The stress resultants N (force) and M (moment), both material.
-#[derive(Clone, Copy, Debug)]
-pub struct Stress<T = f64> {
-    /// N
-    pub n: Vec3<T>,
-    /// M
-    pub m: Vec3<T>,
-}
-
-impl Pack for Stiffness {
-    type Packed = Stiffness<Lanes>;
-
-    #[inline(always)]
-    fn pack(of: [&Self; LANES]) -> Self::Packed {
-        let (cn, cm) = (pack!(of.cn), pack!(of.cm));
-        Stiffness { cn, cm, cc: pack!(of.cc) }
-    }
-}
-
-impl Pack for Strain {
-    type Packed = Strain<Lanes>;
-
-    #[inline(always)]
-    fn pack(of: [&Self; LANES]) -> Self::Packed {
-        Strain { gamma: pack!(of.gamma), kappa: pack!(of.kappa) }
-    }
-}
-
-impl Default for Strain {
-    fn default() -> Self {
-        Self { gamma: Vec3::ZERO, kappa: Vec3::ZERO }
-    }
-}
-
-impl<T: Real> Stiffness<T> {
-    /// The stress resultants of a strain.
-    #[inline(always)]
-    pub fn stress(&self, strain: &Strain<T>) -> Stress<T> {
-        let mut stress = Stress { n: self.cn * strain.gamma, m: self.cm * strain.kappa };
-        if let Some(cc) = self.cc {
-            stress.n += cc * strain.kappa;
-            stress.m += cc.transpose_mul(strain.gamma);
-        }
-        stress
-    }
-}
 
 /// The configuration at a point: the rotation, x' (spatial) and P', both derivatives over initial arc length.
 #[derive(Clone, Copy, Debug)]

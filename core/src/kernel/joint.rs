@@ -43,6 +43,31 @@ pub mod block {
 }
 use block::{ALONG, BETWEEN, P_A, P_B, U_A, U_B};
 
+/// A direction that A carries and one that B carries: material, global components at the start.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectionPair<T = f64> {
+    /// Of A
+    pub a: Vec3<T>,
+    /// Of B
+    pub b: Vec3<T>,
+}
+
+/// Factors of the tangent that a gap adds.
+#[derive(Clone, Copy, Debug)]
+pub struct GapFactors {
+    /// Of the tangent of its forces
+    pub forces: f64,
+    /// Of the row and the column of its multiplier
+    pub multiplier: f64,
+}
+
+impl GapFactors {
+    /// Forces alone
+    pub const NONE: Self = Self { forces: 0.0, multiplier: 0.0 };
+    /// Forces of a multiplier of one are the gradient of its gap, their tangent is the Hessian.
+    pub const HESSIAN: Self = Self { forces: 1.0, multiplier: 0.0 };
+}
+
 /// How far B has slid from the end of A's arm, along the three axes of A.
 pub fn slides<T: Real>(axes: &Mat3, arms: &[Vec3; 2], a: &End<T>, b: &End<T>) -> Vec3<T> {
     let w = b.place + b.rotation.r * Vec3::constant(arms[1]) - a.place;
@@ -51,23 +76,25 @@ pub fn slides<T: Real>(axes: &Mat3, arms: &[Vec3; 2], a: &End<T>, b: &End<T>) ->
 }
 
 /// (R_A a) . (R_B b)
-pub fn cosine<T: Real>(directions: (Vec3<T>, Vec3<T>), a: &End<T>, b: &End<T>) -> T {
-    (a.rotation.r * directions.0).dot(b.rotation.r * directions.1)
+pub fn cosine<T: Real>(directions: DirectionPair<T>, a: &End<T>, b: &End<T>) -> T {
+    (a.rotation.r * directions.a).dot(b.rotation.r * directions.b)
 }
 
-/// Adds the forces that `force` (components along the axes of A) makes on both nodes, `weight` times their tangent, and
-/// `couple` times the blocks of multipliers along the axes.
+/// Adds the forces that `force` (components along the axes of A) makes on both nodes, their tangent, and the blocks of multipliers
+/// along the axes.
 pub fn add_along<T: Real>(
     axes: &Mat3,
     arms: &[Vec3; 2],
     ends: &[End<T>; 2],
     force: Vec3<T>,
-    (weight, couple): (f64, f64),
+    factors: GapFactors,
     out: &mut ElementSystem<T>,
 ) {
+    let GapFactors { forces: weight, multiplier: couple } = factors;
     let [a, b] = ends;
     let (ra, rb) = (&a.rotation, &b.rotation);
-    let (e, arm) = (Mat3::constant(*axes), Vec3::constant(arms[1]));
+    let e = Mat3::constant(*axes);
+    let arm = Vec3::constant(arms[1]);
     let w = b.place + rb.r * arm - a.place;
     let s = e * force;
     let pull = ra.r * s;
@@ -101,21 +128,23 @@ pub fn add_along<T: Real>(
     }
 }
 
-/// Adds the forces of a multiplier on a gap between two directions, `weight` times their tangent, and `couple` times its own
-/// row and column, number `row` of its block.
+/// Adds the forces of a multiplier on a gap between two directions, their tangent, and the multiplier's own row and column, number `row`
+/// of its block.
 pub fn add_between<T: Real>(
-    directions: (Vec3<T>, Vec3<T>),
+    directions: DirectionPair<T>,
     ends: &[End<T>; 2],
     multiplier: T,
-    (weight, couple): (f64, f64),
+    factors: GapFactors,
     row: usize,
     out: &mut ElementSystem<T>,
 ) {
+    let GapFactors { forces: weight, multiplier: couple } = factors;
     let [a, b] = ends;
     let (ra, rb) = (&a.rotation, &b.rotation);
-    let (da, db) = directions;
+    let DirectionPair { a: da, b: db } = directions;
     let (wa, wb) = (rb.r * db, ra.r * da);
-    let (ga, gb) = (ra.potential_gradient(da, wa), rb.potential_gradient(db, wb));
+    let ga = ra.potential_gradient(da, wa);
+    let gb = rb.potential_gradient(db, wb);
     out.add_force(P_A, ga * multiplier);
     out.add_force(P_B, gb * multiplier);
     if weight != 0.0 {

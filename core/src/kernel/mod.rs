@@ -8,6 +8,7 @@ pub mod elastic;
 pub mod element;
 pub mod inertia;
 pub mod joint;
+pub mod law;
 pub mod load;
 pub mod pair;
 pub mod planar;

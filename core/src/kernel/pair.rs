@@ -1,5 +1,5 @@
-//! Elements of two nodes seen from half way between them: what [`Relative`] comes to where there is one integration point, in the
-//! middle. The frame itself stands there, so that nothing is interpolated:
+//! Elements of two nodes seen from half way between them: [`Relative`] elements whose only integration point is in the middle,
+//! where the frame itself stands, so that nothing is interpolated:
 //!
 //! ```text
 //! Gamma = s (R_r^T dx - dX),   K = s phi,   phi = log(R_1^T R_2) = 2h,   s = 1/length
@@ -20,11 +20,12 @@
 //! t_i,t_j: w (F_i^T (S F_j - s a~ Cc B_j) + s B_i^T (Cc^T a~ F_j + s Cm B_j) + E_i B_j),   E_i dphi = d(F_i^T) q + s d(B_i^T) M
 //! ```
 //!
-//! T_i takes spins to rotation vectors, whose own second variation is C2. A third of the work of the general way.
+//! Cn, Cc and Cm are the blocks of the law's tangent. T_i takes spins to rotation vectors, whose own second variation is C2. A third of the work
+//! of the general way.
 
 use super::beam::StiffnessPoint;
-use super::elastic::{Strain, Stress};
 use super::element::ElementSystem;
+use super::law::{SectionLaw, Stiffness, Strain, Stress};
 use super::relative::Relative;
 use crate::rotation::{Rotation, Series};
 use crate::scalar::Real;
@@ -84,10 +85,10 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// Puts the force and, where `weight` is not zero, `weight` times the stiffness of the point half way between two nodes in the place
     /// of what stands in `out`; results as those of [`StiffnessPoint::add_elastic`], carried back.
     #[inline(always)]
-    pub fn fill_half_way(
+    pub fn fill_half_way<L: SectionLaw<T>>(
         &self,
         rotations: &[Rotation<T>; N],
-        point: &StiffnessPoint<N, T>,
+        point: &StiffnessPoint<N, T, L>,
         free: T,
         geometric: Option<&Stress<T>>,
         weight: f64,
@@ -96,7 +97,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         debug_assert!(N == 2, "the frame of other elements does not stand at their points");
         let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
         let arm = self.arm(slope);
-        let stress = point.stress(&self.pair_strain(slope, &between), free);
+        let elastic = point.elastic_part(&self.pair_strain(slope, &between), free);
+        let stress = point.law.stress(&elastic);
         let follows = [self.half.follows(false), self.half.follows(true)];
         let forces = self.pair_forces(&stress, arm, slope, &follows, &between);
         let across = forces.across * (point.weight * slope);
@@ -108,17 +110,18 @@ impl<const N: usize, T: Real> Relative<N, T> {
         if weight != 0.0 {
             let stress = geometric.unwrap_or(&stress);
             let forces = self.pair_forces(stress, arm, slope, &follows, &between);
-            self.fill_pair_tangent(rotations, point, stress, &forces, &follows, &between, point.weight * weight, out);
+            let (stiffness, w) = (point.law.tangent(&elastic), point.weight * weight);
+            self.fill_pair_tangent(rotations, slope, &stiffness, stress, &forces, &follows, &between, w, out);
         }
     }
 
     /// The stress that variations of displacements and rotation vectors are expected to lead to; results as those of
     /// [`StiffnessPoint::extrapolated_stress`].
     #[inline(always)]
-    pub fn extrapolated_half_way(
+    pub fn extrapolated_half_way<L: SectionLaw<T>>(
         &self,
         rotations: &[Rotation<T>; N],
-        point: &StiffnessPoint<N, T>,
+        point: &StiffnessPoint<N, T, L>,
         free: T,
         du: &[Vec3<T>; N],
         dp: &[Vec3<T>; N],
@@ -162,7 +165,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
     fn fill_pair_tangent(
         &self,
         rotations: &[Rotation<T>; N],
-        point: &StiffnessPoint<N, T>,
+        slope: T,
+        stiffness: &Stiffness<T>,
         stress: &Stress<T>,
         forces: &PairForces<T>,
         follows: &[Mat3<T>; 2],
@@ -170,7 +174,6 @@ impl<const N: usize, T: Real> Relative<N, T> {
         w: T,
         out: &mut ElementSystem<T>,
     ) {
-        let (slope, stiffness) = (point.slope[1], &point.stiffness);
         let arm = self.arm(slope);
         let ends = [&rotations[0].t, &rotations[1].t];
         // The weight goes first to what it belongs to: stiff sections of short elements would overflow without it.

@@ -9,9 +9,9 @@
 //! and rotation vectors and angles are interpolated alike, so that `total` and `relative` elements are the same.
 
 use super::beam::StiffnessPoint;
-use super::elastic::Stress;
 use super::element::Weights;
 use super::inertia::Inertia;
+use super::law::{PlanarLaw, PlanarLinear, PlanarStiffness, PlanarStrain, PlanarStress, StoredLaw, Stress};
 use super::relative::carriers;
 use crate::rotation::Series;
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 
 /// An integration point for internal forces, see [`StiffnessPoint`].
 #[derive(Clone, Copy, Debug)]
-pub struct PlanarPoint<const N: usize, T = f64> {
+pub struct PlanarPoint<const N: usize, T = f64, P = PlanarLinear<T>> {
     /// Shape functions
     pub shape: [T; N],
     /// Their derivatives over initial arc length
@@ -29,14 +29,10 @@ pub struct PlanarPoint<const N: usize, T = f64> {
     pub weight: T,
     /// E1
     pub tangent: [T; 2],
-    /// Cn: its diagonal, and the entry beside it
-    pub cn: [T; 3],
-    /// Bending stiffness
-    pub cm: T,
-    /// The coupling of strain and curvature, where there is one
-    pub cc: Option<[T; 2]>,
+    /// The law of the section in the axes of the plane
+    pub law: P,
     /// The strain that makes no stress, where there is one: Gamma and K
-    pub free: Option<[T; 3]>,
+    pub free: Option<PlanarStrain<T>>,
 }
 
 /// Displacement and angle of a node, or their increments.
@@ -47,9 +43,6 @@ pub struct PlanarNode<T = f64> {
     /// About its normal
     pub angle: T,
 }
-
-/// Normal and shear force, and bending moment.
-pub type PlanarStress<T> = [T; 3];
 
 /// Force and tangent of an element in a plane.
 #[derive(Clone, Copy, Debug)]
@@ -96,31 +89,29 @@ impl<const N: usize, T: Real> PlanarSystem<N, T> {
     }
 }
 
-impl<const N: usize> PlanarPoint<N> {
-    /// What of a point matters in the plane with these axes (columns, the third one normal).
-    pub fn new(point: &StiffnessPoint<N>, axes: &Mat3) -> Self {
-        let normal = axes.column(2);
-        let inside = |v: Vec3| axes.transpose_mul(v).0;
-        let [cn1, cn2] = [0, 1].map(|k| inside(point.stiffness.cn * axes.column(k)));
-        let in_plane = |v: Vec3| [inside(v)[0], inside(v)[1]];
+impl<const N: usize, P: PlanarLaw<f64>> PlanarPoint<N, f64, P> {
+    /// The in-plane part of a point, for the plane with these axes (columns, the third one normal).
+    pub fn new<L: StoredLaw<InPlane = P>>(point: &StiffnessPoint<N, f64, L>, axes: &Mat3) -> Self {
+        let in_plane = |v: Vec3| {
+            let [x, y, _] = axes.transpose_mul(v).0;
+            [x, y]
+        };
         Self {
             shape: point.shape,
             slope: point.slope,
             weight: point.weight,
             tangent: in_plane(point.tangent),
-            cn: [cn1[0], cn2[1], cn2[0]],
-            cm: normal.dot(point.stiffness.cm * normal),
-            cc: point.stiffness.cc.map(|cc| in_plane(cc * normal)),
+            law: point.law.in_plane(axes),
             free: point.free.map(|free| {
                 let [x, y] = in_plane(free.gamma);
-                [x, y, normal.dot(free.kappa)]
+                [x, y, axes.column(2).dot(free.kappa)]
             }),
         }
     }
 }
 
-impl<const N: usize> Pack for PlanarPoint<N> {
-    type Packed = PlanarPoint<N, Lanes>;
+impl<const N: usize, P: PlanarLaw<f64> + Pack> Pack for PlanarPoint<N, f64, P> {
+    type Packed = PlanarPoint<N, Lanes, P::Packed>;
 
     fn pack(of: [&Self; LANES]) -> Self::Packed {
         PlanarPoint {
@@ -128,9 +119,7 @@ impl<const N: usize> Pack for PlanarPoint<N> {
             slope: pack!(of.slope),
             weight: pack!(of.weight),
             tangent: pack!(of.tangent),
-            cn: pack!(of.cn),
-            cm: pack!(of.cm),
-            cc: pack!(of.cc),
+            law: pack!(of.law),
             free: pack!(of.free),
         }
     }
@@ -157,15 +146,17 @@ fn within_half_a_turn<T: Real>(angle: T, of: T) -> T {
     angle - (ahead.above(PI, turn, T::zero()) - (-ahead).above(PI, turn, T::zero()))
 }
 
-/// Strain, and what turns it.
+/// The in-plane configuration at a point.
 struct Configuration<T> {
     /// cos and sin of the angle
     turn: [T; 2],
+    /// x' in the axes of the turned section
     y: [T; 2],
-    strain: [T; 3],
+    /// Strain less its free part
+    elastic: PlanarStrain<T>,
 }
 
-impl<const N: usize, T: Real> PlanarPoint<N, T> {
+impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
     #[inline(always)]
     fn sum(&self, of: &[T; N], value: impl Fn(usize) -> T) -> T {
         let mut sum = of[0] * value(0);
@@ -189,19 +180,7 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
                 strain[k] -= own[k] * free;
             }
         }
-        Configuration { turn: [cos, sin], y, strain }
-    }
-
-    #[inline(always)]
-    fn stress(&self, strain: &[T; 3]) -> PlanarStress<T> {
-        let ([x, y, kappa], [c1, c2, c12]) = (*strain, self.cn);
-        let mut stress = [c1 * x + c12 * y, c12 * x + c2 * y, self.cm * kappa];
-        if let Some([a, b]) = self.cc {
-            stress[0] += a * kappa;
-            stress[1] += b * kappa;
-            stress[2] += a * x + b * y;
-        }
-        stress
+        Configuration { turn: [cos, sin], y, elastic: strain }
     }
 
     /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the stress of the
@@ -216,7 +195,7 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
         out: &mut PlanarSystem<N, T>,
     ) {
         let at = self.configuration(nodes, free);
-        let stress = self.stress(&at.strain);
+        let stress = self.law.stress(&at.elastic);
         let ([cos, sin], [y1, y2], [n1, n2, m]) = (at.turn, at.y, stress);
         // f_x' = R N, f_theta = (N x y).e, f_theta' = M
         let (fx, fy) = (cos * n1 - sin * n2, sin * n1 + cos * n2);
@@ -243,14 +222,17 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
         weight: f64,
         out: &mut PlanarSystem<N, T>,
     ) {
-        let ([cos, sin], [y1, y2], [n1, n2, _], [c1, c2, c12]) = (at.turn, at.y, *stress, self.cn);
+        let [cos, sin] = at.turn;
+        let [y1, y2] = at.y;
+        let [n1, n2, _] = *stress;
+        let PlanarStiffness { cn: [c1, c2, c12], cm, cc } = self.law.tangent(&at.elastic);
         let turned = |v: [T; 2]| [cos * v[0] - sin * v[1], sin * v[0] + cos * v[1]];
         let first = turned([c1 * cos - c12 * sin, c12 * cos - c2 * sin]);
         let second = turned([c1 * sin + c12 * cos, c12 * sin + c2 * cos]);
         let cn_a = [c1 * y2 - c12 * y1, c12 * y2 - c2 * y1];
         let x_angle = turned([cn_a[0] - n2, cn_a[1] + n1]);
         let angle_angle = y2 * cn_a[0] - y1 * cn_a[1] - (n1 * y1 + n2 * y2);
-        let coupled = self.cc.map(|[a, b]| (turned([a, b]), a * y2 - b * y1));
+        let coupled = cc.map(|[a, b]| (turned([a, b]), a * y2 - b * y1));
         let w = self.weight * weight;
         for i in 0..N {
             for j in 0..N {
@@ -265,7 +247,7 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
                 tile[5] += x_angle[1] * ns;
                 tile[6] += x_angle[0] * sn;
                 tile[7] += x_angle[1] * sn;
-                tile[8] += self.cm * ss + angle_angle * nn;
+                tile[8] += cm * ss + angle_angle * nn;
                 if let Some(([x, y], bent)) = coupled {
                     tile[2] += x * ss;
                     tile[5] += y * ss;
@@ -277,7 +259,7 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
         }
     }
 
-    /// The stress that a correction `change` of the nodes is expected to lead to: C (strain + B dq).
+    /// The stress that a correction `change` of the nodes is expected to lead to: that of the strain and its variation, strain + B dq.
     #[inline(always)]
     pub fn extrapolated_stress(
         &self,
@@ -285,10 +267,10 @@ impl<const N: usize, T: Real> PlanarPoint<N, T> {
         free: T,
         change: &[PlanarNode<T>; N],
     ) -> PlanarStress<T> {
-        let Configuration { turn: [cos, sin], y, strain: [x, z, kappa] } = self.configuration(nodes, free);
+        let Configuration { turn: [cos, sin], y, elastic: [x, z, kappa] } = self.configuration(nodes, free);
         let along = [0, 1].map(|k| self.sum(&self.slope, |i| change[i].u[k]));
         let turned = self.sum(&self.shape, |i| change[i].angle);
-        self.stress(&[
+        self.law.stress(&[
             x + cos * along[0] + sin * along[1] + y[1] * turned,
             z + cos * along[1] - sin * along[0] - y[0] * turned,
             kappa + self.sum(&self.slope, |i| change[i].angle),
@@ -308,7 +290,7 @@ pub struct PlanarBody<T = f64> {
 }
 
 impl PlanarBody {
-    /// What of mass properties matters in the plane with these axes (columns, the third one normal).
+    /// The in-plane part of mass properties, for the plane with these axes (columns, the third one normal).
     pub fn new(inertia: &Inertia, axes: &Mat3) -> Self {
         let [x, y, _] = axes.transpose_mul(inertia.offset).0;
         let normal = axes.column(2);
@@ -365,7 +347,7 @@ impl<T: Real> PlanarBody<T> {
     }
 }
 
-/// The stress in the plane with these axes.
+/// The in-plane part of a stress in space, for the plane with these axes.
 #[inline(always)]
 pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
     let along = |v: &Vec3<T>, k: usize| {
@@ -375,7 +357,7 @@ pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
     [along(&stress.n, 0), along(&stress.n, 1), along(&stress.m, 2)]
 }
 
-/// The same in space.
+/// The stress in space, in global components, of a stress in the plane with these axes.
 #[inline(always)]
 pub fn in_space<T: Real>([x, y, m]: PlanarStress<T>, axes: &Mat3) -> Stress<T> {
     let [a, b, e] = [0, 1, 2].map(|k| axes.column(k));

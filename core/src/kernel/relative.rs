@@ -8,7 +8,7 @@
 //! Theta_i = log(R_r^T R_i),   R(s) = R_r exp(sum N_i Theta_i),   xi_i = R_r^T x_i
 //! ```
 //!
-//! What follows in that frame is the total Lagrangian element itself, with nodes (xi_i, Theta_i); its forces and tangent are
+//! In that frame the element is the total Lagrangian one itself, with nodes (xi_i, Theta_i); its forces and tangent are
 //! carried back. R_r is the rotation of the middle node, or half way between the two middle ones.
 //!
 //! With material spins t_i of the nodes, t of the frame, A_i = T(Theta_i)^-1 and x~ the skew tensor of x:
@@ -123,7 +123,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
         Some(self.half.follows(i == last))
     }
 
-    /// What the frame sees when the nodes move by `du` and spin by `spins` (material): variations of u and Theta.
+    /// Variations of u and Theta in the frame when the nodes move by `du` and spin by `spins` (material).
     #[inline(always)]
     pub fn variation(&self, du: &[Vec3<T>; N], spins: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N] {
         let (first, _) = carriers(N);
@@ -210,7 +210,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
     ) {
         let over = self.over_frame(local, source, forces, s);
         let drift = self.drift(rotations, forces.frame, s);
-        // What each node's rotation vector does: dTheta_i = own_i dP_i - ..., t = following_i dP_i.
+        // Variations over each node's rotation vector: dTheta_i = own_i dP_i - ..., t = following_i dP_i.
         let (mut own, mut spin, mut row) = (self.back, over.spin, over.row);
         let mut following = [None; N];
         for i in 0..N {
@@ -323,7 +323,7 @@ impl<const N: usize, T: Real> Relative<N, T> {
     }
 }
 
-/// See [`Relative::drift`].
+/// Derivatives of F_i^T m over the spins of the nodes that carry the frame: block (i, j) is row i times column j.
 struct Drift<const N: usize, T> {
     rows: [Mat3<T>; 2],
     columns: [Mat3<T>; 2],

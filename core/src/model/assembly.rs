@@ -2,7 +2,7 @@
 
 use super::linear::Linear;
 use super::{Model, StageContext};
-use crate::effect::{Effect, PlanarForm, RoundOff};
+use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
 use crate::kernel::Weights;
 use crate::system::{
     Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Part, Pattern, Plane, State, Symmetry, System,
@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// The effects of one stage with their scratch, and the system they add to.
 pub struct Assembly {
+    /// The stage
+    pub stage: StageContext,
     effects: Vec<Acting>,
     /// Forces and tangent
     pub system: System,
@@ -25,7 +27,7 @@ pub struct Assembly {
 /// An effect in a stage.
 struct Acting {
     effect: Arc<dyn Effect>,
-    /// What does its work, where the stage is one in a plane
+    /// The form that adds in its place, where the stage is treated in a plane
     planar: Option<Box<dyn PlanarForm>>,
     memory: Memory,
     instances: u64,
@@ -34,16 +36,20 @@ struct Acting {
 
 impl Acting {
     fn new(effect: Arc<dyn Effect>, plane: Option<&Plane>, instances: usize) -> Self {
-        let memory = Memory { points: vec![[0.0; 6]; effect.memory_points()], valid: false };
+        let points = effect.roles().stresses.map_or(0, |stresses| stresses.memory_points());
+        let memory = Memory { points: vec![[0.0; 6]; points], valid: false };
         let planar = plane.and_then(|plane| effect.clone().in_plane(plane));
-        Self { has_tangent: effect.has_tangent(), effect, planar, memory, instances: instances as u64 }
+        Self { has_tangent: effect.tangent().exists(), effect, planar, memory, instances: instances as u64 }
     }
 
     fn is_symmetric(&self) -> bool {
-        self.planar.as_ref().map_or_else(|| self.effect.is_symmetric(), |planar| planar.is_symmetric())
+        match &self.planar {
+            None => self.effect.tangent() != TangentForm::General,
+            Some(planar) => planar.is_symmetric(),
+        }
     }
 
-    /// Of its forces.
+    /// The categories of its forces.
     fn categories(&self) -> impl Iterator<Item = Category> {
         std::iter::once(self.effect.category()).chain(self.effect.damps().then_some(Category::Damping))
     }
@@ -57,7 +63,11 @@ impl Acting {
 
     fn extrapolate(&mut self, at: &State, dq: &[Vec3]) {
         match &self.planar {
-            None => self.effect.extrapolate(at, dq, &mut self.memory),
+            None => {
+                if let Some(stresses) = self.effect.roles().stresses {
+                    stresses.extrapolate(at, dq, &mut self.memory);
+                }
+            }
             Some(planar) => planar.extrapolate(at, dq, &mut self.memory),
         }
     }
@@ -75,7 +85,7 @@ fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part
     }
 }
 
-/// The same of those that inertia or damping come from, without a tangent.
+/// Adds the forces of effects that inertia or damping come from, without a tangent.
 fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
     for (number, acting) in effects.iter().enumerate() {
         if !acting.categories().any(|category| matches!(category, Category::Inertia | Category::Damping)) {
@@ -91,16 +101,21 @@ fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
 impl Assembly {
     /// The system of what acts in a stage on these equations.
     pub fn new(stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
-        let acting = model.acting(stage);
+        Self::of(model.acting(stage), stage, dof_map, model)
+    }
+
+    /// The system of these effects in a stage on these equations.
+    pub fn of(acting: Vec<Arc<dyn Effect>>, stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
         let connectivity = threads::map(acting.iter(), |effect| effect.connectivity());
         let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, dof_map.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&connectivity).map(acts).collect();
-        // What is linear adds its forces by itself.
+        // Linear stages add their forces by themselves.
         let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
         let categories: Vec<Vec<Category>> = effects.iter().map(|acting| acting.categories().collect()).collect();
         let node_blocks = model.node_blocks(dof_map.layout());
         let symmetry = Symmetry::of(connectivity.iter().zip(effects.iter().map(Acting::is_symmetric)), &node_blocks);
         Self {
+            stage: *stage,
             evaluations: effects.iter().map(|acting| (acting.effect.name(), 0)).collect(),
             system: System::new(
                 Pattern::new(dof_map, node_blocks, connectivity, symmetry),
@@ -119,8 +134,8 @@ impl Assembly {
         Ok(())
     }
 
-    /// Forces of the state, and the tangent of the weights; `prescribed_increment`: see [`System::clear`]. Without weights the tangent is left as
-    /// it is.
+    /// Forces of the state, and the tangent of the weights; `prescribed_increment`: see
+    /// [`System::clear`]. Without weights the tangent is left as it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, prescribed_increment: Option<&[Vec3]>) {
         match self.linear.take() {
             None => self.evaluate_effects(state, weights, prescribed_increment),
@@ -131,7 +146,8 @@ impl Assembly {
         }
     }
 
-    /// The same where factors may have taken the place of a tangent that was formed already.
+    /// Forces and tangent as [`Self::evaluate`] forms them, also where factors have taken the place
+    /// of a tangent that was formed already.
     pub fn form_again(&mut self, state: &State, weights: Weights) {
         if let Some(linear) = &mut self.linear {
             linear.formed = None;
@@ -140,7 +156,8 @@ impl Assembly {
         self.evaluate(state, weights, prescribed_increment.as_deref());
     }
 
-    /// The tangent is formed where its weights change; and where increments are prescribed, which act through it.
+    /// The tangent is formed where its weights change; and where increments are prescribed, which
+    /// act through it.
     fn evaluate_linear(
         &mut self,
         linear: &mut Linear,
@@ -167,7 +184,7 @@ impl Assembly {
         let with_tangent = weights != Weights::NONE;
         debug_assert!(with_tangent || prescribed_increment.is_none(), "prescribed increments act through the tangent");
         self.system.begin(with_tangent, prescribed_increment);
-        // What has just been cleared is still near.
+        // Memory that has just been cleared is still in the cache.
         self.add_effects(state, weights, |part| part.clear(with_tangent));
     }
 
@@ -184,8 +201,8 @@ impl Assembly {
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 
-    /// Inertia and damping of a state alone, into other forces than those of the system, which stay; what else stands there is nobody's.
-    /// In linear stages those of its rates.
+    /// Inertia and damping of a state alone, into other forces than those of the system, which
+    /// stay; what else stands there is nobody's. In linear stages those of its rates.
     pub fn evaluate_rates(&mut self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         if let Some(linear) = &self.linear {
             force.iter_mut().for_each(|force| force.fill(Vec3::ZERO));
@@ -203,12 +220,12 @@ impl Assembly {
         std::mem::swap(&mut self.system.force, force);
     }
 
-    /// Whether any effect forms tangents with something that it foresees.
+    /// Tells whether any effect forms tangents with stresses that it foresees.
     pub fn foresees(&self) -> bool {
         self.linear.is_none() && self.effects.iter().any(|acting| !acting.memory.points.is_empty())
     }
 
-    /// Lets effects remember what the next tangent is formed with, see [`Effect::extrapolate`].
+    /// Lets effects remember what the next tangent is formed with, see [`StressPoints::extrapolate`](crate::effect::StressPoints::extrapolate).
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
         if !self.foresees() {
             return;
@@ -223,16 +240,19 @@ impl Assembly {
         self.effects.iter_mut().for_each(|acting| acting.memory.valid = false);
     }
 
-    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers; see [`Effect::drift`].
+    /// First and second derivatives over time of the gaps of joints, by slot of their multipliers;
+    /// see [`Constraint::drift`](crate::effect::Constraint::drift).
     pub fn drift(&self, state: &State) -> [Vec<Vec3>; 2] {
         let [mut rates, mut rates2] = [state.q.len(); 2].map(zeros);
-        self.effects.iter().for_each(|acting| acting.effect.drift(state, &mut rates, &mut rates2));
+        let constraints = self.effects.iter().filter_map(|acting| acting.effect.roles().constraint);
+        constraints.for_each(|constraint| constraint.drift(state, &mut rates, &mut rates2));
         [rates, rates2]
     }
 
     /// The largest round-off among the effects.
     pub fn round_off(&self, state: &State) -> RoundOff {
-        self.effects.iter().map(|acting| acting.effect.round_off(state)).fold(RoundOff::default(), RoundOff::or)
+        let stresses = self.effects.iter().filter_map(|acting| acting.effect.roles().stresses);
+        stresses.map(|stresses| stresses.round_off(state)).fold(RoundOff::default(), RoundOff::or)
     }
 
     /// The largest strain that a field makes, see [`Effect::strain_of`].
@@ -240,11 +260,11 @@ impl Assembly {
         self.effects.iter().map(|acting| acting.effect.strain_of(state, field, length)).fold(0.0, f64::max)
     }
 
-    /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of the others; `None` where no effect does.
-    /// The tangent is used up.
+    /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of
+    /// the others; `None` where no effect does. The tangent is used up.
     pub fn stiffness_along(&mut self, state: &State, field: &[Vec3]) -> Option<f64> {
-        let told: Vec<Option<f64>> =
-            self.effects.iter().map(|acting| acting.effect.stiffness_along(state, field)).collect();
+        let told_by = |acting: &Acting| acting.effect.roles().stresses?.stiffness_along(state, field);
+        let told: Vec<Option<f64>> = self.effects.iter().map(told_by).collect();
         if told.iter().all(Option::is_none) || self.linear.is_some() {
             return None;
         }

@@ -13,13 +13,16 @@ use std::ops::Range;
 /// The band beyond pi in which a node keeps its chart in dynamics, so that it cannot chatter.
 pub const DYNAMIC_BAND: f64 = 1e-3;
 
-/// The same in statics: nodes that are held at pi itself must not change at every iterate.
+/// The band beyond pi in which a node keeps its chart in statics: nodes that are held at pi itself
+/// must not change at every iterate.
 pub const STATIC_BAND: f64 = 1e-9;
 
-/// Most complements taken of one node at once: a node that turned further has no honest direction left.
+/// Most complements taken of one node at once: a node that turned further has no honest direction
+/// left.
 const MOST_CHANGES: usize = 10_000;
 
-/// Neighbours that turn more than this against each other are too far apart for the element between them.
+/// Neighbours that turn more than this against each other are too far apart for the element between
+/// them.
 pub const COARSE: f64 = 2.8;
 
 /// From here on a warning.
@@ -37,9 +40,9 @@ const LITTLE: f64 = 1.0;
 /// Within this angle of a whole turn the direction of P tells nothing of the axis.
 const NEAR_TURN: f64 = 0.5;
 
-/// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until none is left. `lag` is
-/// the time by which the algorithmic acceleration lies ahead of the state; `None` where it is the rate of a momentum, to
-/// which charts do not matter.
+/// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until
+/// none is left. `lag` is the time by which the algorithmic acceleration lies ahead of the state;
+/// `None` where it is the rate of a momentum, to which charts do not matter.
 pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
     let Some(first) = first_beyond(state, rotations, band) else { return 0 };
     state.wound_apart();
@@ -77,7 +80,8 @@ fn is_beyond(p: Vec3, band: f64) -> bool {
     p.squared() > (PI + band) * (PI + band) && p.is_finite()
 }
 
-/// Chooses for each element the nodes that are converted into the chart of its first, and counts the mixed elements.
+/// Chooses for each element the nodes that are converted into the chart of its first, and counts
+/// the mixed elements.
 pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     let mut mixed = 0;
     for (element, info) in elements.iter().enumerate().filter(|(_, e)| e.in_one_chart) {
@@ -93,8 +97,9 @@ pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     mixed
 }
 
-/// Carries the unwrapped rotation vectors along with a correction that the state is about to take. A node may turn further than half
-/// a turn in a load step; how far, only its corrections tell. What is not kept apart goes with the unknowns.
+/// Carries the unwrapped rotation vectors along with a correction that the state is about to take.
+/// A node may turn further than half a turn in a load step; how far, only its corrections tell.
+/// What is not kept apart goes with the unknowns.
 pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
     if state.unwrapped.is_empty() {
         return;
@@ -112,7 +117,8 @@ pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
     });
 }
 
-/// Shows a state as it was before a correction of its unknowns alone; unwrapped rotation vectors that are the unknowns stay so.
+/// Shows a state as it was before a correction of its unknowns alone; unwrapped rotation vectors
+/// that are the unknowns stay so.
 pub fn there_and_back(state: &mut State, dq: &[Vec3], look: impl FnOnce(&State)) {
     let unwrapped = state.unwrapped.iter().zip(&state.q).enumerate();
     let unwound: Vec<usize> = unwrapped.filter(|(_, (unwrapped, q))| unwrapped == q).map(|(slot, _)| slot).collect();
@@ -142,8 +148,8 @@ fn rotated(old: Vec3, p: Vec3) -> Vec3 {
     log(Rotation::new(p).r * Rotation::new(old).r.transpose())
 }
 
-/// The representative of `p` next to where `turned` carries a unwrapped vector; the carried vector itself near whole turns, where
-/// there is none. See [`wind`].
+/// The representative of `p` next to where `turned` carries a unwrapped vector; the carried vector
+/// itself near whole turns, where there is none. See [`wind`].
 fn continued(p: Vec3, unwrapped: Vec3, turned: Vec3) -> Vec3 {
     let carried = unwrapped + turned;
     let candidate = unwound(p, carried);
@@ -152,12 +158,14 @@ fn continued(p: Vec3, unwrapped: Vec3, turned: Vec3) -> Vec3 {
     if together && !near_whole_turn { candidate } else { carried }
 }
 
-/// Continues the unwrapped rotation vectors from the state `before`, and returns the slots where that is ambiguous.
+/// Continues the unwrapped rotation vectors from the state `before`, and returns the slots where
+/// that is ambiguous.
 ///
-/// What corrections have carried them by tells the turns; without any it is less than half a turn.
-/// The unwrapped vector is the one of P + 2 pi k n that lies nearest to the old one carried on by the rotation since. Close to a
-/// whole turn n is no guide: a node that passes it a little aside sees n swing to the other side, and P + 2 pi k n with it.
-/// There the carried one is kept until both come together again; it is ambiguous where they lie far apart.
+/// The way that corrections have carried them tells the turns; without any it is less than half a
+/// turn. The unwrapped vector is the one of P + 2 pi k n that lies nearest to the old one carried
+/// on by the rotation since. Close to a whole turn n is no guide: a node that passes it a little
+/// aside sees n swing to the other side, and P + 2 pi k n with it. There the carried one is kept
+/// until both come together again; it is ambiguous where they lie far apart.
 pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> {
     if state.unwrapped.is_empty() {
         return Vec::new();
@@ -165,7 +173,8 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     let State { q, unwrapped: carried, .. } = state;
     each_rotation(carried, rotations, |k, carried| {
         let (p, old, unwrapped) = (q[k], before.q[k], before.unwrapped_at(k as Slot));
-        // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away from it.
+        // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away
+        // from it.
         let is_near = unwrapped == old && (p - old).norm() < 0.4 * FAR;
         if is_near && (*carried == old || *carried == p) {
             *carried = p;
@@ -185,10 +194,11 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     ambiguous
 }
 
-/// Takes away turns that only the corrections of an iteration made: they may lead round and round before they find a balance. Where a
-/// node seems to have turned by more than pi since the state `before`, those that have turned by little, or as is `prescribed`, tell
-/// the others: along an element the rotations of neighbours differ by less than pi, and so do their unwrapped vectors. What no such node
-/// leads to stays.
+/// Takes away turns that only the corrections of an iteration made: they may lead round and round
+/// before they find a balance. Where a node seems to have turned by more than pi since the state
+/// `before`, those that have turned by little, or as is `prescribed`, tell the others: along an
+/// element the rotations of neighbours differ by less than pi, and so do their unwrapped vectors.
+/// What no such node leads to stays.
 pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: impl Fn(Slot) -> bool) {
     let Charted { elements, rotations } = charted;
     if state.unwrapped.is_empty() {
@@ -220,7 +230,8 @@ fn settle(state: &mut State, unsettled: &mut BTreeSet<Slot>, from: Slot, to: Slo
     }
 }
 
-/// The largest relative rotation between neighbouring nodes of elements that interpolate total vectors.
+/// The largest relative rotation between neighbouring nodes of elements that interpolate total
+/// vectors.
 pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
     let pairs =
         elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.rotations().windows(2));
@@ -231,8 +242,9 @@ pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
     pairs.map(angle).fold(0.0, f64::max)
 }
 
-/// Neighbours that turned from more than a right angle one way to more than that the other way have leapt over pi: their
-/// relative rotation (element, angle) is what it was and what it has changed by since the state `before`.
+/// Neighbours that turned from more than a right angle one way to more than that the other way have
+/// leapt over pi: their relative rotation (element, angle) is what it was and what it has changed
+/// by since the state `before`.
 pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<(usize, f64)> {
     let relative = |state: &State, pair: &[Slot]| {
         let [a, b] = [pair[0], pair[1]].map(|slot| state.q[slot as usize]);
@@ -248,8 +260,9 @@ pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<
     threads::first(elements.len(), |mut part| part.find_map(leap_in))
 }
 
-/// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element, angle). Of elements that take
-/// all their nodes in the chart of the first it is the sum from the first node to the last: beyond pi that chart may be the wrong one.
+/// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element,
+/// angle). Of elements that take all their nodes in the chart of the first it is the sum from the
+/// first node to the last: beyond pi that chart may be the wrong one.
 pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(usize, f64)> {
     let vectors = |pair: &[Slot]| (state.q[pair[0] as usize], state.q[pair[1] as usize]);
     // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.

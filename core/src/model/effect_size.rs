@@ -1,11 +1,12 @@
-//! What each effect of a scene adds to a system: how many of it there are, and what is there for it alone.
+//! What each effect of a scene adds to a system: how many of it there are, and what is there for it
+//! alone.
 
 use super::{Model, StageContext};
 use crate::effect::Effect;
 use crate::system::{Connectivity, DofMap, Pattern, Slot, Symmetry};
 use std::sync::Arc;
 
-/// What an effect adds to a system.
+/// The size of an effect: instances and entries that it adds to a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EffectSize {
     /// The effect
@@ -19,7 +20,7 @@ pub struct EffectSize {
 }
 
 impl Model {
-    /// What each effect that acts in a stage adds to the system of these equations.
+    /// The sizes of all effects that act in a stage, in the system of these equations.
     pub fn shares(&self, stage: &StageContext, dof_map: &DofMap) -> Vec<EffectSize> {
         let effects = self.acting(stage);
         let connectivity: Vec<_> = effects.iter().map(|effect| effect.connectivity()).collect();

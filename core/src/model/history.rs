@@ -31,16 +31,29 @@ pub trait History: Send + Sync {
 
 /// A history as a load or a motion reads it: in all stages, or in those that it belongs to.
 ///
-/// Static stages read it over the load factor, dynamic ones over the clock. A history that belongs to stages reads the time
-/// that has passed in its dynamic stages instead, so that it begins where the first of them does.
+/// Static stages read it over the load factor, dynamic ones over the clock. A history that belongs
+/// to stages reads the time that has passed in its dynamic stages instead, so that it begins where
+/// the first of them does.
 #[derive(Clone)]
 pub struct Reading {
     function: Arc<dyn History>,
     stages: StageSet,
-    /// The time spent in earlier stages of its own
+}
+
+/// The clock of a history that belongs to stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HistoryClock {
+    /// The time spent in earlier stages of the history
     passed: f64,
-    /// The clock at its time 0, while it goes on in a dynamic stage of its own
+    /// The run's clock at the history's time 0, while it goes on in a dynamic stage of its own
     origin: Option<f64>,
+}
+
+impl HistoryClock {
+    /// The time 0 of the history on the run's clock: that of the run for a history of all stages.
+    fn origin(&self) -> f64 {
+        self.origin.unwrap_or(0.0)
+    }
 }
 
 /// Where a stage lies as seen from a history.
@@ -57,7 +70,7 @@ pub enum Phase {
 impl Reading {
     /// In these stages.
     pub fn new(function: Arc<dyn History>, stages: StageSet) -> Self {
-        Self { function, stages, passed: 0.0, origin: None }
+        Self { function, stages }
     }
 
     /// Whether it belongs to some stages only.
@@ -80,64 +93,62 @@ impl Reading {
         self.function.at(0.0)[0]
     }
 
-    /// Settles its time 0 for stage number `stage`, which begins at `time`.
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, time: f64) {
+    /// Sets a clock for stage number `stage`, which begins at `time`.
+    pub fn begin_stage(&self, clock: &mut HistoryClock, stage: usize, kind: StageKind, time: f64) {
         if self.stages.0.is_none() {
             return;
         }
-        if let Some(origin) = self.origin.take() {
-            self.passed = time - origin;
+        if let Some(origin) = clock.origin.take() {
+            clock.passed = time - origin;
         }
         if kind == StageKind::Dynamic && self.stages.contains(stage) {
-            self.origin = Some(time - self.passed);
+            clock.origin = Some(time - clock.passed);
         }
     }
 
-    /// The value in a stage, and its derivatives over time. In statics the load takes the place of the time, and nothing moves.
-    pub fn at(&self, kind: StageKind, time: f64, load: f64) -> [f64; 3] {
+    /// The value in a stage, and its derivatives over time. In statics the load takes the place of
+    /// the time, and nothing moves.
+    pub fn at(&self, clock: &HistoryClock, kind: StageKind, time: f64, load: f64) -> [f64; 3] {
         match kind {
             StageKind::Static => [self.function.at(load)[0], 0.0, 0.0],
-            _ => self.function.at(self.own_time(time)),
+            StageKind::Dynamic | StageKind::Modal | StageKind::Buckling => self.function.at(time - clock.origin()),
         }
     }
 
     /// The first derivative over time just before `time` in a dynamic stage.
-    pub fn slope_before(&self, time: f64) -> f64 {
-        self.function.slope_before(self.own_time(time))
+    pub fn slope_before(&self, clock: &HistoryClock, time: f64) -> f64 {
+        self.function.slope_before(time - clock.origin())
     }
 
     /// The first time behind `time` in a dynamic stage where it takes another course.
-    pub fn next_corner(&self, time: f64) -> Option<f64> {
-        self.next(time, |x| self.function.next_corner(x))
+    pub fn next_corner(&self, clock: &HistoryClock, time: f64) -> Option<f64> {
+        next_on_clock(clock, time, |x| self.function.next_corner(x))
     }
 
     /// The first time behind `time` in a dynamic stage where its first derivative jumps.
-    pub fn next_kink(&self, time: f64) -> Option<f64> {
-        self.next(time, |x| self.function.next_kink(x))
+    pub fn next_kink(&self, clock: &HistoryClock, time: f64) -> Option<f64> {
+        next_on_clock(clock, time, |x| self.function.next_kink(x))
     }
 
     /// The largest first derivative, if it is known.
     pub fn fastest(&self) -> Option<f64> {
         self.function.fastest()
     }
-
-    fn own_time(&self, time: f64) -> f64 {
-        time - self.origin.unwrap_or(0.0)
-    }
-
-    fn next(&self, time: f64, next: impl Fn(f64) -> Option<f64>) -> Option<f64> {
-        let clock = |x: f64| x + self.origin.unwrap_or(0.0);
-        let mut x = next(self.own_time(time))?;
-        // On the clock the place is rounded: it may be where the clock stands.
-        while clock(x) <= time {
-            x = next(x)?;
-        }
-        Some(clock(x))
-    }
 }
 
-/// A table: linear between its points and constant outside; or smooth, each interval by s^3 (10 - 15 s + 6 s^2), whose
-/// first and second derivatives vanish at both ends.
+/// The first time behind `time` on the run's clock that `next` finds on the clock of a history.
+fn next_on_clock(clock: &HistoryClock, time: f64, next: impl Fn(f64) -> Option<f64>) -> Option<f64> {
+    let origin = clock.origin();
+    let mut x = next(time - origin)?;
+    // On the run's clock the place is rounded: it may be where the clock stands.
+    while x + origin <= time {
+        x = next(x)?;
+    }
+    Some(x + origin)
+}
+
+/// A table: linear between its points and constant outside; or smooth, each interval by s^3 (10 -
+/// 15 s + 6 s^2), whose first and second derivatives vanish at both ends.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// Increasing abscissas
@@ -200,7 +211,8 @@ impl History for Table {
     }
 }
 
-/// A velocity that jumps by less than this part of the largest one is that of a smooth motion as a table samples it.
+/// A velocity that jumps by less than this part of the largest one is that of a smooth motion as a
+/// table samples it.
 pub const NOTICED: f64 = 0.05;
 
 impl Table {
@@ -259,18 +271,19 @@ mod tests {
     fn a_history_that_belongs_to_stages_counts_their_time() {
         use StageKind::{Dynamic, Static};
         let ramp = Arc::new(Table { times: vec![0.0, 10.0], values: vec![1.0, 11.0], smooth: false });
-        let mut reading = Reading::new(ramp, StageSet(Some(vec![1, 3])));
+        let mut clock = HistoryClock::default();
+        let reading = Reading::new(ramp, StageSet(Some(vec![1, 3])));
         let phases = [0, 1, 2, 3, 4].map(|stage| reading.phase(stage));
         assert_eq!(phases, [Phase::Before, Phase::In, Phase::Behind, Phase::In, Phase::Behind]);
         assert_eq!(reading.first(), 1.0);
-        reading.begin_stage(0, Dynamic, 0.0);
-        reading.begin_stage(1, Dynamic, 5.0);
-        assert_eq!(reading.at(Dynamic, 7.0, 1.0)[0], 3.0);
-        reading.begin_stage(2, Dynamic, 8.0);
-        reading.begin_stage(3, Dynamic, 20.0);
-        assert_eq!([20.0, 21.0].map(|time| reading.at(Dynamic, time, 1.0)[0]), [4.0, 5.0]);
-        assert_eq!(reading.next_corner(20.0), Some(27.0));
-        reading.begin_stage(3, Static, 20.0);
-        assert_eq!(reading.at(Static, 20.0, 0.5)[0], 1.5);
+        reading.begin_stage(&mut clock, 0, Dynamic, 0.0);
+        reading.begin_stage(&mut clock, 1, Dynamic, 5.0);
+        assert_eq!(reading.at(&clock, Dynamic, 7.0, 1.0)[0], 3.0);
+        reading.begin_stage(&mut clock, 2, Dynamic, 8.0);
+        reading.begin_stage(&mut clock, 3, Dynamic, 20.0);
+        assert_eq!([20.0, 21.0].map(|time| reading.at(&clock, Dynamic, time, 1.0)[0]), [4.0, 5.0]);
+        assert_eq!(reading.next_corner(&clock, 20.0), Some(27.0));
+        reading.begin_stage(&mut clock, 3, Static, 20.0);
+        assert_eq!(reading.at(&clock, Static, 20.0, 0.5)[0], 1.5);
     }
 }

@@ -1,4 +1,5 @@
-//! Stages that are linear in the displacements: forces and tangent of the state in which a stage begins, and no others.
+//! Stages that are linear in the displacements: forces and tangent of the state in which a stage
+//! begins, and no others.
 //!
 //! ```text
 //! g(q, v, a, t) = g(q0, 0, 0, t) + K0 (q - q0) + C0 v + M0 a
@@ -16,7 +17,7 @@ use crate::tensor::Vec3;
 pub struct Linear {
     /// The state about which everything is linear, at rest, with the loads that it has there
     pub origin: State,
-    /// The same, whose clock follows that of the run
+    /// The state about which everything is linear, with a clock that follows that of the run
     pub about: State,
     /// The slots of multipliers, which have no rates
     multipliers: Vec<Slot>,
@@ -25,12 +26,12 @@ pub struct Linear {
     stiffness: Vec<f64>,
     damping: Vec<f64>,
     mass: Vec<f64>,
-    /// Those that the tangent was last formed with, and its revision then
+    /// The weights that the tangent was last formed with, and its revision then
     pub formed: Option<(Weights, u64)>,
 }
 
 impl Linear {
-    /// Of what acts about a state. `Err` never happens without held directions.
+    /// The matrices of these effects about a state. `Err` never happens without held directions.
     pub fn new<'e>(
         effects: impl Iterator<Item = &'e dyn Effect>,
         model: &Model,
@@ -47,7 +48,7 @@ impl Linear {
         let mut matrix = |weights: Weights| {
             whole.clear(None);
             let forget = Memory::default();
-            for (number, effect) in effects.iter().enumerate().filter(|(_, effect)| effect.has_tangent()) {
+            for (number, effect) in effects.iter().enumerate().filter(|(_, effect)| effect.tangent().exists()) {
                 effect.add(&origin, &forget, weights, &mut whole.sink(number, effect.category(), true));
             }
             whole.values.clone()
@@ -71,7 +72,7 @@ impl Linear {
         self.add_rates(state, force);
     }
 
-    /// The same of velocities and accelerations alone.
+    /// Adds the forces of velocities and accelerations alone.
     pub fn add_rates(&self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         for (values, field, category) in
             [(&self.damping, &state.v[..], Category::Damping), (&self.mass, &state.a[..], Category::Inertia)]

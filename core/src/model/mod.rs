@@ -1,42 +1,47 @@
 //! The scene as mechanics sees it: unknowns, elements, effects, constraints, loads.
 
-mod amplitude;
 mod assembly;
+pub mod beam_element;
+mod builder;
 pub mod charts;
 mod constraint;
+mod course;
 mod effect_size;
 mod history;
 mod linear;
 mod names;
+mod parts;
+mod schedule;
+mod section;
+mod stage_error;
 
 pub use crate::system::{StageContext, StageKind, StageSet};
-pub use amplitude::Amplitude;
 pub use assembly::Assembly;
-pub use constraint::{Jump, Motion, MotionKind, Support};
+pub use builder::{BuildError, ModelBuilder, NodeId, StraightBeam};
+pub use constraint::{Motion, MotionKind, Support};
+pub use course::{Amplitude, Course, Progress, Ramp, Timeline};
 pub use effect_size::EffectSize;
 pub use history::{History, NOTICED, Reading, Table};
 pub use names::Names;
+pub use parts::ModelParts;
+pub use schedule::Schedule;
+pub use section::{MassPerLength, SectionMatrices};
+pub use stage_error::{Jump, LARGEST_GAP, MotorJump, StageError};
 
 use crate::effect::joint::nearest_angle;
-use crate::effect::{Effect, Energy, Momentum, MotorState};
+use crate::effect::{Constraint, Effect, Energy, Momentum, MotorState};
 use crate::kernel::MAX_NODES;
-use crate::system::{
-    Category, Direction, DofMap, FrameConflict, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System,
-    most_regions,
-};
+use crate::system::{Category, DofMap, Layout, MirrorData, Node, NodeBlocks, Plane, Slot, State, System, most_regions};
 use crate::tensor::Vec3;
 use crate::threads;
-use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A prescribed rotation may go this far in one step or load increment.
-const LARGEST_TURN: f64 = 0.75 * std::f64::consts::PI;
-
-/// A state that is out of a plane by less, relative to the largest motion, is in it: a stage before that ran in space leaves round-off of
-/// a few thousand steps. What is left aside is dropped, a hundredth of what planar and spatial answers may differ by.
+/// A state that is out of a plane by less, relative to the largest motion, is in it: a stage before
+/// that ran in space leaves round-off of a few thousand steps. What is left aside is dropped, a
+/// hundredth of what planar and spatial answers may differ by.
 const OUT_OF_PLANE: f64 = 1e-12;
 
-/// What a slot holds.
+/// The kind of vector that a slot holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotKind {
     /// A displacement
@@ -53,17 +58,18 @@ impl SlotKind {
     /// All of them, in their order
     pub const ALL: [Self; 4] = [Self::Displacement, Self::Rotation, Self::Force, Self::Moment];
 
-    /// Whether it is one of multipliers: no unknowns of motion, and what stands in the place of forces are gaps.
+    /// Tells whether it holds multipliers: no unknowns of motion, with gaps in the place of forces.
     pub fn is_multiplier(self) -> bool {
         matches!(self, Self::Force | Self::Moment)
     }
 
-    /// What turns the forces of such a slot into forces that compare: a length for moments, 1 for forces.
+    /// The arm that moments are divided by to compare with forces: a length for rotations, else 1.
     pub fn arm(self, length: f64) -> f64 {
         if self == Self::Rotation { length } else { 1.0 }
     }
 
-    /// What the unknowns of such a slot are compared with: a length for displacements, 1 for rotations.
+    /// The scale that the unknowns of such a slot are compared with: a length for displacements, 1
+    /// for rotations.
     pub fn scale(self, length: f64) -> f64 {
         if self == Self::Displacement { length } else { 1.0 }
     }
@@ -74,7 +80,8 @@ impl SlotKind {
 pub struct ElementInfo {
     all: [Slot; MAX_NODES],
     count: u8,
-    /// Whether it interpolates total rotation vectors, so that all of them must be taken in one chart
+    /// True where it interpolates total rotation vectors, so that all of them must be taken in one
+    /// chart
     pub in_one_chart: bool,
 }
 
@@ -102,77 +109,39 @@ pub struct Charted {
     pub elements: Vec<ElementInfo>,
 }
 
-/// An immutable scene; only the courses of amplitudes and motions change from stage to stage.
-#[derive(Clone)]
+/// A scene. Nothing of it changes in a run: what does is [`State`] and [`Schedule`].
 pub struct Model {
-    /// What each slot holds
+    /// The kind of vector that each slot holds
     pub kinds: Arc<Vec<SlotKind>>,
-    /// And the node that it is named after
-    pub names: Arc<Names>,
+    /// The names of nodes, by their slots
+    pub(crate) names: Arc<Names>,
     /// The slots with multipliers
     pub multipliers: Vec<Slot>,
     /// How many joints remember their angle
-    pub angles: usize,
+    pub(crate) angles: usize,
     /// The slots on which rotational springs act: their unwrapped rotation vectors must be known
-    pub sprung: Vec<Slot>,
-    /// Those of the two sides of each joint that remembers its angle
-    pub sprung_joints: Vec<[Option<Slot>; 2]>,
+    pub(crate) sprung: Vec<Slot>,
+    /// The rotations on the two sides of each joint that remembers its angle
+    pub(crate) sprung_joints: Vec<[Option<Slot>; 2]>,
     /// How many beam elements there are
-    pub elements: usize,
-    /// What large rotations ask for
-    pub rotating: Arc<Charted>,
-    /// The same in the present stage: nothing where that is linear
-    pub charted: Arc<Charted>,
-    /// What acts
+    pub(crate) elements: usize,
+    /// Rotations and elements that large rotations change the charts of; see [`Self::charted`]
+    pub(crate) rotating: Charted,
+    /// The effects, in the order in which their forces are added
     pub effects: Vec<Arc<dyn Effect>>,
     /// The factors of loads and springs
-    pub amplitudes: Vec<Amplitude>,
+    pub(crate) amplitudes: Vec<Amplitude>,
     /// Supports
     pub supports: Vec<Support>,
     /// Prescribed motions
-    pub motions: Vec<Motion>,
+    pub(crate) motions: Vec<Motion>,
     /// The plane that the scene lies in, where it is treated in one
     pub plane: Option<Plane>,
-    /// Whether static and dynamic stages are linear in the displacements
+    /// True where static and dynamic stages are linear in the displacements
     pub linear: bool,
     /// The length to which displacements are compared: the diagonal of the scene's box, or 1
     pub length: f64,
 }
-
-/// Why a stage cannot begin.
-#[derive(Clone, Debug, PartialEq)]
-pub enum StageError {
-    /// Two constraints on one node are neither the same nor orthogonal.
-    Conflict(FrameConflict),
-    /// A motion would have to jump.
-    Jump(Jump),
-    /// A support would hold single components of a rotation that is not zero there.
-    TurnedHinge(Slot),
-    /// A motor would have to jump.
-    MotorJump(MotorJump),
-    /// A path or a search for critical loads, and nothing goes with the load factor.
-    NothingGrows(StageKind),
-    /// A search for modes, and nothing that is free to move has mass.
-    NoMass,
-}
-
-/// A motor that would have to jump when a dynamic stage begins.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MotorJump {
-    /// The slot of its multiplier
-    pub slot: Slot,
-    /// The number of its amplitude
-    pub amplitude: usize,
-    /// Whether it turns, or slides
-    pub turns: bool,
-    /// The angle or displacement that it has reached
-    pub from: f64,
-    /// Where it begins
-    pub to: f64,
-}
-
-/// What a motor may jump by when a dynamic stage begins, in radians or relative to the scene's length.
-pub const LARGEST_GAP: f64 = 1e-6;
 
 impl Model {
     /// The number of slots.
@@ -188,6 +157,11 @@ impl Model {
     /// The state before the first stage.
     pub fn rest(&self) -> State {
         State::rest(self.slots(), self.elements, self.amplitudes.len(), self.angles)
+    }
+
+    /// Tells whether a slot holds a rotation vector.
+    pub fn is_rotation(&self, slot: Slot) -> bool {
+        self.kinds[slot as usize] == SlotKind::Rotation
     }
 
     /// The inner product of two motions, displacements over the length of the scene.
@@ -207,37 +181,7 @@ impl Model {
         rotations + displacements / self.length.powi(2)
     }
 
-    /// Settles the courses of loads and motions, and numbers the unknowns that are free in this stage.
-    pub fn begin_stage(&mut self, stage: usize, kind: StageKind, state: &State) -> Result<DofMap, StageError> {
-        if let Some(jump) = self.settle(stage, kind, state).into_iter().next() {
-            return Err(StageError::Jump(jump));
-        }
-        let plane = self
-            .plane
-            .filter(|plane| matches!(kind, StageKind::Static | StageKind::Dynamic) && self.keeps(state, plane));
-        self.refuse_turned_hinges(stage, state)?;
-        self.number(stage, plane)
-    }
-
-    /// Settles the courses of loads and motions; the motions that would have to jump.
-    pub fn settle(&mut self, stage: usize, kind: StageKind, state: &State) -> Vec<Jump> {
-        let fresh = self.has_fresh_loads(stage);
-        self.charted = if self.is_linear(kind) { Arc::default() } else { self.rotating.clone() };
-        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.begin_stage(stage, kind, state.time, fresh));
-        let mut jumps = Vec::new();
-        for (number, motion) in self.motions.iter_mut().enumerate() {
-            let begun = motion.begin_stage(stage, kind, state, self.length, fresh);
-            jumps.extend(begun.err().map(|(from, to)| Jump { motion: number, from, to }));
-        }
-        jumps
-    }
-
-    /// Whether neither a load nor a motion goes with the load factor in the present stage.
-    pub fn is_idle(&self) -> bool {
-        !self.amplitudes.iter().any(Amplitude::grows) && !self.motions.iter().any(Motion::grows)
-    }
-
-    /// Whether no mass of a stage sits where something is free to move.
+    /// Tells whether no mass of a stage sits where something is free to move.
     pub fn lacks_mass(&self, stage: &StageContext, dof_map: &DofMap) -> bool {
         let is_free = |&slot: &Slot| dof_map.of(slot).iter().any(|&number| number != DofMap::HELD);
         let effects = self.effects.iter().filter(|effect| effect.category() == Category::Inertia && effect.acts(stage));
@@ -261,25 +205,25 @@ impl Model {
         jumps
     }
 
+    /// The effects that close gaps by multipliers.
+    pub(super) fn constraints(&self) -> impl Iterator<Item = &dyn Constraint> {
+        self.effects.iter().filter_map(|effect| effect.roles().constraint)
+    }
+
     /// Shows the motors of joints.
     pub fn each_motor(&self, state: &State, show: &mut dyn FnMut(MotorState)) {
-        self.effects.iter().for_each(|effect| effect.motors(state, show));
+        self.constraints().for_each(|constraint| constraint.motors(state, show));
     }
 
-    /// Whether stages of a kind are linear in the displacements.
+    /// The rotations and elements that have charts in stages of a kind: none where these are linear.
+    pub fn charted(&self, kind: StageKind) -> &Charted {
+        const NONE: &Charted = &Charted { rotations: Vec::new(), elements: Vec::new() };
+        if self.is_linear(kind) { NONE } else { &self.rotating }
+    }
+
+    /// Tells whether stages of a kind are linear in the displacements.
     pub fn is_linear(&self, kind: StageKind) -> bool {
-        self.linear && matches!(kind, StageKind::Static | StageKind::Dynamic)
-    }
-
-    /// The unknowns that are free in a stage that has begun, in a plane or in space.
-    pub fn number(&self, stage: usize, plane: Option<Plane>) -> Result<DofMap, StageError> {
-        let (slots, held) = (self.slots(), self.held_directions(stage));
-        let turns = |slot: Slot| self.kinds[slot as usize] == SlotKind::Rotation;
-        let numbered = match plane {
-            None => DofMap::new(slots, &held),
-            Some(plane) => DofMap::planar(slots, &held, plane, turns),
-        };
-        numbered.map_err(StageError::Conflict)
+        self.linear && kind.advances_state()
     }
 
     /// Shows what decides whether the scene lies in a plane, each with a name.
@@ -291,7 +235,8 @@ impl Model {
         self.motions.iter().for_each(|motion| show("motions", motion.aspect()));
     }
 
-    /// Takes out of a state what round-off has put aside of its plane: nothing else would, and it grows from step to step.
+    /// Takes out of a state what round-off has put aside of its plane: nothing else would, and it
+    /// grows from step to step.
     pub fn flatten(&self, plane: &Plane, state: &mut State) {
         if !plane.is_tilted() {
             return;
@@ -310,7 +255,7 @@ impl Model {
         }
     }
 
-    /// Whether a state lies in a plane and moves in it, but for round-off.
+    /// Tells whether a state lies in a plane and moves in it, but for round-off.
     fn keeps(&self, state: &State, plane: &Plane) -> bool {
         let normal = plane.normal();
         let aside = |(kind, value): (&SlotKind, &Vec3)| match kind {
@@ -323,69 +268,6 @@ impl Model {
             let farthest = self.kinds.iter().zip(field).map(aside).fold(0.0, f64::max);
             farthest <= OUT_OF_PLANE * largest
         })
-    }
-
-    /// Whether loads or motions without a history act for the first time in this stage.
-    pub fn has_fresh_loads(&self, stage: usize) -> bool {
-        self.amplitudes.iter().any(|a| a.is_fresh(stage)) || self.motions.iter().any(|m| m.is_fresh(stage))
-    }
-
-    /// Remembers where the stage left the loads.
-    pub fn end_stage(&mut self, state: &State) {
-        self.amplitudes.iter_mut().for_each(|amplitude| amplitude.end_stage(state.time, state.load));
-    }
-
-    fn held_directions(&self, stage: usize) -> Vec<Direction> {
-        let supports = self.supports.iter().filter(|support| support.stages.contains(stage));
-        let moved = self.motions.iter().filter(|motion| motion.acts());
-        // A prescribed rotation holds all of its node, so that what a joint about the same axis holds is no question any more.
-        moved.flat_map(Motion::directions).chain(supports.flat_map(|s| s.directions.clone())).collect()
-    }
-
-    /// One or two held components of a rotation vector survive a change of chart only where they are zero.
-    pub fn refuse_turned_hinges(&self, stage: usize, state: &State) -> Result<(), StageError> {
-        let mut held: HashMap<Slot, Vec<Vec3>> = HashMap::new();
-        self.held_directions(stage).iter().for_each(|d| held.entry(d.slot).or_default().push(d.axis));
-        for &slot in &self.charted.rotations {
-            let Some(axes) = held.get(&slot) else { continue };
-            let turned = axes.iter().any(|axis| state.q[slot as usize].dot(*axis).abs() > 1e-9);
-            let spans = |axis: &Vec3| axes.iter().any(|held| held.dot(*axis).abs() > 1e-9);
-            if turned && !Vec3::UNIT.iter().all(spans) {
-                return Err(StageError::TurnedHinge(slot));
-            }
-        }
-        Ok(())
-    }
-
-    /// The first time behind `time` at which a load or a motion takes another course.
-    pub fn next_corner(&self, time: f64) -> Option<f64> {
-        let loads = self.amplitudes.iter().filter_map(|amplitude| amplitude.next_corner(time));
-        loads.chain(self.motions.iter().filter_map(|motion| motion.next_corner(time))).min_by(f64::total_cmp)
-    }
-
-    /// Sets the clock and the load factor, the loads that belong to them, and the prescribed motions. Where a motion turns
-    /// its node too far at once, its slot and the angle are returned.
-    pub fn set_clock(&self, state: &mut State, time: f64, load: f64) -> Option<(Slot, f64)> {
-        let before = state.amplitude.clone();
-        (state.time, state.load) = (time, load);
-        for (k, amplitude) in self.amplitudes.iter().enumerate() {
-            let [value, rate, rate2] = amplitude.at(time, load);
-            state.amplitude[k] = value;
-            state.amplitude_rates[k] = [rate, rate2];
-        }
-        let mut too_far = None;
-        for turned in self.effects.iter().filter_map(|effect| effect.turned(&before, &state.amplitude)) {
-            if turned.1 > LARGEST_TURN {
-                too_far = Some(turned);
-            }
-        }
-        for motion in &self.motions {
-            let turned = motion.impose(state);
-            if turned > LARGEST_TURN {
-                too_far = Some((motion.slot, turned));
-            }
-        }
-        too_far
     }
 
     /// The largest displacement of a node from one state to another.
@@ -434,27 +316,28 @@ impl Model {
         sum
     }
 
-    /// What joints to ground do to a node, see [`Effect::held_by_ground`].
+    /// Force and moment of joints to ground on a node, see [`Constraint::held_by_ground`].
     pub fn held_by_ground(&self, state: &State, node: Node) -> (Vec3, Vec3) {
-        let parts = self.effects.iter().map(|effect| effect.held_by_ground(state, node));
+        let parts = self.constraints().map(|constraint| constraint.held_by_ground(state, node));
         parts.fold((Vec3::ZERO, Vec3::ZERO), |(f, m), (force, moment)| (f + force, m + moment))
     }
 
-    /// What is driven from outside: each coordinate with the derivative of the energy over it.
+    /// Coordinates that are driven from outside, each with the derivative of the energy over it.
     pub fn drives(&self, state: &State) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
-        self.effects.iter().for_each(|effect| effect.drives(state, &mut |x, force| all.push((x, force))));
+        let driven = self.effects.iter().filter_map(|effect| effect.roles().driven);
+        driven.for_each(|driven| driven.drives(state, &mut |x, force| all.push((x, force))));
         all
     }
 
-    /// Before a step is predicted, see [`Effect::steady`].
+    /// Before a step is predicted, see [`FreeSpins::steady`].
     pub fn steady(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.steady(state));
+        self.effects.iter().filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
     }
 
     /// After a converged state: turns of joints are counted, multipliers have no rates.
     pub fn remember(&self, state: &mut State) {
-        self.effects.iter().for_each(|effect| effect.remember(state));
+        self.constraints().for_each(|constraint| constraint.remember(state));
         for &slot in &self.multipliers {
             let slot = slot as usize;
             [&mut state.v, &mut state.a, &mut state.algorithmic]
@@ -467,7 +350,7 @@ impl Model {
     /// Mass and momenta.
     pub fn momentum(&self, state: &State) -> Momentum {
         let mut sum = Momentum::default();
-        self.effects.iter().for_each(|effect| sum.add(effect.momentum(state)));
+        self.effects.iter().filter_map(|effect| effect.roles().masses).for_each(|mass| sum.add(mass.momentum(state)));
         sum
     }
 }

@@ -30,7 +30,7 @@ pub type Nearest = fn(&mut [f64], &[f64]);
 
 /// Columns of one quantity: the components of a vector, or the terms of a sum.
 pub struct ColumnPart {
-    /// Heading of their picture
+    /// Name of the values in plots and reports
     pub title: &'static str,
     /// Physical quantity of the values
     pub quantity: Quantity,
@@ -105,8 +105,10 @@ pub enum Quantity {
     AngularMomentum,
     /// Centre of mass
     CentreOfMass,
-    /// Real and imaginary parts of eigenvalues of small vibrations
-    Eigenvalue,
+    /// Angular frequency, the imaginary part of an eigenvalue of small vibrations
+    AngularFrequency,
+    /// Growth rate, the real part of an eigenvalue of small vibrations
+    GrowthRate,
     /// Number of a stage
     Stage,
     /// Time
@@ -118,12 +120,33 @@ pub enum Quantity {
 /// Exponents of the units of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dimension {
+    /// Exponent of the radian
+    pub angle: i32,
     /// Exponent of length
     pub length: i32,
     /// Exponent of force
     pub force: i32,
     /// Exponent of time
     pub time: i32,
+}
+
+impl Dimension {
+    /// That of plain numbers.
+    pub const NUMBER: Self = Self { angle: 0, length: 0, force: 0, time: 0 };
+    /// That of angles.
+    pub const ANGLE: Self = Self { angle: 1, ..Self::NUMBER };
+    /// That of lengths.
+    pub const LENGTH: Self = Self { length: 1, ..Self::NUMBER };
+    /// That of forces.
+    pub const FORCE: Self = Self { force: 1, ..Self::NUMBER };
+    /// That of time.
+    pub const TIME: Self = Self { time: 1, ..Self::NUMBER };
+    /// That of moments and energies.
+    pub const MOMENT: Self = Self { length: 1, ..Self::FORCE };
+
+    const fn times_time(self, power: i32) -> Self {
+        Self { time: self.time + power, ..self }
+    }
 }
 
 /// Order at which the error of a quantity falls with the width of elements.
@@ -238,7 +261,7 @@ pub static COLUMNS: [ColumnGroup; 18] = [
         key: "strain",
         parts: &[
             part("strain", Quantity::Strain, &["G1", "G2", "G3"]),
-            part("curvature", Quantity::Curvature, &["K1", "K2", "K3"]),
+            part("change of curvature", Quantity::Curvature, &["K1", "K2", "K3"]),
         ],
         source: Source::BeamPoint(|point, at, out| out.extend(point.strain_and_stress(at.state)[0])),
         needs: &[],
@@ -285,6 +308,13 @@ pub static COLUMNS: [ColumnGroup; 18] = [
     },
 ];
 
+/// Columns of modes and critical loads, which have the number of a mode before the dot.
+static MODE_COLUMNS: [ColumnPart; 3] = [
+    part("angular frequency", Quantity::AngularFrequency, &["omega"]),
+    part("growth rate", Quantity::GrowthRate, &["growth"]),
+    part("critical load factor", Quantity::LoadFactor, &["load"]),
+];
+
 const fn part(title: &'static str, quantity: Quantity, suffixes: &'static [&'static str]) -> ColumnPart {
     ColumnPart { title, quantity, suffixes }
 }
@@ -313,9 +343,19 @@ pub fn find_column(name: &str) -> Option<(&'static ColumnGroup, usize)> {
     }
 }
 
+/// Part of a table that a column belongs to, by its name: a column of a history, or of modes and critical loads, where
+/// the name may be the suffix alone (`mode1.omega`, `omega`).
+pub fn find_part(name: &str) -> Option<&'static ColumnPart> {
+    if let Some((group, component)) = find_column(name) {
+        return Some(group.part(component));
+    }
+    let suffix = name.rsplit_once('.').map_or(name, |(_, suffix)| suffix);
+    MODE_COLUMNS.iter().find(|part| part.suffixes.contains(&suffix))
+}
+
 /// Quantity of a column, by its name.
 pub fn quantity(name: &str) -> Option<Quantity> {
-    find_column(name).map(|(group, component)| group.quantity(component))
+    find_part(name).map(|part| part.quantity)
 }
 
 impl ColumnGroup {
@@ -352,6 +392,11 @@ impl ColumnGroup {
         }
     }
 
+    /// True if the columns belong to a section of one beam, which need not be at a node.
+    pub fn is_of_section(&self) -> bool {
+        matches!(self.source, Source::BeamPoint(_))
+    }
+
     /// True if the columns belong to the whole scene.
     pub fn is_of_scene(&self) -> bool {
         matches!(self.source, Source::Scene(_))
@@ -361,19 +406,19 @@ impl ColumnGroup {
         matches!(self.source, Source::Run(_))
     }
 
-    fn quantity(&self, component: usize) -> Quantity {
+    fn part(&self, component: usize) -> &ColumnPart {
         let mut end = 0;
         let holds = |part: &&ColumnPart| {
             end += part.suffixes.len();
             component < end
         };
-        self.parts.iter().find(holds).unwrap_or(&self.parts[0]).quantity
+        self.parts.iter().find(holds).unwrap_or(&self.parts[0])
     }
 }
 
 impl Quantity {
     /// All quantities.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::Displacement,
         Self::Position,
         Self::Rotation,
@@ -393,7 +438,8 @@ impl Quantity {
         Self::Momentum,
         Self::AngularMomentum,
         Self::CentreOfMass,
-        Self::Eigenvalue,
+        Self::AngularFrequency,
+        Self::GrowthRate,
         Self::Stage,
         Self::Time,
         Self::LoadFactor,
@@ -401,21 +447,21 @@ impl Quantity {
 
     /// Exponents of its units.
     pub fn dimension(self) -> Dimension {
-        let of = |length, force, time| Dimension { length, force, time };
         match self {
-            Self::Displacement | Self::Position | Self::CentreOfMass => of(1, 0, 0),
-            Self::Velocity => of(1, 0, -1),
-            Self::Acceleration => of(1, 0, -2),
-            Self::Rotation | Self::Orientation | Self::SectionAxis | Self::Strain => of(0, 0, 0),
-            Self::AngularVelocity | Self::Eigenvalue => of(0, 0, -1),
-            Self::AngularAcceleration => of(0, 0, -2),
-            Self::Curvature => of(-1, 0, 0),
-            Self::ReactionForce | Self::SectionForce => of(0, 1, 0),
-            Self::ReactionMoment | Self::SectionMoment | Self::Energy => of(1, 1, 0),
-            Self::Momentum => of(0, 1, 1),
-            Self::AngularMomentum => of(1, 1, 1),
-            Self::Time => of(0, 0, 1),
-            Self::Stage | Self::LoadFactor => of(0, 0, 0),
+            Self::Orientation | Self::SectionAxis | Self::Strain | Self::Stage | Self::LoadFactor => Dimension::NUMBER,
+            Self::Rotation => Dimension::ANGLE,
+            Self::AngularVelocity | Self::AngularFrequency => Dimension::ANGLE.times_time(-1),
+            Self::AngularAcceleration => Dimension::ANGLE.times_time(-2),
+            Self::GrowthRate => Dimension::NUMBER.times_time(-1),
+            Self::Displacement | Self::Position | Self::CentreOfMass => Dimension::LENGTH,
+            Self::Velocity => Dimension::LENGTH.times_time(-1),
+            Self::Acceleration => Dimension::LENGTH.times_time(-2),
+            Self::Curvature => Dimension { length: -1, ..Dimension::NUMBER },
+            Self::ReactionForce | Self::SectionForce => Dimension::FORCE,
+            Self::ReactionMoment | Self::SectionMoment | Self::Energy => Dimension::MOMENT,
+            Self::Momentum => Dimension::FORCE.times_time(1),
+            Self::AngularMomentum => Dimension::MOMENT.times_time(1),
+            Self::Time => Dimension::TIME,
         }
     }
 
@@ -442,7 +488,8 @@ impl Quantity {
             | Self::Momentum
             | Self::AngularMomentum
             | Self::CentreOfMass
-            | Self::Eigenvalue
+            | Self::AngularFrequency
+            | Self::GrowthRate
             | Self::Stage
             | Self::Time
             | Self::LoadFactor => None,
@@ -470,7 +517,8 @@ impl Quantity {
             | Self::Momentum
             | Self::AngularMomentum
             | Self::CentreOfMass
-            | Self::Eigenvalue
+            | Self::AngularFrequency
+            | Self::GrowthRate
             | Self::Stage
             | Self::Time
             | Self::LoadFactor => MeshError::Unspecified,

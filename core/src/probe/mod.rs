@@ -7,7 +7,7 @@ mod reading;
 
 pub use columns::{
     COLUMNS, ColumnGroup, ColumnPart, Dimension, MeshError, Nearest, Need, Quantity, Source, clocks, find_column,
-    group, quantity,
+    find_part, group, quantity,
 };
 pub use figure::{Figure, Line, LinePoint, Look};
 pub use place::{BeamPoint, Place};

@@ -1,6 +1,6 @@
 //! Places that columns are read at: nodes, and points within elements.
 
-use crate::effect::beam_elasticity::StressField;
+use crate::effect::elasticity::StressField;
 use crate::kernel::NodeMotion;
 use crate::kernel::element::MAX_NODES;
 use crate::kernel::relative::Relative;

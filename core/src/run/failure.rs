@@ -1,6 +1,7 @@
-//! What a run can end with, by name and with its numbers.
+//! The failures of a run, with their numbers.
 
-use crate::model::{Jump, Model, MotionKind, MotorJump, Reading, SlotKind, StageError, StageKind};
+use crate::failure::{Cause, FailureKind};
+use crate::model::{Model, SlotKind};
 use crate::tensor::Vec3;
 use std::fmt;
 
@@ -26,16 +27,16 @@ pub struct Place {
     pub direction: Vec3,
 }
 
-/// What had been tried where no balance was found, and what is known that may be its cause.
+/// Attempts at a balance that was not found, and a known cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tried {
+pub struct Attempts {
     /// Attempts that were taken back
     pub cutbacks: u64,
-    /// Whether round-off takes the stiffness of the softest motion
+    /// Round-off takes the stiffness of the softest motion.
     pub soft: bool,
 }
 
-/// A failure of a run. The names are part of the contract with users.
+/// A failure of a run, with its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Failure {
     /// Something in the deck that only shows when a stage begins
@@ -52,8 +53,8 @@ pub enum Failure {
         force: f64,
         /// The largest residual of each iterate of the last attempt, over what is allowed
         history: Vec<f64>,
-        /// What had been tried
-        tried: Tried,
+        /// Attempts before it
+        tried: Attempts,
     },
     /// A node turns so far at once that nobody could tell which way.
     TurnsTooFar {
@@ -83,14 +84,14 @@ pub enum Failure {
         place: Place,
         /// Relative to the scene's length, or in radians
         error: f64,
-        /// What the step is allowed
+        /// The error that the step is allowed
         share: f64,
     },
     /// A mechanism or a loose part
     Singular {
         /// When
         at: Moment,
-        /// What moves freely
+        /// The node and the direction that move freely
         place: Option<Place>,
     },
     /// A force, a motion or a result that is not finite
@@ -134,49 +135,55 @@ pub enum Failure {
 }
 
 impl Place {
-    /// Whether it is a condition of a joint.
+    /// The place of a slot, along `direction`.
+    pub(super) fn of(model: &Model, slot: usize, direction: Vec3) -> Self {
+        Self {
+            node: model.node_at(slot),
+            kind: model.kinds[slot],
+            direction: direction.normalized().unwrap_or(Vec3::ZERO),
+        }
+    }
+
+    /// True if it is a condition of a joint.
     pub fn is_joint(&self) -> bool {
         matches!(self.kind, SlotKind::Force | SlotKind::Moment)
     }
 }
 
 impl Failure {
-    /// The name of the failure.
-    pub fn name(&self) -> &'static str {
+    /// Its kind, which has a name.
+    pub fn kind(&self) -> FailureKind {
         match self {
-            Self::Deck(_) => "deck",
+            Self::Deck(_) => FailureKind::Deck,
             Self::NotConverged { .. }
             | Self::TurnsTooFar { .. }
             | Self::LimitPoint { .. }
-            | Self::StepTooSmall { .. } => "not_converged",
-            Self::Singular { .. } => "singular",
-            Self::NonFinite { .. } => "non_finite",
-            Self::MeshTooCoarse { .. } => "mesh_too_coarse",
-            Self::EnergyGrowth { .. } => "energy_growth",
-            Self::Limit(_) => "limit",
-            Self::Io(_) => "io",
-            Self::Interrupted { .. } => "interrupted",
+            | Self::StepTooSmall { .. } => FailureKind::NotConverged,
+            Self::Singular { .. } => FailureKind::Singular,
+            Self::NonFinite { .. } => FailureKind::NonFinite,
+            Self::MeshTooCoarse { .. } => FailureKind::MeshTooCoarse,
+            Self::EnergyGrowth { .. } => FailureKind::EnergyGrowth,
+            Self::Limit(_) => FailureKind::Limit,
+            Self::Io(_) => FailureKind::Io,
+            Self::Interrupted { .. } => FailureKind::Interrupted,
         }
     }
 
-    /// Whether the deck itself asks for what cannot be: in a stage that cannot begin, or with a mechanism before anything is loaded.
+    /// The name of its kind.
+    pub fn name(&self) -> &'static str {
+        self.kind().name()
+    }
+
+    /// True if the deck itself asks for what cannot be: in a stage that cannot begin, or with a
+    /// mechanism before anything is loaded.
     pub fn is_of_start(&self) -> bool {
         match self {
-            Self::Deck(_) | Self::Limit(_) => true,
             Self::Singular { at, .. } => at.stage == 1 && at.time == 0.0 && at.load == 0.0,
-            Self::NotConverged { .. }
-            | Self::TurnsTooFar { .. }
-            | Self::LimitPoint { .. }
-            | Self::StepTooSmall { .. }
-            | Self::NonFinite { .. }
-            | Self::MeshTooCoarse { .. }
-            | Self::EnergyGrowth { .. }
-            | Self::Io(_)
-            | Self::Interrupted { .. } => false,
+            other => other.kind().cause() == Cause::Deck,
         }
     }
 
-    /// Whether no balance was found: another way to it may find one.
+    /// True if no balance was found: another way to it may find one.
     pub(super) fn is_of_balance(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::Singular { .. })
     }
@@ -207,6 +214,8 @@ impl fmt::Display for Place {
         }
     }
 }
+
+impl std::error::Error for Failure {}
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -258,97 +267,5 @@ impl fmt::Display for Failure {
             Self::Interrupted { at, signal } if at.stage == 0 => write!(f, "stopped by signal {signal}"),
             Self::Interrupted { at, signal } => write!(f, "stopped by signal {signal} at {at}"),
         }
-    }
-}
-
-/// The place of a slot, along `direction`.
-pub(super) fn place(model: &Model, slot: usize, direction: Vec3) -> Place {
-    Place {
-        node: model.node_at(slot),
-        kind: model.kinds[slot],
-        direction: direction.normalized().unwrap_or(Vec3::ZERO),
-    }
-}
-
-/// Why a stage cannot begin.
-pub fn refusal(error: &StageError, model: &Model) -> String {
-    let node = |slot: u32| model.node_at(slot as usize);
-    match error {
-        StageError::Conflict(conflict) => format!(
-            "constraints on node \"{}\" act along directions that are neither the same nor orthogonal",
-            node(conflict.slot)
-        ),
-        StageError::Jump(Jump { motion, from, to }) => {
-            let motion = &model.motions[*motion];
-            let turns = motion.kind == MotionKind::Rotation;
-            let name = node(motion.slot);
-            if from == to {
-                return format!("the motion of node \"{name}\" turns it about another axis than it has turned about");
-            }
-            let (from, to) = (size(*from, turns), size(*to, turns));
-            format!("the motion of node \"{name}\" would have to jump from {from} to {to}")
-        }
-        StageError::TurnedHinge(slot) => format!(
-            "a support takes hold of single rotation components of node \"{}\", which has already turned",
-            node(*slot)
-        ),
-        StageError::MotorJump(MotorJump { slot, turns, from, to, .. }) => {
-            let (from, to) = (size(*from, *turns), size(*to, *turns));
-            format!("the motor of the {} would have to jump from {from} to {to}", node(*slot))
-        }
-        StageError::NothingGrows(StageKind::Buckling) => {
-            "no load and no motion grows with the load factor: nothing can buckle".into()
-        }
-        StageError::NothingGrows(_) => {
-            "control = \"arc_length\" needs a load or a motion that grows with the load factor".into()
-        }
-        StageError::NoMass => "a modal stage needs mass: nothing that is free to move has any".into(),
-    }
-}
-
-/// What helps where stage number `stage` (from 0) cannot begin.
-pub fn refusal_help(error: &StageError, model: &Model, stage: usize) -> Option<String> {
-    let driven = |own_stages: Option<bool>| match own_stages {
-        None if stage == 0 => {
-            "a dynamic stage starts where the scene is: give it a `history` that begins with 0".into()
-        }
-        None => "give it a `history` that begins there".into(),
-        Some(false) => format!(
-            "a history is read over the load factor in static stages and over the clock in dynamic ones: `history = {{ name = …, \
-             stages = [{}] }}` begins with this stage and holds its first value before",
-            stage + 1
-        ),
-        Some(true) => "its history must begin where the stages before have left it".into(),
-    };
-    match error {
-        StageError::Jump(Jump { from, to, .. }) if from == to => None,
-        StageError::Jump(jump) => {
-            let history = model.motions[jump.motion].history.as_ref();
-            // At the very start there is no stage before that could hold anything.
-            match history.map(Reading::has_own_stages) {
-                Some(false) if stage == 0 => Some(START.into()),
-                own_stages => Some(driven(own_stages)),
-            }
-        }
-        StageError::MotorJump(jump) => match model.amplitudes[jump.amplitude].has_own_stages() {
-            Some(_) if stage == 0 => Some(START.into()),
-            own_stages => Some(driven(own_stages)),
-        },
-        StageError::TurnedHinge(_) => Some("hold all three, or hold them from the first stage on".into()),
-        StageError::Conflict(_) | StageError::NothingGrows(_) | StageError::NoMass => None,
-    }
-}
-
-/// What helps where the first stage is dynamic.
-const START: &str =
-    "a dynamic stage starts where the scene is: its history must begin with 0 there, or a static stage come before it";
-
-/// A displacement, or an angle in radians and degrees.
-fn size(value: f64, turns: bool) -> String {
-    let short = (value * 1e4).round() / 1e4;
-    match turns {
-        true if value == 0.0 => "0".into(),
-        true => format!("{short} rad ({:.1}°)", value.to_degrees()),
-        false => value.to_string(),
     }
 }

@@ -1,8 +1,7 @@
-//! What a run finds out beside its rows: points on the way, the stability of ends, warnings.
+//! Findings of a run beside its rows: points on the way, the stability of ends, warnings.
 
-use super::analysis_results::Event;
 use super::failure::Moment;
-use super::vibrations::Vibrations;
+use super::results::Event;
 use crate::integrate::Largest;
 use crate::warning::{About, WarningKind};
 use std::fmt;
@@ -14,12 +13,12 @@ pub struct Warning {
     pub kind: WarningKind,
     /// When it was given; `None`: before the run
     pub at: Option<Moment>,
-    /// What it says
+    /// The words for the user
     pub message: String,
 }
 
 impl Warning {
-    /// Whether it puts an answer in doubt.
+    /// True if it puts an answer in doubt.
     pub fn is_doubt(&self) -> bool {
         self.kind.about() != About::Deck
     }
@@ -31,7 +30,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// What is known of the stability of an equilibrium.
+/// The stability of an equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StabilityVerdict {
     /// No small motion leads away from it.
@@ -58,14 +57,15 @@ impl StabilityVerdict {
 pub struct StageStability {
     /// Stage, from 1
     pub stage: usize,
-    /// What is known
+    /// The verdict
     pub verdict: StabilityVerdict,
     /// The number of negative pivots of the tangent in space, where it is known
     pub negative: Option<usize>,
 }
 
 impl StageStability {
-    /// As the numbers of negative pivots tell: those of the stage as it is treated, and for one in a plane those `aside` of it.
+    /// As the numbers of negative pivots tell: those of the stage as it is treated, and for one in
+    /// a plane those `aside` of it.
     pub(super) fn of_pivots(stage: usize, treated: Option<usize>, aside: Option<usize>) -> Self {
         let negative = treated.zip(aside).map(|(treated, aside)| treated + aside);
         let verdict = match negative.or(treated.filter(|&treated| treated > 0)) {
@@ -74,17 +74,6 @@ impl StageStability {
             Some(_) => StabilityVerdict::Unstable,
         };
         Self { stage, verdict, negative }
-    }
-
-    /// As small vibrations tell.
-    pub(super) fn of_vibrations(stage: usize, vibrations: Vibrations) -> Self {
-        let verdict = match vibrations {
-            Vibrations::Counted(negative) => return Self::of_pivots(stage, Some(negative), Some(0)),
-            Vibrations::Bounded => StabilityVerdict::Stable,
-            Vibrations::Growing(_) | Vibrations::Diverging => StabilityVerdict::Unstable,
-            Vibrations::Unknown => StabilityVerdict::Unknown,
-        };
-        Self { stage, verdict, negative: None }
     }
 }
 
@@ -97,14 +86,14 @@ pub struct StageTimeError {
     pub largest: Largest,
 }
 
-/// What was found out on the way.
+/// Findings of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Limit, turning and branch points of static paths
     pub events: Vec<Event>,
-    /// Of each static stage that came to its end
+    /// The stability of each static stage that came to its end
     pub stability: Vec<StageStability>,
-    /// Of each dynamic stage of fixed steps, as far as it came
+    /// The errors of each dynamic stage of fixed steps, as far as it came
     pub time_errors: Vec<StageTimeError>,
     /// In the order in which they were given
     pub warnings: Vec<Warning>,

@@ -1,17 +1,15 @@
-//! What to try after a failure: what the plan does not do already.
+//! Hints after a failure: cures that the plan does not have already.
 
-use super::failure::{Failure, Moment, Tried};
-use super::levels::Approach;
-use super::plan::{Plan, Stage, StageWork};
+use super::failure::{Attempts, Failure, Moment};
+use super::plan::{Approach, Plan, Stage};
 use crate::integrate::Scheme;
-use crate::model::StageKind;
 use crate::system::Category;
 
 /// Load levels beyond which more of them are no advice.
 const MANY_LEVELS: usize = 1000;
 
 impl Failure {
-    /// What to try, in the plan that ended with it.
+    /// A cure, in the plan that ended with it.
     pub fn hint(&self, plan: &Plan) -> Option<String> {
         let has = |at: &Moment| Has::new(plan, at.stage);
         match self {
@@ -44,7 +42,7 @@ impl Failure {
     }
 }
 
-/// What a stage of a plan has already.
+/// A stage of a plan, and the cures that it has already.
 struct Has<'a> {
     plan: &'a Plan,
     stage: &'a Stage,
@@ -59,27 +57,30 @@ impl<'a> Has<'a> {
         Some(Self { plan, stage: plan.stages.get(number - 1)?, before })
     }
 
-    fn hint_of_balance(&self, tried: &Tried) -> String {
+    fn hint_of_balance(&self, tried: &Attempts) -> String {
         if tried.soft {
             return "round-off takes the stiffness of the softest motion (see the warning): use fewer elements of a higher order".into();
         }
         let mesh = self.has_beams().then(|| "more `elements` where it turns most".to_string());
-        match self.stage.work {
-            StageWork::Dynamic { .. } => {
-                let cures = [self.damping(), Some("take a smaller `step`".into()), mesh.map(|mesh| format!("use {mesh}"))];
-                format!("smaller steps were tried: {}", any_of(cures))
-            }
-            StageWork::Path { .. } => {
-                "shorter increments were tried: the mesh may be too coarse where it turns most, or a branch cross the path (a small side \
-                 force chooses one)"
-                    .into()
-            }
-            StageWork::Static { approach: Approach::Straight, .. } => {
-                let cures =
-                    [Some("leave `adaptive = false` out, so that the stage takes smaller levels".into()), self.levels()];
+        let work = &self.stage.work;
+        if work.kind().advances_time() {
+            let cures = [self.damping(), Some("take a smaller `step`".into()), mesh.map(|mesh| format!("use {mesh}"))];
+            return format!("smaller steps were tried: {}", any_of(cures));
+        }
+        if work.load_levels().is_some() && work.follows_path() {
+            return "shorter increments were tried: the mesh may be too coarse where it turns most, or a branch cross the path (a small side \
+                    force chooses one)"
+                .into();
+        }
+        match work.approach() {
+            Some(Approach::Straight) => {
+                let cures = [
+                    Some("leave `adaptive = false` out, so that the stage takes smaller levels".into()),
+                    self.levels(),
+                ];
                 any_of(cures)
             }
-            StageWork::Static { approach: Approach::Parts, .. } => {
+            Some(Approach::Parts) => {
                 let what = if self.stage.rotating { "`frame`" } else { "`history`" };
                 let stages = match self.stage.rotating {
                     true => "",
@@ -91,26 +92,25 @@ impl<'a> Has<'a> {
                      {what}{stages}; else {cures}"
                 )
             }
-            _ => {
+            Some(Approach::Path) | None => {
                 let mesh = mesh.map(|mesh| format!("use {mesh}"));
-                let cures = any_of([self.levels(), mesh, Some("choose a branch by a small side force".into()), self.fall()]);
+                let cures =
+                    any_of([self.levels(), mesh, Some("choose a branch by a small side force".into()), self.fall()]);
                 format!("smaller load levels and arc length were tried: {cures}")
             }
         }
     }
 
     fn hint_of_turns(&self) -> String {
-        match self.stage.work {
-            StageWork::Dynamic { .. } => {
-                let else_damp = self.damping().map_or(String::new(), |damping| format!(": {damping}"));
-                format!(
-                    "use smaller steps; in a stage in which nothing should turn so fast the step does not resolve the motion{else_damp}"
-                )
-            }
-            StageWork::Static { approach: Approach::Straight, .. } => {
-                "use smaller steps: leave `adaptive = false` out, or take more `steps`".into()
-            }
-            _ => "use smaller steps: more `steps`".into(),
+        if self.stage.work.kind().advances_time() {
+            let else_damp = self.damping().map_or(String::new(), |damping| format!(": {damping}"));
+            format!(
+                "use smaller steps; in a stage in which nothing should turn so fast the step does not resolve the motion{else_damp}"
+            )
+        } else if self.stage.work.approach() == Some(Approach::Straight) {
+            "use smaller steps: leave `adaptive = false` out, or take more `steps`".into()
+        } else {
+            "use smaller steps: more `steps`".into()
         }
     }
 
@@ -126,15 +126,15 @@ impl<'a> Has<'a> {
 
     fn hint_of_mechanism(&self) -> String {
         let hold = "add a support, a spring or a joint that holds this direction";
-        match self.stage.work {
-            StageWork::Dynamic { .. } | StageWork::Modal { .. } => format!("{hold}, or give it mass"),
-            StageWork::Static { approach, .. } => {
-                let looked = approach != Approach::Straight && !self.plan.model.linear;
-                if looked { format!("{hold}: its loads do not, either") } else { hold.into() }
-            }
-            StageWork::Path { .. } | StageWork::Buckling { .. } => {
-                format!("{hold}; what its loads hold comes to rest in a static stage with load levels, before this one")
-            }
+        let work = &self.stage.work;
+        if work.kind().needs_inertia() {
+            format!("{hold}, or give it mass")
+        } else if work.follows_path() {
+            format!("{hold}; what its loads hold comes to rest in a static stage with load levels, before this one")
+        } else if self.plan.model.linear || work.approach() == Some(Approach::Straight) {
+            hold.into()
+        } else {
+            format!("{hold}: its loads do not, either")
         }
     }
 
@@ -144,7 +144,7 @@ impl<'a> Has<'a> {
 
     /// More load levels, where they are not many already.
     fn levels(&self) -> Option<String> {
-        let (StageWork::Static { steps, .. } | StageWork::Path { steps, .. }) = self.stage.work else { return None };
+        let steps = self.stage.work.load_levels()?;
         (steps < MANY_LEVELS).then(|| format!("take more `steps` than {steps}"))
     }
 
@@ -156,13 +156,12 @@ impl<'a> Has<'a> {
 
     fn falls_before(&self) -> bool {
         let damped = self.plan.model.effects.iter().any(|e| e.category() == Category::Damping || e.damps());
-        damped && self.before.iter().any(|stage| stage.work.kind() == StageKind::Dynamic)
+        damped && self.before.iter().any(|stage| stage.work.kind().advances_time())
     }
 
     /// Damping of what steps do not resolve, where the scheme has not all of it.
     fn damping(&self) -> Option<String> {
-        let StageWork::Dynamic { scheme, .. } = self.stage.work else { return None };
-        let cure = match SchemeFamily::of(&scheme) {
+        let cure = match SchemeFamily::of(&self.stage.work.scheme()?) {
             SchemeFamily::Newmark => "scheme = \"generalized_alpha\"",
             SchemeFamily::Hht => "scheme = \"generalized_alpha\" with a small `rho_inf`",
             SchemeFamily::GeneralizedAlpha { radius } if radius > 0.0 => "a smaller `rho_inf`",
@@ -172,7 +171,7 @@ impl<'a> Has<'a> {
     }
 }
 
-/// What a scheme is called in a deck.
+/// The name of a scheme in a deck.
 enum SchemeFamily {
     Newmark,
     Hht,

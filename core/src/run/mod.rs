@@ -1,38 +1,38 @@
 //! Runs: stages in sequence, each a loop over levels or steps, and what watches them.
 
-mod analysis_results;
-mod buckling;
-mod control;
-mod direction;
-mod dynamics;
+mod distance;
 mod failure;
 mod findings;
-mod grid;
-mod guard;
-mod handover;
-mod hint;
-mod ledger;
-mod levels;
-mod modal;
+mod issued;
+mod refusal;
+mod results;
+
+mod energy;
 mod observer;
-mod path;
 mod plan;
+
+mod hint;
 mod rehearsal;
-mod rest;
-mod rigid;
-mod space;
+
+mod handover;
+mod naming;
+mod spatial;
 mod stage_run;
-mod start;
-mod statics;
-mod vibrations;
 mod warnings;
 
-pub use analysis_results::{CriticalKind, CriticalLoad, Event, EventKind, Mode};
-pub use failure::{Failure, Moment, Place, refusal, refusal_help};
+mod buckling;
+mod dynamics;
+mod modal;
+mod statics;
+
+mod sequence;
+
+pub use energy::Ledger;
+pub use failure::{Failure, Moment, Place};
 pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
-pub use ledger::Ledger;
-pub use levels::Approach;
 pub use observer::{Counters, Observer, Snapshot};
-pub use plan::{InitialMotion, Plan, Stage, StageWork, Until};
+pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until};
+pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
-pub use stage_run::Run;
+pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
+pub use sequence::Run;

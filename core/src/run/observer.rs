@@ -1,14 +1,14 @@
-//! What watches a run: rows of converged states, results of analyses, warnings, progress.
+//! Observers of a run: rows of converged states, results of analyses, warnings, progress.
 
-use super::analysis_results::{CriticalLoad, Mode};
+use super::energy::Ledger;
 use super::failure::{Failure, Moment};
 use super::findings::{Findings, Warning};
-use super::ledger::Ledger;
+use super::results::StageResult;
 use crate::model::Model;
 use crate::solve::Work;
 use crate::system::{State, System};
 
-/// What an observer sees of a converged state.
+/// A converged state as an observer sees it.
 pub struct Snapshot<'a> {
     /// Stage, from 1
     pub stage: usize,
@@ -36,13 +36,8 @@ pub trait Observer {
     /// A converged state: the start, a load level, a time step.
     fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure>;
 
-    /// The modes of a stage (from 1).
-    fn modes(&mut self, _stage: usize, _modes: &[Mode]) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// The critical loads of a stage (from 1).
-    fn buckling(&mut self, _stage: usize, _loads: &[CriticalLoad]) -> Result<(), Failure> {
+    /// The result of an analysis in stage number `stage` (from 1), beside its rows.
+    fn found(&mut self, _stage: usize, _result: &StageResult) -> Result<(), Failure> {
         Ok(())
     }
 
@@ -55,12 +50,20 @@ pub trait Observer {
     }
 }
 
+/// A function sees the rows.
+impl<F: FnMut(&Snapshot) -> Result<(), Failure>> Observer for F {
+    fn row(&mut self, snapshot: &Snapshot) -> Result<(), Failure> {
+        self(snapshot)
+    }
+}
+
 /// Work done in a run, and what it found out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counters {
     /// Converged levels and time steps
     pub steps: u64,
-    /// Attempts that were taken back: a level or step whose Newton failed, or whose error was too large
+    /// Attempts that were taken back: a level or step whose Newton failed, or whose error was too
+    /// large
     pub cutbacks: u64,
     /// Mixed elements, summed over converged states
     pub mixed_elements: u64,

@@ -1,10 +1,11 @@
-//! What can be told of the stages of a plan before anything is computed: which of them cannot begin, and where histories jump.
+//! Faults of a plan that show before anything is computed: stages that cannot begin, and histories
+//! that jump.
 //!
-//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but prescribed motions moves.
+//! Loads, motions and motors go through their stages as in a run, on a state in which nothing but
+//! prescribed motions moves.
 
-use super::plan::{InitialMotion, Plan, Stage, StageWork};
-use super::start::set_in_motion;
-use crate::model::{Model, Motion, MotionKind, NOTICED, Reading, StageError, StageKind};
+use super::plan::{InitialMotion, Plan, Stage};
+use crate::model::{Model, Motion, MotionKind, NOTICED, Schedule, StageError, StageKind, Timeline};
 use crate::system::{DofMap, Slot, State};
 use crate::tensor::Vec3;
 use std::collections::HashMap;
@@ -12,13 +13,14 @@ use std::collections::HashMap;
 /// Values of a history that agree to this part of the larger one are the same.
 const SAME_VALUE: f64 = 1e-9;
 
-/// Velocities that agree to this part of the larger one are the same: those of initial motions come from other numbers.
+/// Velocities that agree to this part of the larger one are the same: those of initial motions come
+/// from other numbers.
 const SAME_VELOCITY: f64 = 1e-6;
 
 /// Axes with this cosine are the same.
 const SAME_AXIS: f64 = 1.0 - 1e-9;
 
-/// What is known of a plan beforehand.
+/// Faults of a plan.
 #[derive(Debug, Default)]
 pub struct Rehearsal {
     /// Stages, from 0, that cannot begin
@@ -32,16 +34,16 @@ pub struct Rehearsal {
 pub struct HistoryJump {
     /// The stage, from 0
     pub stage: usize,
-    /// What jumps
+    /// The load, motion or motor that jumps
     pub what: Driven,
     /// How
     pub how: JumpKind,
 }
 
-/// What a history drives.
+/// A load, motion or motor that a history drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driven {
-    /// What has the amplitude with this number
+    /// The loads with the amplitude of this number
     Amplitude(usize),
     /// The motion with this number
     Motion(usize),
@@ -61,9 +63,9 @@ pub enum JumpKind {
     },
     /// From one velocity to another where a dynamic stage begins
     Velocity {
-        /// What its nodes have
+        /// The velocity of its nodes
         from: f64,
-        /// What it begins with
+        /// The velocity that it begins with
         to: f64,
     },
     /// In its velocity, within a stage
@@ -85,40 +87,40 @@ pub fn rehearse(plan: &Plan) -> Rehearsal {
     rehearser.found
 }
 
-/// What a stage lacks to begin with, whatever the state: a load that grows, or mass. `fading`: whether what a motion left may fade
-/// with the load factor.
+/// The condition that a stage lacks to begin, whatever the state: a load that grows, or mass.
+/// `fading`: forces that a motion left may fade with the load factor.
 pub(super) fn lacking(
     model: &Model,
+    schedule: &Schedule,
     stage: &Stage,
     number: usize,
     fading: bool,
     dof_map: impl FnOnce() -> Option<DofMap>,
 ) -> Option<StageError> {
     let kind = stage.work.kind();
-    let grows = matches!(stage.work, StageWork::Path { .. } | StageWork::Buckling { .. });
-    if grows && !fading && !stage.rotating && model.is_idle() {
+    if stage.work.follows_path() && !fading && !stage.rotating && schedule.is_idle() {
         return Some(StageError::NothingGrows(kind));
     }
-    let is_modal = kind == StageKind::Modal;
-    let lacks_mass = is_modal && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
+    let lacks_mass = kind.needs_mass() && dof_map().is_some_and(|free| model.lacks_mass(&stage.context(number), &free));
     lacks_mass.then_some(StageError::NoMass)
 }
 
 struct Rehearser<'p> {
-    model: Model,
+    model: &'p Model,
+    schedule: Schedule,
     state: State,
     initial: &'p [InitialMotion],
     found: Rehearsal,
     /// For each motion whether where its node is depends on nothing but motions and supports
     determined: Vec<bool>,
-    /// Whether the stages so far end where they say, and not at an `until`
+    /// True if the stages so far end where they say, and not at an `until`
     sure: bool,
-    /// What computed the state before this one
+    /// The stage that led to the present state
     before: Option<Before>,
     has_moved: bool,
 }
 
-/// What is known of the last static or dynamic stage.
+/// The last static or dynamic stage.
 struct Before {
     number: usize,
     /// For each amplitude its rate at the end
@@ -127,18 +129,19 @@ struct Before {
     velocities: Vec<Option<f64>>,
 }
 
-/// What motions and supports hold of a slot.
+/// The axes of a slot that motions and supports hold.
 #[derive(Default)]
 struct HeldAxes {
     axes: Vec<Vec3>,
-    /// Whether it is a rotation that is prescribed as a whole
+    /// True if it is a rotation that is prescribed as a whole
     turned: bool,
 }
 
 impl<'p> Rehearser<'p> {
     fn new(plan: &'p Plan) -> Self {
-        let model = plan.model.clone();
+        let model = &*plan.model;
         Self {
+            schedule: Schedule::new(model),
             state: model.rest(),
             initial: &plan.initial,
             found: Rehearsal::default(),
@@ -153,8 +156,8 @@ impl<'p> Rehearser<'p> {
     fn begin(&mut self, number: usize, stage: &Stage) {
         let kind = stage.work.kind();
         let clock = self.state.time;
-        let fresh = number == 0 || self.model.has_fresh_loads(number);
-        let jumps = self.model.settle(number, kind, &self.state);
+        let fresh = number == 0 || self.schedule.has_fresh_loads(self.model, number);
+        let jumps = self.schedule.settle(self.model, number, kind, &self.state);
         if self.sure {
             let certain = jumps.into_iter().filter(|jump| self.determined[jump.motion]);
             self.found.refusals.extend(certain.map(|jump| (number, StageError::Jump(jump))));
@@ -162,28 +165,24 @@ impl<'p> Rehearser<'p> {
             self.look_at_amplitudes(number, kind);
             self.look_at_static_motions(number, kind);
         }
-        let fading = self.has_moved && kind == StageKind::Static;
-        let lacks = lacking(&self.model, stage, number, fading, || self.model.number(number, None).ok());
+        let fading = self.has_moved && kind.ramps_load();
+        let lacks =
+            lacking(self.model, &self.schedule, stage, number, fading, || self.schedule.dof_map(self.model, None).ok());
         self.found.refusals.extend(lacks.map(|error| (number, error)));
         let amplitude = self.state.amplitude.clone();
-        self.state.load = match kind {
-            StageKind::Static => 0.0,
-            StageKind::Dynamic => 1.0,
-            StageKind::Buckling if fresh => 0.0,
-            StageKind::Modal | StageKind::Buckling => self.state.load,
-        };
-        if kind != StageKind::Dynamic {
+        self.state.load = kind.first_load(self.state.load, fresh);
+        if !kind.advances_time() {
             let load = self.state.load;
-            self.model.set_clock(&mut self.state, clock, load);
+            self.schedule.set_clock(self.model, &mut self.state, clock, load);
             return;
         }
         let begins = !std::mem::replace(&mut self.has_moved, true);
         if begins {
             self.state.stand_still();
-            self.initial.iter().for_each(|motion| set_in_motion(&mut self.state, motion));
+            self.initial.iter().for_each(|motion| motion.give_to(&mut self.state));
         }
         let given = self.state.v.clone();
-        self.model.set_clock(&mut self.state, clock, 1.0);
+        self.schedule.set_clock(self.model, &mut self.state, clock, 1.0);
         if !self.sure {
             return;
         }
@@ -192,7 +191,7 @@ impl<'p> Rehearser<'p> {
         let given = begins.then_some(&given[..]);
         self.look_at_velocities(number, given);
         self.look_at_motors(number, begins);
-        if let StageWork::Dynamic { end, .. } = stage.work {
+        if let Some(end) = stage.work.end() {
             self.look_at_kinks(number, end);
         }
     }
@@ -200,18 +199,21 @@ impl<'p> Rehearser<'p> {
     /// Rotations that motions have turned.
     fn look_at_hinges(&mut self, number: usize) {
         if self.model.motions.iter().any(|motion| motion.kind == MotionKind::Rotation) {
-            let turned = self.model.refuse_turned_hinges(number, &self.state);
+            let turned = self.schedule.refuse_turned_hinges(self.model, &self.state);
             self.found.refusals.extend(turned.err().map(|error| (number, error)));
         }
     }
 
-    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in the one before.
+    /// Loads, free strains and motors whose history goes on in this stage, and that have acted in
+    /// the one before.
     fn look_at_amplitudes(&mut self, number: usize, kind: StageKind) {
         let Some(before) = &self.before else { return };
-        let load = if kind == StageKind::Static { 0.0 } else { 1.0 };
-        for (k, amplitude) in self.model.amplitudes.iter().enumerate() {
-            let (from, [to, ..]) = (amplitude.reached(), amplitude.at(self.state.time, load));
-            if amplitude.follows_history() && amplitude.acts_in(before.number) && differ(from, to, SAME_VALUE) {
+        let load = if kind.ramps_load() { 0.0 } else { 1.0 };
+        for (k, timeline) in self.schedule.loads(self.model).enumerate() {
+            let from = timeline.reached();
+            let [to, ..] = timeline.at(self.state.time, load);
+            let acted = self.model.amplitudes[k].acts_in(before.number);
+            if timeline.follows_history() && acted && differ(from, to, SAME_VALUE) {
                 let how = JumpKind::Value { from, to };
                 self.found.jumps.push(HistoryJump { stage: number, what: Driven::Amplitude(k), how });
             }
@@ -220,12 +222,13 @@ impl<'p> Rehearser<'p> {
 
     /// In dynamic stages they are refused.
     fn look_at_static_motions(&mut self, number: usize, kind: StageKind) {
-        if self.before.is_none() || kind != StageKind::Static {
+        if self.before.is_none() || !kind.ramps_load() {
             return;
         }
-        for (k, motion) in self.model.motions.iter().enumerate() {
-            let ((from, _), to) = (motion.reached(&self.state), motion.start(self.state.time));
-            let jumps = motion.follows_history() && motion.is_apart(from, to, self.model.length);
+        for (k, (motion, timeline)) in self.schedule.motions(self.model).enumerate() {
+            let from = timeline.reached();
+            let [to, ..] = timeline.at(self.state.time, 0.0);
+            let jumps = timeline.follows_history() && motion.is_apart(from, to, self.model.length);
             if self.determined[k] && jumps {
                 let how = JumpKind::Value { from, to };
                 self.found.jumps.push(HistoryJump { stage: number, what: Driven::Motion(k), how });
@@ -233,10 +236,12 @@ impl<'p> Rehearser<'p> {
         }
     }
 
-    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give, where they do.
+    /// Motions at the start of a dynamic stage. `given`: the velocities that initial motions give,
+    /// where they do.
     fn look_at_velocities(&mut self, number: usize, given: Option<&[Vec3]>) {
-        for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
-            let [value, rate, rate2] = motion.at(self.state.time, 1.0);
+        let motions = self.schedule.motions(self.model).enumerate();
+        for (k, (motion, timeline)) in motions.filter(|(_, (_, timeline))| timeline.acts()) {
+            let [value, rate, rate2] = timeline.at(self.state.time, 1.0);
             let from = match (given, &self.before) {
                 (Some(given), _) => Some(velocity_along(motion, given, rate)),
                 (None, Some(before)) => before.velocities[k],
@@ -245,15 +250,13 @@ impl<'p> Rehearser<'p> {
             let how = if ![value, rate, rate2].iter().all(|value| value.is_finite()) {
                 Some(JumpKind::NotFinite)
             } else {
-                let fastest =
-                    motion.history.as_ref().and_then(Reading::fastest).map(|rate| (rate * motion.value).abs());
-                from.and_then(|from| velocity_jump(from, rate, fastest, given.is_some()))
+                from.and_then(|from| velocity_jump(from, rate, motion.amplitude.fastest(), given.is_some()))
             };
             self.found.jumps.extend(how.map(|how| HistoryJump { stage: number, what: Driven::Motion(k), how }));
         }
     }
 
-    /// The same of motors. `begins`: initial motions set the scene in motion.
+    /// Motors at the start of a dynamic stage. `begins`: initial motions set the scene in motion.
     fn look_at_motors(&mut self, number: usize, begins: bool) {
         // How fast a joint turns that a static stage has turned before is known to nobody yet.
         if begins && self.before.is_some() && !self.initial.is_empty() {
@@ -280,32 +283,30 @@ impl<'p> Rehearser<'p> {
             let how = next.filter(|&time| time < end).map(|time| JumpKind::Kink { time });
             jumps.extend(how.map(|how| HistoryJump { stage: number, what, how }));
         };
-        for (k, motion) in self.model.motions.iter().enumerate().filter(|(_, motion)| motion.acts()) {
-            look(motion.next_kink(clock), Driven::Motion(k));
+        for (k, (_, timeline)) in self.schedule.motions(self.model).enumerate() {
+            look(timeline.next_kink(clock), Driven::Motion(k));
         }
-        let amplitudes = &self.model.amplitudes;
         self.model.each_motor(&self.state, &mut |motor| {
-            look(amplitudes[motor.amplitude].next_kink(clock), Driven::Motor(motor.slot));
+            look(self.schedule.load(self.model, motor.amplitude).next_kink(clock), Driven::Motor(motor.slot));
         });
     }
 
     fn end(&mut self, number: usize, stage: &Stage) {
         let kind = stage.work.kind();
-        let (time, load) = match stage.work {
-            StageWork::Dynamic { end, .. } => (end, 1.0),
-            StageWork::Static { .. } | StageWork::Path { .. } => (self.state.time, 1.0),
-            StageWork::Modal { .. } | StageWork::Buckling { .. } => (self.state.time, self.state.load),
-        };
-        self.model.set_clock(&mut self.state, time, load);
-        self.model.end_stage(&self.state);
+        let time = stage.work.end().unwrap_or(self.state.time);
+        let load = kind.last_load(self.state.load);
+        self.schedule.set_clock(self.model, &mut self.state, time, load);
+        self.schedule.end_stage(self.model, &self.state);
         self.sure &= stage.until.is_none();
-        if !matches!(kind, StageKind::Static | StageKind::Dynamic) {
+        if !kind.advances_state() {
             return;
         }
+        let velocity = |timeline: Timeline| timeline.acts().then(|| timeline.rate_before(time));
+        let velocities = self.schedule.motions(self.model).map(|(_, timeline)| velocity(timeline));
         self.before = Some(Before {
             number,
-            rates: self.model.amplitudes.iter().map(|amplitude| amplitude.rate_before(time)).collect(),
-            velocities: self.model.motions.iter().map(|m| m.acts().then(|| m.velocity_before(time))).collect(),
+            rates: self.schedule.loads(self.model).map(|timeline| timeline.rate_before(time)).collect(),
+            velocities: velocities.collect(),
         });
         self.look_for_loose_ends(number);
     }
@@ -313,9 +314,9 @@ impl<'p> Rehearser<'p> {
     /// Finds the motions whose nodes motions and supports of this stage alone do not hold.
     fn look_for_loose_ends(&mut self, stage: usize) {
         let mut held: HashMap<Slot, HeldAxes> = HashMap::new();
-        for motion in &self.model.motions {
+        for (motion, timeline) in self.schedule.motions(self.model) {
             let held = held.entry(motion.slot).or_default();
-            if motion.acts() {
+            if timeline.acts() {
                 held.axes.push(motion.axis);
                 held.turned |= motion.kind == MotionKind::Rotation;
             }
@@ -335,7 +336,8 @@ impl<'p> Rehearser<'p> {
     }
 }
 
-/// The velocity that a motion's node has along it; that of a rotation about another axis is none that it could go on with.
+/// The velocity that a motion's node has along it; that of a rotation about another axis is none
+/// that it could go on with.
 fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     let own = given[motion.slot as usize];
     let along = own.dot(motion.axis);
@@ -344,7 +346,8 @@ fn velocity_along(motion: &Motion, given: &[Vec3], rate: f64) -> f64 {
     if fits { along } else { 0.0 }
 }
 
-/// What initial motions give a motion that begins at rest is none of its business: the scene begins with the velocity of the motion.
+/// A jump of a velocity; none where initial motions move the node of a motion that begins at rest:
+/// the scene begins with the velocity of the motion.
 fn velocity_jump(from: f64, to: f64, fastest: Option<f64>, begins: bool) -> Option<JumpKind> {
     let noticed = fastest.is_none_or(|fastest| (to - from).abs() > NOTICED * fastest);
     let jumps = noticed && differ(from, to, SAME_VELOCITY) && (to != 0.0 || !begins);

@@ -12,13 +12,14 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Of a pattern.
+    /// The columns of a pattern.
     pub fn new(pattern: &Pattern) -> Self {
         let (mut rows, mut places) = (Vec::new(), Vec::new());
         let mut starts = vec![0];
         for column in 0..pattern.dof_map.count() as u32 {
             let mut entries: Vec<_> = pattern.entries(column).collect();
-            // The tile on the diagonal comes between the others, and nodes that share displacements are not in the order of equations.
+            // The tile on the diagonal comes between the others, and nodes that share displacements
+            // are not in the order of equations.
             entries.sort_unstable_by_key(|entry| entry.row);
             rows.extend(entries.iter().map(|entry| entry.row));
             places.extend(entries.iter().map(|entry| entry.place as u32));

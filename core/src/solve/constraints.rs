@@ -1,20 +1,23 @@
 //! Tangents with Lagrange multipliers, made ready for a factorisation without pivoting.
 //!
-//! With the rows B and columns C of the multipliers (C = B^T where the tangent is symmetric) and weights W,
+//! With the rows B and columns C of the multipliers (C = B^T where the tangent is symmetric) and
+//! weights W,
 //!
 //! ```text
 //! | K  C | |u|   |f|                  | K + C W B  C | |u|   |f + C W g|
 //! | B  0 | |l| = |g|   is the same as |     B      0 | |l| = |    g    |
 //! ```
 //!
-//! C W B stands in for the stiffness that a part has only through its joints: its pivots are then those of a part that is held, and each
-//! multiplier, which is eliminated behind what it ties, has a negative one. The inertia on the space that the constraints leave is
-//! that of the tangent for any W (congruence with [I, C W/2; 0, I]), and so is the solution.
+//! C W B stands in for the stiffness that a part has only through its joints: its pivots are then
+//! those of a part that is held, and each multiplier, which is eliminated behind what it ties, has
+//! a negative one. The inertia on the space that the constraints leave is that of the tangent for
+//! any W (congruence with [I, C W/2; 0, I]), and so is the solution.
 
 use crate::system::{DofMap, Matrix, Pattern, Slot, System};
 use std::collections::BTreeMap;
 
-/// A multiplier gets so many times the stiffness beside it: what it ties is then held even where it has lost its own stiffness.
+/// A multiplier gets so many times the stiffness beside it: what it ties is then held even where it
+/// has lost its own stiffness.
 const FACTOR: f64 = 8.0;
 
 /// The multipliers of a pattern, and the values of the last tangent that was made ready.
@@ -42,7 +45,8 @@ struct Tie {
     diagonal: usize,
 }
 
-/// An entry of C W B: the place that it is added to, the number of the multiplier, and where its two factors stand.
+/// An entry of C W B: the place that it is added to, the number of the multiplier, and where its
+/// two factors stand.
 struct Addition {
     place: usize,
     row: usize,
@@ -142,8 +146,9 @@ impl Constraints {
 }
 
 impl Multiplier {
-    /// From the stiffness beside a multiplier in its own unit, so that it does not depend on any: FACTOR/w = sum B_k C_k/|K_kk|. Where
-    /// nothing has stiffness that of others, `largest`, must do.
+    /// From the stiffness beside a multiplier in its own unit, so that it does not depend on any:
+    /// FACTOR/w = sum B_k C_k/|K_kk|. Where nothing has stiffness that of others, `largest`, must
+    /// do.
     fn weight(&self, values: &[f64], largest: f64) -> f64 {
         let square = |tie: &Tie| (values[tie.of_column] * values[tie.of_row]).abs();
         let stiff = self.ties.iter().filter(|tie| values[tie.diagonal] != 0.0);

@@ -8,19 +8,22 @@ use crate::threads;
 
 /// The bounds of the test.
 ///
-/// A state has converged when every translational residual is below `tolerance` F and every rotational one below
-/// `tolerance` F l, or at its round-off floor; F is the largest nodal force, or moment over l, among internal, external,
-/// inertia and support forces, and l the length of the scene. A last correction below 1e-12 in |du|/l and |dpsi| ends it too.
+/// A state has converged when every translational residual is below `tolerance` F and every
+/// rotational one below `tolerance` F l, or at its round-off floor; F is the largest nodal force,
+/// or moment over l, among internal, external, inertia and support forces, and l the length of the
+/// scene. A last correction below 1e-12 in |du|/l and |dpsi| ends it too.
 #[derive(Clone, Copy, Debug)]
 pub struct Convergence {
     /// Relative to the largest force
     pub tolerance: f64,
 }
 
-/// Correction below which nothing more can be gained, relative to the length of the scene, and in radians.
+/// Correction below which nothing more can be gained, relative to the length of the scene, and in
+/// radians.
 const SMALLEST_CORRECTION: f64 = 1e-12;
 
-/// Gaps of joints are closed more tightly than forces are balanced, relative to the scene's length and in radians.
+/// Gaps of joints are closed more tightly than forces are balanced, relative to the scene's length
+/// and in radians.
 const GAP: f64 = 1e-2;
 
 /// Sums of a few products carry a few times the round-off of one.
@@ -37,16 +40,17 @@ pub struct Residual {
     pub value: Vec3,
     /// The force F to which it is compared
     pub force: f64,
-    /// Whether some residual is allowed for its round-off alone.
+    /// True if some residual is allowed for its round-off alone.
     pub noisy: bool,
 }
 
-/// What the test says.
+/// The verdict of the stop test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// In balance
     Converged,
-    /// The residual is not larger than what round-off may have made of it, but the last correction was.
+    /// The residual is not larger than what round-off may have made of it, but the last correction
+    /// was.
     Noisy,
     /// Not yet
     Continue,
@@ -55,8 +59,8 @@ pub enum Verdict {
 }
 
 impl Convergence {
-    /// Judges the forces of `system`, and the [`size`] of the last correction: `None` before the first, infinite where charts have changed
-    /// since.
+    /// Judges the forces of `system`, and the [`size`] of the last correction: `None` before the
+    /// first, infinite where charts have changed since.
     pub fn judge(&self, model: &Model, system: &System, round_off: RoundOff, last: Option<f64>) -> (Verdict, Residual) {
         let residual = self.residual(model, system, round_off);
         if !(residual.ratio.is_finite() && residual.force.is_finite()) {
@@ -117,7 +121,8 @@ struct Peak {
 /// The largest forces and residuals.
 #[derive(Clone, Copy, Debug, Default)]
 struct Peaks {
-    /// The largest nodal force among all categories and what constraints hold, and the largest moment
+    /// The largest nodal force among all categories and what constraints hold, and the largest
+    /// moment
     force: f64,
     moment: f64,
     /// By kind of slot
@@ -137,7 +142,7 @@ impl Peaks {
         all.unwrap_or_default()
     }
 
-    /// Those in a region.
+    /// The peaks in a region.
     fn among(region: &Region, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
         let slots = region.slots.clone();
         let dof_map = &system.pattern.dof_map;
@@ -192,7 +197,8 @@ impl Peaks {
     }
 }
 
-/// The larger of two numbers, in one instruction, unlike `f64::max`: where one is NaN it is the second, and `poison` tells.
+/// The larger of two numbers, in one instruction, unlike `f64::max`: where one is NaN it is the
+/// second, and `poison` tells.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
@@ -202,8 +208,8 @@ fn free_part(dof_map: &DofMap, slot: Slot, force: Vec3) -> Vec3 {
     force - dof_map.held_part(slot, force)
 }
 
-/// The size of a correction, or of any other motion: its largest vector, displacements over the length of the scene. What is no number
-/// does not count.
+/// The size of a correction, or of any other motion: its largest vector, displacements over the
+/// length of the scene. What is no number does not count.
 pub fn size(model: &Model, motion: &[Vec3]) -> f64 {
     threads::largest(motion.len(), |slots| {
         let mut squares = [0.0_f64; 4];

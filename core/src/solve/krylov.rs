@@ -1,7 +1,8 @@
 //! Eigenvalues of largest magnitude of a linear operator, by projection onto a block Krylov space.
 //!
-//! Blocks find eigenvalues that occur several times, such as the bending modes of a round section. The basis is orthonormal in an
-//! inner product x . W y that makes the operator symmetric where there is one.
+//! Blocks find eigenvalues that occur several times, such as the bending modes of a round section.
+//! The basis is orthonormal in an inner product x . W y that makes the operator symmetric where
+//! there is one.
 
 use crate::scalar::{LANES, Lanes};
 use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
@@ -16,7 +17,7 @@ pub trait Operator {
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>>;
     /// W x, of the inner product; W may be semidefinite.
     fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
-    /// Whether it is symmetric in that inner product
+    /// True if it is symmetric in that inner product
     fn is_symmetric(&self) -> bool;
 }
 
@@ -39,7 +40,8 @@ const FOUND: f64 = 1e-11;
 /// Vectors that lose this part of themselves when the basis is taken out of them bring nothing new.
 const NOTHING_NEW: f64 = 1e-11;
 
-/// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer. `None` where an image cannot be had.
+/// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer.
+/// `None` where an image cannot be had.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
     let most = operator.size().min(24 * wanted + 160);
     eigenvalues_within(operator, wanted, most)
@@ -100,7 +102,8 @@ impl Spectrum {
         self.combine(number, &self.space.basis)
     }
 
-    /// What an eigenvector leaves, |A x - theta x| over |theta x|, in the norm of the inner product.
+    /// The residual of an eigenvector, |A x - theta x| over |theta x|, in the norm of the inner
+    /// product.
     pub fn residual(&self, operator: &mut dyn Operator, number: usize) -> f64 {
         let (theta, [re, im]) = (self.values[number], self.vector(number));
         let [mut left_re, mut left_im] = self.combine(number, &self.space.images);

@@ -4,60 +4,60 @@ use super::block::BlockSolver;
 use super::constraints::Constraints;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
-use super::softest::NullVector;
 use super::tangent::Tangent;
 use crate::system::{Leftover, Slot, System};
 use crate::tensor::Vec3;
 
 /// Solves with tangents of one pattern.
 ///
-/// Blocks serve what is not too much of a net; multipliers of joints are made ready for them (`solve/constraints.rs`). Tangents whose pivots fail
-/// across blocks are left to LU with partial pivoting. Factors take the place of a tangent that may go as long
-/// as that is sure to lose no digits; else they stand beside it, and what they solve is looked at.
+/// Blocks serve scenes that are not too much of a net; multipliers of joints are made ready for
+/// them (`solve/constraints.rs`). Tangents whose pivots fail across blocks are left to LU with
+/// partial pivoting. Factors take the place of a tangent that may go as long as that is sure to
+/// lose no digits; else they stand beside it, and what they solve is looked at.
 pub struct LinearSolver {
     /// Where the pattern suits them
     blocks: Option<Box<BlockSolver>>,
     /// Once blocks were left, or where there are none
     general: Option<Box<GeneralSolver>>,
     trust: Trust,
-    /// Whether the last factorisation has come to its end
+    /// True if the last factorisation has come to its end
     pub(super) factored: bool,
-    /// That of the tangent that was factorised last; `None` where its values may have changed under the same number
+    /// That of the tangent that was factorised last; `None` where its values may have changed under
+    /// the same number
     revision: Option<u64>,
     pub(super) multipliers: Vec<Slot>,
     /// The tangent that blocks factorise where there are multipliers
     constraints: Option<Constraints>,
     /// Where it cannot count them itself
     pub(super) pivots: Option<Pivots>,
-    /// The last right-hand side where it had to be one list, solved, as it was, and what its solution left of it
+    /// The last right-hand side where it had to be one list, solved, as it was, and what its
+    /// solution left of it
     right_hand_side: Vec<f64>,
     wanted: Vec<f64>,
     leftover: Leftover,
 }
 
-/// Whether blocks do the work, where there are any.
+/// The trust in blocks, where there are any.
 #[derive(Clone, Copy)]
 struct Trust {
     in_blocks: bool,
     /// Solutions until they have another chance, and how many there will be when they fail again
     absence: u32,
     next: u32,
-    /// Whether pivots have just not helped either
+    /// True if pivots have just not helped either
     in_vain: bool,
-    /// Whether the last factorisation was sure to lose no digits
+    /// True if the last factorisation was sure to lose no digits
     is_sure: bool,
 }
 
-/// A solution is one of a system whose entries differ by no more than this, relative to each (Oettli and Prager 1964).
+/// A solution is one of a system whose entries differ by no more than this, relative to each
+/// (Oettli and Prager 1964).
 const BACKWARD_ERROR: f64 = 1e-11;
 
-/// What refinement does not bring below this is no solution.
+/// The backward error above which refinement has found no solution.
 const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
 
-/// Blocks need more of them.
-const FEW_DIGITS: f64 = 4.0;
-
-/// So many corrections
+/// Corrections of one solution
 const REFINEMENTS: usize = 3;
 
 impl LinearSolver {
@@ -69,7 +69,8 @@ impl LinearSolver {
         Self::by(blocks, constraints, system, multipliers)
     }
 
-    /// The same beside the solver of another system, whose analysis it takes over where the patterns are alike.
+    /// A solver beside that of another system, whose analysis it takes over where the patterns are
+    /// alike.
     pub fn beside(other: &Self, others: &System, system: &System, multipliers: &[Slot]) -> Option<Self> {
         match other.blocks().filter(|_| system.pattern.is_like(&others.pattern)) {
             Some(blocks) => {
@@ -102,7 +103,7 @@ impl LinearSolver {
         })
     }
 
-    /// What its multipliers are, where there are some.
+    /// The constraints of its multipliers, where there are some.
     pub(super) fn constraints(&self) -> Option<&Constraints> {
         self.constraints.as_ref()
     }
@@ -112,17 +113,18 @@ impl LinearSolver {
         self.blocks.as_deref()
     }
 
-    /// The same while it is in use.
+    /// Its solver in blocks while it is in use.
     fn blocks_in_use(&mut self) -> Option<&mut BlockSolver> {
         self.blocks.as_deref_mut().filter(|_| self.trust.in_blocks)
     }
 
-    /// Whether its factorisation is one of symmetric tangents, without pivoting.
+    /// True if its factorisation is one of symmetric tangents, without pivoting.
     pub(super) fn is_symmetric(&self) -> bool {
         self.trust.in_blocks && self.blocks().is_some_and(BlockSolver::is_symmetric)
     }
 
-    /// Whether what was factorised last is known to have positive pivots only: then no digits are lost.
+    /// True if what was factorised last is known to have positive pivots only: then no digits are
+    /// lost.
     fn is_positive_definite(&self) -> bool {
         self.factored && self.constraints.is_none() && self.blocks().is_some_and(|blocks| blocks.negative() == Some(0))
     }
@@ -146,17 +148,18 @@ impl LinearSolver {
         blocks.negative()?.checked_sub(of_multipliers)
     }
 
-    /// Whether the determinant of the last factorisation is negative on the space that constraints leave, where blocks tell: each multiplier
-    /// turns the sign of that of the whole.
+    /// True if the determinant of the last factorisation is negative on the space that constraints
+    /// leave, where blocks tell: each multiplier turns the sign of that of the whole.
     pub(super) fn has_negative_determinant(&self) -> Option<bool> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
         let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
         Some(blocks.has_negative_determinant()? != (of_multipliers % 2 == 1))
     }
 
-    /// Solves for the correction that a system asks for with the last factorisation, which is that of its tangent, and writes it into a field
-    /// of slots; held directions take their part of `held`. It [looks](LinearSolver::solve) at what is left where it is asked to and there is something to look at.
-    /// `false` where there is no solution.
+    /// Solves for the correction that a system asks for with the last factorisation, which is that
+    /// of its tangent, and writes it into a field of slots; held directions take their part of
+    /// `held`. It [looks](LinearSolver::solve) at what is left where it is asked to and there is
+    /// something to look at. `false` where there is no solution.
     pub fn correct(&mut self, system: &System, looks: bool, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         let nothing_to_look_at = !looks || self.is_positive_definite() || system.holds_factors();
         let (is_factored, is_plain) = (self.factored, self.constraints.is_none());
@@ -179,12 +182,13 @@ impl LinearSolver {
         self.blocks().filter(|_| self.trust.in_blocks).map_or("sparse LU", BlockSolver::name)
     }
 
-    /// Whether its last factorisation is that of this tangent.
+    /// True if its last factorisation is that of this tangent.
     pub fn has_factorised(&self, system: &System) -> bool {
         self.factored && self.revision == Some(system.revision)
     }
 
-    /// Factorises the tangent where it is another one than the last; whether there is a factorisation, and whether it is new.
+    /// Factorises the tangent where it is another one than the last; whether there is a
+    /// factorisation, and whether it is new.
     pub fn factorise_new(&mut self, tangent: &mut Tangent) -> (bool, bool) {
         if self.has_factorised(tangent.system()) {
             return (true, false);
@@ -234,7 +238,8 @@ impl LinearSolver {
         self.factored
     }
 
-    /// The same for systems whose values do not stay: what it solves is looked at here and now, where pivots do not vouch for it.
+    /// Factorises a system whose values do not stay: a solution is looked at here and now, where
+    /// pivots do not vouch for it.
     pub fn factorise_surely(&mut self, system: &System) -> bool {
         if !self.factorise(system) || self.is_positive_definite() {
             return self.factored;
@@ -244,9 +249,10 @@ impl LinearSolver {
         self.solve(system, &mut x)
     }
 
-    /// Solves with the last factorisation, which is that of `system`; `false` where there is no solution. What blocks leave
-    /// of the residual is refined, unless all pivots are positive, or the tangent is gone: then they are [sure](BlockSolver::is_sure), and
-    /// what they leave shows in Newton's next residual.
+    /// Solves with the last factorisation, which is that of `system`; `false` where there is no
+    /// solution. What blocks leave of the residual is refined, unless all pivots are positive, or
+    /// the tangent is gone: then they are [sure](BlockSolver::is_sure), and what they leave shows
+    /// in Newton's next residual.
     pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
         if !self.trust.in_blocks || self.is_positive_definite() || system.holds_factors() {
             return self.solve_once(system, right_hand_side);
@@ -286,7 +292,8 @@ impl LinearSolver {
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
-    /// Corrects a solution until its residual is round-off; `false` where it stays larger than it may.
+    /// Corrects a solution until its residual is round-off; `false` where it stays larger than it
+    /// may.
     fn refine(&mut self, system: &System, wanted: &[f64], x: &mut [f64]) -> bool {
         let mut error = f64::INFINITY;
         for _ in 0..=REFINEMENTS {
@@ -307,27 +314,24 @@ impl LinearSolver {
         error <= LARGEST_BACKWARD_ERROR
     }
 
-    /// After corrections that led nowhere: in general where few digits of the softest stiffness are left, of which pivots save more; and
-    /// in turns with blocks where that did not help either.
-    pub fn doubt(&mut self, tangent: &mut Tangent) {
+    /// True if blocks do the work at present.
+    pub(super) fn is_in_blocks(&self) -> bool {
+        self.trust.in_blocks
+    }
+
+    /// After corrections that led nowhere pivoting gives way to blocks, which then stay for the
+    /// next attempt whatever they lose; `false` where blocks did the work, and may be left.
+    pub(super) fn gives_way_to_blocks(&mut self) -> bool {
         if !self.trust.in_blocks {
             self.return_to_blocks();
             self.trust.in_vain = true;
-            return;
+            return true;
         }
-        if std::mem::take(&mut self.trust.in_vain) {
-            return;
-        }
-        // The factorisation may be that of the iterate before; either may leave blocks itself.
-        let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
-        let is_doubtful = softest.is_some_and(|vector: NullVector| vector.digits(tangent.look()) < FEW_DIGITS);
-        if is_doubtful && self.trust.in_blocks {
-            self.factored = self.leave_blocks(tangent.look());
-        }
+        std::mem::take(&mut self.trust.in_vain)
     }
 
     /// From here on in general, until blocks have another chance.
-    fn leave_blocks(&mut self, system: &System) -> bool {
+    pub(super) fn leave_blocks(&mut self, system: &System) -> bool {
         if self.general.is_none() {
             self.general = GeneralSolver::new(system).map(Box::new);
         }
@@ -338,8 +342,9 @@ impl LinearSolver {
         general.factorise(system)
     }
 
-    /// After a solution in balance. An iterate that flies far away loses digits that the structure has: blocks come back, after twice as many
-    /// solutions each time that they fail, and one less for each that they find.
+    /// After a solution in balance. An iterate that flies far away loses digits that the structure
+    /// has: blocks come back, after twice as many solutions each time that they fail, and one less
+    /// for each that they find.
     pub fn succeeded(&mut self) {
         self.trust.in_vain = false;
         if self.trust.in_blocks {

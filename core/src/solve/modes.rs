@@ -1,4 +1,5 @@
-//! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each checked before it is given.
+//! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each checked before it
+//! is given.
 
 use super::krylov::{Operator, Spectrum, largest_eigenvalues, roughly_largest_eigenvalues};
 use super::linear::LinearSolver;
@@ -13,7 +14,8 @@ const MADE_OF_OTHERS: f64 = 1e-6;
 /// An eigenvector leaves no more than this of itself.
 const RESIDUAL: f64 = 1e-5;
 
-/// The same of conservative scenes, whose frequencies are wrong by its square only: solutions with slender beams leave more.
+/// The same of conservative scenes, whose frequencies are wrong by its square only: solutions with
+/// slender beams leave more.
 const RESIDUAL_OF_SYMMETRIC: f64 = 1e-3;
 
 /// The energies of a mode balance to this.
@@ -25,10 +27,12 @@ const NO_DAMPING: f64 = 1e-14;
 /// Of a rough look so many exponents tell.
 const NEARLY_RIGHT: usize = 6;
 
-/// Frequencies that round-off may change by more than this part of themselves are found once more from strains.
+/// Frequencies that round-off may change by more than this part of themselves are found once more
+/// from strains.
 const UNCERTAIN: f64 = 1e-9;
 
-/// Motions slower than this part of the shift are free ones: their stiffness is round-off, and balances nothing.
+/// Motions slower than this part of the shift are free ones: their stiffness is round-off, and
+/// balances nothing.
 const FREE: f64 = 1e-3;
 
 /// Without dampers, a motion that grows faster than this part of |s| has a twin that decays.
@@ -51,11 +55,11 @@ pub struct SmallMotion {
     pub exponent: Complex<f64>,
     /// The part of |s| that round-off in the stiffness may have taken
     pub uncertainty: f64,
-    /// Of motions without damping that are uncertain
+    /// The shape of motions without damping that are uncertain
     pub shape: Option<ModeShape>,
 }
 
-/// What moves in a small motion.
+/// The shape of a small motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeShape {
     /// One number an equation
@@ -64,7 +68,7 @@ pub struct ModeShape {
     pub mass: f64,
 }
 
-/// What is known of the matrices.
+/// Properties of the matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Form {
     /// K symmetric, C = 0: s^2 is real.
@@ -97,7 +101,7 @@ pub struct ModeSearch<'a> {
     /// Rigid motions of free parts, and M times each: orthonormal, and taken out of everything
     rigid: Vec<[Vec<f64>; 2]>,
     shift: f64,
-    /// Whether the system and its factors are those of the shift
+    /// True if the system and its factors are those of the shift
     is_ready: bool,
     /// Negative pivots of K + shift^2 M, where K is symmetric
     negative: Option<usize>,
@@ -114,12 +118,13 @@ impl Matrices {
         }
     }
 
-    /// Whether nothing has any mass.
+    /// True if nothing has any mass.
     pub fn is_massless(&self) -> bool {
         self.mass.iter().all(|&m| m == 0.0)
     }
 
-    /// The root of the smallest K_ii / M_ii, or of the stiffest over the heaviest: no lowest frequency lies above it.
+    /// The root of the smallest K_ii / M_ii, or of the stiffest over the heaviest: no lowest
+    /// frequency lies above it.
     pub fn softest_frequency(&self, system: &System) -> f64 {
         let Self { stiffness, mass, .. } = self;
         let (mut softest, mut largest) = (f64::INFINITY, [0.0_f64; 2]);
@@ -143,7 +148,7 @@ impl Matrices {
 }
 
 impl<'a> ModeSearch<'a> {
-    /// Of these matrices; `rigid` motions are left out.
+    /// A search in these matrices; `rigid` motions are left out.
     pub fn new(
         system: &'a mut System,
         solver: &'a mut LinearSolver,
@@ -235,12 +240,13 @@ impl<'a> ModeSearch<'a> {
         self.negative.filter(|_| self.form == Form::Symmetric)
     }
 
-    /// Whether stiffness holds everything, so that nothing can grow but by dampers that drive.
+    /// True if stiffness holds everything, so that nothing can grow but by dampers that drive.
     pub fn is_held(&self) -> bool {
         self.negative == Some(0)
     }
 
-    /// Whether `motions`, nearest to the shift that was factorised last, reach around another shift: those near to it are among them.
+    /// True if `motions`, nearest to the shift that was factorised last, reach around another
+    /// shift: those near to it are among them.
     pub fn reaches(&self, motions: &[SmallMotion], other: f64) -> bool {
         let shift = Complex::from(self.shift);
         let distance = |exponent: Complex<f64>| match self.form {
@@ -251,8 +257,8 @@ impl<'a> ModeSearch<'a> {
         reach >= 2.0 * distance(other.into())
     }
 
-    /// How many motions swing slower than `omega` or grow, rigid ones among them, where pivots tell. Another shift has to be factorised
-    /// afterwards.
+    /// How many motions swing slower than `omega` or grow, rigid ones among them, where pivots
+    /// tell. Another shift has to be factorised afterwards.
     pub fn slower(&mut self, omega: f64) -> Option<usize> {
         self.matrices.combine_squared(-omega * omega, &mut self.system.values);
         self.system.revision += 1;
@@ -265,7 +271,7 @@ impl<'a> ModeSearch<'a> {
         self.count(done)
     }
 
-    /// What the exponents nearest to the shift are like; `None` where a solution fails.
+    /// Rough exponents nearest to the shift; `None` where a solution fails.
     pub fn roughly_nearest(&mut self) -> Option<Vec<f64>> {
         let (shift, form, diagonal) = (self.shift, self.form, self.inner_product());
         let values = roughly_largest_eigenvalues(&mut Motions { search: self, diagonal })?;
@@ -280,8 +286,8 @@ impl<'a> ModeSearch<'a> {
         if takes_energies { Vec::new() } else { self.diagonal() }
     }
 
-    /// The motions nearest to the shift that was factorised last, nearest first; those that do not pass the checks are left out.
-    /// `None` where a solution fails.
+    /// The motions nearest to the shift that was factorised last, nearest first; those that do not
+    /// pass the checks are left out. `None` where a solution fails.
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
         let room = match self.form {
             Form::Symmetric | Form::Undamped => wanted,
@@ -363,8 +369,8 @@ impl<'a> ModeSearch<'a> {
 /// general:   with z = (x, s x/e):   A z = z/(s - e),   from   Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
 /// ```
 ///
-/// Inner products are kinetic energies, and in general the sum of strain and kinetic energies: it makes a conservative A normal, so that
-/// round-off invents no motions.
+/// Inner products are kinetic energies, and in general the sum of strain and kinetic energies: it
+/// makes a conservative A normal, so that round-off invents no motions.
 struct Motions<'s, 'a> {
     search: &'s mut ModeSearch<'a>,
     /// In the place of strain energies, where these are no inner product
@@ -433,7 +439,8 @@ impl Operator for Motions<'_, '_> {
     }
 }
 
-/// The root with a real part that is not negative, and a positive imaginary part if that is zero; of real squares exactly.
+/// The root with a real part that is not negative, and a positive imaginary part if that is zero;
+/// of real squares exactly.
 fn root(square: Complex<f64>) -> Complex<f64> {
     match square {
         Complex { re, im: 0.0 } if re < 0.0 => Complex::new(0.0, (-re).sqrt()),
@@ -442,7 +449,7 @@ fn root(square: Complex<f64>) -> Complex<f64> {
     }
 }
 
-/// Whether each entry is the negative of its mirror image.
+/// True if each entry is the negative of its mirror image.
 fn is_skew(system: &System, values: &[f64]) -> bool {
     if system.pattern.symmetry == Symmetry::Whole {
         return false;

@@ -4,7 +4,8 @@ use crate::model::Model;
 use crate::scalar::CompressedField;
 use crate::tensor::Vec3;
 
-/// Where only round-off is left, a correction smaller than this part of the unknowns ends the iteration.
+/// Where only round-off is left, a correction smaller than this part of the unknowns ends the
+/// iteration.
 const FINE: f64 = 1e-8;
 
 /// Follows corrections that refine a solution whose residual is round-off.
@@ -17,7 +18,7 @@ pub(super) struct Refinement {
     last: f64,
     /// The last correction over the one before
     ratio: f64,
-    /// Whether both go the same way
+    /// True if both go the same way
     aligned: bool,
 }
 
@@ -50,7 +51,8 @@ impl Refinement {
         self.last > FINE && self.last.is_finite() && self.ratio > most
     }
 
-    /// What is still to come: of corrections that go one way, each `ratio` times the one before, the sum of the series.
+    /// The sum of the corrections that are still to come: of those that go one way, each `ratio`
+    /// times the one before.
     pub fn uncertainty(&self) -> f64 {
         let series = if self.aligned { 1.0 / (1.0 - self.ratio.min(0.99)) } else { 1.0 };
         if self.last.is_finite() { (self.last * series).min(1.0) } else { 0.0 }

@@ -1,18 +1,22 @@
-//! When Newton's iteration goes on with the tangent it has (modified Newton), and when it forms another.
+//! When Newton's iteration goes on with the tangent it has (modified Newton), and when it forms
+//! another.
 //!
-//! A correction with an old tangent costs an evaluation of forces and a substitution; one with a new tangent costs an
-//! evaluation of both and a factorisation, about three times that. Where a new tangent has made a residual smaller by theta, the
-//! same tangent makes the next one smaller by about 2 theta (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is
-//! kept where so much brings balance soon enough. Where a residual is round-off ratios tell nothing: a tangent of such an iterate is formed
-//! once, and serves for all that follow as long as their corrections become smaller. Only residuals and counts decide, never a clock.
+//! A correction with an old tangent costs an evaluation of forces and a substitution; one with a
+//! new tangent costs an evaluation of both and a factorisation, about three times that. Where a new
+//! tangent has made a residual smaller by theta, the same tangent makes the next one smaller by
+//! about 2 theta (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is kept where so
+//! much brings balance soon enough. Where a residual is round-off ratios tell nothing: a tangent of
+//! such an iterate is formed once, and serves for all that follow as long as their corrections
+//! become smaller. Only residuals and counts decide, never a clock.
 
 /// The ratio of a residual to what is allowed that is expected to become one in balance.
 const EXPECTED: f64 = 0.1;
 
-/// The factor of the next residual with the same tangent, over that of the first one: twice what theory has.
+/// The factor of the next residual with the same tangent, over that of the first one: twice what
+/// theory has.
 const SAME: f64 = 4.0;
 
-/// So many corrections with an old tangent cost less than one with a new one.
+/// Corrections with an old tangent that cost less than one with a new one
 const CHEAP: i32 = 2;
 
 /// Follows one solution after the other.
@@ -20,17 +24,17 @@ const CHEAP: i32 = 2;
 pub(super) struct Reuse {
     /// The largest residual of each iterate of the present solution, over what is allowed
     pub history: Vec<f64>,
-    /// Whether there is a tangent near the present iterate
+    /// True if there is a tangent near the present iterate
     kept: bool,
-    /// Whether the residual of the present iterate is round-off
+    /// True if the residual of the present iterate is round-off
     noisy: bool,
-    /// Whether nothing but round-off lies between the tangent's iterate and the present one
+    /// True if nothing but round-off lies between the tangent's iterate and the present one
     fine: bool,
-    /// Whether the last correction was found with the tangent of its iterate
+    /// True if the last correction was found with the tangent of its iterate
     own: bool,
     /// The tangents that this solution could not do without so far
     needed: usize,
-    /// And the last solution, once there is one
+    /// The tangents that the last solution could not do without, once there is one
     before: usize,
 }
 
@@ -39,14 +43,16 @@ impl Reuse {
         Self { history: Vec::new(), kept: false, noisy: false, fine: false, own: false, needed: 0, before: usize::MAX }
     }
 
-    /// A solution begins; `kept` where the tangent is already that of its first iterate, but for the loads.
+    /// A solution begins; `kept` where the tangent is already that of its first iterate, but for
+    /// the loads.
     pub fn begin(&mut self, kept: bool) {
         self.history.clear();
         (self.kept, self.own, self.needed) = (kept, false, 0);
         (self.noisy, self.fine) = (false, false);
     }
 
-    /// The present iterate has this residual, over what is allowed; `noisy` where that is round-off.
+    /// The present iterate has this residual, over what is allowed; `noisy` where that is
+    /// round-off.
     pub fn look(&mut self, residual: f64, noisy: bool) {
         self.history.push(residual);
         self.noisy = noisy;
@@ -57,8 +63,8 @@ impl Reuse {
         self.before = self.needed;
     }
 
-    /// Whether the next evaluation had better form the tangent, too: neither is balance expected, nor did the last solution
-    /// need another one from here on.
+    /// True if the next evaluation had better form the tangent, too: neither is balance expected,
+    /// nor did the last solution need another one from here on.
     pub fn expects_tangent(&self) -> bool {
         match self.history.is_empty() {
             true => !self.kept,
@@ -67,37 +73,38 @@ impl Reuse {
         }
     }
 
-    /// Whether residuals have fallen so fast that the next one will do.
+    /// True if residuals have fallen so fast that the next one will do.
     pub fn expects_balance(&self) -> bool {
         self.will_do(1)
     }
 
-    /// Whether there is a tangent near the present iterate.
+    /// True if there is a tangent near the present iterate.
     pub fn has_tangent(&self) -> bool {
         self.kept
     }
 
-    /// Whether the tangent that is there shall serve for the present iterate.
+    /// True if the tangent that is there shall serve for the present iterate.
     pub fn keeps_tangent(&self) -> bool {
         if self.noisy { self.serves_on() } else { self.brings_balance() }
     }
 
-    /// Whether the tangent that is there is that of the present iterate but for round-off.
+    /// True if the tangent that is there is that of the present iterate but for round-off.
     fn serves_on(&self) -> bool {
         self.kept && self.fine
     }
 
-    /// Whether the tangent that is there is expected to bring balance soon enough.
+    /// True if the tangent that is there is expected to bring balance soon enough.
     fn brings_balance(&self) -> bool {
         self.kept && (self.begins() || self.will_do(CHEAP))
     }
 
-    /// Whether this is the first iterate, whose tangent may have been given.
+    /// True if this is the first iterate, whose tangent may have been given.
     fn begins(&self) -> bool {
         self.history.len() == 1
     }
 
-    /// The iterate has its own tangent, which is used unless it is in balance; `leaps` where prescribed increments lie between it and the next.
+    /// The iterate has its own tangent, which is used unless it is in balance; `leaps` where
+    /// prescribed increments lie between it and the next.
     pub fn form(&mut self, leaps: bool) {
         self.needed += usize::from(!self.brings_balance());
         (self.kept, self.own) = (true, true);
@@ -109,17 +116,19 @@ impl Reuse {
         self.own = self.begins();
     }
 
-    /// Whether the present correction is found with the tangent of its iterate.
+    /// True if the present correction is found with the tangent of its iterate.
     pub fn is_own(&self) -> bool {
         self.own
     }
 
-    /// The tangent that is there serves no more: unknowns have changed their meaning, or corrections with it do not become smaller.
+    /// The tangent that is there serves no more: unknowns have changed their meaning, or
+    /// corrections with it do not become smaller.
     pub fn forget(&mut self) {
         self.kept = false;
     }
 
-    /// Whether residuals have fallen so fast that after so many corrections more the next one will do.
+    /// True if residuals have fallen so fast that after so many corrections more the next one will
+    /// do.
     fn will_do(&self, corrections: i32) -> bool {
         let [.., before, last] = self.history[..] else { return false };
         let factor = if self.own && corrections > 1 { SAME * last / before } else { last / before };
@@ -131,7 +140,8 @@ impl Reuse {
 mod tests {
     use super::*;
 
-    /// How many tangents a solution with these residuals forms, and how many evaluations it makes for nothing.
+    /// How many tangents a solution with these residuals forms, and how many evaluations it makes
+    /// for nothing.
     fn solve(reuse: &mut Reuse, residuals: &[f64]) -> (usize, usize) {
         let (mut formed, mut twice) = (0, 0);
         reuse.begin(false);
@@ -204,7 +214,8 @@ mod tests {
             assert!(!reuse.expects_tangent() && reuse.keeps_tangent());
             reuse.keep();
         }
-        // Nor where the residual is more than round-off again, or unknowns have changed their meaning.
+        // Nor where the residual is more than round-off again, or unknowns have changed their
+        // meaning.
         reuse.look(30.0, false);
         assert!(!reuse.keeps_tangent());
         reuse.look(0.5, true);

@@ -16,9 +16,9 @@ pub struct NullVector {
     pub entries: Vec<f64>,
     /// The unknowns themselves
     pub motion: Vec<f64>,
-    /// Whether the tangent has some stiffness against it after all
+    /// True if the tangent has some stiffness against it after all
     pub held: bool,
-    /// Whether no factorisation of the tangent came to its end
+    /// True if no factorisation of the tangent came to its end
     pub broke_down: bool,
 }
 
@@ -41,8 +41,12 @@ impl NullVector {
     }
 }
 
-/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no stiffness.
+/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has
+/// no stiffness.
 const NO_STIFFNESS: f64 = 8.0;
+
+/// Decimal digits of the softest stiffness that factorisation in blocks must leave.
+const FEW_DIGITS: f64 = 4.0;
 
 /// Forces of multipliers that cancel to this part of themselves cancel.
 const SAID_TWICE: f64 = 1e-10;
@@ -53,8 +57,9 @@ impl LinearSolver {
         self.softest(tangent).filter(|vector| !vector.held)
     }
 
-    /// The direction in which the tangent has the least stiffness, by inverse iteration; of a tangent that stays with the last factorisation.
-    /// Unknowns are scaled by their diagonal, so that forces and moments compare.
+    /// The direction in which the tangent has the least stiffness, by inverse iteration; of a
+    /// tangent that stays with the last factorisation. Unknowns are scaled by their diagonal, so
+    /// that forces and moments compare.
     pub fn softest(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
         let system = tangent.look();
         if system.pattern.dof_map.count() == 0 {
@@ -90,8 +95,23 @@ impl LinearSolver {
         Some(NullVector { entries: x, motion, held, broke_down: false })
     }
 
-    /// Whether what moves most, by entries that compare, are multipliers whose forces cancel: conditions that hold what is held already. Their
-    /// unknowns are round-off, of which the stiffness tells nothing.
+    /// After corrections that led nowhere: in general where few digits of the softest stiffness are
+    /// left, of which pivots save more; and in turns with blocks where that did not help either.
+    pub fn doubt(&mut self, tangent: &mut Tangent) {
+        if self.gives_way_to_blocks() {
+            return;
+        }
+        // The factorisation may be that of the iterate before; either may leave blocks itself.
+        let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
+        let is_doubtful = softest.is_some_and(|vector| vector.digits(tangent.look()) < FEW_DIGITS);
+        if is_doubtful && self.is_in_blocks() {
+            self.factored = self.leave_blocks(tangent.look());
+        }
+    }
+
+    /// True if what moves most, by entries that compare, are multipliers whose forces cancel:
+    /// conditions that hold what is held already. Their unknowns are round-off, of which the
+    /// stiffness tells nothing.
     fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
         let Some(constraints) = self.constraints() else { return false };
         let mut multipliers = vec![0.0; motion.len()];
@@ -109,7 +129,8 @@ impl LinearSolver {
         left.iter().zip(&all).all(|(left, all)| left.abs() <= SAID_TWICE * all)
     }
 
-    /// The same where the factorisation broke down: the diagonal is raised by a little first.
+    /// The direction of least stiffness where the factorisation broke down: the diagonal is raised
+    /// by a little first.
     fn null_vector_of_shifted(&mut self, system: &System, broke_down: bool) -> Option<NullVector> {
         let mut shifted = system.clone();
         // Multipliers have no diagonal: they get a little compliance.
@@ -139,7 +160,8 @@ fn diagonal(system: &System) -> Vec<f64> {
     diagonal
 }
 
-/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column comparable.
+/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column
+/// comparable.
 fn scales(system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
     threads::each_part(&mut diagonal, |_, part| part.iter_mut().for_each(|entry| *entry = entry.abs().sqrt()));
     let roots = &diagonal;
@@ -170,8 +192,9 @@ fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
     threads::first(diagonal.len(), |mut part| part.find(|&column| diagonal[column] == 0.0 && is_empty(column)))
 }
 
-/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is compensated, so that fine meshes of slender beams,
-/// whose softest motions are nearly free, are not taken for mechanisms.
+/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is
+/// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are not
+/// taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
 }
@@ -192,7 +215,8 @@ fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
     if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }
 
-/// The sums over some columns of tiles, of the terms and of their squares. A sum for each row of a tile: they do not wait for each other.
+/// The sums over some columns of tiles, of the terms and of their squares. A sum for each row of a
+/// tile: they do not wait for each other.
 fn stiffness_of_columns<const W: usize>(
     system: &System,
     x: &[f64],

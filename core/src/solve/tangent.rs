@@ -1,4 +1,5 @@
-//! A tangent that solvers may use up: factors take its place, and who looks at it again has it formed again.
+//! A tangent that solvers may use up: factors take its place, and who looks at it again has it
+//! formed again.
 
 use crate::kernel::Weights;
 use crate::model::Assembly;
@@ -9,9 +10,9 @@ use crate::tensor::Mat3;
 pub struct Tangent<'a> {
     assembly: &'a mut Assembly,
     state: &'a State,
-    /// What it is formed again with; `None` where it stays
+    /// The weights that it is formed again with; `None` where it stays
     weights: Option<Weights>,
-    /// What is added to it then, see [`System::add_to_own_block`]
+    /// Blocks that are added to it then, see [`System::add_to_own_block`]
     additions: &'a [(Slot, Mat3)],
 }
 
@@ -26,7 +27,7 @@ impl<'a> Tangent<'a> {
         Self { assembly, state, weights: Some(weights), additions: &[] }
     }
 
-    /// The same to which something was added.
+    /// The tangent to which something was added.
     pub fn with(self, additions: &'a [(Slot, Mat3)]) -> Self {
         Self { additions, ..self }
     }
@@ -36,7 +37,8 @@ impl<'a> Tangent<'a> {
         &self.assembly.system
     }
 
-    /// The same for what may take its place; `None` where it stays, or is gone already.
+    /// The system whose values factors may take the place of; `None` where the tangent stays, or is
+    /// gone already.
     pub(super) fn give_away(&mut self) -> Option<&mut System> {
         let may_go = self.weights.is_some() && !self.assembly.system.holds_factors();
         may_go.then_some(&mut self.assembly.system)
@@ -53,7 +55,7 @@ impl<'a> Tangent<'a> {
         &self.assembly.system
     }
 
-    /// Whether it stays.
+    /// True if it stays.
     pub(super) fn stays(&self) -> bool {
         self.weights.is_none()
     }

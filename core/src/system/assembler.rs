@@ -1,6 +1,6 @@
 //! Where effects add their forces and tangents: to the whole system, or to the part of it that belongs to a region.
 
-use super::assembly::Category;
+use super::category::Category;
 use super::dof_map::DofMap;
 use super::node_blocks::NodeBlocks;
 use super::pattern::{Pattern, ScatterMap, TILE, WIDTH};

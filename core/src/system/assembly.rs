@@ -1,34 +1,18 @@
 //! Forces and tangent of the whole scene.
 
 use super::assembler::{Assembler, Part};
-use super::pattern::{Pattern, Symmetry, Tile, WIDTH, transposed};
+use super::category::Category;
+use super::pattern::{Pattern, Symmetry, WIDTH};
 use super::regions::{self, Region};
 use super::state::Slot;
 use super::storage::{Tiles, as_tiles};
+use super::tile::{Tile, transposed};
 use super::values::Values;
 use crate::kernel::ElementSystem;
 use crate::scalar::{Instructions, Lanes};
 use crate::tensor::{Mat3, Vec3, zeros};
 use crate::threads;
 use std::ops::Range;
-
-/// What a force is; the stop test of Newton and the energy account look at them apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Category {
-    /// Stress resultants and springs
-    Internal,
-    /// Mass times acceleration, in all its forms
-    Inertia,
-    /// Loads, entered with the opposite sign
-    External,
-    /// What takes energy away with velocities
-    Damping,
-}
-
-impl Category {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 4] = [Self::Internal, Self::Inertia, Self::External, Self::Damping];
-}
 
 /// Room to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for again and again.
 #[derive(Default)]

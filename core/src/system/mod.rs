@@ -2,6 +2,8 @@
 
 mod assembler;
 mod assembly;
+mod category;
+mod connectivity;
 mod dof_map;
 mod field;
 mod node_blocks;
@@ -12,16 +14,20 @@ mod runs;
 mod stage;
 mod state;
 mod storage;
+mod tile;
 mod values;
 
 pub use assembler::{Assembler, Part};
-pub use assembly::{Category, Leftover, Matrix, System};
+pub use assembly::{Leftover, Matrix, System};
+pub use category::Category;
+pub use connectivity::Connectivity;
 pub use dof_map::{Direction, DofMap, FrameConflict};
 pub use field::Field;
 pub use node_blocks::{Layout, NodeBlocks};
-pub use pattern::{Connectivity, Entry, Meetings, Pattern, Symmetry, Tile, WIDTH, transposed};
+pub use pattern::{Entry, Meetings, Pattern, Symmetry, WIDTH};
 pub use plane::{MirrorData, Plane, rounded};
 pub use regions::{Region, most as most_regions};
 pub use stage::{StageContext, StageKind, StageSet};
 pub use state::{Anchor, Fading, Memory, Node, RotationRate, Slot, State};
 pub use storage::{Own, Tiles, upper_entry, upper_start};
+pub use tile::{Tile, transposed};

@@ -1,5 +1,6 @@
 //! The sparsity pattern of the tangent in tiles, and for each element the places its blocks go to, worked out once.
 
+use super::connectivity::Connectivity;
 use super::dof_map::DofMap;
 use super::node_blocks::{NodeBlocks, SLOTS};
 use super::regions::{self, Region, Shares};
@@ -14,70 +15,6 @@ use std::sync::OnceLock;
 
 /// A tile of the tangent is one of an element's tangent, but in a plane.
 const _: () = assert!(WIDTH == 3 * SLOTS);
-
-/// A block of the tangent, by columns.
-pub type Tile<const W: usize> = [[f64; W]; W];
-
-/// The transpose.
-#[inline(always)]
-pub fn transposed<const W: usize>(tile: &Tile<W>) -> Tile<W> {
-    let mut out = [[0.0; W]; W];
-    for c in 0..W {
-        for r in 0..W {
-            out[c][r] = tile[r][c];
-        }
-    }
-    out
-}
-
-/// The slots that meet in each instance of an effect: one clique an element.
-#[derive(Clone, Debug, Default)]
-pub struct Connectivity {
-    slots: Vec<Slot>,
-    instances: Runs,
-    pub(super) divisible: bool,
-}
-
-impl Connectivity {
-    /// Of an effect that adds no others than the [instances that a sink takes](super::Assembler::instances), so that regions of a large scene
-    /// can be evaluated at once.
-    pub fn divisible() -> Self {
-        Self { divisible: true, ..Self::default() }
-    }
-
-    /// Adds an instance that couples these slots, in the order of its blocks.
-    pub fn push(&mut self, slots: impl IntoIterator<Item = Slot>) {
-        let before = self.slots.len();
-        self.slots.extend(slots);
-        self.instances.push(self.slots.len() - before);
-    }
-
-    fn shrink(&mut self) {
-        self.slots.shrink_to_fit();
-        self.instances.shrink_to_fit();
-    }
-
-    /// The number of instances.
-    pub fn len(&self) -> usize {
-        self.instances.len()
-    }
-
-    /// Whether there is no instance.
-    pub fn is_empty(&self) -> bool {
-        self.instances.is_empty()
-    }
-
-    /// The slots of an instance.
-    #[inline]
-    pub fn get(&self, k: usize) -> &[Slot] {
-        &self.slots[self.instances.get(k)]
-    }
-
-    /// All instances.
-    pub fn iter(&self) -> impl Iterator<Item = &[Slot]> {
-        (0..self.len()).map(|k| self.get(k))
-    }
-}
 
 /// Where the blocks of one effect's instances go.
 #[derive(Clone, Debug)]

@@ -3,9 +3,9 @@
 //! Regions are cut by the scene alone. Elements between regions, and effects that are not cut, come after all regions, in their order:
 //! a sum has the same terms in the same order on any number of threads.
 
+use super::connectivity::Connectivity;
 use super::dof_map::DofMap;
 use super::node_blocks::NodeBlocks;
-use super::pattern::Connectivity;
 use crate::scalar::LANES;
 use crate::threads;
 use std::ops::Range;

@@ -1,6 +1,6 @@
 //! How the values of a tangent stand in one list: first the tiles on the diagonal, one a group, then those beside it.
 
-use super::pattern::Tile;
+use super::tile::Tile;
 use std::ops::Range;
 
 /// The place of a tile that is not kept: that of its transpose is.

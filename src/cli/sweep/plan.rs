@@ -1,38 +1,39 @@
-//! What a command line, or a sweep.toml, makes of a sweep.
+//! The sweep that a command line or a sweep.toml describes.
 
-use super::Wanted;
+use super::SweepArguments;
 use super::slurm::absolute;
-use crate::cli::Status;
-use crate::cli::load::{self, Refusal};
-use crate::cli::run::folder;
-use crate::cli::say;
+use crate::cli::console;
+use crate::cli::error::{CommandError, DeckError};
+use crate::cli::folders::folder;
+use crate::cli::load;
 use crate::deck::{Diagnostic, Looked, SweepFile, VaryBody, VaryTable};
-use crate::study::sweep::{Axis, Combination, Outcome, Range, Store, Sweep, Values, usual_outputs};
+use crate::study::SweepError;
+use crate::study::sweep::{Combination, PointResult, Range, Store, Sweep, SweepAxis, Values, usual_outputs};
 use std::path::{Path, PathBuf};
 
 /// A sweep with its place.
 pub struct Plan {
-    /// Of the deck, or of the sweep.toml
+    /// Name of the deck, or of the sweep.toml
     pub name: String,
     /// The sweep
     pub sweep: Sweep,
-    /// Where its table goes
+    /// Folder of the table
     pub folder: PathBuf,
-    /// Where its points go
+    /// Results of its points
     pub store: Store,
 }
 
 impl Plan {
     /// Reads the deck and what is varied of it.
-    pub fn of(wanted: &Wanted) -> Result<Self, Refusal> {
+    pub fn of(wanted: &SweepArguments) -> Result<Self, CommandError> {
         let text = load::text(&wanted.file)?;
         let given = if SweepFile::is_one(&text) { Some(read(&wanted.file, &text)?) } else { None };
         let file = given.clone().unwrap_or_default();
-        let usage = |why: String| Refusal::of(Status::Wrong, "usage", why);
+        let usage = |error: SweepError| CommandError::Usage(error.to_string());
 
         let mut axes = file.vary.iter().map(axis).collect::<Result<Vec<_>, _>>().map_err(usage)?;
         for text in &wanted.vary {
-            let axis = Axis::parse(text).map_err(usage)?;
+            let axis = SweepAxis::parse(text).map_err(usage)?;
             axes.retain(|known| known.key != axis.key);
             axes.push(axis);
         }
@@ -48,8 +49,8 @@ impl Plan {
         let settings: Vec<String> = file.set.iter().chain(&wanted.set).cloned().collect();
         let loaded = load::deck(&deck, &settings)?;
         if loaded.deck.accuracy.is_some() {
-            return Err(usage(
-                "a sweep runs the deck's own elements and steps: take `accuracy` out of the deck, or use --error-bars"
+            return Err(CommandError::Usage(
+                "a sweep runs the elements and steps of the deck: remove `accuracy` from the deck, or use --error-bars"
                     .into(),
             ));
         }
@@ -60,31 +61,30 @@ impl Plan {
         };
         let sweep =
             Sweep::new(&loaded.text, &axes, how, outputs, wanted.error_bars || file.error_bars).map_err(usage)?;
-        sweep.check(&loaded.deck).map_err(|why| Refusal::of(Status::Wrong, "deck", why))?;
+        sweep.check(&loaded.deck)?;
         let name = load::name(&wanted.file);
         let folder = folder(wanted.out.as_deref(), &name, false);
         Ok(Self { sweep, store: Store::of(&folder), folder, name })
     }
 
-    /// What is known of a point (from 0).
-    pub fn known(&self, point: usize) -> Option<Outcome> {
+    /// The saved result of a point (from 0).
+    pub fn known(&self, point: usize) -> Option<PointResult> {
         self.store.find(&self.sweep.identity(point))
     }
 
-    /// Keeps what came of a point (from 0).
-    pub fn keep(&self, point: usize, outcome: &Outcome) -> Result<(), Refusal> {
-        let kept = self.store.keep(&self.sweep.identity(point), outcome);
-        kept.map_err(Refusal::io)
+    /// Saves the result of a point (from 0).
+    pub fn keep(&self, point: usize, result: &PointResult) -> Result<(), CommandError> {
+        Ok(self.store.keep(&self.sweep.identity(point), result)?)
     }
 
-    /// What no other sweep and no other folder has.
+    /// A text that differs for every sweep and every folder.
     pub fn fingerprint(&self) -> String {
         self.sweep.fingerprint(&std::path::absolute(&self.folder).unwrap_or_default().display().to_string())
     }
 
-    /// The words that make the same sweep from any folder.
-    pub fn words(&self, wanted: &Wanted) -> Result<Vec<String>, Refusal> {
-        let path = |path: &Path| Ok(absolute(path)?.display().to_string());
+    /// The command line that makes this sweep from any folder.
+    pub fn words(&self, wanted: &SweepArguments) -> Result<Vec<String>, CommandError> {
+        let path = |path: &Path| absolute(path).map(|path| path.display().to_string());
         let mut words = vec!["sweep".into(), path(&wanted.file)?, "--out".into(), path(&self.folder)?];
         for (flag, values) in [("--set", &wanted.set), ("--vary", &wanted.vary), ("--output", &wanted.outputs)] {
             words.extend(values.iter().flat_map(|value| [flag.to_string(), value.clone()]));
@@ -101,31 +101,34 @@ impl Plan {
     /// The points (from 0) that are still to be run.
     pub fn open(&self, redo: bool) -> Vec<usize> {
         let known = self.sweep.gathered(&self.store);
-        let again = |outcome: &Outcome| outcome.status == Outcome::KILLED || (redo && !outcome.finished());
+        let again = |result: &PointResult| result.status == PointResult::KILLED || (redo && !result.finished());
         let is_open = |k: &usize| known[*k].as_ref().is_none_or(again);
         let open: Vec<usize> = (0..known.len()).filter(is_open).collect();
         if open.len() < known.len() {
-            say::note(&format!("{}: goes on after {} points that are done", self.name, known.len() - open.len()));
+            console::note(&format!("{}: continues, {} points are done", self.name, known.len() - open.len()));
         }
         open
     }
 }
 
-fn read(path: &Path, text: &str) -> Result<SweepFile, Refusal> {
+fn read(path: &Path, text: &str) -> Result<SweepFile, CommandError> {
     SweepFile::read(text).map_err(|found: Vec<Diagnostic>| {
-        let count = if found.len() == 1 { "1 error".to_string() } else { format!("{} errors", found.len()) };
-        Refusal {
+        CommandError::Deck(DeckError {
+            message: load::count_of_errors(found.len(), path),
             details: load::render(&path.display().to_string(), text, &found),
-            ..Refusal::of(Status::Wrong, "deck", format!("{count} in {}", path.display()))
-        }
+            ..DeckError::default()
+        })
     })
 }
 
-fn axis(table: &VaryTable) -> Result<Axis, String> {
+fn axis(table: &VaryTable) -> Result<SweepAxis, SweepError> {
     let values = match table.body {
         VaryBody::List(ref values) => Ok(Values::List(values.clone())),
         VaryBody::Range { from, to, count, log } => Values::of_range(Range { from, to, logarithmic: log }, count),
     };
     let key = table.key.value.clone();
-    Ok(Axis { values: values.map_err(|why| format!("`{key}`: {why}"))?, key })
+    match values {
+        Ok(values) => Ok(SweepAxis { key, values }),
+        Err(reason) => Err(SweepError::Key { key, reason: Box::new(reason) }),
+    }
 }

@@ -1,16 +1,17 @@
 //! Points as tasks of a Slurm job array.
 //!
-//! Files decide: a point whose results are there has ended, whatever Slurm says. The array has a name that belongs to the sweep and its
-//! folder, so that the same command follows an array that is under way instead of submitting it twice; it is asked for by name, since Slurm
-//! forgets jobs, and without accounting, which many clusters lack.
+//! A point has ended when its file of results exists, whatever Slurm says. The array is named after
+//! the sweep and its folder, so that the command, when it is run again, follows a running array
+//! instead of submitting it twice. The queue is asked for by this name, since Slurm forgets jobs,
+//! and without accounting, which many clusters lack.
 
+use super::SweepArguments;
 use super::plan::Plan;
-use super::{Wanted, stopped};
-use crate::cli::load::Refusal;
+use crate::cli::error::CommandError;
 use crate::cli::progress::Progress;
-use crate::cli::{Status, say};
-use crate::output::PartFile;
-use crate::study::sweep::Outcome;
+use crate::cli::{console, signals};
+use crate::output::{OutputError, PartFile};
+use crate::study::sweep::PointResult;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,16 +19,17 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// The largest array where Slurm does not tell its own.
-const MOST_TASKS: usize = 1000;
+/// Largest number of tasks of an array where Slurm does not tell its limit.
+const DEFAULT_MAX_TASKS: usize = 1000;
 
-/// What a shared file system may take to show a file that another machine has written, in looks at the queue.
-const GRACE: usize = 3;
+/// Queue checks after which a point without a file is given up: a shared file system shows files of
+/// other machines late.
+const MAX_CHECKS_WITHOUT_FILE: usize = 3;
 
-/// Between looks at whether the user has stopped us.
-const MOMENT: Duration = Duration::from_millis(50);
+/// Time between checks for a signal.
+const SIGNAL_CHECK: Duration = Duration::from_millis(50);
 
-/// States that a task does not leave again.
+/// States of a task that has ended.
 const ENDED: [&str; 10] = [
     "COMPLETED",
     "FAILED",
@@ -41,8 +43,9 @@ const ENDED: [&str; 10] = [
     "REVOKED",
 ];
 
-/// Submits points (from 0), or follows those that were, until all have ended.
-pub fn run(plan: &Plan, points: &[usize], wanted: &Wanted) -> Result<(), Refusal> {
+/// Submits points (numbers from 0), or follows the array that was submitted before, until all
+/// points have ended.
+pub fn run(plan: &Plan, points: &[usize], wanted: &SweepArguments) -> Result<(), CommandError> {
     let array =
         Array { plan, name: format!("beamsim-{}", plan.fingerprint()), folder: absolute(&plan.folder)?.join("slurm") };
     let under_way = array.states()?.values().any(|state| is_open(state));
@@ -50,7 +53,7 @@ pub fn run(plan: &Plan, points: &[usize], wanted: &Wanted) -> Result<(), Refusal
         return Ok(());
     }
     let tasks = if under_way {
-        say::note(&format!("{}: follows the array `{}` that is under way", plan.name, array.name));
+        console::note(&format!("{}: follows the running array `{}`", plan.name, array.name));
         array.submitted()?
     } else {
         array.submit(points, wanted)?
@@ -65,14 +68,14 @@ struct Array<'a> {
 }
 
 impl Array<'_> {
-    /// Writes what the tasks read, and hands the array in.
-    fn submit(&self, points: &[usize], wanted: &Wanted) -> Result<Vec<Vec<usize>>, Refusal> {
+    /// Writes the files of the tasks, and submits the array.
+    fn submit(&self, points: &[usize], wanted: &SweepArguments) -> Result<Vec<Vec<usize>>, CommandError> {
         let each = points.len().div_ceil(largest_array());
         let tasks: Vec<Vec<usize>> = points.chunks(each).map(<[usize]>::to_vec).collect();
         let words = |task: &Vec<usize>| task.iter().map(|k| (k + 1).to_string()).collect::<Vec<_>>().join(",");
         let lines: String = tasks.iter().map(|task| words(task) + "\n").collect();
-        // Without their folder for words, tasks end before they begin.
-        fs::create_dir_all(self.folder.join("log")).map_err(|error| io(&self.folder, &error))?;
+        // Tasks fail at once where the folder of their logs is missing.
+        fs::create_dir_all(self.folder.join("log")).map_err(|error| io(&self.folder, error))?;
         self.write("tasks", &lines)?;
         self.write("array.sh", &self.script(wanted)?)?;
         let log = self.folder.join("log").display().to_string().replace('%', "%%");
@@ -80,13 +83,13 @@ impl Array<'_> {
         command.args(["--parsable", "--no-requeue"]).arg(format!("--array=0-{}", tasks.len() - 1));
         command.arg(format!("--job-name={}", self.name)).arg(format!("--output={log}/%a.txt"));
         command.args(&wanted.sbatch).arg(self.folder.join("array.sh"));
-        // What an earlier run left must not look like an end of this one.
+        // Results of an earlier run must not be taken for results of this one.
         for &point in points {
-            self.plan.store.forget(&self.plan.sweep.identity(point)).map_err(|error| io(&self.folder, &error))?;
+            self.plan.store.forget(&self.plan.sweep.identity(point))?;
         }
         let answer = output(&mut command)?;
         let job = answer.lines().last().unwrap_or("").split(';').next().unwrap_or("").trim().to_string();
-        say::note(&format!(
+        console::note(&format!(
             "{}: {} points in {} tasks of the Slurm job {job}, `{}`",
             self.plan.name,
             points.len(),
@@ -96,13 +99,13 @@ impl Array<'_> {
         Ok(tasks)
     }
 
-    fn write(&self, name: &str, content: &str) -> Result<(), Refusal> {
-        PartFile::write(&self.folder, name, content.as_bytes()).map_err(Refusal::io)
+    fn write(&self, name: &str, content: &str) -> Result<(), CommandError> {
+        Ok(PartFile::write(&self.folder, name, content.as_bytes())?)
     }
 
-    /// A task runs the points that stand in its line.
-    fn script(&self, wanted: &Wanted) -> Result<String, Refusal> {
-        let program = std::env::current_exe().map_err(|error| io(Path::new("beamsim"), &error))?;
+    /// The script of a task, which runs the points of its line in the file of tasks.
+    fn script(&self, wanted: &SweepArguments) -> Result<String, CommandError> {
+        let program = std::env::current_exe().map_err(|error| io(Path::new("beamsim"), error))?;
         let words = [vec![program.display().to_string()], self.plan.words(wanted)?].concat();
         let words: Vec<String> = words.iter().map(|word| quoted(word)).collect();
         let tasks = quoted(&self.folder.join("tasks").display().to_string());
@@ -112,24 +115,24 @@ impl Array<'_> {
         ))
     }
 
-    /// The tasks that were handed in before.
-    fn submitted(&self) -> Result<Vec<Vec<usize>>, Refusal> {
+    /// The points of the tasks that were submitted before.
+    fn submitted(&self) -> Result<Vec<Vec<usize>>, CommandError> {
         let path = self.folder.join("tasks");
-        let text = fs::read_to_string(&path).map_err(|error| io(&path, &error))?;
+        let text = fs::read_to_string(&path).map_err(|error| io(&path, error))?;
         let points =
             |line: &str| line.split(',').filter_map(|word| word.parse::<usize>().ok()?.checked_sub(1)).collect();
         Ok(text.lines().map(points).collect())
     }
 
     /// The state of each task that Slurm still knows.
-    fn states(&self) -> Result<HashMap<usize, String>, Refusal> {
+    fn states(&self) -> Result<HashMap<usize, String>, CommandError> {
         let mut command = Command::new("squeue");
         command.args(["--me", "-h", "-r", "-t", "all", "-n", &self.name, "-o", "%K|%T"]);
         let listed = output(&mut command)?;
         let mut states: HashMap<usize, String> = HashMap::new();
         for (task, state) in listed.lines().filter_map(|line| line.trim().split_once('|')) {
             let Ok(task) = task.parse() else { continue };
-            // Of an earlier array with this name a task may still be listed as ended.
+            // An ended task of an earlier array with this name may still be listed.
             let known = states.entry(task).or_default();
             if known.is_empty() || is_open(state) {
                 *known = state.into();
@@ -138,8 +141,8 @@ impl Array<'_> {
         Ok(states)
     }
 
-    /// Until every point has ended or is given up.
-    fn follow(&self, tasks: &[Vec<usize>], poll: Duration) -> Result<(), Refusal> {
+    /// Waits until every point has ended or is given up.
+    fn follow(&self, tasks: &[Vec<usize>], poll: Duration) -> Result<(), CommandError> {
         let mut progress = Progress::new(&self.plan.name);
         let mut open: Vec<(usize, usize)> = tasks
             .iter()
@@ -151,31 +154,31 @@ impl Array<'_> {
         while !open.is_empty() && wait(poll) {
             let states = match self.states() {
                 Ok(states) => states,
-                Err(refusal) => {
-                    // Nothing is known: that is not an end.
-                    progress.note(&format!("warning[{}]: {}", refusal.name, refusal.message));
+                Err(error) => {
+                    // The queue could not be read: the next check may succeed.
+                    progress.note(&format!("warning[{}]: {error}", error.name()));
                     continue;
                 }
             };
             open.retain(|&(_, point)| !self.has_ended(point));
             for &(task, point) in &open {
                 let state = states.get(&task).map_or("", String::as_str);
-                let looks = gone.entry(point).or_default();
-                *looks = if states.contains_key(&task) && is_open(state) { 0 } else { *looks + 1 };
-                if *looks > GRACE {
+                let checks = gone.entry(point).or_default();
+                *checks = if states.contains_key(&task) && is_open(state) { 0 } else { *checks + 1 };
+                if *checks > MAX_CHECKS_WITHOUT_FILE {
                     self.give_up(point, state)?;
                 }
             }
-            open.retain(|(_, point)| gone.get(point).is_none_or(|&looks| looks <= GRACE));
+            open.retain(|(_, point)| gone.get(point).is_none_or(|&checks| checks <= MAX_CHECKS_WITHOUT_FILE));
             let running = states.values().filter(|state| *state == "RUNNING").count();
             let done = count - open.len();
             progress
-                .tell(done as f64 / count as f64, || format!("{done} of {count} points, {running} tasks are running"));
+                .show(done as f64 / count as f64, || format!("{done} of {count} points, {running} tasks are running"));
         }
         progress.done();
-        if stopped().is_some() {
-            say::note(&format!(
-                "{}: the array goes on, and the same command follows it; `scancel --me -n {}` ends it",
+        if signals::caught().is_some() {
+            console::note(&format!(
+                "{}: the array is still running; run the command again to follow it, or end it by `scancel --me -n {}`",
                 self.plan.name, self.name
             ));
         }
@@ -183,46 +186,46 @@ impl Array<'_> {
     }
 
     fn has_ended(&self, point: usize) -> bool {
-        self.plan.known(point).is_some_and(|outcome| outcome.status != Outcome::KILLED)
+        self.plan.known(point).is_some_and(|result| result.status != PointResult::KILLED)
     }
 
-    /// A task is gone, and has left nothing of a point.
-    fn give_up(&self, point: usize, state: &str) -> Result<(), Refusal> {
+    /// Marks a point as killed: its task has ended without a result.
+    fn give_up(&self, point: usize, state: &str) -> Result<(), CommandError> {
         if self.has_ended(point) {
             return Ok(());
         }
         let message =
-            if state.is_empty() { "Slurm knows nothing of it any more".into() } else { format!("Slurm: {state}") };
-        say::note(&format!("point {}: {}: {message}", point + 1, Outcome::KILLED));
-        self.plan.keep(point, &Outcome::failed(Outcome::KILLED, message))
+            if state.is_empty() { "Slurm no longer lists its task".into() } else { format!("Slurm: {state}") };
+        console::note(&format!("point {}: {}: {message}", point + 1, PointResult::KILLED));
+        self.plan.keep(point, &PointResult::failed(PointResult::KILLED, message))
     }
 }
 
 fn is_open(state: &str) -> bool {
-    // `CANCELLED by 1000`; what is unknown may go on.
+    // States may have more words: `CANCELLED by 1000`. A task in an unknown state may still run.
     !ENDED.contains(&state.split(' ').next().unwrap_or(state))
 }
 
-/// `false` where the user has stopped us.
+/// Waits; `false` after a signal.
 fn wait(time: Duration) -> bool {
     let end = Instant::now() + time;
-    while Instant::now() < end && stopped().is_none() {
-        sleep(MOMENT.min(time));
+    while Instant::now() < end && signals::caught().is_none() {
+        sleep(SIGNAL_CHECK.min(time));
     }
-    stopped().is_none()
+    signals::caught().is_none()
 }
 
-/// What is the largest number of a task but one.
+/// The largest number of tasks of an array: Slurm numbers them from 0 to MaxArraySize - 1.
 fn largest_array() -> usize {
-    let told = output(Command::new("scontrol").args(["show", "config"])).unwrap_or_default();
-    let line = told.lines().find(|line| line.trim_start().starts_with("MaxArraySize"));
+    let config = output(Command::new("scontrol").args(["show", "config"])).unwrap_or_default();
+    let line = config.lines().find(|line| line.trim_start().starts_with("MaxArraySize"));
     let number = line.and_then(|line| line.split('=').nth(1)?.trim().parse::<usize>().ok());
-    number.filter(|&number| number > 1).map_or(MOST_TASKS, |number| number - 1)
+    number.filter(|&number| number > 1).map_or(DEFAULT_MAX_TASKS, |number| number - 1)
 }
 
-fn output(command: &mut Command) -> Result<String, Refusal> {
+fn output(command: &mut Command) -> Result<String, CommandError> {
     let name = command.get_program().to_string_lossy().into_owned();
-    let refuse = |why: String| Refusal::of(Status::Io, "io", format!("{name}: {why}"));
+    let refuse = |why: String| CommandError::Io(format!("{name}: {why}"));
     let done = command.output().map_err(|error| refuse(format!("{error}; is Slurm installed here?")))?;
     if done.status.success() {
         return Ok(String::from_utf8_lossy(&done.stdout).into_owned());
@@ -234,13 +237,13 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', "'\\''"))
 }
 
-/// The whole path of what may not exist yet.
-pub fn absolute(path: &Path) -> Result<PathBuf, Refusal> {
-    std::path::absolute(path).map_err(|error| io(path, &error))
+/// The absolute path of a file or folder that may not exist yet.
+pub fn absolute(path: &Path) -> Result<PathBuf, CommandError> {
+    std::path::absolute(path).map_err(|error| io(path, error))
 }
 
-fn io(path: &Path, error: &std::io::Error) -> Refusal {
-    Refusal::of(Status::Io, "io", format!("{}: {error}", path.display()))
+fn io(path: &Path, error: std::io::Error) -> CommandError {
+    OutputError::file(path, error).into()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The whole shape of a scene at the rows of its history, few enough to be carried about.
 
-use super::super::Row;
+use super::super::{Row, Units};
 use super::encode::{base64, quantised};
 use crate::scene::Scene;
 use beamsim_core::model::SlotKind;
@@ -25,15 +25,43 @@ const MOST_EVENTS: usize = 5000;
 /// Fields below this part of the largest of their kind are round-off.
 const NOTHING: f64 = 1e-9;
 
-/// What colours show, with the kind that each is compared with.
-const FIELDS: [(&str, &str, char); 7] = [
-    ("N1", "axial force N1", 'N'),
-    ("N2", "shear force N2", 'N'),
-    ("N3", "shear force N3", 'N'),
-    ("M1", "torque M1", 'M'),
-    ("M2", "bending moment M2", 'M'),
-    ("M3", "bending moment M3", 'M'),
-    ("energy", "strain energy per length", 'E'),
+/// A field that colours show.
+struct Field {
+    name: &'static str,
+    label: &'static str,
+    /// Fields of one kind are compared with the largest of them
+    kind: FieldKind,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum FieldKind {
+    Force,
+    Moment,
+    EnergyPerLength,
+}
+
+impl FieldKind {
+    /// An energy per length has the unit of a force.
+    fn unit(self, units: &Units) -> Option<String> {
+        match self {
+            Self::Force | Self::EnergyPerLength => units.force(),
+            Self::Moment => units.moment(),
+        }
+    }
+}
+
+const fn field(name: &'static str, label: &'static str, kind: FieldKind) -> Field {
+    Field { name, label, kind }
+}
+
+const FIELDS: [Field; 7] = [
+    field("N1", "axial force N1", FieldKind::Force),
+    field("N2", "shear force N2", FieldKind::Force),
+    field("N3", "shear force N3", FieldKind::Force),
+    field("M1", "torque M1", FieldKind::Moment),
+    field("M2", "bending moment M2", FieldKind::Moment),
+    field("M3", "bending moment M3", FieldKind::Moment),
+    field("energy", "strain energy per length", FieldKind::EnergyPerLength),
 ];
 
 /// Watches a run.
@@ -147,7 +175,7 @@ impl Film {
     }
 
     /// As the page takes it; `row` gives the number of a row of the history among those that are shown.
-    pub fn to_json(&self, row: &dyn Fn(usize) -> usize) -> Value {
+    pub fn to_json(&self, row: &dyn Fn(usize) -> usize, units: &Units) -> Value {
         let places = initial(&self.figure, &self.shown);
         let mut first = 0;
         let mut beams = Vec::new();
@@ -173,24 +201,29 @@ impl Film {
             "rows": frames().map(|frame| row(frame.row)).collect::<Vec<_>>(),
             "places": base64(frames().flat_map(|frame| frame.places.as_flattened()).flat_map(|x| x.to_le_bytes())),
             "turns": base64(frames().flat_map(|frame| frame.turns.as_flattened()).flat_map(|x| x.to_le_bytes())),
-            "fields": self.fields(),
+            "fields": self.fields(units),
             "events": self.events.iter().map(|event| at_row(event, row)).collect::<Vec<_>>(),
         })
     }
 
-    fn fields(&self) -> Vec<Value> {
+    /// The fields that are more than round-off.
+    fn fields(&self, units: &Units) -> Vec<Value> {
         let of = |k: usize| self.frames.iter().flat_map(move |frame| frame.fields.iter().map(move |all| all[k]));
         let size = |k: usize| of(k).fold(0.0_f32, |size, x| size.max(x.abs()));
-        let largest = |kind: char| {
-            FIELDS.iter().enumerate().filter(|(_, field)| field.2 == kind).fold(0.0_f32, |s, (k, _)| s.max(size(k)))
-        };
-        let is_something = |k: &usize| size(*k) as f64 > NOTHING * largest(FIELDS[*k].2) as f64;
-        let some = (0..FIELDS.len()).filter(is_something);
-        some.map(|k| {
-            let (low, high, data) = quantised(of(k));
-            json!({ "name": FIELDS[k].0, "label": FIELDS[k].1, "low": low, "high": high, "data": data })
-        })
-        .collect()
+        let sizes: Vec<f32> = (0..FIELDS.len()).map(size).collect();
+        let mut shown = Vec::new();
+        for (k, Field { name, label, kind }) in FIELDS.iter().enumerate() {
+            let of_kind = FIELDS.iter().zip(&sizes).filter(|(field, _)| field.kind == *kind).map(|(_, size)| *size);
+            let largest = of_kind.fold(0.0, f32::max);
+            if f64::from(sizes[k]) > NOTHING * f64::from(largest) {
+                let (low, high, data) = quantised(of(k));
+                let unit = kind.unit(units);
+                shown.push(
+                    json!({ "name": name, "label": label, "unit": unit, "low": low, "high": high, "data": data }),
+                );
+            }
+        }
+        shown
     }
 }
 

@@ -5,11 +5,10 @@ mod film;
 
 pub use film::Film;
 
-use super::{HistoryReader, PartFile, Record};
+use super::{HistoryReader, OutputError, PartFile, Record, Units};
 use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart};
 use encode::base64;
 use serde_json::{Value, json};
-use std::io;
 use std::path::Path;
 
 /// The page, which has places for a title and for data.
@@ -28,11 +27,11 @@ pub struct Report<'a> {
 
 impl Report<'_> {
     /// Writes the page of results in a folder.
-    pub fn write(&self, results: &Path, film: Film, path: &Path) -> io::Result<()> {
+    pub fn write(&self, results: &Path, film: Film, path: &Path) -> Result<(), OutputError> {
         PartFile::write_to(path, self.page(results, film)?.as_bytes())
     }
 
-    fn page(&self, results: &Path, mut film: Film) -> io::Result<String> {
+    fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
         let history = HistoryReader::of_results(results).map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
         // The last row of a run that was stopped is the one of that moment, which the film passes over.
@@ -42,17 +41,19 @@ impl Report<'_> {
         let row = |of: usize| shown.partition_point(|&k| k <= of).saturating_sub(1);
         let (bars, columns): (Vec<usize>, Vec<usize>) =
             (0..history.names.len()).partition(|&k| is_bar(&history.names, k));
+        let units = self.record.units();
         let data = json!({
             "title": self.title,
             "version": env!("CARGO_PKG_VERSION"),
             "deck": self.record.text(),
             "run": self.record.bare(),
-            "history": table(&history, &shown, &columns, ""),
+            "length_unit": units.length(),
             "parts": parts(),
-            "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, ".err") },
-            "scene": film.to_json(&row),
-            "modes": numbers(&results.join("modes.csv"))?,
-            "buckling": numbers(&results.join("buckling.csv"))?,
+            "history": table(&history, &shown, &columns, &units),
+            "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, &units) },
+            "scene": film.to_json(&row, &units),
+            "modes": small_table(&results.join("modes.csv"), &units)?,
+            "buckling": small_table(&results.join("buckling.csv"), &units)?,
         });
         let escaped = self.title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
         let (before, after) = PAGE.split_once("{{DATA}}").unwrap_or((PAGE, ""));
@@ -61,13 +62,22 @@ impl Report<'_> {
     }
 }
 
-/// A small table of the results, where they have it.
-fn numbers(path: &Path) -> io::Result<Value> {
+/// A small table of the results as columns, units and rows; null if there is no such file. Fields that
+/// are no numbers stay texts.
+fn small_table(path: &Path, units: &Units) -> Result<Value, OutputError> {
     if !path.exists() {
         return Ok(Value::Null);
     }
-    let HistoryReader { names, rows } = HistoryReader::read(path)?;
-    Ok(json!({ "columns": names, "rows": rows }))
+    let wrong = |error: csv::Error| OutputError::content(path, error);
+    let mut reader = csv::Reader::from_path(path).map_err(wrong)?;
+    let names: Vec<String> = reader.headers().map_err(wrong)?.iter().map(str::to_string).collect();
+    let units: Vec<Option<String>> = names.iter().map(|name| units.of_column(name)).collect();
+    let field = |text: &str| text.parse::<f64>().map_or_else(|_| json!(text), |number| json!(number));
+    let mut rows: Vec<Vec<Value>> = Vec::new();
+    for record in reader.records() {
+        rows.push(record.map_err(wrong)?.iter().map(field).collect());
+    }
+    Ok(json!({ "columns": names, "units": units, "rows": rows }))
 }
 
 /// Whether a column is the error bar of another.
@@ -75,14 +85,15 @@ fn is_bar(names: &[String], k: usize) -> bool {
     names[k].strip_suffix(".err").is_some_and(|of| names.iter().any(|name| name == of))
 }
 
-/// Columns that share a picture: the group of the whole scene that they belong to, if they do, their heading, and the ends
-/// of their names.
+/// Rows of the table of columns: columns that share a picture, with the group of the whole scene that they
+/// belong to, if they do.
 fn parts() -> Vec<Value> {
     let of_history = COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_scene());
     let of_group = |group: &'static ColumnGroup| {
         let scene = group.is_of_scene().then_some(group.key);
-        let part = move |part: &ColumnPart| json!({ "scene": scene, "title": part.title, "suffixes": part.suffixes });
-        group.parts.iter().map(part)
+        let of_section = group.is_of_section();
+        let row = move |part: &ColumnPart| json!({ "scene": scene, "of_section": of_section, "title": part.title, "suffixes": part.suffixes });
+        group.parts.iter().map(row)
     };
     of_history.flat_map(of_group).collect()
 }
@@ -94,8 +105,15 @@ fn rows(history: &HistoryReader, frames: &[usize]) -> Vec<usize> {
     (0..count).filter(|k| k.is_multiple_of(stride) || frames.binary_search(k).is_ok() || k + 1 == count).collect()
 }
 
-fn table(history: &HistoryReader, rows: &[usize], columns: &[usize], suffix: &str) -> Value {
-    let names: Vec<&str> = columns.iter().map(|&k| history.names[k].trim_end_matches(suffix)).collect();
+/// Rows of some columns of a history. Columns of error bars get the names of the columns that they
+/// belong to.
+fn table(history: &HistoryReader, rows: &[usize], columns: &[usize], units: &Units) -> Value {
+    let name = |&k: &usize| {
+        if is_bar(&history.names, k) { history.names[k].trim_end_matches(".err") } else { &history.names[k] }
+    };
+    let names: Vec<&str> = columns.iter().map(name).collect();
+    let units: Vec<Option<String>> = names.iter().map(|name| units.of_column(name)).collect();
     let numbers = columns.iter().flat_map(|&k| rows.iter().map(move |&row| history.rows[row][k]));
-    json!({ "columns": names, "rows": rows.len(), "data": base64(numbers.flat_map(f64::to_le_bytes)) })
+    let data = base64(numbers.flat_map(f64::to_le_bytes));
+    json!({ "columns": names, "units": units, "rows": rows.len(), "data": data })
 }

@@ -1,14 +1,13 @@
 //! Springs, cables and joints.
 
 use super::{Composer, DrivenTable, stage_set};
-use crate::deck::{self, Diagnostic, JointKind};
+use crate::deck::{self, Diagnostic};
 use crate::scene::joints::FoundJoint;
-use beamsim_core::effect::joint::{self, Joints};
-use beamsim_core::effect::link::{self, Links};
-use beamsim_core::effect::spring::{self, Spring};
+use beamsim_core::effect::joint::{Drive, FreeCoordinate, Joint, Joints, Motor, SpringDamper};
+use beamsim_core::effect::spring::{GroundSpring, GroundSprings, Link, Links};
 use beamsim_core::model::{Amplitude, SlotKind, StageSet, Support};
 use beamsim_core::run::Driven;
-use beamsim_core::system::Direction;
+use beamsim_core::system::{Direction, Node};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 impl Composer<'_> {
@@ -19,7 +18,7 @@ impl Composer<'_> {
             let Some((node, _)) = self.node(at) else { continue };
             let axes = crate::scene::constraints::axes(*axes);
             let turned = |k: [f64; 3]| axes * Mat3::diagonal(k) * axes.transpose();
-            springs.push(spring::Instance {
+            springs.push(GroundSpring {
                 node: self.mesh.nodes[node].node,
                 translation: turned([k[0], k[1], k[2]]),
                 rotation: turned([k[3], k[4], k[5]]),
@@ -33,7 +32,7 @@ impl Composer<'_> {
         } else {
             let reason = format!("{} [[spring]] table(s)", springs.len());
             self.out.springs = springs.clone();
-            self.push(Spring { springs }, reason);
+            self.push(GroundSprings { springs }, reason);
         }
     }
 
@@ -58,7 +57,7 @@ impl Composer<'_> {
                 self.diagnostics.push(Diagnostic::error(message, spring.span.clone()));
                 continue;
             }
-            links.push(link::Instance {
+            links.push(Link {
                 nodes: [a.node, b.node],
                 places: [a.place, b.place],
                 stiffness: *stiffness,
@@ -78,7 +77,7 @@ impl Composer<'_> {
 
     /// Joints that need multipliers, and springs and dampers of those that do not.
     pub(super) fn joints(&mut self, connections: &[FoundJoint]) {
-        let joints: Vec<joint::Instance> = connections.iter().filter_map(|c| self.joint(c)).collect();
+        let joints: Vec<Joint> = connections.iter().filter_map(|c| self.joint(c)).collect();
         if joints.is_empty() {
             let why = if connections.is_empty() {
                 "no [[joint]]"
@@ -91,80 +90,83 @@ impl Composer<'_> {
         self.push(Joints { joints }, reason);
     }
 
-    fn joint(&mut self, connection: &FoundJoint) -> Option<joint::Instance> {
+    /// `None` where supports or shared nodes do all its work, or where something is wrong.
+    fn joint(&mut self, connection: &FoundJoint) -> Option<Joint> {
         let joint = connection.joint;
-        let node = |k: usize| connection.nodes[k].map(|node| self.mesh.nodes[node].node);
-        let nodes = [node(0), node(1)];
-        let place = |k: usize| connection.nodes[k].map_or(connection.place, |node| self.mesh.nodes[node].place);
-        let places = [place(0), place(1)];
-        let sprung = joint.stiffness != 0.0 || joint.damping != 0.0;
+        let kind = joint.kind;
         let support = connection.is_support();
-        let mut kind = connection.kind();
-        if support {
-            // Supports hold it; what is left is its drive, or the one direction of a universal joint.
-            match joint.kind {
-                JointKind::Universal => kind.held = [true; 3],
-                _ if sprung => kind.normal = &[],
-                _ => return None,
-            }
-            if joint.motor.is_some() {
-                return None;
-            }
+        let normal = if support { kind.ground.normal } else { kind.normal };
+        // The motor of a support is a motion of its node.
+        if support && (joint.motor.is_some() || (normal.is_empty() && !is_sprung(joint))) {
+            return None;
         }
-        let motor = match &joint.motor {
+        let drive = match kind.driven {
+            Some(coordinate) => self.drive(joint, coordinate)?,
             None => None,
-            Some((value, history)) => {
-                let amplitude = self.amplitude_of("motor", &joint.span, history.as_ref(), None)?;
-                Some(joint::Motor { value: *value, amplitude })
-            }
         };
+        let nodes = connection.nodes.map(|node| node.map(|node| self.mesh.nodes[node].node));
         let shared = matches!(nodes, [Some(a), Some(b)] if a.u == b.u);
-        if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.held[0]) {
+        if shared && (connection.arms != [Vec3::ZERO; 2] || !kind.shares_displacement()) {
             let message = "these parts share their displacement through another joint at the same point";
             let diagnostic = Diagnostic::error(message, joint.span.clone());
             self.diagnostics.push(diagnostic.help("give the parts points of their own, and join these"));
             return None;
         }
-        if !sprung && motor.is_none() && shared && kind.normal.is_empty() {
+        if shared && drive.is_none() && normal.is_empty() {
             return None;
         }
-        let turns = sprung && joint.kind == JointKind::Revolute;
-        let mut instance = joint::Instance {
-            kind,
+        let turns = matches!(drive, Some(Drive::Motor(FreeCoordinate::Angle, _)));
+        let has_along = !shared && !support;
+        let has_between = !normal.is_empty() || turns;
+        let found = Joint {
+            held: kind.held,
+            normal,
             nodes,
-            places,
+            places: connection.nodes.map(|node| node.map_or(connection.place, |node| self.mesh.nodes[node].place)),
             arms: connection.arms,
             axes: connection.axes,
-            along: None,
-            between: None,
-            drive: joint::Drive { stiffness: joint.stiffness, damping: joint.damping, motor },
-            angle: turns.then_some(self.out.angles),
+            along: has_along.then(|| self.multiplier(SlotKind::Force, connection)),
+            between: has_between.then(|| self.multiplier(SlotKind::Moment, connection)),
+            drive,
+            angle: self.remembered_angle(joint, nodes),
         };
-        self.out.angles += usize::from(turns);
-        self.out.sprung_joints.extend(turns.then(|| nodes.map(|node| node.map(|node| node.p))));
         self.out.jointed.extend(connection.nodes.into_iter().flatten());
-        if !shared && !support {
-            instance.along = Some(self.multiplier(SlotKind::Force, connection));
+        self.out.driven.extend(found.motor_slot().map(|slot| DrivenTable {
+            drives: Driven::Motor(slot),
+            what: "motor",
+            span: joint.span.clone(),
+            history: joint.motor.as_ref().and_then(|motor| motor.history.clone()),
+        }));
+        self.hold_idle_multipliers(&found);
+        Some(found)
+    }
+
+    /// The number of a joint's angle among those that the state remembers, where a spring or damper turns.
+    fn remembered_angle(&mut self, joint: &deck::Joint, nodes: [Option<Node>; 2]) -> Option<usize> {
+        if !is_sprung(joint) || joint.kind.driven != Some(FreeCoordinate::Angle) {
+            return None;
         }
-        if !kind.normal.is_empty() || (motor.is_some() && joint.kind == JointKind::Revolute) {
-            instance.between = Some(self.multiplier(SlotKind::Moment, connection));
-        }
-        if let Some((_, history)) = &joint.motor {
-            let slot = if joint.kind == JointKind::Prismatic { instance.along } else { instance.between };
-            let table = |slot| DrivenTable {
-                drives: Driven::Motor(slot),
-                what: "motor",
-                span: joint.span.clone(),
-                history: history.clone(),
-            };
-            self.out.driven.extend(slot.map(table));
-        }
-        for slot in [instance.along, instance.between].into_iter().flatten() {
-            let used = instance.used(slot);
+        self.out.sprung_joints.push(nodes.map(|node| node.map(|node| node.p)));
+        Some(self.out.sprung_joints.len() - 1)
+    }
+
+    /// Components of multipliers that a joint does not use are held at zero.
+    fn hold_idle_multipliers(&mut self, joint: &Joint) {
+        for slot in [joint.along, joint.between].into_iter().flatten() {
+            let used = joint.used(slot);
             let directions = (0..3).filter(|&k| !used[k]).map(|k| Direction { slot, axis: Vec3::UNIT[k] }).collect();
             self.out.idle_multipliers.push(Support { directions, stages: StageSet::default() });
         }
-        Some(instance)
+    }
+
+    /// The drive of a joint on its free coordinate: a motor takes the place of spring and damper. The outer `None` is an unknown history.
+    fn drive(&mut self, joint: &deck::Joint, coordinate: FreeCoordinate) -> Option<Option<Drive>> {
+        if let Some(motor) = &joint.motor {
+            let amplitude = self.amplitude_of("motor", &joint.span, motor.history.as_ref(), None)?;
+            return Some(Some(Drive::Motor(coordinate, Motor { value: motor.value, amplitude })));
+        }
+        let spring = SpringDamper { stiffness: joint.stiffness, damping: joint.damping };
+        Some(is_sprung(joint).then_some(Drive::Spring(coordinate, spring)))
     }
 
     fn multiplier(&mut self, kind: SlotKind, connection: &FoundJoint) -> u32 {
@@ -173,4 +175,9 @@ impl Composer<'_> {
         self.out.multipliers.push((kind, node));
         (self.mesh.slots() + self.out.multipliers.len() - 1) as u32
     }
+}
+
+/// A joint with a spring or a damper.
+fn is_sprung(joint: &deck::Joint) -> bool {
+    joint.stiffness != 0.0 || joint.damping != 0.0
 }

@@ -1,16 +1,17 @@
-//! What static stages take over from a motion.
+//! Fading inertia: static stages take forces of inertia and damping over from a motion before them.
 
 use super::Composer;
-use crate::deck::{EffectWord, StageBody};
+use crate::deck::EffectWord;
 use beamsim_core::effect::Effect;
-use beamsim_core::effect::fading_inertia::FadingInertia;
+use beamsim_core::effect::inertia::FadingInertia;
 use beamsim_core::model::StageSet;
 use std::collections::BTreeSet;
 
 impl Composer<'_> {
     /// The forces of inertia and damping, in stages that need them.
     pub(super) fn fading_inertia(&mut self) {
-        let (mesh, stages) = (self.mesh, self.stages_after_motion());
+        let mesh = self.mesh;
+        let stages = self.stages_after_motion();
         let slots = mesh.nodes.iter().flat_map(|node| [(node.node.u, false), (node.node.p, true)]);
         let slots: BTreeSet<_> = if stages.is_empty() { BTreeSet::new() } else { slots.collect() };
         let named: Vec<String> = stages.iter().map(|number| format!("stage {}", number + 1)).collect();
@@ -24,17 +25,17 @@ impl Composer<'_> {
         self.push(effect, format!("{} begins where something may move", named.join(", ")));
     }
 
-    /// Static stages after a dynamic one, and after static ones that may have ended before all was taken away; from 0.
+    /// Static stages after a dynamic one, and after static ones that may have ended before all was
+    /// taken away; from 0.
     fn stages_after_motion(&self) -> Vec<usize> {
-        let (mut stages, mut moves) = (Vec::new(), false);
+        let mut stages = Vec::new();
+        let mut moves = false;
         for (number, stage) in self.deck.stages.iter().enumerate() {
-            match stage.body {
-                StageBody::Dynamic { .. } => moves = true,
-                StageBody::Static { .. } | StageBody::Path { .. } => {
-                    stages.extend(moves.then_some(number));
-                    moves &= stage.until.is_some();
-                }
-                StageBody::Modal { .. } | StageBody::Buckling { .. } => {}
+            if stage.body.advances_time() {
+                moves = true;
+            } else if stage.body.finds_balance() {
+                stages.extend(moves.then_some(number));
+                moves &= stage.until.is_some();
             }
         }
         stages

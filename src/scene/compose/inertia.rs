@@ -1,24 +1,26 @@
-//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional damping.
+//! Mass of beams and bodies, and what acts on mass: gravity, rotating frames, mass-proportional
+//! damping.
 
-use super::{Composer, SWITCHED_OFF, push_volume};
+use super::{Composer, SWITCHED_OFF};
 use crate::deck::{self, Diagnostic, EffectWord, InterpolationWord};
-use crate::scene::mesh::{BeamElement, Mesh, MeshBeam, Rule, Station};
+use crate::scene::mesh::{BeamElement, MeshBeam};
 use crate::scene::names;
-use crate::scene::section::MassPerLength;
-use beamsim_core::effect::beam_mass::BeamMass;
-use beamsim_core::effect::gravity::{BeamGravity, BodyGravity};
-use beamsim_core::effect::mass_damping::{BeamMassDamping, BodyMassDamping};
-use beamsim_core::effect::rigid_body::{Body, RigidBody};
-use beamsim_core::effect::rotary_inertia::RotaryInertia;
-use beamsim_core::effect::rotating_frame::RotatingFrame;
-use beamsim_core::effect::section_inertia::SectionInertia;
+use beamsim_core::effect::inertia::{
+    BeamMass, BeamMassDamping, Body, BodyMassDamping, RigidBody, RotaryInertia, RotatingFrame, SectionInertia,
+};
+use beamsim_core::effect::load::{BeamGravity, BodyGravity};
 use beamsim_core::effect::{ByOrder, VolumeElements};
 use beamsim_core::kernel::inertia::Inertia;
+use beamsim_core::model::MassPerLength;
+use beamsim_core::model::beam_element::{
+    ElementGeometry, NodalInertia, PlacedNode, Rule, Station, body_inertia, push_volume,
+};
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
 impl Composer<'_> {
-    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section has it.
+    /// Mass on the centre line, rotary inertia, and eccentric mass: each only where some section
+    /// has it.
     pub(super) fn beam_inertia(&mut self) {
         let names = ["beam mass", "rotary inertia", "eccentric section inertia", "section inertia at nodes"];
         if !self.dynamic || self.mesh.element_count == 0 {
@@ -27,7 +29,9 @@ impl Composer<'_> {
         }
         let wanted = self.deck.effects.allow(EffectWord::RotaryInertia);
         let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
-        let (mut mass, mut rotary, mut eccentric) = (ByOrder::default(), ByOrder::default(), ByOrder::default());
+        let mut mass = ByOrder::default();
+        let mut rotary = ByOrder::default();
+        let mut eccentric = ByOrder::default();
         let bodies = self.each_inertia(|element, stations, found| {
             if found.iter().any(|m| m.offset != Vec3::ZERO) {
                 return push_volume(&mut eccentric, element, stations, |k| found[k]);
@@ -53,7 +57,9 @@ impl Composer<'_> {
             (_, false) => self.reason(names[1], false, SWITCHED_OFF),
             (true, _) if !bodies.is_empty() => self.reason(names[1], false, "what sections have is at the nodes"),
             (true, _) => self.reason(names[1], false, "no section has rotary inertia (`rhoJ`)"),
-            _ => self.push(rotary, "sections have rotary inertia, and something moves or may vibrate".into()),
+            (false, true) => {
+                self.push(rotary, "sections have rotary inertia, and something moves or may vibrate".into())
+            }
         }
         if bodies.is_empty() {
             self.reason(
@@ -93,19 +99,17 @@ impl Composer<'_> {
             self.diagnostics.push(Diagnostic::error(message, body.span.clone()));
             return None;
         }
-        let d = Vec3(body.offset);
-        let steiner = (Mat3::diagonal([d.squared(); 3]) - d.outer(d)) * body.mass;
-        let inertia = Arc::new(Inertia { mass: body.mass, offset: d, about_node: centre + steiner });
-        let node = &self.mesh.nodes[node];
-        Some(Body { node: node.node, place: node.place, inertia })
+        let inertia = Arc::new(body_inertia(body.mass, Vec3(body.offset), centre));
+        let PlacedNode { node, place } = self.mesh.nodes[node];
+        Some(Body { node, place, inertia })
     }
 
     pub(super) fn body_inertia(&mut self) {
         let bodies = self.out.bodies.clone();
         match (bodies.is_empty(), self.dynamic) {
             (true, _) => self.reason("rigid body inertia", false, "no [[body]]"),
-            (_, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
-            _ => {
+            (false, false) => self.reason("rigid body inertia", false, "no dynamic stage"),
+            (false, true) => {
                 let reason = format!("{} [[body]] table(s), and something moves or may vibrate", bodies.len());
                 let gyroscopic = self.deck.effects.allow(EffectWord::Gyroscopic);
                 self.push(RigidBody { name: "rigid body inertia", bodies, gyroscopic }, reason);
@@ -120,10 +124,9 @@ impl Composer<'_> {
         if framed.is_empty() {
             return self.reason("rotating frame", false, "no stage has a `frame`");
         }
-        let is_static =
-            |stage: &deck::Stage| matches!(stage.body, deck::StageBody::Static { .. } | deck::StageBody::Path { .. });
         // One amplitude for all static stages: what one has brought in stays for the next.
-        let ramped: Vec<usize> = framed.iter().filter(|(_, stage)| is_static(stage)).map(|(k, _)| k + 1).collect();
+        let ramped: Vec<usize> =
+            framed.iter().filter(|(_, stage)| stage.body.finds_balance()).map(|(k, _)| k + 1).collect();
         let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
         let (elements, nodal) =
             self.inertia_elements(|element, station, inertia| (inertia, element.between(&station.shape)));
@@ -141,7 +144,7 @@ impl Composer<'_> {
                 stage: *number,
                 spin: Vec3(frame.spin),
                 about,
-                amplitude: amplitude.filter(|_| is_static(stage)),
+                amplitude: amplitude.filter(|_| stage.body.finds_balance()),
                 elements: elements.clone(),
                 bodies: bodies.clone(),
             }));
@@ -149,21 +152,22 @@ impl Composer<'_> {
         self.reason("rotating frame", true, format!("{} stage(s) with a `frame`", framed.len()));
     }
 
-    /// Visits the elements with the mass properties of their volume points, about the centre line and in global axes, and
-    /// returns what sits at nodes instead: on beams whose rotations are relative all that turns with the section, because no
-    /// chart matters there.
+    /// Visits the elements with the mass properties of their volume points, about the centre line
+    /// and in global axes, and returns what sits at nodes instead: on beams whose rotations are
+    /// relative all that turns with the section, because no chart matters there.
     fn each_inertia(&self, mut visit: impl FnMut(&BeamElement, &[Station], &[Inertia])) -> Vec<Body> {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
-        let mut nodal = NodalInertia::new(self.mesh);
+        let mut nodal = NodalInertia::new(self.mesh.nodes.len());
         self.each_element(|element| {
-            let (beam, stations) = (element.beam, element.stations(Rule::Volume));
+            let beam = element.beam;
+            let stations = element.stations(Rule::Volume);
             let relative = beam.interpolation == InterpolationWord::Relative;
             let eccentric = stations.iter().any(|station| mass_at(beam, station).offset != Vec3::ZERO);
             if relative && eccentric {
-                return nodal.add(element, |whole| whole);
+                return add_at_nodes(&mut nodal, element, |whole| whole);
             }
             if relative && rotary {
-                nodal.add(element, |whole| Inertia { mass: 0.0, ..whole });
+                add_at_nodes(&mut nodal, element, |whole| Inertia { mass: 0.0, ..whole });
             }
             let turns = eccentric || (rotary && !relative);
             let at = |station: &Station| {
@@ -173,10 +177,11 @@ impl Composer<'_> {
             let found: Vec<Inertia> = stations.iter().map(at).collect();
             visit(element, &stations, &found);
         });
-        nodal.bodies(self.mesh)
+        nodal.bodies(|node| self.mesh.nodes[node])
     }
 
-    /// What acts on all mass of beams: elements with a quantity of each of their points, and what sits at nodes instead.
+    /// All mass of beams: elements with a quantity of each of their points, and the bodies that sit
+    /// at nodes instead.
     fn inertia_elements<Q: Copy + PartialEq>(
         &self,
         quantity: impl Fn(&BeamElement, &Station, Inertia) -> Q,
@@ -193,10 +198,12 @@ impl Composer<'_> {
         let mut bodies = self.out.bodies.clone();
         let acceleration = self.deck.gravity.as_ref().map(|g| Vec3(g.value)).filter(|g| *g != Vec3::ZERO);
         let Some(acceleration) = acceleration else {
-            let why = match &self.deck.gravity {
-                _ if !self.deck.effects.allow(EffectWord::Gravity) => SWITCHED_OFF,
-                Some(_) => "`gravity` is zero",
-                None => "no `gravity`",
+            let why = if !self.deck.effects.allow(EffectWord::Gravity) {
+                SWITCHED_OFF
+            } else if self.deck.gravity.is_some() {
+                "`gravity` is zero"
+            } else {
+                "no `gravity`"
             };
             self.reason("gravity on beams", false, why);
             return self.reason("gravity on bodies", false, why);
@@ -225,10 +232,12 @@ impl Composer<'_> {
         let names = ["mass-proportional damping of beams", "mass-proportional damping of bodies"];
         let [mass, _] = self.deck.damping.unwrap_or_default();
         if mass == 0.0 || !self.dynamic {
-            let why = match mass {
-                _ if !self.deck.effects.allow(EffectWord::Damping) => SWITCHED_OFF,
-                0.0 => "no `mass` in [damping]",
-                _ => "nothing moves in time",
+            let why = if !self.deck.effects.allow(EffectWord::Damping) {
+                SWITCHED_OFF
+            } else if mass == 0.0 {
+                "no `mass` in [damping]"
+            } else {
+                "nothing moves in time"
             };
             return names.into_iter().for_each(|name| self.reason(name, false, why));
         }
@@ -247,52 +256,20 @@ impl Composer<'_> {
     }
 }
 
-/// Mass properties of sections, collected at nodes: mass, first moment of mass, inertia about the node.
-struct NodalInertia {
-    /// By node; none where no element of these beams ends
-    nodes: Vec<(f64, Vec3, Mat3)>,
-}
-
-impl NodalInertia {
-    fn new(mesh: &Mesh) -> Self {
-        Self { nodes: vec![(0.0, Vec3::ZERO, Mat3::ZERO); mesh.nodes.len()] }
-    }
-
-    /// Adds what an element brings to its nodes; `pick` may leave parts out.
-    fn add(&mut self, element: &BeamElement, pick: impl Fn(Inertia) -> Inertia) {
-        for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
-            let own = pick(mass_at(element.beam, station).turned(station.axes));
-            let (mass, moment, about) = &mut self.nodes[node];
-            *mass += own.mass * station.weight;
-            *moment += own.offset * (own.mass * station.weight);
-            *about += own.about_node * station.weight;
-        }
-    }
-
-    /// The bodies at nodes that have any.
-    fn bodies(self, mesh: &Mesh) -> Vec<Body> {
-        let mut last: Option<Arc<Inertia>> = None;
-        let body = |(node, (mass, moment, about_node)): (usize, (f64, Vec3, Mat3))| {
-            let offset = if mass > 0.0 { moment * (1.0 / mass) } else { Vec3::ZERO };
-            let (node, inertia) = (&mesh.nodes[node], Inertia { mass, offset, about_node });
-            let known = last.take().filter(|known| **known == inertia);
-            let inertia = known.unwrap_or_else(|| Arc::new(inertia));
-            last = Some(inertia.clone());
-            Body { node: node.node, place: node.place, inertia }
-        };
-        let there = |(_, (mass, _, about)): &(usize, (f64, Vec3, Mat3))| *mass != 0.0 || *about != Mat3::ZERO;
-        let mut bodies: Vec<Body> = self.nodes.into_iter().enumerate().filter(there).map(body).collect();
-        bodies.shrink_to_fit();
-        bodies
+/// Adds the sections of an element to its nodes, each with the part of its mass properties that `pick` leaves.
+fn add_at_nodes(nodal: &mut NodalInertia, element: &BeamElement, pick: impl Fn(Inertia) -> Inertia) {
+    for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
+        let own = pick(mass_at(element.beam, station).turned(station.axes));
+        nodal.add(node, &own, station.weight);
     }
 }
 
 fn mass_at(beam: &MeshBeam, station: &Station) -> MassPerLength {
-    let none = MassPerLength { mass: 0.0, offset: Vec3::ZERO, about_line: Mat3::ZERO };
-    beam.section.at(station.fraction).mass.unwrap_or(none)
+    beam.section.at(station.fraction).mass_per_length()
 }
 
-/// Whether a matrix can be the inertia of a body: principal values not negative, none beyond the sum of the others.
+/// True if a matrix can be the inertia of a body: no principal value negative, none larger than the
+/// sum of the others.
 fn is_inertia(matrix: [[f64; 3]; 3]) -> bool {
     let eigen = nalgebra::SymmetricEigen::new(nalgebra::Matrix3::from_fn(|i, j| matrix[i][j])).eigenvalues;
     let slack = 1e-9 * eigen.amax();

@@ -1,34 +1,38 @@
 //! Loads at nodes and along beams.
 
-use super::{Composer, push_volume};
+use super::Composer;
 use crate::deck::{self, Diagnostic, EffectWord, Frame, InterpolationWord, LoadTarget, LoadVector};
-use crate::scene::mesh::{BeamElement, Rule, Station};
+use crate::scene::mesh::BeamElement;
 use crate::scene::names;
-use beamsim_core::effect::line_load::{LineLoad, LineLoadKind};
-use beamsim_core::effect::node_load::{self, NodeLoad, NodeLoadKind};
+use beamsim_core::effect::load::{LineLoad, LineLoadKind, NodeForce, NodeLoad, NodeLoadKind};
 use beamsim_core::effect::{ByOrder, Effect};
 use beamsim_core::kernel::load::Intensity;
+use beamsim_core::model::beam_element::{ElementGeometry, Rule, Station, push_volume};
 use beamsim_core::tensor::{Mat3, Vec3};
 
 impl Composer<'_> {
     /// Loads at nodes, and beside them those that line loads on relative beams leave there.
     pub(super) fn node_loads(&mut self, mut loads: NodeLoads) {
-        use NodeLoadKind::{MaterialForce, MaterialMoment, SpatialForce, SpatialMoment};
-        let kinds = [SpatialForce, SpatialMoment, MaterialForce, MaterialMoment];
         for load in &self.deck.loads {
             let LoadTarget::At(at) = &load.target else { continue };
             let Some((node, on)) = self.node(at) else { continue };
             let Some(amplitude) = self.amplitude_of_load(load) else { continue };
             let Some(frame) = self.load_axes(load, at, node, on) else { continue };
             let node = self.mesh.nodes[node].node;
-            for (vector, kind) in [(load.force, force_kind(load)), (load.moment, force_kind(load) + 1)] {
-                if let Some(vector) = vector {
-                    loads[kind].push(node_load::Instance { node, vector: frame * Vec3(vector.start), amplitude });
-                }
-            }
+            let at_node = |vector: LoadVector| NodeForce { node, vector: frame * Vec3(vector.start), amplitude };
+            let own = loads.in_frame(load.frame);
+            own.forces.extend(load.force.map(at_node));
+            own.moments.extend(load.moment.map(at_node));
         }
         let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
-        for (kind, loads) in kinds.into_iter().zip(loads) {
+        let NodeLoads { dead, following } = loads;
+        let kinds = [
+            (NodeLoadKind::SpatialForce, dead.forces),
+            (NodeLoadKind::SpatialMoment, dead.moments),
+            (NodeLoadKind::MaterialForce, following.forces),
+            (NodeLoadKind::MaterialMoment, following.moments),
+        ];
+        for (kind, loads) in kinds {
             let effect = NodeLoad { kind, loads, tangent };
             if effect.loads.is_empty() {
                 self.reason(effect.name(), false, "no such [[load]] at a node");
@@ -62,9 +66,8 @@ impl Composer<'_> {
                 self.diagnostics.push(Diagnostic::error(message, at.span.clone()));
                 None
             }
-            _ => {
+            [(first, fraction), _, ..] => {
                 let message = format!("several beams meet at `{}`; whose section is meant?", at.value);
-                let (first, fraction) = beams[0];
                 let end = if fraction > 0.5 { "end" } else { "start" };
                 let help = format!("name the node on a beam, such as `{}@{end}`", self.mesh.beams[first].name);
                 self.diagnostics.push(Diagnostic::error(message, at.span.clone()).help(help));
@@ -75,7 +78,8 @@ impl Composer<'_> {
 
     /// Line loads; those that turn with a relative beam are returned as loads at its nodes.
     pub(super) fn line_loads(&mut self) -> NodeLoads {
-        let (mut spatial, mut material) = (ByOrder::default(), ByOrder::default());
+        let mut spatial = ByOrder::default();
+        let mut material = ByOrder::default();
         let mut nodal = NodeLoads::default();
         for load in &self.deck.loads {
             let LoadTarget::Along(along) = &load.target else { continue };
@@ -99,10 +103,9 @@ impl Composer<'_> {
             }
         }
         let tangent = self.deck.effects.allow(EffectWord::FollowerTangent);
-        let [force, moment, following_force, following_moment] = nodal.each_ref().map(|loads| !loads.is_empty());
         let kinds = [
-            (LineLoadKind::Spatial, spatial, force || moment),
-            (LineLoadKind::Material, material, following_force || following_moment),
+            (LineLoadKind::Spatial, spatial, !nodal.dead.is_empty()),
+            (LineLoadKind::Material, material, !nodal.following.is_empty()),
         ];
         for (kind, mut elements, acts_at_nodes) in kinds {
             elements.shrink_to_fit();
@@ -118,24 +121,46 @@ impl Composer<'_> {
     }
 }
 
-/// Loads at nodes by kind: forces and moments fixed in space, then those that turn with the section.
-pub(super) type NodeLoads = [Vec<node_load::Instance>; 4];
+/// Forces and moments at nodes.
+#[derive(Default)]
+pub(super) struct ForcesAndMoments {
+    forces: Vec<NodeForce>,
+    moments: Vec<NodeForce>,
+}
 
-/// The place of a load's forces among [`NodeLoads`]; that of its moments is the next.
-fn force_kind(load: &deck::Load) -> usize {
-    if load.frame == Frame::Space { 0 } else { 2 }
+impl ForcesAndMoments {
+    fn is_empty(&self) -> bool {
+        self.forces.is_empty() && self.moments.is_empty()
+    }
+}
+
+/// Loads at nodes by their frame.
+#[derive(Default)]
+pub(super) struct NodeLoads {
+    /// Fixed in space
+    dead: ForcesAndMoments,
+    /// Turning with the section
+    following: ForcesAndMoments,
+}
+
+impl NodeLoads {
+    fn in_frame(&mut self, frame: Frame) -> &mut ForcesAndMoments {
+        match frame {
+            Frame::Space => &mut self.dead,
+            Frame::Body | Frame::Section => &mut self.following,
+        }
+    }
 }
 
 /// A load along an element, taken at its nodes.
 fn add_nodal_loads(out: &mut NodeLoads, load: &deck::Load, element: &BeamElement, amplitude: usize) {
     for (station, &node) in element.stations(Rule::Nodal).iter().zip(element.nodes) {
         let Intensity { force, moment, .. } = intensity(load, element, station, amplitude);
-        for (vector, kind) in [(force, force_kind(load)), (moment, force_kind(load) + 1)] {
-            if vector != Vec3::ZERO {
-                let vector = vector * station.weight;
-                out[kind].push(node_load::Instance { node: element.mesh.nodes[node].node, vector, amplitude });
-            }
-        }
+        let node = element.mesh.nodes[node].node;
+        let at_node = |vector: Vec3| NodeForce { node, vector: vector * station.weight, amplitude };
+        let own = out.in_frame(load.frame);
+        own.forces.extend((force != Vec3::ZERO).then(|| at_node(force)));
+        own.moments.extend((moment != Vec3::ZERO).then(|| at_node(moment)));
     }
 }
 

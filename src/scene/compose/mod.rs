@@ -8,19 +8,17 @@ mod spins;
 
 use super::constraints::find_history;
 use super::joints::FoundJoint;
-use super::mesh::{BeamElement, Mesh, Rule, Station};
+use super::mesh::{BeamElement, Mesh};
 use super::output::needs;
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
-use beamsim_core::effect::beam_elasticity::{BeamElasticity, ElasticElements, StressField};
-use beamsim_core::effect::elastic_element::ElasticElement;
-use beamsim_core::effect::interpolation::{Interpolation, RelativeVectors, TotalVectors};
-use beamsim_core::effect::rigid_body::Body;
-use beamsim_core::effect::strain_rate_damping::StrainRateDamping;
-use beamsim_core::effect::{Connection, Effect, VolumeElement, VolumeElements};
-use beamsim_core::effect::{link, spring};
-use beamsim_core::kernel::beam::StiffnessPoint;
-use beamsim_core::kernel::elastic::Strain;
-use beamsim_core::kernel::volume::VolumePoint;
+use beamsim_core::effect::Effect;
+use beamsim_core::effect::elasticity::{
+    BeamElasticity, ElasticElements, Interpolation, RelativeVectors, StrainRateDamping, StressField, TotalVectors,
+};
+use beamsim_core::effect::inertia::Body;
+use beamsim_core::effect::spring::{GroundSpring, Link};
+use beamsim_core::kernel::law::Strain;
+use beamsim_core::model::beam_element::{SectionPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
 use beamsim_core::probe::Need;
 use beamsim_core::run::Driven;
@@ -34,20 +32,20 @@ use std::sync::Arc;
 pub struct Reason {
     /// The effect
     pub name: &'static str,
-    /// Whether it acts
+    /// True if it acts
     pub active: bool,
-    /// Why
+    /// The reason for that
     pub reason: String,
 }
 
 /// A table that a history drives, for messages.
 #[derive(Clone)]
 pub struct DrivenTable {
-    /// What it drives
+    /// The driven motion or motor
     pub drives: Driven,
-    /// What it is called
+    /// Its name in messages
     pub what: &'static str,
-    /// Where it stands
+    /// Its place in the deck
     pub span: Span,
     /// Its history, if it has one
     pub history: Option<HistoryUse>,
@@ -66,24 +64,23 @@ pub struct Composition {
     /// Rigid bodies
     pub bodies: Vec<Body>,
     /// Springs and cables between nodes
-    pub links: Vec<link::Instance>,
+    pub links: Vec<Link>,
     /// Springs to ground
-    pub springs: Vec<spring::Instance>,
+    pub springs: Vec<GroundSpring>,
     /// Slots of multipliers, behind those of the mesh: what they hold, and the joint
     pub multipliers: Vec<(SlotKind, String)>,
     /// Components of these that nothing uses
     pub idle_multipliers: Vec<Support>,
     /// Nodes whose rotation a joint takes hold of
     pub jointed: Vec<usize>,
-    /// What histories drive, but for motions
+    /// Tables that histories drive, but for motions
     pub driven: Vec<DrivenTable>,
-    /// How many joints remember their angle
-    pub angles: usize,
     /// The slots of the rotations on both sides of each of them
     pub sprung_joints: Vec<[Option<Slot>; 2]>,
 }
 
-/// What makes amplitudes one: the name of the history with its stages, and the stages of what it drives.
+/// Tables with the same key share an amplitude: the history with its stages, and the stages of the
+/// table.
 type AmplitudeKey = (Option<(String, Option<Vec<usize>>)>, Option<Vec<usize>>);
 
 /// Collects effects while the tables of the deck are walked through.
@@ -97,10 +94,11 @@ struct Composer<'a> {
     dynamic: bool,
 }
 
-/// Why what a scene has does not act
+/// The reason of effects that are switched off
 const SWITCHED_OFF: &str = "switched off in [effects]";
-/// The same of parts of the tangent, whose pivots tell whether a state is stable
+/// The reason of a switched-off geometric stiffness
 const UNSTRESSED: &str = "switched off in [effects]: what stress makes unstable is not told";
+/// The reason of a switched-off tangent of following loads
 const UNTURNED: &str = "switched off in [effects]: negative pivots are those of a tangent without it";
 
 /// Composes the effects of a deck.
@@ -124,7 +122,6 @@ pub fn compose(
         idle_multipliers: Vec::new(),
         jointed: Vec::new(),
         driven: Vec::new(),
-        angles: 0,
         sprung_joints: Vec::new(),
     };
     let mut composer = Composer { deck, mesh, histories, diagnostics, out, known_amplitudes: HashMap::new(), dynamic };
@@ -194,10 +191,12 @@ impl Composer<'_> {
     /// Parts of the mechanics that [effects] may switch off.
     fn formulation(&mut self) {
         let beams = self.mesh.element_count > 0;
-        let (large, linear) = ("large rotations", "switched off in [effects]: static and dynamic stages are linear");
-        match self.deck.effects.allow(EffectWord::LargeRotations) {
-            true => self.reason(large, true, "forces and tangents of the present state"),
-            false => self.reason(large, false, linear),
+        let large = "large rotations";
+        let linear = "switched off in [effects]: static and dynamic stages are linear";
+        if self.deck.effects.allow(EffectWord::LargeRotations) {
+            self.reason(large, true, "forces and tangents of the present state");
+        } else {
+            self.reason(large, false, linear);
         }
         let parts = [
             (EffectWord::Shear, "shear", "sections have `GA`"),
@@ -226,12 +225,11 @@ impl Composer<'_> {
             if element.beam.interpolation != way {
                 return;
             }
-            let free = free.get(&element.beam.name).copied();
-            match element.nodes.len() {
-                2 => elements.two.push(elastic(element, free, elements.two.last())),
-                3 => elements.three.push(elastic(element, free, elements.three.last())),
-                _ => elements.four.push(elastic(element, free, elements.four.last())),
-            }
+            let beam = element.beam;
+            push_elastic(&mut elements, element, free.get(&beam.name).copied(), |station| SectionPoint {
+                law: beam.section.at(station.fraction).law_in(station.axes),
+                free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
+            });
         });
         elements.shrink_to_fit();
         if elements.is_empty() {
@@ -248,12 +246,13 @@ impl Composer<'_> {
         self.reason(I::NAME, true, format!("{count} beam elements"));
         self.out.elasticity.push(effect.clone());
         self.out.effects.push(effect.clone());
-        match self.deck.damping {
-            Some([_, factor]) if factor != 0.0 && self.dynamic => {
-                self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
-            }
-            _ if !self.deck.effects.allow(EffectWord::Damping) => self.reason(I::DAMPING_NAME, false, SWITCHED_OFF),
-            _ => self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time"),
+        let [_, factor] = self.deck.damping.unwrap_or_default();
+        if factor != 0.0 && self.dynamic {
+            self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
+        } else if !self.deck.effects.allow(EffectWord::Damping) {
+            self.reason(I::DAMPING_NAME, false, SWITCHED_OFF);
+        } else {
+            self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or nothing moves in time");
         }
     }
 
@@ -280,7 +279,8 @@ impl Composer<'_> {
         let acts = |of: &[&str]| self.out.reasons.iter().any(|reason| reason.active && of.contains(&reason.name));
         let inertia = ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "rigid body inertia"];
         let loads = ["following line loads", "following forces", "following moments", "dead moments"];
-        let (turns, loaded) = (acts(&inertia), acts(&loads));
+        let turns = acts(&inertia);
+        let loaded = acts(&loads);
         let spin = "inertia against rotation has forces of its spin alone";
         let why = [spin, SWITCHED_OFF, "nothing has inertia against rotation"];
         self.part(EffectWord::Gyroscopic, "gyroscopic forces", turns, why);
@@ -288,7 +288,7 @@ impl Composer<'_> {
         self.part(EffectWord::FollowerTangent, "follower tangent", loaded, why);
     }
 
-    /// A part of what may be there: why it acts, was switched off, or has nothing that it belongs to.
+    /// The reason of a switchable part: it acts, was switched off, or has nothing to act on.
     fn part(&mut self, word: EffectWord, name: &'static str, there: bool, [acts, off, nowhere]: [&str; 3]) {
         match (there, self.deck.effects.allow(word)) {
             (false, _) => self.reason(name, false, nowhere),
@@ -297,7 +297,7 @@ impl Composer<'_> {
         }
     }
 
-    /// What is known and never acts yet.
+    /// Reasons of effects that are known and never act yet.
     fn never(&mut self) {
         let seams = self.mesh.beams.iter().any(|beam| beam.interpolation == InterpolationWord::Total);
         let why = if seams {
@@ -309,84 +309,25 @@ impl Composer<'_> {
     }
 }
 
-/// Inertia is there for dynamic stages, where momenta are looked at, and where only small vibrations tell whether a static stage ends stable.
+/// True where effects of inertia are needed: by dynamic and modal stages, by outputs of momentum,
+/// and by static stages whose stability only small vibrations show.
 fn needs_mass(deck: &Deck) -> bool {
-    let inertia =
-        |body: &deck::StageBody| matches!(body, deck::StageBody::Dynamic { .. } | deck::StageBody::Modal { .. });
-    let dynamic = deck.stages.iter().any(|stage| inertia(&stage.body) || stage.frame.is_some());
+    let dynamic = deck.stages.iter().any(|stage| stage.body.needs_inertia() || stage.frame.is_some());
     dynamic || needs(deck, Need::Mass) || may_flutter(deck)
 }
 
-/// Whether a static stage may end under loads that turn, whose tangents are not symmetric.
+/// True if a static stage may end under loads that turn, whose tangents are not symmetric.
 fn may_flutter(deck: &Deck) -> bool {
     let turns = |load: &deck::Load| match load.frame {
         deck::Frame::Space => load.moment.is_some(),
         deck::Frame::Body | deck::Frame::Section => true,
     };
-    let settles = |body: &deck::StageBody| match body {
-        deck::StageBody::Static { .. } | deck::StageBody::Path { .. } => true,
-        deck::StageBody::Modal { .. } | deck::StageBody::Buckling { .. } | deck::StageBody::Dynamic { .. } => false,
-    };
-    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| settles(&stage.body))
+    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| stage.body.finds_balance())
 }
 
 /// The stages of the deck count from 1, those of a run from 0.
 pub fn stage_set(stages: Option<&Vec<usize>>) -> StageSet {
     StageSet(stages.map(|stages| stages.iter().map(|s| s - 1).collect()))
-}
-
-fn connect<const N: usize>(element: &BeamElement) -> Connection<N> {
-    let node = |i: usize| &element.mesh.nodes[element.nodes[i]];
-    Connection { element: element.number as u32, nodes: std::array::from_fn(|i| node(i).node) }
-}
-
-/// Pushes an element with these volume points into the batch of its order.
-fn push_volume<Q: Copy + PartialEq>(
-    batches: &mut VolumeElements<Q>,
-    element: &BeamElement,
-    stations: &[Station],
-    quantity: impl Fn(usize) -> Q,
-) {
-    match element.nodes.len() {
-        2 => batches.two.push(volume(element, stations, quantity, batches.two.last())),
-        3 => batches.three.push(volume(element, stations, quantity, batches.three.last())),
-        _ => batches.four.push(volume(element, stations, quantity, batches.four.last())),
-    }
-}
-
-fn volume<const N: usize, Q: Copy + PartialEq>(
-    element: &BeamElement,
-    stations: &[Station],
-    quantity: impl Fn(usize) -> Q,
-    neighbour: Option<&VolumeElement<N, Q>>,
-) -> VolumeElement<N, Q> {
-    let point = |k: usize| {
-        let Station { shape, weight, .. } = &stations[k];
-        VolumePoint { shape: std::array::from_fn(|i| shape[i]), weight: *weight, quantity: quantity(k) }
-    };
-    let points = std::array::from_fn(point);
-    VolumeElement::new(connect(element), element.place(), element.arms(), points, neighbour)
-}
-
-fn elastic<const N: usize, const G: usize>(
-    element: &BeamElement,
-    free: Option<usize>,
-    neighbour: Option<&ElasticElement<N, G>>,
-) -> ElasticElement<N, G> {
-    let (beam, stations) = (element.beam, element.stations(Rule::Inner));
-    let point = |k: usize| {
-        let station = &stations[k];
-        StiffnessPoint {
-            shape: std::array::from_fn(|i| station.shape[i]),
-            slope: std::array::from_fn(|i| station.slope[i]),
-            weight: station.weight,
-            tangent: station.axes.column(0),
-            stiffness: beam.section.at(station.fraction).stiffness_in(station.axes),
-            free: beam.free_strain.as_ref().map(|free| free_strain(free.strain, station.axes)),
-        }
-    };
-    let (arms, points) = (element.arms(), std::array::from_fn(point));
-    ElasticElement::new(connect(element), element.rounding(), arms, points, free, neighbour)
 }
 
 /// From section axes to global components.

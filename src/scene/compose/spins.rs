@@ -1,21 +1,17 @@
 //! Straight parts whose spin about their own axis nothing resists.
 
 use super::Composer;
-use crate::deck::{EffectWord, Frame, JointKind, Load, LoadTarget, MotionWhat, Spanned, StageBody};
+use crate::deck::{EffectWord, Frame, Load, LoadTarget, MotionWhat, Spanned};
 use crate::scene::joints::FoundJoint;
 use crate::scene::mesh::MeshBeam;
-use crate::scene::section::SectionMatrices;
 use beamsim_core::effect::Effect;
-use beamsim_core::effect::spin_hold::{HeldIn, Instance, SpinHold};
+use beamsim_core::effect::spin_hold::{HeldIn, SpinHold, SpinningPart};
 use beamsim_core::system::Slot;
 use beamsim_core::tensor::{Mat3, Vec3};
 use std::collections::{BTreeMap, HashSet};
 
-/// What is nearer to a straight line is one, relative to its length.
+/// Distance of a node from a straight line that still counts as on it, relative to the length of the line.
 const STRAIGHT: f64 = 1e-9;
-
-/// Stiffnesses that differ by less are the same, relative to themselves.
-const ALIKE: f64 = 1e-9;
 
 /// No beam, in lists by slot.
 const NONE: usize = usize::MAX;
@@ -25,37 +21,23 @@ struct StraightPart<'m> {
     beams: Vec<&'m MeshBeam>,
     /// The rotations at its two ends
     ends: [Slot; 2],
-    hold: Instance,
+    hold: SpinningPart,
 }
 
 impl StraightPart<'_> {
-    /// Whether it is straight without load, and bends and turns about all axes alike: a spin in a bend strains nothing, nor does it move mass.
+    /// It is straight without load, and bends and turns about all axes alike: a spin in a bend strains nothing, nor does it move mass.
     fn is_round(&self) -> bool {
-        let at = |beam: &MeshBeam, fraction: f64| {
-            let SectionMatrices { stiffness: k, mass } = beam.section.at(fraction);
-            let j = mass.map_or(Mat3::ZERO, |mass| mass.about_line).0;
-            let turns_alike =
-                (j[1][1] - j[2][2]).abs() <= ALIKE * j[1][1].abs() && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
-            let size = |i: usize| k[i][i].abs();
-            let alike = |i: usize, j: usize| (k[i][i] - k[j][j]).abs() <= ALIKE * size(i).max(size(j));
-            let apart = |i: usize, j: usize| i == j || k[i][j].abs() <= ALIKE * (size(i) * size(j)).sqrt();
-            turns_alike && alike(1, 2) && alike(4, 5) && (0..6).all(|i| (0..6).all(|j| apart(i, j)))
-        };
-        self.beams
-            .iter()
-            .all(|beam| beam.free_strain.is_none() && beam.fractions.iter().all(|&fraction| at(beam, fraction)))
+        let has_round_sections =
+            |beam: &MeshBeam| beam.fractions.iter().all(|&fraction| beam.section.at(fraction).is_round());
+        self.beams.iter().all(|beam| beam.free_strain.is_none() && has_round_sections(beam))
     }
 }
 
 impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
         let parts = self.straight_parts(&self.resisted_rotations(connections));
-        let is_static = |body: &StageBody| match body {
-            StageBody::Static { .. } | StageBody::Path { .. } | StageBody::Buckling { .. } => true,
-            StageBody::Modal { .. } | StageBody::Dynamic { .. } => false,
-        };
-        let rests = self.deck.stages.iter().any(|stage| is_static(&stage.body));
-        let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<Instance> {
+        let rests = self.deck.stages.iter().any(|stage| !stage.body.needs_inertia());
+        let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<SpinningPart> {
             parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect()
         };
         let in_motion = holds(&|part| self.dynamic && !self.has_spin_inertia(part));
@@ -116,14 +98,16 @@ impl Composer<'_> {
         let start = first_end.place;
         let second_end = farthest(start)?;
         let end = second_end.place;
-        let (axis, length) = ((end - start).normalized()?, (end - start).norm());
+        let axis = (end - start).normalized()?;
+        let length = (end - start).norm();
         let aside = |place: Vec3| (place - start - axis * axis.dot(place - start)).norm();
         if nodes.iter().any(|node| aside(node.place) > STRAIGHT * length) {
             return None;
         }
-        let (beam, middle) = (beams[0], beams[0].nodes.len() / 2);
+        let beam = beams[0];
+        let middle = beams[0].nodes.len() / 2;
         let torsion = beam.section.at(beam.fractions[middle]).stiffness[3][3];
-        let hold = Instance {
+        let hold = SpinningPart {
             node: nodes[middle].node,
             nodes: nodes.iter().map(|node| node.node).collect(),
             axis,
@@ -132,7 +116,7 @@ impl Composer<'_> {
         Some(StraightPart { beams, ends: [first_end.node.p, second_end.node.p], hold })
     }
 
-    /// Whether something of it is turned by gravity, or resists a spin by its inertia.
+    /// Something of it is turned by gravity, or resists a spin by its inertia.
     fn has_spin_inertia(&self, part: &StraightPart) -> bool {
         let rotary = self.deck.effects.allow(EffectWord::RotaryInertia);
         let of_beam = |beam: &&MeshBeam| {
@@ -144,7 +128,7 @@ impl Composer<'_> {
         part.beams.iter().any(of_beam) || of_body
     }
 
-    /// Whether loads may turn it about its axis: moments, loads that turn with it, weight beside its axis, in rotating frames all inertia; and
+    /// Loads may turn it about its axis: moments, loads that turn with it, weight beside its axis, in rotating frames all inertia; and
     /// where it bends about one axis more easily than about another, or is curved by itself, whatever bends it.
     fn feels_loads(&self, part: &StraightPart) -> bool {
         let acts_on = |load: &Load| match &load.target {
@@ -166,13 +150,13 @@ impl Composer<'_> {
         turns || (bends && !part.is_round()) || part.beams.iter().any(is_eccentric) || inert
     }
 
-    /// Whether a node of a part is one of its ends.
+    /// A node of a part is one of its ends.
     fn is_at_end(&self, part: &StraightPart, name: &Spanned<String>) -> bool {
         let found = self.mesh.find_node(self.deck, name).ok();
         found.is_some_and(|(number, _)| part.ends.contains(&self.mesh.nodes[number].node.p))
     }
 
-    /// Whether a node of a part has this name.
+    /// A node of a part has this name.
     fn is_on(&self, part: &StraightPart, name: &Spanned<String>) -> bool {
         let found = self.mesh.find_node(self.deck, name).ok();
         found.is_some_and(|(number, _)| part.hold.nodes.contains(&self.mesh.nodes[number].node))
@@ -184,7 +168,7 @@ impl Composer<'_> {
         let named = |name: &Spanned<String>| self.mesh.find_node(self.deck, name).ok().map(|(number, _)| slot(number));
         let held = self.deck.supports.iter().filter(|support| support.fix[3..].contains(&true));
         let turned = self.deck.motions.iter().filter(|m| matches!(m.what, MotionWhat::Rotation { .. }));
-        let joined = connections.iter().filter(|connection| connection.joint.kind != JointKind::Spherical);
+        let joined = connections.iter().filter(|connection| connection.joint.kind.holds_rotation());
         let aside = connections.iter().filter(|connection| connection.arms != [Vec3::ZERO; 2]);
         let sprung = self.out.springs.iter().filter(|s| s.rotation != Mat3::ZERO || s.rotation_damping != Mat3::ZERO);
         let heavy = self.deck.bodies.iter().filter(|body| body.offset != [0.0; 3]);
@@ -206,6 +190,7 @@ fn root(part_of: &[usize], mut number: usize) -> usize {
 }
 
 fn join(part_of: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (root(part_of, a), root(part_of, b));
+    let a = root(part_of, a);
+    let b = root(part_of, b);
     part_of[a.max(b)] = a.min(b);
 }

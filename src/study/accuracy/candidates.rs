@@ -1,39 +1,39 @@
-//! What a round tells of the errors of variants, and which of these are accurate enough.
+//! The errors of the variants of a round, and the variants that are accurate enough.
 
-use super::estimate::Share;
-use super::round::Round;
-use crate::study::cost::{Pace, Point};
+use super::estimate::ErrorShare;
+use super::round::{Compared, Round};
+use crate::study::cost::{Pace, Variant};
 
 /// The error of a variant.
 pub struct Estimate {
-    /// What comes from the mesh
-    pub mesh: Share,
-    /// And from the steps
-    pub step: Share,
+    /// The part that comes from the mesh
+    pub mesh: ErrorShare,
+    /// The part that comes from the steps
+    pub step: ErrorShare,
 }
 
 impl Estimate {
-    /// The largest of all outputs, over what is wanted of it.
+    /// The largest ratio of the error of an output to the wanted error.
     pub fn ratio(&self) -> f64 {
         self.mesh.largest + self.step.largest
     }
 }
 
-/// The errors that a round tells of.
+/// The errors of the variants of a round.
 pub struct Estimates {
-    /// Of its variant
+    /// The error of its own variant
     pub own: Estimate,
-    /// The share of the other mesh
-    pub remeshed: Option<Share>,
+    /// The mesh error of the variant on another mesh
+    pub remeshed: Option<ErrorShare>,
 }
 
 /// A variant that is accurate enough.
 pub struct Candidate {
     /// The variant
-    pub point: Point,
+    pub variant: Variant,
     /// Its error
     pub estimate: Estimate,
-    /// Whether the round has run it
+    /// True if the round has run it
     pub has_run: bool,
 }
 
@@ -41,19 +41,19 @@ impl Estimates {
     /// The variants of a round that are accurate enough, the cheapest first.
     pub fn accurate_enough(&self, round: &Round) -> Vec<Candidate> {
         let step = |pace: Pace| if pace == round.own.pace { self.own.step.clone() } else { self.own.step.of_coarser() };
-        let of = |point: &Point, mesh: &Share, has_run| {
-            let estimate = Estimate { mesh: mesh.clone(), step: step(point.pace) };
-            Candidate { point: point.clone(), estimate, has_run }
+        let of = |variant: &Variant, mesh: &ErrorShare, has_run| {
+            let estimate = Estimate { mesh: mesh.clone(), step: step(variant.pace) };
+            Candidate { variant: variant.clone(), estimate, has_run }
         };
         let mut all = vec![of(&round.own, &self.own.mesh, true)];
-        all.extend(round.longer.as_ref().map(|(longer, _)| of(longer, &self.own.mesh, true)));
-        if let (Some(share), Some((remeshed, _))) = (&self.remeshed, &round.remeshed) {
+        all.extend(round.longer.as_ref().map(|longer| of(&longer.variant, &self.own.mesh, true)));
+        if let (Some(share), Some(Compared { variant: remeshed, .. })) = (&self.remeshed, &round.remeshed) {
             all.push(of(remeshed, share, true));
             let alike = round.remeshed_alike().filter(|alike| alike.pace != remeshed.pace);
             all.extend(alike.map(|alike| of(&alike, share, false)));
         }
         all.retain(|candidate| candidate.estimate.ratio() <= 1.0);
-        all.sort_by(|a, b| a.point.work().total_cmp(&b.point.work()));
+        all.sort_by(|a, b| a.variant.work().total_cmp(&b.variant.work()));
         all
     }
 }

@@ -5,16 +5,24 @@ use crate::study::cost::{Sampler, Samples};
 use crate::study::scale::mesh_error;
 use beamsim_core::probe::MeshError;
 
-/// The order of the error over the step that estimates count on, and that of smooth motions.
-const ORDER_IN_TIME: f64 = 1.5;
-const SMOOTH_IN_TIME: f64 = 2.0;
+/// The orders of the error over the step.
+const TIME_ORDERS: Orders = Orders { assumed: 1.5, smooth: 2.0 };
 
-/// What a column tells of, as far as its error falls with the width of elements.
+/// Orders of the error over a width.
+#[derive(Clone, Copy, Debug)]
+pub struct Orders {
+    /// The order that estimates assume
+    pub assumed: f64,
+    /// The order for smooth solutions, at nodes
+    pub smooth: f64,
+}
+
+/// Kinds of columns by the order of their error over the width of elements.
 #[derive(Clone, Copy, PartialEq)]
 enum Falls {
-    /// Where nodes are, and what follows from it
+    /// Motions of nodes, and other columns that are not resultants
     Places,
-    /// Resultants: they follow slopes, and fall with one order less
+    /// Resultants: they depend on slopes, whose error has one order less
     Slopes,
 }
 
@@ -28,46 +36,49 @@ impl Falls {
         }
     }
 
-    /// The order over the width of elements of an order that is assumed, and that at nodes of smooth scenes.
-    fn in_space(self, order: usize) -> (f64, f64) {
+    /// The orders for elements of an order.
+    fn in_space(self, order: usize) -> Orders {
         let order = order as f64;
         match self {
-            Self::Places => (order + 0.5, 2.0 * order),
-            Self::Slopes => (order - 0.5, order),
+            Self::Places => Orders { assumed: order + 0.5, smooth: 2.0 * order },
+            Self::Slopes => Orders { assumed: order - 0.5, smooth: order },
         }
     }
 }
 
-/// The lowest order that is believed.
+/// The lowest order that estimates use.
 const LEAST_ORDER: f64 = 0.5;
 
-/// What Newton's method leaves of its tolerance, about: its last iteration does better than it must, though with a kept tangent not by much.
+/// The usual error of Newton's method over its tolerance: the last iteration reaches less than the
+/// tolerance, but with a kept tangent not much less.
 const LEFT_BY_NEWTON: f64 = 0.2;
 
-/// What Newton's method leaves of all outputs, over the largest value of their kind.
+/// The error of Newton's method in all outputs, relative to the largest value of their kind.
 pub fn left_by_newton(deck: &Deck) -> f64 {
     LEFT_BY_NEWTON * largest_tolerance(deck)
 }
 
+/// The largest tolerance of Newton's method in all stages.
 pub fn largest_tolerance(deck: &Deck) -> f64 {
     deck.stages.iter().map(|stage| stage.tolerance).fold(0.0, f64::max)
 }
 
-/// By what differences of columns to a run with other elements are divided to be errors: `ratio` is that of the widths of the other
-/// elements and the own; columns that lie `between` nodes may be nodes there, or nearer to one.
+/// For each column: the difference to a run with other elements over this is the error. `ratio` is
+/// the width of the other elements over that of the own ones. Columns that lie `between` nodes may
+/// be at or near nodes of the other mesh.
 pub fn divisors_in_space(ratio: f64, order: usize, columns: &[String], between: &[bool]) -> Vec<f64> {
     let divisor = |(column, &between): (&String, &bool)| {
-        if between { ratio.min(1.0) } else { (ratio.powf(Falls::of(column).in_space(order).0) - 1.0).abs() }
+        if between { ratio.min(1.0) } else { (ratio.powf(Falls::of(column).in_space(order).assumed) - 1.0).abs() }
     };
     columns.iter().zip(between).map(divisor).collect()
 }
 
-/// And to a run with other steps.
+/// The difference to a run with other steps over this is the error.
 pub fn divisor_in_time(ratio: f64) -> f64 {
-    (ratio.powf(ORDER_IN_TIME) - 1.0).abs()
+    (ratio.powf(TIME_ORDERS.assumed) - 1.0).abs()
 }
 
-/// What the error comes from.
+/// A source of errors.
 #[derive(Clone, Copy)]
 pub enum Source {
     /// The mesh, of elements of an order
@@ -77,116 +88,116 @@ pub enum Source {
 }
 
 impl Source {
-    /// The order that is assumed, and that at nodes of smooth scenes.
-    fn orders(self, falls: Falls) -> (f64, f64) {
+    /// The orders of the error over the width of elements, or the step.
+    fn orders(self, falls: Falls) -> Orders {
         match self {
             Self::Mesh(order) => falls.in_space(order),
-            Self::Steps => (ORDER_IN_TIME, SMOOTH_IN_TIME),
+            Self::Steps => TIME_ORDERS,
         }
     }
 }
 
 /// The part of the error of a run that comes from its mesh, or its steps.
 #[derive(Clone)]
-pub struct Share {
-    /// The largest of all outputs, over what is wanted of it; infinite where nothing is known
+pub struct ErrorShare {
+    /// The largest ratio of the error of an output to the wanted error; infinite where it is
+    /// unknown
     pub largest: f64,
-    /// Of each output
+    /// The error of each output
     pub columns: Vec<f64>,
-    /// The same of the coarser run that it is known from
-    coarser: (f64, Vec<f64>),
+    /// `largest` for the coarser run of the comparison
+    largest_of_coarser: f64,
+    /// `columns` for the coarser run of the comparison
+    columns_of_coarser: Vec<f64>,
 }
 
-impl Share {
-    /// Nothing.
+impl ErrorShare {
+    /// No error.
     pub fn none(columns: usize) -> Self {
-        Self { largest: 0.0, columns: vec![0.0; columns], coarser: (0.0, vec![0.0; columns]) }
+        let zero = vec![0.0; columns];
+        Self { largest: 0.0, columns: zero.clone(), largest_of_coarser: 0.0, columns_of_coarser: zero }
     }
 
-    /// Nothing is known.
+    /// An unknown error.
     pub fn unknown(columns: usize) -> Self {
-        let none = Self::none(columns);
-        Self { largest: f64::INFINITY, coarser: (f64::INFINITY, none.coarser.1), ..none }
+        Self { largest: f64::INFINITY, largest_of_coarser: f64::INFINITY, ..Self::none(columns) }
     }
 
-    /// That of the coarser run.
+    /// The error of the coarser run of the comparison.
     pub fn of_coarser(&self) -> Self {
-        let (largest, columns) = self.coarser.clone();
-        Self { largest, columns, coarser: self.coarser.clone() }
+        Self { largest: self.largest_of_coarser, columns: self.columns_of_coarser.clone(), ..self.clone() }
     }
 }
 
-/// How an error falls from round to round.
+/// The decrease of errors from round to round.
 #[derive(Default)]
 pub struct Fall {
-    /// By what columns tell of
+    /// The decrease for each kind of columns
     traces: [Trace; 2],
-    /// Which of them has the largest error
+    /// The number of the kind with the largest error
     leading: usize,
 }
 
-/// How the largest error of some columns falls.
+/// The decrease of the largest error of one kind of columns.
 #[derive(Default)]
 struct Trace {
-    /// Of the round before
+    /// The difference in the round before
     before: Option<Difference>,
-    /// The order that was seen from round to round
+    /// The order that was observed from round to round
     seen: Option<f64>,
-    /// That, if it was lower than the assumed one
+    /// The observed order, if it is lower than the assumed one
     low: Option<f64>,
 }
 
-/// How far a run is from a coarser one.
+/// The difference between a run and a coarser one.
 #[derive(Clone, Copy)]
 struct Difference {
-    /// Of an element or a step of the run
+    /// The width of the elements, or the step, of the run
     width: f64,
-    /// And of the coarser one, over that
+    /// The width of the coarser run over that
     ratio: f64,
-    /// Over what is wanted
+    /// The largest ratio of the difference of a column to the wanted error
     size: f64,
 }
 
 impl Difference {
-    /// Of an error that is the width to the power of an order.
+    /// The difference that an error of an order would give, but for a factor.
     fn of_order(&self, order: f64) -> f64 {
         self.width.powf(order) * (self.ratio.powf(order) - 1.0)
     }
 }
 
 impl Fall {
-    /// The order that was seen of the largest error, if it was lower than the assumed one.
+    /// The observed order of the largest error, if it is lower than the assumed one.
     pub fn low_order(&self) -> Option<f64> {
         self.traces[self.leading].low
     }
 
-    /// Half way from the order that estimates of the largest error count on to that of smooth scenes, for elements of an order; and that.
-    pub fn planned_orders(&self, order: usize) -> (f64, f64) {
-        let (assumed, smooth) = Falls::ALL[self.leading].in_space(order);
-        (0.5 * (assumed + smooth), smooth)
+    /// The orders of the largest error for elements of an order, to plan the next mesh; the assumed
+    /// order is half way to that of smooth scenes.
+    pub fn planned_orders(&self, order: usize) -> Orders {
+        let Orders { assumed, smooth } = Falls::ALL[self.leading].in_space(order);
+        Orders { assumed: 0.5 * (assumed + smooth), smooth }
     }
 
-    /// The share of the error of a run of a `width` that a coarser one tells, whose width is `ratio` times that.
-    pub fn share(
-        &mut self,
-        source: Source,
-        (width, ratio): (f64, f64),
-        (own, coarser): (&Samples, &Samples),
-        (sampler, wanted, between): (&Sampler, &Accuracy, &[bool]),
-    ) -> Share {
+    /// The error of a run, estimated from its difference to a coarser run.
+    pub fn share(&mut self, source: Source, pair: &Pair, outputs: &Outputs) -> ErrorShare {
+        let Pair { own, coarser, width, ratio } = *pair;
+        let Outputs { sampler, between, .. } = *outputs;
         let mut differences = sampler.differences(coarser, own, &sampler.scales(own));
         let mut of_coarser = differences.clone();
         let falls: Vec<Falls> = sampler.columns.iter().map(|column| Falls::of(column)).collect();
         let mut largest = [f64::NAN; 2];
         let mut coarser = f64::NAN;
-        // What is interpolated may differ by its error from a node of the other mesh.
-        let interpolated = largest_of(sampler, wanted, &differences, |k| between[k]);
+        // The difference of an interpolated value to a node of the other mesh may be its whole
+        // error.
+        let interpolated = outputs.largest_of(&differences, |k| between[k]);
         for k in (0..falls.len()).filter(|&k| between[k]) {
             of_coarser[k] = 2.0 * differences[k];
         }
         for (number, one) in Falls::ALL.into_iter().enumerate() {
             let is_of = |k: usize| falls[k] == one && !between[k];
-            let size = largest_of(sampler, wanted, &differences, is_of);
+            let size = outputs.largest_of(&differences, is_of);
             if size.is_nan() {
                 continue;
             }
@@ -201,20 +212,21 @@ impl Fall {
         let rank = |value: f64| if value.is_nan() { -1.0 } else { value };
         self.leading = usize::from(rank(largest[1]) > rank(largest[0]));
         let known = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
-        Share {
+        ErrorShare {
             largest: known(largest[0].max(largest[1]).max(interpolated)),
             columns: differences,
-            coarser: (known(coarser.max(2.0 * interpolated)), of_coarser),
+            largest_of_coarser: known(coarser.max(2.0 * interpolated)),
+            columns_of_coarser: of_coarser,
         }
     }
 }
 
 impl Trace {
-    /// The order that an error is taken to fall with: the assumed one, or what was seen from round to round where that is lower, as it is
-    /// for waves with fronts; half way to it where it is higher.
-    fn order(&mut self, (assumed, smooth): (f64, f64), now: Difference) -> f64 {
+    /// The order that the estimate uses: the observed one where it is lower than the assumed one,
+    /// as for waves with fronts; half way to it where it is higher.
+    fn order(&mut self, Orders { assumed, smooth }: Orders, now: Difference) -> f64 {
         match self.before {
-            // Nothing new is seen of the same width.
+            // The same width shows nothing new.
             Some(before) if before.width == now.width => {}
             Some(before) if before.width > now.width => self.seen = Some(seen_order(smooth, before, now)),
             Some(before) => self.seen = Some(seen_order(smooth, now, before)),
@@ -226,29 +238,64 @@ impl Trace {
     }
 }
 
-/// The order that explains a difference of a coarse run and one of a fine run, not above that of smooth scenes: the two need not have the
-/// same ratio, so it is sought by halves.
+/// The order that explains the differences of a coarse and a fine run, at most that of smooth
+/// solutions. The two differences may have different ratios, so it is found by bisection.
 fn seen_order(smooth: f64, coarse: Difference, fine: Difference) -> f64 {
     let too_high = |order| coarse.of_order(order) * fine.size > fine.of_order(order) * coarse.size;
-    let halve = |(low, high): (f64, f64), _| match 0.5 * (low + high) {
-        middle if too_high(middle) => (low, middle),
-        middle => (middle, high),
-    };
-    if too_high(smooth) { (0..20).fold((LEAST_ORDER, smooth), halve).0 } else { smooth }
+    if !too_high(smooth) {
+        return smooth;
+    }
+    let mut low = LEAST_ORDER;
+    let mut high = smooth;
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        if too_high(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    low
 }
 
-/// The largest of some columns over what is wanted; NaN where nothing can be compared: columns that are always zero cannot.
-fn largest_of(sampler: &Sampler, wanted: &Accuracy, differences: &[f64], of: impl Fn(usize) -> bool) -> f64 {
-    let over = |&k: &usize| differences[k] / wanted.of(&sampler.columns[k]);
-    sampler.outputs.iter().filter(|&&k| of(k)).map(over).fold(f64::NAN, f64::max)
+/// A run and a coarser one, which is compared with it.
+pub struct Pair<'a> {
+    /// The numbers of the run
+    pub own: &'a Samples,
+    /// The numbers of the coarser run
+    pub coarser: &'a Samples,
+    /// The width of the elements, or the step, of the run
+    pub width: f64,
+    /// The width of the coarser run over that
+    pub ratio: f64,
+}
+
+/// The outputs whose errors are estimated.
+#[derive(Clone, Copy)]
+pub struct Outputs<'a> {
+    /// The compared numbers
+    pub sampler: &'a Sampler,
+    /// The wanted errors
+    pub wanted: &'a Accuracy,
+    /// For each column: true if it lies between nodes of the finer mesh
+    pub between: &'a [bool],
+}
+
+impl Outputs<'_> {
+    /// The largest ratio of a difference to the wanted error among some columns; NaN where nothing
+    /// can be compared, as for columns that are always zero.
+    fn largest_of(&self, differences: &[f64], of: impl Fn(usize) -> bool) -> f64 {
+        let over = |&k: &usize| differences[k] / self.wanted.of(&self.sampler.columns[k]);
+        self.sampler.outputs.iter().filter(|&&k| of(k)).map(over).fold(f64::NAN, f64::max)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What a fall makes of errors of an order on meshes of these widths, each compared with one of `ratio` times the width.
-    fn orders(believed: (f64, f64), order: f64, meshes: &[(f64, f64)]) -> Vec<f64> {
+    /// The orders that a trace uses for errors of an order on meshes of these widths and ratios.
+    fn orders(believed: Orders, order: f64, meshes: &[(f64, f64)]) -> Vec<f64> {
         let mut fall = Trace::default();
         let seen = |&(width, ratio): &(f64, f64)| {
             let size = Difference { width, ratio, size: 0.0 }.of_order(order);
@@ -259,11 +306,11 @@ mod tests {
 
     #[test]
     fn a_lower_order_is_believed_and_a_higher_one_half() {
-        // Companions are not always twice as wide, and a search goes back to wider elements too.
+        // The ratio of widths is not always 2, and a search returns to wider elements too.
         let meshes = [(1.0 / 3.0, 1.5), (0.25, 2.0), (0.2, 5.0 / 3.0), (0.5, 2.0), (0.5, 2.0), (0.125, 2.0)];
         let near = |order: f64, of: f64| (order - of).abs() < 1e-5;
         for (order, believed) in [(0.1, LEAST_ORDER), (1.0, 1.0), (2.5, 2.5), (3.0, 2.75), (4.0, 3.25), (7.0, 3.25)] {
-            let all = orders((2.5, 4.0), order, &meshes);
+            let all = orders(Orders { assumed: 2.5, smooth: 4.0 }, order, &meshes);
             assert!(all[0] == 2.5 && all[1..].iter().all(|&seen| near(seen, believed)), "{order}: {all:?}");
         }
     }

@@ -1,16 +1,19 @@
-//! A wanted accuracy instead of elements and steps: the deck is run on finer meshes and with smaller steps until the estimated error of all
-//! outputs is below what is wanted.
+//! Elements and steps for a wanted accuracy: the deck is run on finer meshes and with smaller steps
+//! until the estimated error of all outputs is below the wanted one.
 //!
-//! Each round runs up to three variants: the last of the search so far, one with twice its step, and one with half its elements and, after the
-//! first round, that longer step too. The differences tell the errors of mesh and step: with a ratio r of widths and an order q,
+//! Each round runs up to three variants: the latest one of the search, one with twice its step, and
+//! one with half its elements, which after the first round has the longer step too. The differences
+//! give the errors of mesh and step. With a ratio r of widths and an order q,
 //!
 //! ```text
 //! e = |U - U_coarse| / (r^q - 1)
 //! ```
 //!
-//! where q is half an order less than smooth scenes have at the least, 2 for steps, the order of elements for resultants and one more for all else, or half way from
-//! there to what is seen from round to round: so estimates are above errors. The error of the coarser run is r^q times that, so the cheapest
-//! that is accurate enough is what is found.
+//! For smooth solutions the order is at least 2 for steps, the order of the elements for
+//! resultants, and one more for other columns. The estimate uses q half an order below that, or
+//! half way from there to the order that is observed from round to round, so that estimates are
+//! above errors. The error of the coarser run is r^q times that of the finer one, so that the
+//! search can return the cheapest variant that is accurate enough.
 
 mod candidates;
 mod estimate;
@@ -20,47 +23,56 @@ mod search;
 use estimate::largest_tolerance;
 pub(super) use estimate::{divisor_in_time, divisors_in_space, left_by_newton};
 
-use super::cost::{Crew, Family, Mesher, Options, Pace, Patience, Point, Refusal, Sampler};
+use super::StudyError;
+use super::change::Change;
+use super::cost::{Family, Mesher, Original, Pace, Patience, Pool, Sampler, StudyOptions, Variant};
 use crate::deck::{Accuracy, Deck, InterpolationWord, StageBody};
 use crate::scene::Scene;
 use crate::study::Outcome;
 use beamsim_core::run::Failure;
 use search::Search;
 
-/// From this accuracy on, cubic elements are cheaper than quadratic ones.
+/// For a smaller wanted error than this, cubic elements are cheaper than quadratic ones.
 const CUBIC: f64 = 3e-3;
 
-/// The first step over the deck's, at most; and how many steps a stage must have then.
+/// The largest first step over that of the deck.
 const FIRST_STEP: f64 = 2.0;
+/// The smallest number of first steps in a stage.
 const LEAST_STEPS: f64 = 32.0;
 
-/// The tolerance of Newton's method over the wanted accuracy, at most.
+/// The largest tolerance of Newton's method over the wanted error.
 const NEWTON: f64 = 1e-3;
 
-/// What a search found.
+/// The result of a search.
 pub struct Found {
     /// The variant of the deck
-    pub point: Point,
-    /// What makes it of the deck
-    pub settings: Vec<String>,
-    /// Whether the estimate is what was wanted
+    pub variant: Variant,
+    /// The changes that make it of the deck
+    pub changes: Vec<Change>,
+    /// True if all estimates are at most the wanted errors
     pub reached: bool,
     /// The names of all outputs
     pub columns: Vec<String>,
-    /// The estimated error of each, over the largest value of its kind; NaN where there is nothing to compare
+    /// The estimated error of each, over the largest value of its kind; NaN where there is nothing
+    /// to compare
     pub estimates: Vec<f64>,
-    /// The largest estimate over what is wanted of its output
+    /// The largest ratio of an estimate to the wanted error
     pub ratio: f64,
-    /// What stopped the search before it came to its end
+    /// The failure that stopped the search early
     pub stopped: Option<Failure>,
-    /// Variants that were run
+    /// The number of runs
     pub runs: usize,
-    /// All outputs of the variant, where they were kept: it need not run again
+    /// All outputs of the variant, where they were kept, so that it need not run again
     pub outcome: Option<Outcome>,
 }
 
 impl Found {
-    /// The output whose estimate is largest, and the estimate.
+    /// The settings (`KEY=VALUE`) that make the variant.
+    pub fn settings(&self) -> Vec<String> {
+        self.changes.iter().map(ToString::to_string).collect()
+    }
+
+    /// The output with the largest ratio of estimate to wanted error, and its estimate.
     pub fn worst(&self, wanted: &Accuracy) -> (&str, f64) {
         let over = |k: &usize| self.estimates[*k] / wanted.of(&self.columns[*k]);
         let known = (0..self.columns.len()).filter(|k| over(k).is_finite());
@@ -68,16 +80,23 @@ impl Found {
     }
 }
 
-/// Finds a variant of the deck `text` whose estimated errors are what is wanted. Where the budget is over before, or it would take too many
-/// nodes, the best one that was found.
-pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options: Options) -> Result<Found, Refusal> {
+/// Finds a variant of the deck `text` whose estimated errors are at most the wanted ones; the best
+/// variant so far if the budget ends before, or the mesh would have too many nodes.
+pub fn reach(
+    text: &str,
+    deck: &Deck,
+    scene: &Scene,
+    wanted: &Accuracy,
+    options: StudyOptions,
+) -> Result<Found, StudyError> {
+    let original = Original { text, deck };
     let pace = first_pace(deck);
     let sampler = Sampler::of_histories(deck, scene, outputs(wanted, scene)?, coarser(pace));
     let own: Vec<Vec<usize>> = deck.beams.iter().map(|beam| beam.elements.value.clone()).collect();
     let mut mesher =
-        Mesher { text, deck, sampler: &sampler, interpolation: Some(InterpolationWord::Relative), keeps_places: true };
+        Mesher { original, sampler: &sampler, interpolation: Some(InterpolationWord::Relative), keeps_places: true };
     if !mesher.makes_sense(None, &own) {
-        // Some supports take hold of rotation vectors.
+        // Supports of single rotation components need the total interpolation.
         mesher.interpolation = None;
     }
     let order = if wanted.least() < CUBIC { 3 } else { 2 };
@@ -88,31 +107,32 @@ pub fn reach(text: &str, deck: &Deck, scene: &Scene, wanted: &Accuracy, options:
         ..Family::default()
     };
     let newton = (NEWTON * wanted.least() / largest_tolerance(deck)).min(1.0);
-    let crew = Crew::new(text, deck, &sampler, options)
-        .with_patience(|point| if is_offer(point) { Patience::SHORT } else { Patience::LONG })
+    let pool = Pool::new(original, &sampler, options)
+        .with_patience(|variant| if has_long_steps(variant) { Patience::SHORT } else { Patience::LONG })
         .with_outcomes();
-    Search::new(wanted, mesher, family, pace, newton).run(crew)
+    Search::new(wanted, mesher, family, pace, newton).run(pool)
 }
 
-/// Whether its steps are longer than the deck's own: an offer, no more.
-fn is_offer(point: &Point) -> bool {
-    matches!(point.pace, Pace::Steps(factor) if factor > 1.0)
+/// True if the steps are longer than those of the deck. Such a variant may fail without harm: the
+/// search goes on with shorter steps.
+fn has_long_steps(variant: &Variant) -> bool {
+    matches!(variant.pace, Pace::Steps(factor) if factor > 1.0)
 }
 
-/// With twice the step.
+/// The pace with twice the step.
 fn coarser(pace: Pace) -> Pace {
     scaled(pace, 2.0)
 }
 
-/// With steps longer by this factor.
+/// The pace with steps multiplied by a factor.
 fn scaled(pace: Pace, by: f64) -> Pace {
     match pace {
         Pace::Steps(factor) => Pace::Steps(by * factor),
-        other => other,
+        Pace::Timeless | Pace::Adapts(_) => pace,
     }
 }
 
-/// Steps as long as leave a stage enough of them.
+/// The first pace: the longest steps that leave each stage enough of them.
 fn first_pace(deck: &Deck) -> Pace {
     let mut start = 0.0;
     let mut fewest = f64::INFINITY;
@@ -129,11 +149,11 @@ fn first_pace(deck: &Deck) -> Pace {
     Pace::Steps(factor.min(FIRST_STEP))
 }
 
-/// Numbers of the columns of which an accuracy is wanted.
-fn outputs(wanted: &Accuracy, scene: &Scene) -> Result<Vec<usize>, Refusal> {
+/// The numbers of the columns of which an accuracy is wanted.
+fn outputs(wanted: &Accuracy, scene: &Scene) -> Result<Vec<usize>, StudyError> {
     let columns = super::outcome::columns(scene);
     for name in wanted.columns() {
-        super::outcome::find_column(&columns, name).map_err(Refusal::Deck)?;
+        super::outcome::find_column(&columns, name)?;
     }
     Ok((0..columns.len()).filter(|&k| wanted.of(&columns[k]).is_finite()).collect())
 }

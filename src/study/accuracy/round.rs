@@ -1,54 +1,63 @@
-//! One round of a search: a variant, and the runs that tell the shares of its error.
+//! One round of a search: a variant, and the runs from which its errors are estimated.
 
-use super::is_offer;
-use crate::study::cost::{Crew, Point, Refusal, Trial};
+use super::has_long_steps;
+use crate::study::StudyError;
+use crate::study::cost::{Pool, Trial, Variant};
 
-/// A variant, and what it is compared with.
+/// A variant, and those that it is compared with.
 pub struct Round {
     /// The variant
-    pub own: Point,
-    /// With a longer step, and how many times as long that is
-    pub longer: Option<(Point, f64)>,
-    /// On another mesh, and how many times as wide its elements are, less than one where they are narrower. Its steps may be the longer
-    /// ones: what a mesh errs by depends little on them, and they cost less.
-    pub remeshed: Option<(Point, f64)>,
+    pub own: Variant,
+    /// The variant with a longer step
+    pub longer: Option<Compared>,
+    /// A variant on another mesh. It may have the longer steps, which cost less: the mesh error
+    /// hardly depends on the step.
+    pub remeshed: Option<Compared>,
 }
 
-/// What came of a round.
+/// A variant that another one is compared with.
+pub struct Compared {
+    /// The variant
+    pub variant: Variant,
+    /// Its step, or the width of its elements, over that of the other
+    pub ratio: f64,
+}
+
+/// The runs of a round.
 pub struct Trials {
-    /// Of the variant
+    /// The run of the variant
     pub own: Trial,
-    /// With a longer step
+    /// The run with a longer step
     pub longer: Option<Trial>,
-    /// On another mesh
+    /// The run on another mesh
     pub remeshed: Option<Trial>,
-    /// How many runs that were
+    /// The number of runs
     pub runs: usize,
 }
 
 impl Round {
-    /// Its runs.
-    pub fn points(&self) -> Vec<Point> {
+    /// All its variants.
+    pub fn variants(&self) -> Vec<Variant> {
         let others = [&self.longer, &self.remeshed].into_iter().flatten();
-        std::iter::once(&self.own).chain(others.map(|(point, _)| point)).cloned().collect()
+        std::iter::once(&self.own).chain(others.map(|other| &other.variant)).cloned().collect()
     }
 
     /// The other mesh with the steps of the variant.
-    pub fn remeshed_alike(&self) -> Option<Point> {
-        self.remeshed.as_ref().map(|(point, _)| Point { pace: self.own.pace, ..point.clone() })
+    pub fn remeshed_alike(&self) -> Option<Variant> {
+        self.remeshed.as_ref().map(|other| Variant { pace: self.own.pace, ..other.variant.clone() })
     }
 
-    /// Runs them; `None` where the budget left one out.
-    pub fn run(&mut self, crew: &mut Crew) -> Result<Option<Trials>, Refusal> {
-        let points = self.points();
-        crew.forget_all_but(&points);
-        // A step on offer is tried alone: where it is too long for the first one, nothing is compared with it.
-        let alone = if is_offer(&self.own) { 1 } else { points.len() };
-        crew.expect(alone);
-        let mut trials = crew.run(&points[..alone])?;
-        if alone < points.len() && trials[0].as_ref().is_some_and(|own| own.status != "limit") {
-            crew.expect(points.len() - alone);
-            trials.extend(crew.run(&points[alone..])?);
+    /// Runs its variants; `None` where the budget skipped one.
+    pub fn run(&mut self, pool: &mut Pool) -> Result<Option<Trials>, StudyError> {
+        let variants = self.variants();
+        pool.forget_all_but(&variants);
+        // A long step is tried alone first: if it is too long, there is nothing to compare with.
+        let alone = if has_long_steps(&self.own) { 1 } else { variants.len() };
+        pool.expect(alone);
+        let mut trials = pool.run(&variants[..alone])?;
+        if alone < variants.len() && trials[0].as_ref().is_some_and(|own| own.status != "limit") {
+            pool.expect(variants.len() - alone);
+            trials.extend(pool.run(&variants[alone..])?);
         }
         let runs = trials.len();
         let Some(trials) = trials.into_iter().collect::<Option<Vec<Trial>>>() else { return Ok(None) };
@@ -59,21 +68,21 @@ impl Round {
         let trials = Trials { own, longer, remeshed, runs };
         let failed = |trial: &Option<Trial>| trial.as_ref().is_some_and(|trial| !trial.finished());
         if trials.own.finished() && (failed(&trials.longer) || failed(&trials.remeshed)) {
-            return self.run_meshes_alike(trials, crew);
+            return self.run_meshes_alike(trials, pool);
         }
         Ok(Some(trials))
     }
 
-    /// Where the longer step is too long, the meshes are compared with the other one.
-    fn run_meshes_alike(&mut self, trials: Trials, crew: &mut Crew) -> Result<Option<Trials>, Refusal> {
-        let pace = self.remeshed.as_ref().map(|(point, _)| point.pace);
+    /// Compares the meshes with the shorter step, where the longer one is too long.
+    fn run_meshes_alike(&mut self, trials: Trials, pool: &mut Pool) -> Result<Option<Trials>, StudyError> {
+        let pace = self.remeshed.as_ref().map(|other| other.variant.pace);
         let Some(alike) = self.remeshed_alike().filter(|alike| Some(alike.pace) != pace) else {
             return Ok(Some(trials));
         };
-        crew.expect(1);
-        let again = crew.run(std::slice::from_ref(&alike))?.remove(0);
-        if let Some((point, _)) = &mut self.remeshed {
-            *point = alike;
+        pool.expect(1);
+        let again = pool.run(std::slice::from_ref(&alike))?.remove(0);
+        if let Some(other) = &mut self.remeshed {
+            other.variant = alike;
         }
         let runs = trials.runs + 1;
         Ok(again.map(|remeshed| Trials { remeshed: Some(remeshed), runs, ..trials }))

@@ -1,47 +1,67 @@
-//! Runs that have ended, kept on disk while a study is under way: one that was stopped goes on where it was.
+//! Runs that have ended, saved on disk while a study is running, so that a stopped study can
+//! continue.
 
-use super::trial::{Seconds, Trial};
-use crate::output::PartFile;
-use csv::{ReaderBuilder, WriterBuilder};
+use super::trial::Trial;
+use crate::output::{OutputError, PartFile};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// The name of the file.
+/// The name of the file: JSON, a line for the study and one for each run.
 const NAME: &str = "cost.journal";
 
-/// What stands at the end of a line that is whole: half a number is a number too.
-const END: &str = ".";
-
-/// Keeps runs by their settings.
+/// Saves runs by their settings.
 #[derive(Default)]
 pub struct Journal {
     known: HashMap<String, Trial>,
-    file: Option<(PathBuf, File)>,
-    /// Why nothing is written any more
-    trouble: Option<io::Error>,
+    file: Option<OpenFile>,
+    /// Why runs are no longer written
+    write_error: Option<io::Error>,
+}
+
+struct OpenFile {
+    path: PathBuf,
+    file: File,
+}
+
+/// The first line of the file.
+#[derive(Serialize, Deserialize)]
+struct Heading<'a> {
+    study: Cow<'a, str>,
+}
+
+/// The line of a run. A line that was cut off is no JSON, and read as the end.
+#[derive(Serialize, Deserialize)]
+struct Entry<'a> {
+    settings: Cow<'a, str>,
+    run: Cow<'a, Trial>,
 }
 
 impl Journal {
-    /// Opens the journal in a folder; what it holds of the study `identity` is known, what it holds of any other is forgotten.
-    pub fn open(folder: &Path, identity: &str) -> io::Result<Self> {
+    /// Opens the journal in a folder. Runs of the study `identity` are read, those of other studies
+    /// are forgotten.
+    pub fn open(folder: &Path, identity: &str) -> Result<Self, OutputError> {
         let path = folder.join(NAME);
-        let known = fs::read(&path).ok().and_then(|bytes| read(&bytes, identity)).unwrap_or_default();
-        // Written anew, as a whole: the last line of a stopped study may be half a line.
-        let mut content = line(&[identity.to_string()]);
-        known.iter().for_each(|(key, trial)| content.extend(line(&record(key, trial))));
+        let known = fs::read_to_string(&path).ok().and_then(|text| read(&text, identity)).unwrap_or_default();
+        // The file is written anew, since the last line of a stopped study may be incomplete.
+        let mut content = line(&Heading { study: identity.into() });
+        for (key, trial) in &known {
+            content.extend(line(&Entry { settings: key.into(), run: Cow::Borrowed(trial) }));
+        }
         PartFile::write(folder, NAME, &content)?;
-        let file = OpenOptions::new().append(true).open(&path)?;
-        Ok(Self { known, file: Some((path, file)), trouble: None })
+        let file = OpenOptions::new().append(true).open(&path).map_err(|error| OutputError::file(&path, error))?;
+        Ok(Self { known, file: Some(OpenFile { path, file }), write_error: None })
     }
 
-    /// How many runs are known.
+    /// The number of known runs.
     pub fn len(&self) -> usize {
         self.known.len()
     }
 
-    /// Whether no run is known.
+    /// True if no run is known.
     pub fn is_empty(&self) -> bool {
         self.known.is_empty()
     }
@@ -51,67 +71,46 @@ impl Journal {
         self.known.get(key).cloned()
     }
 
-    /// Keeps a run. One that cannot be written is known all the same, and [`Journal::trouble`] tells.
+    /// Saves a run. If it cannot be written, it is only known in memory, and
+    /// [`Journal::write_error`] gives the reason.
     pub fn keep(&mut self, key: &str, trial: &Trial) {
         self.known.insert(key.into(), trial.clone());
-        let written = self.file.as_mut().map_or(Ok(()), |(_, file)| file.write_all(&line(&record(key, trial))));
+        let entry = line(&Entry { settings: key.into(), run: Cow::Borrowed(trial) });
+        let written = self.file.as_mut().map_or(Ok(()), |OpenFile { file, .. }| file.write_all(&entry));
         if let Err(error) = written {
             self.file = None;
-            self.trouble = Some(error);
+            self.write_error = Some(error);
         }
     }
 
-    /// Why runs are not written any more.
-    pub fn trouble(&self) -> Option<&io::Error> {
-        self.trouble.as_ref()
+    /// The reason why runs are no longer written.
+    pub fn write_error(&self) -> Option<&io::Error> {
+        self.write_error.as_ref()
     }
 
-    /// The study is done: nothing is left to go on with.
-    pub fn close(self) -> io::Result<()> {
-        self.file.map_or(Ok(()), |(path, _)| fs::remove_file(path))
+    /// Removes the file of a study that is finished.
+    pub fn close(self) -> Result<(), OutputError> {
+        match self.file {
+            Some(OpenFile { path, .. }) => fs::remove_file(&path).map_err(|error| OutputError::file(&path, error)),
+            None => Ok(()),
+        }
     }
 }
 
-fn line(fields: &[String]) -> Vec<u8> {
-    let mut writer = WriterBuilder::new().flexible(true).from_writer(Vec::new());
-    // Memory takes what it is given.
-    let _ = writer.write_record(fields);
-    writer.into_inner().unwrap_or_default()
+/// A line of JSON; texts and numbers cannot fail to be written.
+fn line(content: &impl Serialize) -> Vec<u8> {
+    let mut line = serde_json::to_vec(content).unwrap_or_default();
+    line.push(b'\n');
+    line
 }
 
-fn record(key: &str, trial: &Trial) -> Vec<String> {
-    let Trial { status, samples, steps, iterations, factorisations, seconds } = trial;
-    let mut fields = vec![key.to_string(), status.clone()];
-    fields.extend([steps, iterations, factorisations].map(u64::to_string));
-    fields.extend([seconds.cpu, seconds.wall].map(|x| format!("{x:?}")));
-    fields.push(samples.len().to_string());
-    fields.extend(samples.iter().map(|x| format!("{x:?}")));
-    fields.push(END.into());
-    fields
-}
-
-/// `None` where it is the journal of another study.
-fn read(bytes: &[u8], identity: &str) -> Option<HashMap<String, Trial>> {
-    let mut reader = ReaderBuilder::new().flexible(true).has_headers(false).from_reader(bytes);
-    let mut records = reader.records();
-    (records.next()?.ok()?.get(0)? == identity).then_some(())?;
-    Some(records.filter_map(|record| parse(&record.ok()?)).collect())
-}
-
-/// `None` for a line that was not finished.
-fn parse(record: &csv::StringRecord) -> Option<(String, Trial)> {
-    let whole = |k: usize| record.get(k)?.parse::<u64>().ok();
-    let number = |k: usize| record.get(k)?.parse::<f64>().ok();
-    let end = record.len().checked_sub(1).filter(|&end| end >= 8 && &record[end] == END)?;
-    let samples: Vec<f64> = (8..end).map(number).collect::<Option<_>>()?;
-    (samples.len() as u64 == whole(7)?).then_some(())?;
-    let trial = Trial {
-        status: record.get(1)?.into(),
-        samples,
-        steps: whole(2)?,
-        iterations: whole(3)?,
-        factorisations: whole(4)?,
-        seconds: Seconds { cpu: number(5)?, wall: number(6)? },
-    };
-    Some((record.get(0)?.into(), trial))
+/// The runs of a journal; `None` where it belongs to another study.
+fn read(text: &str, identity: &str) -> Option<HashMap<String, Trial>> {
+    let mut lines = text.lines();
+    let heading: Heading = serde_json::from_str(lines.next()?).ok()?;
+    if heading.study != identity {
+        return None;
+    }
+    let entries = lines.map_while(|line| serde_json::from_str::<Entry>(line).ok());
+    Some(entries.map(|Entry { settings, run }| (settings.into_owned(), run.into_owned())).collect())
 }

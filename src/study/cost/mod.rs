@@ -1,92 +1,54 @@
-//! What accuracy costs in time: a scene is run on several meshes, with several orders and steps; errors are held against a reference
-//! that the study makes itself, and the cheapest run for each accuracy is found.
+//! The cost of accuracy: a scene is run on several meshes, with several orders and steps. Errors
+//! are measured against a reference that the study computes itself, and the cheapest run for each
+//! accuracy is found.
 
-mod crew;
 mod frontier;
 mod grid;
 mod journal;
+mod limits;
+mod mesher;
 mod order;
 mod places;
+mod pool;
 mod reference;
+mod run;
 mod sample;
 mod table;
 pub(in crate::study) mod trial;
+mod variant;
 
-pub use frontier::Knob;
-pub use grid::{Family, Pace, Point};
 pub use journal::Journal;
 pub use order::{Expected, Order};
 pub use reference::Reference;
+pub use run::{CostRun, Limit, StudyOptions, Timing};
 pub use trial::{Patience, Seconds, Trial};
+pub use variant::{Family, Pace, Variant};
 
-pub(in crate::study) use crew::Crew;
-pub(in crate::study) use grid::{Mesher, dynamic_stages};
+pub(in crate::study) use mesher::{Companion, Mesher};
+pub(in crate::study) use pool::Pool;
 pub(in crate::study) use sample::{Sampler, Samples};
+pub(in crate::study) use variant::{Original, dynamic_stages};
 
 use crate::deck::{Deck, Diagnostic, InterpolationWord, NormWord, StageBody};
 use crate::output::HistoryReader;
 use crate::scene::Scene;
-use crate::study::outcome::{Outcome, columns, find_column};
+use crate::study::StudyError;
+use crate::study::outcome::{Outcome, StageClock, columns, find_column};
 use beamsim_core::run::Failure;
 use grid::Grid;
-use std::time::Duration;
+use run::Errors;
 
-/// Outputs that a reference lacks, named one by one.
+/// The largest number of outputs without a reference that are named one by one.
 const LISTED: usize = 4;
 
-/// What errors are held against.
+/// The reference that errors are measured against.
 pub enum Against {
     /// Runs finer than all others
     Finest,
     /// A stored history
     Table(HistoryReader),
-    /// What the deck expects
+    /// The values of [[expect]]
     Expectations,
-}
-
-/// How a study is done.
-pub struct Options<'a> {
-    /// Runs at a time
-    pub threads: usize,
-    /// Runs are begun no later than this
-    pub budget: Option<Duration>,
-    /// Tells of signals
-    pub interrupted: &'a (dyn Fn() -> Option<i32> + Sync),
-    /// Runs that are done, of how many
-    pub tell: &'a mut dyn FnMut(usize, usize),
-    /// Where runs are kept as they end, so that a study goes on where it stopped
-    pub journal: &'a mut Journal,
-}
-
-/// A run of the study.
-pub struct Run {
-    /// The variant
-    pub point: Point,
-    /// What makes it of the deck
-    pub settings: Vec<String>,
-    /// What came; `None` where the budget left it out
-    pub trial: Option<Trial>,
-    /// The error of each output; NaN where it cannot be compared
-    pub errors: Vec<f64>,
-    /// The largest of those that count; NaN where the run failed
-    pub error: f64,
-    /// What it takes
-    pub timing: Timing,
-    /// Whether no other run is both faster and at least as accurate
-    pub frontier: bool,
-    /// What its error comes from, for runs of the frontier
-    pub limit: Option<Knob>,
-}
-
-/// The time of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timing {
-    /// Medians
-    pub seconds: Seconds,
-    /// The largest CPU time less the smallest, over the median
-    pub spread: f64,
-    /// How often it ran alone; none: it ran once, beside others
-    pub alone: usize,
 }
 
 /// Orders of convergence of a family.
@@ -100,60 +62,60 @@ pub struct Orders {
 }
 
 /// The study of a scene.
-pub struct Study {
+pub struct CostStudy {
     /// The names of all outputs
     pub columns: Vec<String>,
     /// Numbers of those whose error counts
     pub outputs: Vec<usize>,
     /// How errors are measured
     pub norm: NormWord,
-    /// Whether only the ends of runs have been compared, for want of other instants in common
+    /// True if only the ends of stages have been compared, because runs have no other instants in
+    /// common
     pub ends_only: bool,
-    /// What errors are measured against
+    /// The reference of the errors
     pub reference: Reference,
     /// All runs, by family, mesh and pace
-    pub runs: Vec<Run>,
+    pub runs: Vec<CostRun>,
     /// Orders of convergence
     pub orders: Vec<Orders>,
 }
 
-/// Why there is no study.
-pub enum Refusal {
-    /// Something in the deck
-    Deck(Diagnostic),
-    /// A run could not be made
-    Failure(Failure),
-}
-
 /// Studies a deck, whose text is `text`.
-pub fn study(text: &str, deck: &Deck, scene: &Scene, against: &Against, options: Options) -> Result<Study, Refusal> {
+pub fn study(
+    text: &str,
+    deck: &Deck,
+    scene: &Scene,
+    against: &Against,
+    options: StudyOptions,
+) -> Result<CostStudy, StudyError> {
+    let original = Original { text, deck };
     let grid = Grid::of(deck);
-    let (sampler, given) = sampler(deck, scene, &grid, against).map_err(Refusal::Deck)?;
-    let mut crew = Crew::new(text, deck, &sampler, options);
+    let (sampler, given) = sampler(deck, scene, &grid, against)?;
+    let mut pool = Pool::new(original, &sampler, options);
 
-    let mesher = Mesher { text, deck, sampler: &sampler, interpolation: None, keeps_places: false };
-    let points = grid.points(&mesher);
-    crew.expect(points.len());
+    let mesher = Mesher { original, sampler: &sampler, interpolation: None, keeps_places: false };
+    let variants = grid.variants(&mesher);
+    pool.expect(variants.len());
     let reference = match given {
         Some(reference) => reference,
-        None => finest(&mesher, &grid, &sampler, &mut crew)?,
+        None => finest(&mesher, &grid, &sampler, &mut pool)?,
     };
-    let trials = crew.run(&points)?;
+    let trials = pool.run(&variants)?;
     let scales = sampler.scales(&reference.samples);
-    sampler.refuse_nothing(&scales).map_err(Refusal::Deck)?;
+    sampler.refuse_nothing(&scales)?;
 
-    let mut runs: Vec<Run> = points
-        .into_iter()
-        .zip(trials)
-        .map(|(point, trial)| Run::new(deck, text, &sampler, &reference.samples, &scales, point, trial))
-        .collect();
-    crew.time_alone(&mut runs, reference.least_told())?;
-    frontier::mark(&mut runs, reference.least_told());
+    let mut runs: Vec<CostRun> = Vec::new();
+    for (variant, trial) in variants.into_iter().zip(trials) {
+        let errors = errors(&sampler, trial.as_ref(), &reference.samples, &scales);
+        runs.push(CostRun::new(original, variant, trial, errors));
+    }
+    pool.time_alone(&mut runs, reference.resolution())?;
+    frontier::mark(&mut runs, reference.resolution());
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, &scales);
-    frontier::find_limits(&mut runs, &mut crew, &distance)?;
+    limits::find(&mut runs, &mut pool, &distance)?;
     let orders = orders(deck, &grid, &sampler, &runs, &distance);
-    Ok(Study {
-        ends_only: sampler.looks_at_ends_only(deck, grid.paces[0]),
+    Ok(CostStudy {
+        ends_only: sampler.compares_ends_only(deck, grid.paces[0]),
         outputs: sampler.outputs.clone(),
         norm: sampler.norm,
         columns: sampler.columns.clone(),
@@ -163,27 +125,35 @@ pub fn study(text: &str, deck: &Deck, scene: &Scene, against: &Against, options:
     })
 }
 
+/// The errors of a trial; NaN where it did not finish.
+fn errors(sampler: &Sampler, trial: Option<&Trial>, reference: &Samples, scales: &[f64]) -> Errors {
+    let of_outputs = match trial.filter(|trial| trial.finished()) {
+        Some(trial) => sampler.differences(&trial.samples, reference, scales),
+        None => vec![f64::NAN; sampler.columns.len()],
+    };
+    Errors { worst: sampler.worst(&of_outputs), of_outputs }
+}
+
 /// The reference that the study makes itself.
-fn finest(mesher: &Mesher, grid: &Grid, sampler: &Sampler, crew: &mut Crew) -> Result<Reference, Refusal> {
-    let points = reference::points(mesher, grid);
-    crew.expect(points.len());
-    let trials = crew.run_needed(&points)?;
-    reference::establish(sampler, &points, &trials).map_err(|status| {
-        let own = (status == "singular").then(|| crew.own_failure()).flatten();
-        Refusal::Failure(own.unwrap_or(Failure::Limit(no_reference(&status))))
-    })
+fn finest(mesher: &Mesher, grid: &Grid, sampler: &Sampler, pool: &mut Pool) -> Result<Reference, StudyError> {
+    let variants = reference::variants(mesher, grid);
+    pool.expect(variants.len());
+    let trials = pool.run_needed(&variants)?;
+    if let Some(failed) = trials.iter().find(|trial| !trial.finished()) {
+        let own = if failed.status == "singular" { pool.own_failure() } else { None };
+        return Err(StudyError::Failure(own.unwrap_or(Failure::Limit(no_reference(&failed.status)))));
+    }
+    Ok(reference::establish(sampler, &variants, &trials))
 }
 
 fn no_reference(status: &str) -> String {
     match status {
-        "interrupted" => "the budget is too small for the run that errors are measured against".into(),
-        status => format!(
-            "the run that errors are measured against ended with `{status}`: nothing finer can be compared with"
-        ),
+        "interrupted" => "the budget is too small for the reference run".into(),
+        status => format!("the reference run, which is finer than all others, ended with `{status}`"),
     }
 }
 
-/// What is looked at, and the reference where one is given.
+/// The compared outputs, and the reference where one is given.
 fn sampler(
     deck: &Deck,
     scene: &Scene,
@@ -202,7 +172,7 @@ fn sampler(
         }
         Against::Expectations => {
             let (sampler, samples) = Sampler::of_expectations(deck, scene);
-            (sampler, samples, "what the deck expects")
+            (sampler, samples, "the values of [[expect]]")
         }
     };
     let scales = sampler.scales(&samples);
@@ -214,23 +184,27 @@ fn sampler(
     let lacking: Vec<&str> = lacking.iter().map(|&k| sampler.columns[k].as_str()).collect();
     let made = match lacking.len() {
         0 => made.to_string(),
-        1..=LISTED => format!("{made} (which says nothing of {})", lacking.join(", ")),
-        more => format!("{made} (which says nothing of {more} outputs: {}, …)", lacking[..LISTED].join(", ")),
+        1..=LISTED => format!("{made} (without values of {})", lacking.join(", ")),
+        more => format!("{made} (without values of {more} outputs: {}, …)", lacking[..LISTED].join(", ")),
     };
     sampler.outputs = known;
     Ok((sampler, Some(Reference { samples, uncertainty: 0.0, made })))
 }
 
-/// Refuses a history that ends before the deck does: nothing is known of what follows.
+/// Refuses a history that ends before the deck does.
 fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
-    let rows = |body: &StageBody| !matches!(body, StageBody::Modal { .. } | StageBody::Buckling { .. });
-    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| rows(&stage.body)) else {
+    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| stage.body.writes_rows()) else {
         return Ok(());
     };
-    let (stage, clock) = stored.clocks().last().unwrap_or((1, 0.0));
+    let start = StageClock { stage: 1, clock: 0.0 };
+    let StageClock { stage, clock } = stored.clocks().last().unwrap_or(start);
     let early = match last.body {
         StageBody::Dynamic { end, .. } if stage == k + 1 => last.until.is_none() && clock < end * (1.0 - 1e-9),
-        _ => stage < k + 1,
+        StageBody::Static { .. }
+        | StageBody::Path { .. }
+        | StageBody::Modal { .. }
+        | StageBody::Buckling { .. }
+        | StageBody::Dynamic { .. } => stage < k + 1,
     };
     if early {
         let message = format!("the given history ends at {clock:.6} of stage {stage}, before the deck does");
@@ -241,45 +215,11 @@ fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
     Ok(())
 }
 
-/// Numbers of the columns whose error counts.
+/// The numbers of the columns whose error counts.
 fn outputs(deck: &Deck, scene: &Scene) -> Result<Vec<usize>, Diagnostic> {
     let columns = columns(scene);
     let Some(names) = &deck.cost.outputs else { return Ok((0..columns.len()).collect()) };
     names.iter().map(|name| find_column(&columns, name)).collect()
-}
-
-impl Run {
-    fn new(
-        deck: &Deck,
-        text: &str,
-        sampler: &Sampler,
-        reference: &Samples,
-        scales: &[f64],
-        point: Point,
-        trial: Option<Trial>,
-    ) -> Self {
-        let finished = trial.as_ref().filter(|trial| trial.finished());
-        let errors = match finished {
-            Some(trial) => sampler.differences(&trial.samples, reference, scales),
-            None => vec![f64::NAN; sampler.columns.len()],
-        };
-        let seconds = trial.as_ref().map_or(Seconds { cpu: f64::NAN, wall: f64::NAN }, |trial| trial.seconds);
-        Self {
-            settings: point.settings(deck, text),
-            error: sampler.worst(&errors),
-            errors,
-            timing: Timing { seconds, spread: f64::NAN, alone: 0 },
-            frontier: false,
-            limit: None,
-            point,
-            trial,
-        }
-    }
-
-    /// What is compared, where the run came to its end.
-    fn samples(&self) -> Option<&Samples> {
-        self.trial.as_ref().filter(|trial| trial.finished()).map(|trial| &trial.samples)
-    }
 }
 
 /// Orders of all families: in space with the finest pace, in time on the finest mesh.
@@ -287,10 +227,10 @@ fn orders(
     deck: &Deck,
     grid: &Grid,
     sampler: &Sampler,
-    runs: &[Run],
+    runs: &[CostRun],
     distance: &dyn Fn(&Samples, &Samples) -> f64,
 ) -> Vec<Orders> {
-    let observed = |row: Vec<&Run>, width: &dyn Fn(&Run) -> f64| {
+    let observed = |row: Vec<&CostRun>, width: &dyn Fn(&CostRun) -> f64| {
         let known: Vec<(f64, &Samples)> = row.iter().filter_map(|run| Some((width(run), run.samples()?))).collect();
         let widths: Vec<f64> = known.iter().map(|(width, _)| *width).collect();
         let distances: Vec<f64> = known.windows(2).map(|pair| distance(pair[0].1, pair[1].1)).collect();
@@ -298,20 +238,22 @@ fn orders(
     };
     let finest_pace = grid.paces[grid.paces.len() - 1];
     let of_family = |family: &Family| {
-        let own = || runs.iter().filter(|run| run.point.family == *family);
-        // Runs of a family are in the order of their meshes.
-        let finest = own().next_back().map(|run| run.point.elements.clone()).unwrap_or_default();
+        let own = || runs.iter().filter(|run| run.variant.family == *family);
+        // The runs of a family are sorted by their meshes.
+        let finest = own().next_back().map(|run| run.variant.elements.clone()).unwrap_or_default();
         let in_space = family.order.map(|order| Order {
-            observed: observed(own().filter(|run| run.point.pace == finest_pace).collect(), &|run| run.point.width()),
+            observed: observed(own().filter(|run| run.variant.pace == finest_pace).collect(), &|run| {
+                run.variant.width()
+            }),
             expected: sampler.order_in_space(order, family.interpolation == Some(InterpolationWord::Relative)),
         });
-        let factor = |run: &Run| match run.point.pace {
+        let factor = |run: &CostRun| match run.variant.pace {
             Pace::Steps(factor) => factor,
             Pace::Adapts(_) | Pace::Timeless => f64::NAN,
         };
         let in_time = matches!(finest_pace, Pace::Steps(_)).then(|| Order {
-            observed: observed(own().filter(|run| run.point.elements == finest).collect(), &factor),
-            expected: grid::order_in_time(deck, family),
+            observed: observed(own().filter(|run| run.variant.elements == finest).collect(), &factor),
+            expected: variant::order_in_time(deck, family),
         });
         Orders { family: family.clone(), space: in_space, time: in_time }
     };

@@ -1,17 +1,19 @@
 //! Orders of convergence, from the differences of three runs.
 
-/// Differences below this part of the outputs are mostly what Newton's method leaves.
+/// Relative differences below this come mostly from the tolerance of Newton's method.
 const NOISE: f64 = 1e-8;
 
-/// The bounds of orders that are looked for.
+/// The bounds of observed orders.
 const ORDERS: [f64; 2] = [0.05, 20.0];
 
-/// An order as seen, and as it should be.
+/// An observed and an expected order of convergence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Order {
-    /// From the finest three runs whose differences are no noise; `None` where there are none
+    /// The order of the finest three runs whose differences are above the noise; `None` where there
+    /// are none
     pub observed: Option<f64>,
-    /// Of smooth solutions on fine meshes; `None` where the outputs have different ones
+    /// The order for smooth solutions on fine meshes; `None` where the outputs have different
+    /// orders
     pub expected: Option<Expected>,
 }
 
@@ -20,26 +22,28 @@ pub struct Order {
 pub struct Expected {
     /// The order
     pub order: f64,
-    /// Whether it may well be higher
+    /// True if the observed order may be higher
     pub at_least: bool,
 }
 
 impl Order {
-    /// What it means where the two disagree.
+    /// The meaning of an observed order that differs from the expected one.
     pub fn remark(&self) -> Option<&'static str> {
-        let (observed, expected) = (self.observed?, self.expected?);
-        match observed / expected.order {
-            part if part < 0.8 => Some("lower than expected: too coarse still, or the scene is not smooth"),
-            part if part > 1.2 && !expected.at_least => {
-                Some("higher than expected: errors cancel, or it is too coarse still")
-            }
-            _ => None,
+        let observed = self.observed?;
+        let expected = self.expected?;
+        let ratio = observed / expected.order;
+        if ratio < 0.8 {
+            Some("lower than expected: the meshes or steps are too coarse, or the solution is not smooth")
+        } else if ratio > 1.2 && !expected.at_least {
+            Some("higher than expected: errors cancel, or the meshes or steps are too coarse")
+        } else {
+            None
         }
     }
 }
 
-/// The order of the error as a power of a width, from widths (falling) and the distances between neighbouring runs: of the finest three
-/// that tell.
+/// The order of the error as a power of the width, from falling widths and the distances between
+/// neighbouring runs: that of the finest three runs from which it can be computed.
 pub fn observed(widths: &[f64], distances: &[f64]) -> Option<f64> {
     let triples = widths.windows(3).zip(distances.windows(2));
     triples

@@ -1,36 +1,47 @@
-//! Where outputs lie on beams: at nodes of a mesh, or between them, where elements of its order only come near.
+//! Positions of outputs on beams: at nodes of a mesh, or between them, where values are
+//! interpolated.
 
 use crate::deck::Deck;
 use crate::scene::{Scene, Spot};
 
-/// How far a node may lie from where it is looked for, in elements.
+/// Tolerance for the position of a node, in elements.
 const AT_NODE: f64 = 1e-6;
 
-/// The places of columns on beams, for those that name one.
+/// A piece of a beam, both numbered from 0.
+#[derive(Clone, Copy)]
+pub struct Piece {
+    /// The beam
+    pub beam: usize,
+    /// The piece
+    pub number: usize,
+}
+
+/// The positions of columns on beams, where their names have one.
 pub struct Places(Vec<Option<Spot>>);
 
 impl Places {
-    /// Those of the columns of a scene.
+    /// The positions of the columns of a scene.
     pub fn of(deck: &Deck, scene: &Scene, columns: &[String]) -> Self {
         let spot = |column: &String| {
-            // Behind a space stands at which row it is looked at.
+            // After a space the name tells the row of an expectation.
             let (place, _) = column.split(' ').next()?.rsplit_once('.')?;
             scene.mesh.spot(deck, place)
         };
         Self(columns.iter().map(spot).collect())
     }
 
-    /// Of how many elements, of an order, those of a piece of a beam must be a multiple for the outputs on it to stay nodes that are nodes of
-    /// the deck's mesh; one where that is more than `most`.
-    pub fn unit(&self, (beam, piece): (usize, usize), order: usize, outputs: &[usize], most: usize) -> usize {
+    /// The smallest number of elements of an order that gives a piece of a beam nodes at all
+    /// outputs that are nodes of the deck's mesh; its multiples do too. 1 where it would be more
+    /// than `most`.
+    pub fn unit(&self, piece: Piece, order: usize, outputs: &[usize], most: usize) -> usize {
         let counts = |k: &usize| outputs.is_empty() || outputs.contains(k);
-        let here = |spot: &&Spot| spot.is_node && (spot.beam, spot.piece) == (beam, piece);
+        let here = |spot: &&Spot| spot.is_node && spot.beam == piece.beam && spot.piece == piece.number;
         let all = || self.0.iter().enumerate().filter(|(k, _)| counts(k)).filter_map(|(_, spot)| spot.as_ref());
         let kept: Vec<f64> = all().filter(here).map(|spot| spot.along).collect();
         (1..=most).find(|&count| kept.iter().all(|&along| is_node(along, count * order))).unwrap_or(1)
     }
 
-    /// For each column whether it lies between nodes of a mesh, whose beams have these orders.
+    /// For each column: true if it lies between nodes of a mesh whose beams have these orders.
     pub fn between(&self, elements: &[Vec<usize>], orders: &[usize]) -> Vec<bool> {
         let lies_between = |spot: &Spot| {
             let count = elements.get(spot.beam).and_then(|pieces| pieces.get(spot.piece));
@@ -40,7 +51,7 @@ impl Places {
     }
 }
 
-/// Whether there is a node so far along a piece of so many equal parts.
+/// True if a piece of `parts` equal parts has a node at the fraction `along`.
 fn is_node(along: f64, parts: usize) -> bool {
     let x = along * parts as f64;
     (x - x.round()).abs() < AT_NODE
@@ -54,9 +65,12 @@ mod tests {
     fn nodes_of_a_mesh_stay_nodes_of_its_multiples() {
         let spot = |along, is_node| Some(Spot { beam: 0, piece: 1, along, is_node });
         let places = Places(vec![None, spot(0.5, true), spot(1.0 / 3.0, true), spot(0.37, false)]);
-        let unit = |order, outputs: &[usize], most| places.unit((0, 1), order, outputs, most);
+        let unit = |order, outputs: &[usize], most| places.unit(Piece { beam: 0, number: 1 }, order, outputs, most);
         assert_eq!((unit(1, &[], 10), unit(2, &[], 10), unit(3, &[], 10)), (6, 3, 2));
-        assert_eq!((unit(1, &[1], 10), unit(1, &[], 5), places.unit((0, 0), 1, &[], 10)), (2, 1, 1));
+        assert_eq!(
+            (unit(1, &[1], 10), unit(1, &[], 5), places.unit(Piece { beam: 0, number: 0 }, 1, &[], 10)),
+            (2, 1, 1)
+        );
         assert_eq!(places.between(&[vec![1, 4]], &[3]), [false, false, false, true]);
         assert_eq!(places.between(&[vec![1, 3]], &[1]), [false, true, false, true]);
     }

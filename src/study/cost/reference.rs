@@ -1,43 +1,47 @@
-//! What errors are measured against: the finest run of all, extrapolated in time, with its own uncertainty.
+//! The reference of errors: the finest run of all, extrapolated in time, with its uncertainty.
 
-use super::grid::{Family, Grid, Mesher, Pace, Point};
+use super::grid::Grid;
+use super::mesher::{Companion, Mesher};
 use super::sample::{Sampler, Samples};
 use super::trial::Trial;
+use super::variant::{Family, Pace, Variant};
 use crate::deck::InterpolationWord;
 
 /// The finest mesh of the reference over that of the study, in nodes.
 const FINER: f64 = 2.0;
 
-/// Differences between two runs, one of twice the width or step, are this times the error of the finer one at least: a second order is
-/// taken for sure, though more is usual.
-const SURE: f64 = 3.0;
+/// The difference between two runs, one with twice the width or step, over the error of the finer
+/// one: that of second order, which is the least that is assumed.
+const SECOND_ORDER: f64 = 3.0;
 
-/// Halved steps bring differences down to a quarter; where they do so within these bounds, what is left is extrapolated.
-const FALLS: [f64; 2] = [3.3, 4.8];
+/// Halved steps reduce differences to a quarter. Within these bounds of the ratio, the result is
+/// extrapolated.
+const EXTRAPOLATED_RATIOS: [f64; 2] = [3.3, 4.8];
 
-/// What errors are measured against.
+/// The reference of errors.
 pub struct Reference {
-    /// The numbers
+    /// The numbers that are compared
     pub samples: Samples,
-    /// How uncertain they are, like an error
+    /// Their uncertainty, relative like an error
     pub uncertainty: f64,
-    /// What it is made of
+    /// Its origin, in words
     pub made: String,
 }
 
-/// Errors below this times the uncertainty of the reference cannot be told apart.
-const TOLD: f64 = 2.0;
+/// Errors below this times the uncertainty of the reference cannot be distinguished.
+const RESOLVED: f64 = 2.0;
 
 impl Reference {
-    /// The smallest error that can be told.
-    pub fn least_told(&self) -> f64 {
-        TOLD * self.uncertainty
+    /// The smallest error that can be measured.
+    pub fn resolution(&self) -> f64 {
+        RESOLVED * self.uncertainty
     }
 }
 
-/// The runs that a reference is made of, the finest mesh first, and of each mesh the coarsest pace.
-pub fn points(mesher: &Mesher, grid: &Grid) -> Vec<Point> {
-    let bent = !mesher.deck.beams.is_empty();
+/// The variants that a reference is made of: on the finest mesh with every pace, the coarsest
+/// first, then on a coarser mesh.
+pub fn variants(mesher: &Mesher, grid: &Grid) -> Vec<Variant> {
+    let bent = !mesher.original.deck.beams.is_empty();
     let family = Family {
         order: bent.then_some(3),
         interpolation: bent.then_some(InterpolationWord::Relative),
@@ -51,34 +55,32 @@ pub fn points(mesher: &Mesher, grid: &Grid) -> Vec<Point> {
     };
     let elements = mesher.elements(family.order, FINER * finest);
     let (fine, coarse) = match mesher.companion(family.order, &elements) {
-        (coarse, ratio) if ratio > 1.0 => (elements, coarse),
-        (finer, _) => (finer, elements),
+        Companion { elements: coarse, ratio } if ratio > 1.0 => (elements, coarse),
+        Companion { elements: finer, .. } => (finer, elements),
     };
-    let point = |elements: &Vec<_>, pace| Point::new(family.clone(), elements.clone(), pace);
-    let coarse = bent.then(|| point(&coarse, paces[0]));
-    paces.iter().map(|&pace| point(&fine, pace)).chain(coarse).collect()
+    let variant = |elements: &Vec<_>, pace| Variant::new(family.clone(), elements.clone(), pace);
+    let coarse = bent.then(|| variant(&coarse, paces[0]));
+    paces.iter().map(|&pace| variant(&fine, pace)).chain(coarse).collect()
 }
 
-/// The reference from the runs of [`points`]; `Err` with the status of one that failed.
-pub fn establish(sampler: &Sampler, points: &[Point], trials: &[Trial]) -> Result<Reference, String> {
-    if let Some(failed) = trials.iter().find(|trial| !trial.finished()) {
-        return Err(failed.status.clone());
-    }
+/// The reference from finished runs of [`variants`].
+pub fn establish(sampler: &Sampler, variants: &[Variant], trials: &[Trial]) -> Reference {
     let samples = |k: usize| &trials[k].samples;
     let scales = sampler.scales(samples(0));
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, &scales);
-    let coarse = points.iter().position(|point| point.elements != points[0].elements);
-    // Of meshes of which one is not twice as fine all over, less is sure.
-    let halved = coarse.is_none_or(|k| points[0].count() >= 2 * points[k].count());
-    let sure = if halved { SURE } else { 1.0 };
-    let in_space = coarse.map_or(0.0, |k| distance(samples(0), samples(k)) / sure);
-    let last = coarse.unwrap_or(points.len()) - 1;
-    let (found, in_time, how) = match (points[0].pace, last) {
-        (Pace::Steps(_), 2) => in_time(sampler, [samples(0), samples(1), samples(2)], &scales),
-        (Pace::Adapts(_), 2) => (samples(2).clone(), distance(samples(1), samples(2)), ""),
-        _ => (samples(0).clone(), 0.0, ""),
+    let coarse = variants.iter().position(|variant| variant.elements != variants[0].elements);
+    // The factor of second order holds only for meshes of which one is twice as fine everywhere.
+    let halved = coarse.is_none_or(|k| variants[0].count() >= 2 * variants[k].count());
+    let divisor = if halved { SECOND_ORDER } else { 1.0 };
+    let in_space = coarse.map_or(0.0, |k| distance(samples(0), samples(k)) / divisor);
+    let last = coarse.unwrap_or(variants.len()) - 1;
+    let in_time = match (variants[0].pace, last) {
+        (Pace::Steps(_), 2) => halved_steps(sampler, [samples(0), samples(1), samples(2)], &scales),
+        (Pace::Adapts(_), 2) => TimeLimit::of(samples(2), distance(samples(1), samples(2))),
+        (Pace::Timeless | Pace::Steps(_) | Pace::Adapts(_), _) => TimeLimit::of(samples(0), 0.0),
     };
-    let finest = &points[last];
+    let how = if in_time.is_extrapolated { ", extrapolated" } else { "" };
+    let finest = &variants[last];
     let parts = [
         finest.family.order.map(|order| format!("{} elements of order {order}", finest.count())),
         match finest.pace {
@@ -88,20 +90,35 @@ pub fn establish(sampler: &Sampler, points: &[Point], trials: &[Trial]) -> Resul
         },
     ];
     let made = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
-    Ok(Reference { samples: found, uncertainty: in_space + in_time, made })
+    Reference { samples: in_time.samples, uncertainty: in_space + in_time.uncertainty, made }
 }
 
-/// Three runs whose steps are halved: the limit that a second order leads to, where they show one, its uncertainty, and what was done.
-fn in_time(sampler: &Sampler, runs: [&Samples; 3], scales: &[f64]) -> (Samples, f64, &'static str) {
+/// The result for ever smaller steps.
+struct TimeLimit {
+    samples: Samples,
+    /// The uncertainty that comes from the steps, relative like an error
+    uncertainty: f64,
+    is_extrapolated: bool,
+}
+
+impl TimeLimit {
+    fn of(samples: &Samples, uncertainty: f64) -> Self {
+        Self { samples: samples.clone(), uncertainty, is_extrapolated: false }
+    }
+}
+
+/// The limit from three runs with halved steps: extrapolated where their differences show a second
+/// order.
+fn halved_steps(sampler: &Sampler, runs: [&Samples; 3], scales: &[f64]) -> TimeLimit {
     let distance = |a: &Samples, b: &Samples| sampler.distance(a, b, scales);
-    let [first, second] = [distance(runs[0], runs[1]), distance(runs[1], runs[2])];
-    let ratio = first / second;
-    if !(FALLS[0]..=FALLS[1]).contains(&ratio) {
-        return (runs[2].clone(), second, "");
+    let first = distance(runs[0], runs[1]);
+    let second = distance(runs[1], runs[2]);
+    if !(EXTRAPOLATED_RATIOS[0]..=EXTRAPOLATED_RATIOS[1]).contains(&(first / second)) {
+        return TimeLimit::of(runs[2], second);
     }
     let third = 1.0 / 3.0;
-    let [before, found] =
-        [sampler.extrapolated(runs[1], runs[0], third), sampler.extrapolated(runs[2], runs[1], third)];
-    let uncertainty = distance(&before, &found) / SURE;
-    (found, uncertainty, ", extrapolated")
+    let before = sampler.extrapolated(runs[1], runs[0], third);
+    let samples = sampler.extrapolated(runs[2], runs[1], third);
+    let uncertainty = distance(&before, &samples) / SECOND_ORDER;
+    TimeLimit { samples, uncertainty, is_extrapolated: true }
 }

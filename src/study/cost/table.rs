@@ -1,11 +1,12 @@
 //! cost.csv
 
-use super::grid::Pace;
-use super::{Run, Study};
+use super::variant::Pace;
+use super::{CostRun, CostStudy};
+use crate::deck::Words;
 use csv::Writer;
 
-impl Study {
-    /// A table of comma-separated values, a line for each run.
+impl CostStudy {
+    /// The content of the file: comma-separated values, a line for each run.
     pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
         let mut table = Writer::from_writer(Vec::new());
         let own = [
@@ -37,21 +38,18 @@ impl Study {
     }
 }
 
-fn fields(run: &Run) -> Vec<String> {
+fn fields(run: &CostRun) -> Vec<String> {
     let number = |x: f64| if x.is_finite() { format!("{x:?}") } else { String::new() };
-    let family = &run.point.family;
+    let family = &run.variant.family;
     let count =
         |pick: fn(&super::Trial) -> u64| run.trial.as_ref().map_or(String::new(), |trial| pick(trial).to_string());
-    let (step, tolerance) = match run.point.pace {
-        Pace::Timeless => (String::new(), String::new()),
-        Pace::Steps(factor) => (number(factor), String::new()),
-        Pace::Adapts(tolerance) => (String::new(), number(tolerance)),
-    };
+    let step = if let Pace::Steps(factor) = run.variant.pace { number(factor) } else { String::new() };
+    let tolerance = if let Pace::Adapts(tolerance) = run.variant.pace { number(tolerance) } else { String::new() };
     let own = [
         family.order.map_or(String::new(), |order| order.to_string()),
         family.interpolation.map_or(String::new(), |word| word.word().into()),
-        family.scheme.unwrap_or_default().into(),
-        run.point.count().to_string(),
+        family.scheme.map_or(String::new(), |name| name.word().into()),
+        run.variant.count().to_string(),
         step,
         tolerance,
         run.trial.as_ref().map_or("left out".into(), |trial| trial.status.clone()),
@@ -64,8 +62,8 @@ fn fields(run: &Run) -> Vec<String> {
         number(run.timing.spread),
         run.timing.alone.to_string(),
         run.frontier.to_string(),
-        run.limit.map_or(String::new(), |knob| knob.name().into()),
-        run.settings.join(" "),
+        run.limit.map_or(String::new(), |limit| limit.name().into()),
+        run.settings().join(" "),
     ];
     own.into_iter().chain(run.errors.iter().map(|&error| number(error))).collect()
 }

@@ -1,16 +1,18 @@
 //! One run of a variant.
 
-use super::grid::equal_part;
 use super::sample::{Sampler, Samples};
+use super::variant::{Original, Variant, equal_part};
 use crate::deck::{Deck, StageBody};
-use crate::scene::Scene;
+use crate::study::StudyError;
+use crate::study::built::BuiltDeck;
+use crate::study::change::Change;
 use crate::study::outcome::Outcome;
-use crate::study::variant::Variant;
 use beamsim_core::run::Failure;
 use cpu_time::ThreadTime;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// How often a run may try: so many times its steps and levels, and some.
+/// The limit of attempts of a run: factors of its steps and levels, and a constant.
 #[derive(Clone, Copy, Debug)]
 pub struct Patience {
     per_step: f64,
@@ -19,21 +21,23 @@ pub struct Patience {
 }
 
 impl Patience {
-    /// What takes more attempts than that would not end in any time that a user waits.
+    /// A run with more attempts would take longer than any user waits.
     pub const LONG: Self = Self { per_step: 50.0, per_level: 50.0, more: 1000.0 };
-    /// Steps that fail cost as much as many that do not, and tell no error: one in forty, halved once each, uses this up.
+    /// For runs that are worth little if many of their steps fail: one in forty, halved once each,
+    /// uses this up.
     pub const SHORT: Self = Self { per_step: 1.05, per_level: 50.0, more: 10.0 };
 }
 
-/// Steps of a stage whose steps adapt.
+/// Additional steps that a stage with adaptive steps may take.
 const MOST_ADAPTED: f64 = 1e5;
 
-/// What came of a run.
-#[derive(Clone, Debug, PartialEq)]
+/// The result of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
     /// `finished`, or a failure's name
     pub status: String,
-    /// What is compared; empty where it failed
+    /// The numbers that are compared; empty where the run failed
+    #[serde(with = "crate::output::json::exact")]
     pub samples: Samples,
     /// Converged levels and steps
     pub steps: u64,
@@ -41,51 +45,53 @@ pub struct Trial {
     pub iterations: u64,
     /// Factorisations
     pub factorisations: u64,
-    /// What it took
+    /// The time it took
     pub seconds: Seconds,
 }
 
-/// What a run took, from the text of the deck to its last row.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The time of a run, from the deck to its last row.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
-    /// Of its thread
+    /// CPU seconds of its thread
     pub cpu: f64,
-    /// On the wall
+    /// Wall-clock seconds
     pub wall: f64,
 }
 
 impl Trial {
-    /// One that did not come to its end.
+    /// The result of a run that did not finish.
     pub(super) fn ended(status: &str) -> Self {
         let seconds = Seconds { cpu: f64::NAN, wall: f64::NAN };
         Self { status: status.into(), samples: Vec::new(), steps: 0, iterations: 0, factorisations: 0, seconds }
     }
 
-    /// Whether there is something to compare.
+    /// True if the run finished: then there are numbers to compare.
     pub fn finished(&self) -> bool {
         self.status == "finished"
     }
 }
 
-/// Runs the deck `text` with settings; beside what came of it all its outputs, where there is such a scene. `interrupted` tells of signals.
+/// Runs a deck with changes. Gives the trial, and all outputs where there is such a scene.
+/// `interrupted` gives the signal that was caught.
 pub fn run(
-    text: &str,
-    settings: &[String],
+    deck: &Deck,
+    changes: &[Change],
     sampler: &Sampler,
     patience: Patience,
     interrupted: &dyn Fn() -> Option<i32>,
 ) -> (Trial, Option<Outcome>) {
-    let (cpu, wall) = (ThreadTime::try_now().ok(), Instant::now());
-    let outcome = simulate(text, settings, sampler, patience, interrupted);
+    let cpu = ThreadTime::try_now().ok();
+    let wall = Instant::now();
+    let outcome = simulate(deck, changes, sampler, patience, interrupted);
     let wall = wall.elapsed().as_secs_f64();
-    // A system that does not tell the time of threads has that on the wall.
+    // Systems without CPU times of threads have the wall-clock time instead.
     let cpu = cpu.and_then(|start| start.try_elapsed().ok()).map_or(wall, |time| time.as_secs_f64());
     let seconds = Seconds { cpu, wall };
     let trial = match &outcome {
         Ok(outcome) => {
-            let failure = outcome.ended.as_ref().err().map(Failure::name);
+            let failure = outcome.ended.as_ref().err();
             Trial {
-                status: failure.unwrap_or("finished").into(),
+                status: failure.map_or("finished", Failure::name).into(),
                 samples: if failure.is_none() { sampler.of(outcome) } else { Vec::new() },
                 steps: outcome.counters.steps,
                 iterations: outcome.counters.work.iterations,
@@ -98,46 +104,44 @@ pub fn run(
     (trial, outcome.ok())
 }
 
-/// Whether the deck `text` with settings makes sense and has the outputs that are looked at.
-pub fn makes_sense(text: &str, settings: &[String], sampler: &Sampler) -> bool {
-    read(text, settings, sampler).is_ok()
+/// True if a variant describes a scene that has the compared outputs.
+pub fn makes_sense(original: Original, variant: &Variant, sampler: &Sampler) -> bool {
+    build(original.deck, &variant.changes(original), sampler).is_ok()
 }
 
-/// Runs the deck `text` with settings; `Err` where there is no such scene.
+/// Runs a deck with changes; `Err` where there is no such scene.
 pub fn simulate(
-    text: &str,
-    settings: &[String],
+    deck: &Deck,
+    changes: &[Change],
     sampler: &Sampler,
     patience: Patience,
     interrupted: &dyn Fn() -> Option<i32>,
-) -> Result<Outcome, String> {
-    let (deck, scene) = read(text, settings, sampler)?;
+) -> Result<Outcome, StudyError> {
+    let BuiltDeck { deck, scene } = build(deck, changes, sampler)?;
     Ok(Outcome::of(&scene, sampler.recorder(&scene), attempts(&deck, patience), interrupted))
 }
 
-fn read(text: &str, settings: &[String], sampler: &Sampler) -> Result<(Deck, Scene), String> {
-    let Variant { deck, scene, .. } = Variant::read(text, settings)?;
+fn build(deck: &Deck, changes: &[Change], sampler: &Sampler) -> Result<BuiltDeck, StudyError> {
+    let built = BuiltDeck::changed(deck, changes)?;
     // A point of an arc may be a node of some meshes only.
-    if !sampler.suits(&scene) {
-        return Err("it has other outputs".into());
+    if !sampler.suits(&built.scene) {
+        return Err(StudyError::OtherOutputs);
     }
-    Ok((deck, scene))
+    Ok(built)
 }
 
-/// How often a run of a deck may try, steps and levels together.
+/// The limit of attempts of a run, steps and levels together.
 fn attempts(deck: &Deck, patience: Patience) -> u64 {
     let mut start = 0.0;
     let mut most = patience.more;
     for stage in &deck.stages {
-        most += match stage.body {
-            StageBody::Static { steps, .. } => patience.per_level * steps as f64,
-            StageBody::Path { max_steps, .. } => patience.per_level * max_steps as f64,
-            StageBody::Dynamic { end, step, step_tolerance, .. } => {
-                let count = (end - start) / equal_part(deck, step) + 1.0;
-                start = end;
-                patience.per_step * if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
-            }
-            StageBody::Modal { .. } | StageBody::Buckling { .. } => patience.per_level,
+        most += if let StageBody::Dynamic { end, step, step_tolerance, .. } = stage.body {
+            let count = (end - start) / equal_part(deck, step) + 1.0;
+            start = end;
+            patience.per_step * if step_tolerance.is_some() { count + MOST_ADAPTED } else { count }
+        } else {
+            // An analysis without increments has the patience of one level.
+            patience.per_level * stage.body.increments().unwrap_or(1) as f64
         };
     }
     most as u64

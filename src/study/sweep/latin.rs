@@ -1,4 +1,5 @@
-//! Points that are spread over all axes: of so many equal parts of each axis every one holds just one point.
+//! Latin hypercube: each axis is cut into as many equal parts as there are points, and each part
+//! holds one point.
 
 /// `count` points in the unit cube, the same for the same seed on every machine.
 pub fn latin_hypercube(count: usize, axes: usize, seed: u64) -> Vec<Vec<f64>> {
@@ -12,7 +13,7 @@ pub fn latin_hypercube(count: usize, axes: usize, seed: u64) -> Vec<Vec<f64>> {
     points
 }
 
-/// The numbers below `count` in any order (Fisher and Yates).
+/// The numbers below `count` in random order (Fisher and Yates).
 fn shuffled(count: usize, random: &mut SplitMix) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
     for last in (1..count).rev() {
@@ -21,7 +22,7 @@ fn shuffled(count: usize, random: &mut SplitMix) -> Vec<usize> {
     order
 }
 
-/// Steele, Lea and Flood 2014, doi:10.1145/2714064.2660195
+/// The generator SplitMix64 (Steele, Lea and Flood 2014, doi:10.1145/2714064.2660195).
 struct SplitMix(u64);
 
 impl SplitMix {
@@ -32,7 +33,7 @@ impl SplitMix {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1)
+    /// A number in [0, 1).
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 * 0.5_f64.powi(53)
     }

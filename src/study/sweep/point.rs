@@ -1,85 +1,93 @@
 //! One point of a sweep.
 
+use crate::deck;
+use crate::output::json::exact;
+use crate::study::built::BuiltDeck;
 use crate::study::error_bars::of_expected;
-use crate::study::outcome::Outcome as Run;
-use crate::study::variant::Variant;
+use crate::study::outcome::Outcome;
 use crate::study::{Recorder, expected_values};
 use beamsim_core::run::{Failure, Warning};
+use serde::{Deserialize, Serialize};
 
-/// What came of a point.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Outcome {
+/// The result of a point.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointResult {
     /// `finished`, or a failure's name
     pub status: String,
-    /// What went wrong
+    /// The message of the failure, or the first warning
     pub message: String,
-    /// What was looked at; none where it failed
+    /// The outputs; none where it failed
+    #[serde(with = "exact")]
     pub values: Vec<f64>,
-    /// Estimated errors of these, where they are wanted
+    /// The estimated errors of the outputs, where they are wanted
+    #[serde(with = "exact")]
     pub errors: Vec<f64>,
     /// Converged levels and steps, Newton iterations, factorisations
     pub work: [u64; 3],
-    /// On the wall
+    /// Wall-clock seconds
     pub seconds: f64,
 }
 
-impl Outcome {
-    /// The status of a point whose process was gone before it came to an end.
+impl PointResult {
+    /// The status of a point whose process ended without a result.
     pub const KILLED: &str = "killed";
 
-    /// One without results.
+    /// The result of a point that failed.
     pub fn failed(status: &str, message: String) -> Self {
         Self { status: status.into(), message, ..Self::default() }
     }
 
-    /// Whether it came to its end.
+    /// True if the run finished.
     pub fn finished(&self) -> bool {
         self.status == "finished"
     }
 }
 
-/// Runs the deck `text`, which expects what is looked at, with settings.
-pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> Outcome {
-    match Variant::read(text, settings) {
-        Ok(variant) => simulate(variant, error_bars, interrupted),
-        Err(why) => Outcome::failed("deck", why),
+/// Runs the deck `text`, which has an expectation for each output, with settings. These are applied
+/// to the text, since users may vary anything, such as parameters that expressions depend on.
+pub fn run(text: &str, settings: &[String], error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> PointResult {
+    let text = match deck::apply(text, settings) {
+        Ok(text) => text,
+        Err(why) => return PointResult::failed("deck", why),
+    };
+    match BuiltDeck::read(&text) {
+        Ok(built) => simulate(&text, built, error_bars, interrupted),
+        Err(error) => PointResult::failed("deck", error.to_string()),
     }
 }
 
-fn simulate(variant: Variant, error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> Outcome {
-    let Variant { text, deck, mut scene } = variant;
-    // Rows of a history that nobody reads need not be kept.
+fn simulate(text: &str, built: BuiltDeck, error_bars: bool, interrupted: &dyn Fn() -> Option<i32>) -> PointResult {
+    let BuiltDeck { deck, mut scene } = built;
+    // The rows of the history are not needed.
     let probes = std::mem::take(&mut scene.probes);
-    let run = Run::of(&scene, Some(Recorder::new(&scene)), u64::MAX, interrupted);
+    let run = Outcome::of(&scene, Some(Recorder::new(&scene)), u64::MAX, interrupted);
     scene.probes = probes;
     let counters = &run.counters;
-    let outcome = Outcome {
+    let outcome = PointResult {
         work: [counters.steps, counters.work.iterations, counters.work.factorisations],
         seconds: run.seconds,
-        ..Outcome::default()
+        ..PointResult::default()
     };
-    let failed = |failure: Failure, outcome| {
-        let (status, message) = (failure.name().to_string(), failure.to_string());
-        Outcome { status, message, ..outcome }
+    let failed = |failure: Failure, outcome| PointResult {
+        status: failure.name().into(),
+        message: failure.to_string(),
+        ..outcome
     };
     if let Err(failure) = run.ended {
         return failed(failure, outcome);
     }
-    let errors = match error_bars {
-        true => of_expected(&text, &deck, &scene, &run.expected, interrupted),
-        false => Ok(Vec::new()),
-    };
+    let errors = if error_bars { of_expected(text, &deck, &scene, &run.expected, interrupted) } else { Ok(Vec::new()) };
     match errors {
         Ok(errors) => {
             let expected = expected_values(&scene.expectations);
             let missed = expected.iter().zip(&run.expected).find(|(_, value)| value.is_nan());
             let missed = missed.map(|((name, _), _)| format!("`{name}` was not reached"));
-            let message = missed.unwrap_or_else(|| told(&run.counters.findings.warnings));
-            Outcome { status: "finished".into(), message, values: run.expected, errors, ..outcome }
+            let message = missed.unwrap_or_else(|| summary(&run.counters.findings.warnings));
+            PointResult { status: "finished".into(), message, values: run.expected, errors, ..outcome }
         }
-        // What was run is worth having without.
         Err(failure @ Failure::Interrupted { .. }) => failed(failure, outcome),
-        Err(failure) => Outcome {
+        // The outputs are valid without error bars.
+        Err(failure) => PointResult {
             status: "finished".into(),
             message: format!("no error bars: {failure}"),
             values: run.expected,
@@ -88,8 +96,8 @@ fn simulate(variant: Variant, error_bars: bool, interrupted: &dyn Fn() -> Option
     }
 }
 
-/// The first warning of a run, and the names of others; nothing where there are none.
-fn told(warnings: &[Warning]) -> String {
+/// The first warning of a run and the names of other kinds; empty without warnings.
+fn summary(warnings: &[Warning]) -> String {
     let Some(first) = warnings.first() else { return String::new() };
     let mut names = vec![first.kind.name()];
     for warning in warnings {

@@ -1,11 +1,10 @@
-//! What came of points, a small file each: processes on several machines write beside each other, and one that was killed leaves nothing
-//! half done.
+//! The results of points, a small file each: processes on several machines write at the same time,
+//! and a killed one leaves no half result.
 
-use super::point::Outcome;
-use crate::output::PartFile;
-use serde_json::{Value, json};
+use super::point::PointResult;
+use crate::output::{OutputError, PartFile, remove_if_there};
+use serde::{Deserialize, Serialize};
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// The folder of a sweep's points.
@@ -13,64 +12,53 @@ pub struct Store {
     folder: PathBuf,
 }
 
+/// The content of a file: the identity of the point, and its result.
+#[derive(Serialize, Deserialize)]
+struct StoredPoint {
+    identity: String,
+    #[serde(flatten)]
+    result: PointResult,
+}
+
+/// The path of a point.
+struct Place {
+    folder: PathBuf,
+    name: String,
+}
+
 impl Store {
-    /// In the folder of a sweep's results.
+    /// The store in the folder of a sweep's results.
     pub fn of(folder: &Path) -> Self {
         Self { folder: folder.join("points") }
     }
 
-    /// Where a point stands, its folder and its name: by what it is, not by its number, so that a sweep that grows finds what was run of it.
-    fn place(&self, identity: &str) -> (PathBuf, String) {
+    /// The path of a point. It depends on the identity and not on the number, so that a larger
+    /// sweep finds the results of a smaller one.
+    fn place(&self, identity: &str) -> Place {
         let mark = identity.rsplit(' ').next().unwrap_or(identity);
-        (self.folder.join(&mark[..mark.len().min(2)]), format!("{mark}.json"))
+        Place { folder: self.folder.join(&mark[..mark.len().min(2)]), name: format!("{mark}.json") }
     }
 
-    /// Keeps what came of a point.
-    pub fn keep(&self, identity: &str, outcome: &Outcome) -> io::Result<()> {
-        let (folder, name) = self.place(identity);
-        let (part, _) = PartFile::written(&folder, &name, record(identity, outcome).to_string().as_bytes())?;
+    /// Saves the result of a point.
+    pub fn keep(&self, identity: &str, result: &PointResult) -> Result<(), OutputError> {
+        let Place { folder, name } = self.place(identity);
+        let stored = StoredPoint { identity: identity.into(), result: result.clone() };
+        let path = folder.join(&name);
+        let content = serde_json::to_vec(&stored).map_err(|error| OutputError::content(&path, error))?;
+        let (part, _) = PartFile::written(&folder, &name, &content)?;
         part.rename(&name)
     }
 
-    /// What came of a point; `None` where nothing is there.
-    pub fn find(&self, identity: &str) -> Option<Outcome> {
-        let (folder, name) = self.place(identity);
-        read(&serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()?, identity)
+    /// The result of a point, where there is one.
+    pub fn find(&self, identity: &str) -> Option<PointResult> {
+        let Place { folder, name } = self.place(identity);
+        let stored: StoredPoint = serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()?;
+        (stored.identity == identity).then_some(stored.result)
     }
 
-    /// Forgets what came of a point.
-    pub fn forget(&self, identity: &str) -> io::Result<()> {
-        let (folder, name) = self.place(identity);
-        crate::output::remove_if_there(&folder, &name)
+    /// Removes the result of a point.
+    pub fn forget(&self, identity: &str) -> Result<(), OutputError> {
+        let Place { folder, name } = self.place(identity);
+        remove_if_there(&folder, &name)
     }
-}
-
-/// Numbers stand as texts: the shortest that read back to the same.
-fn record(identity: &str, outcome: &Outcome) -> Value {
-    let texts = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>();
-    json!({
-        "identity": identity,
-        "status": outcome.status,
-        "message": outcome.message,
-        "values": texts(&outcome.values),
-        "errors": texts(&outcome.errors),
-        "work": outcome.work,
-        "seconds": outcome.seconds,
-    })
-}
-
-fn read(record: &Value, identity: &str) -> Option<Outcome> {
-    (record["identity"].as_str()? == identity).then_some(())?;
-    let numbers = |key: &str| -> Option<Vec<f64>> {
-        record[key].as_array()?.iter().map(|text| text.as_str()?.parse().ok()).collect()
-    };
-    let work: Vec<u64> = record["work"].as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
-    Some(Outcome {
-        status: record["status"].as_str()?.into(),
-        message: record["message"].as_str()?.into(),
-        values: numbers("values")?,
-        errors: numbers("errors")?,
-        work: work.try_into().ok()?,
-        seconds: record["seconds"].as_f64()?,
-    })
 }

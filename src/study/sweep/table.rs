@@ -1,17 +1,18 @@
-//! sweep.csv: a row a point.
+//! sweep.csv: a row for each point.
 
-use super::{Outcome, Sweep};
+use super::{PointResult, Sweep};
 
-/// A point of which nothing is known: it was not run, or killed.
+/// The status of a point without a result.
 const MISSING: &str = "missing";
 
 impl Sweep {
-    /// One table of all points. It holds no times, so that every way of running them gives the same bytes.
-    pub fn to_csv(&self, outcomes: &[Option<Outcome>]) -> Result<Vec<u8>, csv::Error> {
+    /// The content of the file. It holds no times, so that all ways of running the points give the
+    /// same bytes.
+    pub fn to_csv(&self, results: &[Option<PointResult>]) -> Result<Vec<u8>, csv::Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.header())?;
-        for (k, outcome) in outcomes.iter().enumerate() {
-            writer.write_record(self.row(k, outcome.as_ref()))?;
+        for (k, result) in results.iter().enumerate() {
+            writer.write_record(self.row(k, result.as_ref()))?;
         }
         writer.into_inner().map_err(|error| error.into_error().into())
     }
@@ -28,21 +29,21 @@ impl Sweep {
         names
     }
 
-    fn row(&self, point: usize, outcome: Option<&Outcome>) -> Vec<String> {
+    fn row(&self, point: usize, result: Option<&PointResult>) -> Vec<String> {
         let mut cells = vec![(point + 1).to_string()];
         cells.extend(self.points[point].iter().cloned());
-        cells.push(outcome.map_or(MISSING, |outcome| &outcome.status).into());
+        cells.push(result.map_or(MISSING, |result| &result.status).into());
         let number = |x: Option<&f64>| x.filter(|x| !x.is_nan()).map_or(String::new(), |x| format!("{x:?}"));
-        let numbers = |of: fn(&Outcome) -> &Vec<f64>| {
-            (0..self.outputs.len()).map(move |k| number(outcome.and_then(|outcome| of(outcome).get(k))))
+        let numbers = |of: fn(&PointResult) -> &Vec<f64>| {
+            (0..self.outputs.len()).map(move |k| number(result.and_then(|result| of(result).get(k))))
         };
-        cells.extend(numbers(|outcome| &outcome.values));
+        cells.extend(numbers(|result| &result.values));
         if self.error_bars {
-            cells.extend(numbers(|outcome| &outcome.errors));
+            cells.extend(numbers(|result| &result.errors));
         }
-        let work = |k: usize| outcome.map_or(String::new(), |outcome| outcome.work[k].to_string());
+        let work = |k: usize| result.map_or(String::new(), |result| result.work[k].to_string());
         cells.extend((0..3).map(work));
-        cells.push(outcome.map_or(String::new(), |outcome| outcome.message.clone()));
+        cells.push(result.map_or(String::new(), |result| result.message.clone()));
         cells
     }
 }

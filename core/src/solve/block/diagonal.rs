@@ -2,8 +2,8 @@
 
 use std::ops::{Index, IndexMut};
 
-/// The tiles on the diagonal of a piece, called by its rows: they stand in a list of their own, row by row, or in the tangent, group by
-/// group. `S` is a slice of them.
+/// The tiles on the diagonal of a piece, called by its rows: they stand in a list of their own, row
+/// by row, or in the tangent, group by group. `S` is a slice of them.
 pub struct Diagonal<'a, S> {
     tiles: S,
     /// The row or the group of the first

@@ -4,7 +4,8 @@ use super::order::{self, Order};
 use crate::system::Pattern;
 use std::ops::Range;
 
-/// Elimination makes so many blocks out of one at most; beyond, a supernodal factorisation is faster.
+/// Elimination makes so many blocks out of one at most; beyond, a supernodal factorisation is
+/// faster.
 const MOST_FILL: usize = 8;
 
 /// How much fill a factorisation may have.
@@ -64,8 +65,9 @@ impl Source {
 
 /// The elimination of block rows one after the other.
 ///
-/// Rows are called by their place in the order. The rows that the elimination of row k changes are its later neighbours;
-/// the blocks right of the diagonal in row k stand in their order. Blocks that no elimination changes are those of the tangent.
+/// Rows are called by their place in the order. The rows that the elimination of row k changes are
+/// its later neighbours; the blocks right of the diagonal in row k stand in their order. Blocks
+/// that no elimination changes are those of the tangent.
 #[derive(Clone, Debug)]
 pub struct Elimination {
     /// The group of each row
@@ -76,7 +78,8 @@ pub struct Elimination {
     pub branches: Vec<Range<usize>>,
     /// The rows after all branches
     pub trunk: Range<usize>,
-    /// The groups of each branch and of the trunk, where those of each follow each other; else nothing
+    /// The groups of each branch and of the trunk, where those of each follow each other; else
+    /// nothing
     pub runs: Vec<Range<usize>>,
     /// Where the later neighbours of each row begin
     pub starts: Vec<u32>,
@@ -84,8 +87,9 @@ pub struct Elimination {
     pub later: Vec<u32>,
     /// Where the targets of each row begin, where there are some
     target_starts: Vec<u32>,
-    /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a: the number, among those that
-    /// elimination changes, of the block that they share right of the diagonal
+    /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a:
+    /// the number, among those that elimination changes, of the block that they share right of the
+    /// diagonal
     pub targets: Vec<u32>,
     /// The blocks that elimination changes
     changed: Vec<u32>,
@@ -100,8 +104,8 @@ pub struct Elimination {
 }
 
 impl Elimination {
-    /// In the order of [`order::find`]: without any fill on chains and trees. `None` where there is more fill than there may be, or memory
-    /// for the analysis cannot be had.
+    /// In the order of [`order::find`]: without any fill on chains and trees. `None` where there is
+    /// more fill than there may be, or memory for the analysis cannot be had.
     pub fn new(pattern: &Pattern, multipliers: &[u32], fill: Fill) -> Option<Self> {
         let most = match fill {
             Fill::Little => MOST_FILL * pattern.pairs(),
@@ -168,7 +172,7 @@ impl Elimination {
         self.below[block]
     }
 
-    /// Whether a block by rows and its mirror image by columns stand at one place and are the same.
+    /// True if a block by rows and its mirror image by columns stand at one place and are the same.
     #[inline(always)]
     pub fn is_one(&self, block: usize) -> bool {
         self.above.is_empty() && !matches!(self.below[block].stands(), Stands::Own(_))

@@ -8,8 +8,8 @@ use super::tile::{self, Block, Own, Part, Rows, Tile, Upper, Width};
 use crate::system::upper_entry;
 use std::ops::Range;
 
-/// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 A_kj a row
-/// takes Y^T D^-1 Y from what comes later.
+/// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then:
+/// with Y = L^-1 A_kj a row takes Y^T D^-1 Y from what comes later.
 pub struct Ldl<const W: usize>
 where
     Width<W>: Rows<W>,

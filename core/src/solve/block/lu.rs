@@ -1,4 +1,5 @@
-//! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal where those in place are small.
+//! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal
+//! where those in place are small.
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
@@ -7,8 +8,8 @@ use super::stretch::Stretch;
 use super::tile::{self, Block, Own, Part, RowOrder, Rows, Tile, Width};
 use std::ops::Range;
 
-/// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then: with Y = L^-1 P A_kj and
-/// W = U^-T A_jk^T a row takes W^T Y from what comes later.
+/// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then:
+/// with Y = L^-1 P A_kj and W = U^-T A_jk^T a row takes W^T Y from what comes later.
 pub struct Lu<const W: usize> {
     orders: Stretch<RowOrder<W>>,
     /// The blocks above the diagonal that are not those of the tangent

@@ -1,13 +1,15 @@
-//! Factorisations of the tangent in blocks, the unknowns of one node each, 6 x 6 or in a plane 3 x 3: L D L^T where it is symmetric, LU
-//! where not.
+//! Factorisations of the tangent in blocks, the unknowns of one node each, 6 x 6 or in a plane 3 x
+//! 3: L D L^T where it is symmetric, LU where not.
 //!
-//! The order of elimination is that of least degree, in large scenes turned towards a middle, so that chains and trees get no fill at all.
-//! Pivots are not looked for across blocks: who uses this looks at the residual of what it solved, or whether the factorisation is
-//! [sure](BlockSolver::is_sure). Where blocks are not filled up the tangent's own serve beside the diagonal; those on it may give their
-//! place to the factors, too.
+//! The order of elimination is that of least degree, in large scenes turned towards a middle, so
+//! that chains and trees get no fill at all. Pivots are not looked for across blocks: who uses this
+//! looks at the residual of what it solved, or whether the factorisation is
+//! [sure](BlockSolver::is_sure). Where blocks are not filled up the tangent's own serve beside the
+//! diagonal; those on it may give their place to the factors, too.
 
 mod diagonal;
 mod elimination;
+mod factor;
 mod ldl;
 mod lu;
 mod order;
@@ -19,6 +21,7 @@ use crate::system::{Matrix, Pattern, Symmetry, System, WIDTH};
 use crate::tensor::Vec3;
 use crate::threads;
 use elimination::{Elimination, Fill};
+use factor::Factor;
 use ldl::Ldl;
 use lu::Lu;
 use pieces::Pieces;
@@ -28,55 +31,26 @@ use std::sync::Arc;
 pub struct BlockSolver {
     elimination: Arc<Elimination>,
     factor: Box<dyn Factor>,
-    /// What is solved for, by row
+    /// The unknowns that are solved for, by row
     parts: Vec<f64>,
 }
 
-/// The numbers of a factorisation.
-trait Factor: Send {
-    /// What it does, in a word.
-    fn name(&self) -> &'static str;
-
-    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
-    fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool;
-
-    /// See [`BlockSolver::can_stay_within`].
-    fn can_stay_within(&self, elimination: &Elimination, system: &System) -> bool;
-
-    /// See [`BlockSolver::factorise_within`].
-    fn factorise_within(&mut self, elimination: &Elimination, system: &mut System) -> bool;
-
-    /// See [`BlockSolver::negative`].
-    fn negative(&self) -> Option<usize>;
-
-    /// See [`BlockSolver::has_negative_determinant`].
-    fn has_negative_determinant(&self) -> Option<bool>;
-
-    /// See [`BlockSolver::is_sure`].
-    fn is_sure(&self) -> bool;
-
-    /// See [`BlockSolver::is_symmetric`].
-    fn is_symmetric(&self) -> bool;
-
-    /// Solves with the last factorisation, which is that of `matrix`, row by row.
-    fn solve(&self, elimination: &Elimination, matrix: Matrix, x: &mut [f64]);
-}
-
 impl BlockSolver {
-    /// For tangents of this pattern; groups of `multipliers` are eliminated behind those that they meet. `None` where blocks would fill
-    /// up, or memory cannot be had.
+    /// For tangents of this pattern; groups of `multipliers` are eliminated behind those that they
+    /// meet. `None` where blocks would fill up, or memory cannot be had.
     pub fn new(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
         let elimination = Elimination::new(pattern, multipliers, Fill::Little)?;
         Self::by(Arc::new(elimination), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
-    /// For tangents of this pattern that are symmetric, even where the pattern does not say so, and with as much fill as it takes.
-    /// `None` where memory cannot be had.
+    /// For tangents of this pattern that are symmetric, even where the pattern does not say so, and
+    /// with as much fill as it takes. `None` where memory cannot be had.
     pub fn symmetric(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
         Self::by(Arc::new(Elimination::new(pattern, multipliers, Fill::Any)?), pattern, true)
     }
 
-    /// Another one for tangents of a pattern that is [like](Pattern::is_like) its own: in the same order.
+    /// Another one for tangents of a pattern that is [like](Pattern::is_like) its own: in the same
+    /// order.
     pub fn of_like(&self, pattern: &Pattern) -> Option<Self> {
         Self::by(Arc::new(self.elimination.of_like(pattern)), pattern, pattern.symmetry == Symmetry::Whole)
     }
@@ -97,7 +71,7 @@ impl BlockSolver {
         Some(Self { elimination, factor, parts })
     }
 
-    /// What it does, in a word.
+    /// The name of its factorisation, in a word.
     pub fn name(&self) -> &'static str {
         self.factor.name()
     }
@@ -112,7 +86,7 @@ impl BlockSolver {
         self.elimination.later.len()
     }
 
-    /// Whether it takes the tangent for symmetric.
+    /// True if it takes the tangent for symmetric.
     pub fn is_symmetric(&self) -> bool {
         self.factor.is_symmetric()
     }
@@ -122,34 +96,35 @@ impl BlockSolver {
         self.factor.factorise(&self.elimination, matrix)
     }
 
-    /// Whether the factors may take the place of this tangent: each branch has nodes that follow each other, and the tangent keeps as much of
-    /// the tiles on its diagonal as the factors.
+    /// True if the factors may take the place of this tangent: each branch has nodes that follow
+    /// each other, and the tangent keeps as much of the tiles on its diagonal as the factors.
     pub fn can_stay_within(&self, system: &System) -> bool {
         self.factor.can_stay_within(&self.elimination, system)
     }
 
-    /// Factorises a tangent whose place the factors [can](Self::can_stay_within) take: it needs no memory. `false` where a pivot is zero or
-    /// no number; the tangent is gone in any case.
+    /// Factorises a tangent whose place the factors [can](Self::can_stay_within) take: it needs no
+    /// memory. `false` where a pivot is zero or no number; the tangent is gone in any case.
     pub fn factorise_within(&mut self, system: &mut System) -> bool {
         self.factor.factorise_within(&self.elimination, system)
     }
 
-    /// How many pivots of the last factorisation are negative: as many as the matrix has negative eigenvalues (Sylvester).
-    /// `None` where it is not symmetric, or did not come to its end.
+    /// How many pivots of the last factorisation are negative: as many as the matrix has negative
+    /// eigenvalues (Sylvester). `None` where it is not symmetric, or did not come to its end.
     pub fn negative(&self) -> Option<usize> {
         self.factor.negative()
     }
 
-    /// Whether the determinant of what was factorised last is negative: an odd number of its real eigenvalues is. `None` where the
-    /// factorisation did not come to its end.
+    /// True if the determinant of what was factorised last is negative: an odd number of its real
+    /// eigenvalues is. `None` where the factorisation did not come to its end.
     pub fn has_negative_determinant(&self) -> Option<bool> {
         self.factor.has_negative_determinant()
     }
 
-    /// Whether the last factorisation shows no sign of lost digits. Where the tangent is symmetric, all pivots are positive: it is that of a
-    /// matrix which differs from A_ij by a few eps sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed.,
-    /// theorems 10.4, 10.5). Where not, no row took from an entry on the diagonal much more than what it had then: no proof, since
-    /// several rows may take some each.
+    /// True if the last factorisation shows no sign of lost digits. Where the tangent is symmetric,
+    /// all pivots are positive: it is that of a matrix which differs from A_ij by a few eps
+    /// sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorems
+    /// 10.4, 10.5). Where not, no row took from an entry on the diagonal much more than what it had
+    /// then: no proof, since several rows may take some each.
     pub fn is_sure(&self) -> bool {
         self.factor.is_sure()
     }
@@ -162,8 +137,9 @@ impl BlockSolver {
         }
     }
 
-    /// Solves for the correction that a system asks for, whose tangent was factorised last, and writes it into a field of slots; held
-    /// directions take their part of `held`. Whether it is finite.
+    /// Solves for the correction that a system asks for, whose tangent was factorised last, and
+    /// writes it into a field of slots; held directions take their part of `held`. Whether it is
+    /// finite.
     pub fn correct(&mut self, system: &System, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         match system.pattern.width() {
             WIDTH => self.correct_by::<WIDTH>(system, held, out),

@@ -1,9 +1,10 @@
-//! In which order blocks are eliminated: that of least degree, and in large scenes from several ends to a middle, so that branches of
-//! the elimination tree can be eliminated at once.
+//! In which order blocks are eliminated: that of least degree, and in large scenes from several
+//! ends to a middle, so that branches of the elimination tree can be eliminated at once.
 //!
-//! Least degree runs along a chain from one end to the other: its tree is a single branch. But whatever fills up under one order is
-//! a chordal graph, which can be eliminated without any more fill towards any of its cliques (Rose, Tarjan and Lueker 1976,
-//! doi:10.1137/0205021): here towards one in its middle.
+//! Least degree runs along a chain from one end to the other: its tree is a single branch. But
+//! whatever fills up under one order is a chordal graph, which can be eliminated without any more
+//! fill towards any of its cliques (Rose, Tarjan and Lueker 1976, doi:10.1137/0205021): here
+//! towards one in its middle.
 
 use crate::system::{Meetings, Pattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -29,7 +30,8 @@ const NONE: u32 = u32::MAX;
 pub struct Order {
     /// The group of each row
     pub order: Vec<u32>,
-    /// Consecutive rows from the first on that meet others only after the last of them; empty where it does not pay
+    /// Consecutive rows from the first on that meet others only after the last of them; empty where
+    /// it does not pay
     pub branches: Vec<Range<usize>>,
     /// What each row leaves behind
     pub neighbours: Neighbours,
@@ -44,7 +46,8 @@ pub struct Neighbours {
 }
 
 impl Neighbours {
-    /// Neighbours in the pattern, and what the rows that were eliminated before leave behind. `None` where these are more than `most`.
+    /// Neighbours in the pattern, and what the rows that were eliminated before leave behind.
+    /// `None` where these are more than `most`.
     fn new(meetings: &Meetings, order: &[u32], most: usize) -> Option<Self> {
         let (n, row_of) = (order.len(), inverse(order));
         // Rows whose first later neighbour is this one
@@ -81,7 +84,8 @@ impl Neighbours {
         Some(Self { starts, later })
     }
 
-    /// The same where rows come in another order, in which each still comes before those that it changes, and these as they did.
+    /// The same where rows come in another order, in which each still comes before those that it
+    /// changes, and these as they did.
     fn permuted(&self, places: &[u32]) -> Self {
         let row_of = inverse(places);
         let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
@@ -125,8 +129,8 @@ impl Neighbours {
     }
 }
 
-/// The order for a pattern, in which each group of `multipliers` stands behind the groups that it meets. `None` where it fills up to more
-/// blocks than `most`, or memory cannot be had.
+/// The order for a pattern, in which each group of `multipliers` stands behind the groups that it
+/// meets. `None` where it fills up to more blocks than `most`, or memory cannot be had.
 pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order> {
     let meetings = &pattern.meetings();
     let order = match multipliers {
@@ -159,8 +163,9 @@ fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
     places.iter().map(|&place| order[place as usize]).collect()
 }
 
-/// That of least degree among all other groups, and each multiplier right behind the last group that it meets: with everything after it
-/// clamped, what it ties is there, so that its pivot has the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
+/// That of least degree among all other groups, and each multiplier right behind the last group
+/// that it meets: with everything after it clamped, what it ties is there, so that its pivot has
+/// the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
 fn constrained(node_blocks: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
     let mut is_multiplier = vec![false; node_blocks];
     multipliers.iter().for_each(|&group| is_multiplier[group as usize] = true);
@@ -196,7 +201,8 @@ fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u
     Some(order)
 }
 
-/// An order without more fill that ends in a clique in the middle: that of maximum cardinality search from it, backwards.
+/// An order without more fill that ends in a clique in the middle: that of maximum cardinality
+/// search from it, backwards.
 fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
     let (n, earlier) = (neighbours.count(), neighbours.earlier());
     let start = middle(&neighbours.parents());
@@ -229,7 +235,8 @@ fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
     order
 }
 
-/// The row below which, and beside whose later neighbours, no part of the tree has more than half of the rows.
+/// The row below which, and beside whose later neighbours, no part of the tree has more than half
+/// of the rows.
 fn middle(parents: &[u32]) -> usize {
     let sizes = sizes(parents);
     // Children come before their parents.
@@ -247,7 +254,8 @@ fn sizes(parents: &[u32]) -> Vec<u32> {
     sizes
 }
 
-/// Rows branch by branch, those of the trunk last, and the branches; none where most rows are in one of them.
+/// Rows branch by branch, those of the trunk last, and the branches; none where most rows are in
+/// one of them.
 fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
     let n = parents.len();
     let roots = branch_roots(parents);
@@ -273,7 +281,8 @@ fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
     if 4 * largest > 3 * n { ((0..n as u32).collect(), Vec::new()) } else { (rows, branches) }
 }
 
-/// The roots of the trees in each branch, where rows are taken for the trunk from the largest tree on, as long as that pays.
+/// The roots of the trees in each branch, where rows are taken for the trunk from the largest tree
+/// on, as long as that pays.
 fn branch_roots(parents: &[u32]) -> Vec<Vec<u32>> {
     let sizes = sizes(parents);
     let mut children: Vec<Vec<u32>> = vec![Vec::new(); parents.len()];

@@ -1,8 +1,9 @@
-//! A factorisation in pieces: branches of the elimination tree, which are eliminated at once, and the trunk, where they meet.
+//! A factorisation in pieces: branches of the elimination tree, which are eliminated at once, and
+//! the trunk, where they meet.
 
-use super::Factor;
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
+use super::factor::Factor;
 use super::tile::{Own, Part, Tile};
 use crate::scalar::Instructions;
 use crate::system::{Matrix, Symmetry, System};
@@ -22,10 +23,11 @@ macro_rules! run {
     };
 }
 
-/// What the pivots of rows were.
+/// The signs of the pivots of rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Signs {
-    /// How many are negative; of unsymmetric tangents, how many tiles on the diagonal have a negative determinant
+    /// How many are negative; of unsymmetric tangents, how many tiles on the diagonal have a
+    /// negative determinant
     pub negative: usize,
     /// How many rows may have lost digits, or cost later ones some
     pub doubtful: usize,
@@ -40,10 +42,10 @@ impl AddAssign for Signs {
 
 /// The numbers of rows that follow each other, but for the tiles on their diagonal.
 pub trait Piece<const W: usize>: Send + Sync + Sized {
-    /// What it does, in a word
+    /// The name of the factorisation, in a word
     const NAME: &'static str;
 
-    /// Whether it is one of symmetric tangents, whose pivots have the signs of eigenvalues
+    /// It factorises symmetric tangents, whose pivots have the signs of eigenvalues
     const SYMMETRIC: bool;
 
     /// A tile on the diagonal as it is factorised
@@ -52,7 +54,8 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// Nothing
     const NOTHING: Self::Own;
 
-    /// Of these rows, and blocks right of the diagonal that elimination changes. `None` where memory cannot be had.
+    /// Of these rows, and blocks right of the diagonal that elimination changes. `None` where
+    /// memory cannot be had.
     fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self>;
 
     /// Its rows.
@@ -61,11 +64,12 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// The numbers of a tangent on its diagonal as they are factorised in their place.
     fn within(numbers: &[f64]) -> &[Self::Own];
 
-    /// The same to factorise them.
+    /// The numbers of a tangent on its diagonal, to be factorised in their place.
     fn within_mut(numbers: &mut [f64]) -> &mut [Self::Own];
 
-    /// Makes some of its rows ready, once, before the first elimination that changes them: `own` are the tiles that those on the diagonal
-    /// are copies of; without, they stand there themselves.
+    /// Makes some of its rows ready, once, before the first elimination that changes them: `own`
+    /// are the tiles that those on the diagonal are copies of; without, they stand there
+    /// themselves.
     fn load(
         &mut self,
         rows: Range<usize>,
@@ -75,7 +79,8 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
         diagonal: &mut Diagonal<&mut [Self::Own]>,
     );
 
-    /// Adds what another piece takes from the tile of a row; whether that is no more than it may be.
+    /// Adds what another piece takes from the tile of a row; whether that is no more than it may
+    /// be.
     fn add_own(sum: &mut Self::Own, other: &Self::Own) -> bool;
 
     /// Adds what belongs to the same rows.
@@ -84,8 +89,8 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
     /// Sets all numbers to zero.
     fn clear(&mut self);
 
-    /// Eliminates the next of its rows; what that changes in rows later than its own goes to `beyond`. `None` where a pivot is zero or no
-    /// number.
+    /// Eliminates the next of its rows; what that changes in rows later than its own goes to
+    /// `beyond`. `None` where a pivot is zero or no number.
     fn eliminate(
         &mut self,
         rows: Range<usize>,
@@ -95,14 +100,15 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
         beyond: (&mut Self, &mut Diagonal<&mut [Self::Own]>),
     ) -> Option<Signs>;
 
-    /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to `beyond`.
+    /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to
+    /// `beyond`.
     fn forward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]);
 
     /// Solves with the upper factor for its own part `x`, where all later rows are solved.
     fn backward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]);
 }
 
-/// What a piece looks at to solve.
+/// The view of a piece on the factors, to solve.
 pub struct Look<'a, P: Piece<W>, const W: usize> {
     pub elimination: &'a Elimination,
     /// The tiles of the tangent beside its diagonal
@@ -122,7 +128,7 @@ pub struct Pieces<P: Piece<W>, const W: usize> {
     trunk: P,
     /// Later than the trunk there is nothing.
     nothing: P,
-    /// Whether the last factorisation stands within the tangent
+    /// True if the last factorisation stands within the tangent
     is_within: bool,
     /// What it has on the diagonal where it does not, row by row
     diagonal: Vec<P::Own>,
@@ -156,7 +162,8 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
         has_room
     }
 
-    /// Eliminates all rows: branches at once, then the trunk. The tiles on the diagonal stand piece by piece; see [`Piece::load`] for `own`.
+    /// Eliminates all rows: branches at once, then the trunk. The tiles on the diagonal stand piece
+    /// by piece; see [`Piece::load`] for `own`.
     fn eliminate(
         &mut self,
         elimination: &Elimination,
@@ -219,7 +226,7 @@ fn within<'a, T>(elimination: &'a Elimination, tiles: &'a [T]) -> Vec<Diagonal<'
     elimination.runs.iter().map(of_piece).collect()
 }
 
-/// The same to factorise them.
+/// The tiles on the diagonal by pieces, to be factorised.
 fn within_mut<'a, T>(elimination: &'a Elimination, tiles: &'a mut [T]) -> Vec<Diagonal<'a, &'a mut [T]>> {
     let mut runs: Vec<(usize, &Range<usize>)> = elimination.runs.iter().enumerate().collect();
     runs.sort_by_key(|(_, node_blocks)| (node_blocks.start, node_blocks.end));

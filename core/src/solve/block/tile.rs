@@ -1,5 +1,5 @@
-//! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 where a scene is planar. Every loop runs along rows, which lie
-//! next to each other.
+//! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 where a scene is planar.
+//! Every loop runs along rows, which lie next to each other.
 
 use super::elimination::{Source, Stands};
 use super::stretch::Stretch;
@@ -10,12 +10,14 @@ use crate::system::{upper_entry, upper_start};
 /// A part of a vector that belongs to one tile row.
 pub type Part<const W: usize> = [f64; W];
 
-/// Rows of a tile keep their order as long as no pivot takes so many times its size from the diagonal entry of a row below it: a measure
-/// without units, as entries of L have some. What it is does not matter much: tiles that take their rows in another order are doubtful.
+/// Rows of a tile keep their order as long as no pivot takes so many times its size from the
+/// diagonal entry of a row below it: a measure without units, as entries of L have some. What it is
+/// does not matter much: tiles that take their rows in another order are doubtful.
 const GROWTH: f64 = 16.0;
 
-/// The terms that elimination takes from an entry on the diagonal may be so many times that entry: they cost as many times its round-off
-/// (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorem 13.6).
+/// The terms that elimination takes from an entry on the diagonal may be so many times that entry:
+/// they cost as many times its round-off (Higham, Accuracy and Stability of Numerical Algorithms,
+/// 2nd ed., theorem 13.6).
 const MODERATE: f64 = 1e3;
 
 /// The order in which a tile takes its rows as pivots.
@@ -239,7 +241,8 @@ where
     }
 }
 
-/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves loops keep numbers out of registers.
+/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves
+/// loops keep numbers out of registers.
 macro_rules! each_row {
     ($width:ident, |$row:ident| $work:expr) => {{
         const { assert!($width <= 6) };
@@ -342,7 +345,7 @@ where
     });
 }
 
-/// Whether w^T y is [`MODERATE`] beside the tile on the diagonal that it is taken from.
+/// True if w^T y is [`MODERATE`] beside the tile on the diagonal that it is taken from.
 #[inline(always)]
 pub fn is_moderate<const W: usize>(w: &Tile<W>, y: &Tile<W>, target: &Tile<W>) -> bool
 where
@@ -414,8 +417,9 @@ where
     each_row!(W, |r| part[r] -= Width::<W>::dot(&y[r], x));
 }
 
-/// L D L^T of a symmetric tile, whose upper triangle is read: L^T takes the place above the diagonal, 1/D that of the
-/// diagonal. The number of negative pivots; `None` where one is zero or no number.
+/// L D L^T of a symmetric tile, whose upper triangle is read: L^T takes the place above the
+/// diagonal, 1/D that of the diagonal. The number of negative pivots; `None` where one is zero or
+/// no number.
 #[inline(always)]
 pub fn factorise_symmetric<const W: usize>(tile: &mut Tile<W>) -> Option<usize>
 where
@@ -438,7 +442,8 @@ where
     (poison == 0.0).then_some(negative)
 }
 
-/// Zero; NaN where a pivot or its inverse is infinite or no number. One look at a sum of these costs less than one at each.
+/// Zero; NaN where a pivot or its inverse is infinite or no number. One look at a sum of these
+/// costs less than one at each.
 #[inline(always)]
 fn poison_of(pivot: f64, inverse: f64) -> f64 {
     (pivot + inverse) * 0.0
@@ -469,9 +474,10 @@ where
     each_row!(W, |r| w[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r])));
 }
 
-/// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds inverses. Rows stay where they are
-/// if their pivots are large enough for what is below them; else those with the largest pivots come first. Tells, too, whether no digits
-/// are lost. `None` where a pivot is zero or no number.
+/// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds
+/// inverses. Rows stay where they are if their pivots are large enough for what is below them; else
+/// those with the largest pivots come first. Tells, too, whether no digits are lost. `None` where a
+/// pivot is zero or no number.
 #[inline(always)]
 pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<(RowOrder<W>, bool)>
 where
@@ -487,7 +493,8 @@ where
     Some((order, has_grown_moderately(tile, &order, &before)))
 }
 
-/// The same with rows where they are; `false` where a pivot takes too much ([`GROWTH`]), is zero or no number.
+/// The same with rows where they are; `false` where a pivot takes too much ([`GROWTH`]), is zero or
+/// no number.
 #[inline(always)]
 fn factorise_in_order<const W: usize>(tile: &mut Tile<W>) -> bool
 where
@@ -530,7 +537,7 @@ where
     Some(order)
 }
 
-/// Whether |L| |U| is moderate beside the tile that was factorised with its rows in this order.
+/// True if |L| |U| is moderate beside the tile that was factorised with its rows in this order.
 #[inline(never)]
 fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, before: &Tile<W>) -> bool {
     let lower = |i: usize, k: usize| if k < i { factor[i][k].abs() } else { 1.0 };
@@ -543,8 +550,8 @@ fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b
     })
 }
 
-/// Whether the determinant of a tile that was factorised with its rows in this order is negative: negative pivots and exchanges of rows
-/// are odd in sum.
+/// True if the determinant of a tile that was factorised with its rows in this order is negative:
+/// negative pivots and exchanges of rows are odd in sum.
 #[inline(always)]
 pub fn has_negative_determinant<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>) -> bool {
     let mut is_negative = false;
@@ -613,7 +620,8 @@ where
     store::<W>(&lanes, w);
 }
 
-/// Of a [`factorise_symmetric`]d tile what [`solve_symmetric`] takes: L^-T (its diagonal is one) above the diagonal, D^-1 on it.
+/// Of a [`factorise_symmetric`]d tile what [`solve_symmetric`] takes: L^-T (its diagonal is one)
+/// above the diagonal, D^-1 on it.
 #[inline(always)]
 pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Upper<W>)
 where
@@ -635,7 +643,8 @@ where
     });
 }
 
-/// Of a [`factorise`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal, U^-1 from there on.
+/// Of a [`factorise`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal,
+/// U^-1 from there on.
 #[inline(always)]
 pub fn invert<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
 where
@@ -675,8 +684,8 @@ where
     row::<W>(&out)
 }
 
-/// Solves with what a factorisation has left of a tile, its triangles inverted: two products take a half of the time of two
-/// substitutions, each of whose numbers waits for the one before.
+/// Solves with what a factorisation has left of a tile, its triangles inverted: two products take a
+/// half of the time of two substitutions, each of whose numbers waits for the one before.
 #[inline(always)]
 pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
     let (mut y, mut z) = ([0.0; W], [0.0; W]);

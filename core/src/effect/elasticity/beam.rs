@@ -1,0 +1,496 @@
+//! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
+
+use super::element::{ElasticElement, ElasticPoint};
+use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
+use super::planar::PlanarElasticity;
+use crate::effect::{
+    AT_ONCE, ByOrder, Driven, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints, TangentForm, at_slots,
+    for_each_batch, side_by_side,
+};
+use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
+use crate::kernel::{ElementSystem, NodePlace, Weights};
+use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Plane, State};
+use crate::tensor::Vec3;
+use crate::threads;
+use std::marker::PhantomData;
+use std::sync::Arc;
+
+/// Elastic elements of all orders.
+pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, ElasticElement<4, 3>>;
+
+/// All beam elements that interpolate in one way.
+#[derive(Clone, Debug)]
+pub struct BeamElasticity<I> {
+    /// The elements
+    pub elements: ElasticElements,
+    /// The stress that geometric parts of the tangent are formed with, where that is not the scene's: none
+    unstressed: Option<Vec<[f64; 6]>>,
+    way: PhantomData<I>,
+}
+
+impl<I: Interpolation> BeamElasticity<I> {
+    /// Of these elements.
+    pub fn new(elements: ElasticElements) -> Self {
+        Self { elements, unstressed: None, way: PhantomData }
+    }
+
+    /// Leaves out of the tangent what stress brings to it.
+    pub fn without_geometric_stiffness(mut self) -> Self {
+        self.unstressed = Some(vec![[0.0; 6]; self.memory_points()]);
+        self
+    }
+
+    /// The integration points of the elements before this one.
+    pub(super) fn points_before(&self, element: usize) -> usize {
+        let (two, three) = (self.elements.two.len(), self.elements.three.len());
+        element + element.saturating_sub(two) + element.saturating_sub(two + three)
+    }
+
+    /// The stresses of geometric parts; empty where they are the present ones.
+    pub(super) fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
+        match &self.unstressed {
+            Some(none) => none,
+            None if memory.valid => &memory.points,
+            None => &[],
+        }
+    }
+}
+
+/// Strain and stress in beam elements, however they interpolate.
+pub trait StressField: Send + Sync {
+    /// Strain and stress (material, global components) at the integration points of an element; `None` where it is not
+    /// one of these.
+    fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>>;
+}
+
+impl<I: Interpolation> StressField for BeamElasticity<I> {
+    fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>> {
+        for_each_batch!(self.elements, |_first, batch| {
+            // Batches are in the order of the scene.
+            if let Ok(k) = batch.binary_search_by_key(&element, |e| e.connection.element) {
+                return Some(batch[k].strains_and_stresses::<I>(at).to_vec());
+            }
+        });
+        None
+    }
+}
+
+impl<I: Interpolation> Effect for BeamElasticity<I> {
+    fn name(&self) -> &'static str {
+        I::NAME
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::divisible();
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            connectivity.push(element.connection.slots());
+        });
+        connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
+    }
+
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        // Where they are the mesh shows.
+        for_each_batch!(self.elements, |_first, batch| for alike in batch.chunk_by(ElasticElement::is_like) {
+            for point in alike[0].points() {
+                show(MirrorData::Vector(point.tangent));
+                point.law.show_directions(&mut |stiffness| {
+                    show(MirrorData::Tensor(stiffness.cn));
+                    show(MirrorData::Tensor(stiffness.cm));
+                    if let Some(cc) = stiffness.cc {
+                        show(MirrorData::Coupling(cc));
+                    }
+                });
+                if let Some(free) = point.free {
+                    show(MirrorData::Vector(free.gamma));
+                    show(MirrorData::Axial(free.kappa));
+                }
+            }
+        });
+    }
+
+    fn in_plane(self: Arc<Self>, plane: &Plane) -> Option<Box<dyn PlanarForm>> {
+        Some(Box::new(PlanarElasticity::new(self, *plane)))
+    }
+
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let remembered = self.remembered(memory);
+        for_each_batch!(self.elements, out.instances(), |first, batch| {
+            let part = remembered.get(self.points_before(first)..).unwrap_or_default();
+            let done = Instructions::here().run_side_by_side(
+                #[inline(always)]
+                || add_batch::<I, _, _>(batch, first, part, at, weights, out),
+            );
+            if done.is_none() {
+                let mut work = workspace(batch);
+                let each = batch.iter().enumerate();
+                each.for_each(|(k, element)| {
+                    element.add::<I>(first + k, stresses_of(part, k), at, weights.stiffness, &mut work, out);
+                });
+            }
+        });
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        let mut strain = 0.0;
+        for_each_batch!(self.elements, |_first, batch| {
+            threads::in_order(batch.chunks(AT_ONCE), |batch| energy_of::<I, _, _>(batch, at), |own| strain += own);
+        });
+        Energy { kinetic: 0.0, strain }
+    }
+
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let mut largest = 0.0_f64;
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            largest = largest.max(element.strain_of::<I>(at, field, length));
+        });
+        largest
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles { stresses: Some(self), driven: Some(self), ..Roles::NONE }
+    }
+}
+
+impl<I: Interpolation> StressPoints for BeamElasticity<I> {
+    fn memory_points(&self) -> usize {
+        let ByOrder { two, three, four } = &self.elements;
+        self.points_before(two.len() + three.len() + four.len())
+    }
+
+    fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
+        for_each_batch!(self.elements, |first, batch| {
+            let own = &mut memory.points[self.points_before(first)..self.points_before(first + batch.len())];
+            extrapolate_batch::<I, _, _>(batch, at, dq, own);
+        });
+        memory.valid = true;
+    }
+
+    fn stiffness_along(&self, at: &State, field: &[Vec3]) -> Option<f64> {
+        let mut sum = 0.0;
+        for_each_batch!(self.elements, |_first, batch| for element in batch {
+            sum += element.stiffness_along::<I>(at, field)?;
+        });
+        Some(sum)
+    }
+
+    fn round_off(&self, at: &State) -> RoundOff {
+        let mut largest = RoundOff::default();
+        for_each_batch!(self.elements, |_first, batch| {
+            threads::in_order(
+                batch.chunks(AT_ONCE),
+                |part| noise_of(part, at),
+                |round_off| largest = largest.or(round_off),
+            );
+        });
+        largest
+    }
+}
+
+impl<I: Interpolation> Driven for BeamElasticity<I> {
+    fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
+        for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
+            let pull: f64 = element
+                .points()
+                .iter()
+                .zip(&element.strains_and_stresses::<I>(at))
+                .map(|(point, (_, stress))| {
+                    let free = point.free.unwrap_or_default();
+                    -point.weight * (free.gamma.dot(stress.n) + free.kappa.dot(stress.m))
+                })
+                .sum();
+            show(element.free_amplitude(at), pull);
+        });
+    }
+}
+
+/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the stiffness against bending by 1e-7 of itself.
+const UNSTRAINED: f64 = 1e-14;
+
+/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000 elements they add up to 1e-8.
+const UNBENT: f64 = 1e-12;
+
+/// The largest round-off of the forces of some elements.
+fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> RoundOff {
+    let mut largest = RoundOff::default();
+    for element in batch {
+        let nodes = element.connection.nodes.iter();
+        let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
+        element.each_noise(u, |round_off| largest = largest.or(round_off));
+    }
+    largest
+}
+
+/// Adds the elements of one order, `first` instances after the first one of the effect; `remembered` are the stresses of
+/// geometric parts.
+#[inline(always)]
+fn add_batch<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    first: usize,
+    remembered: &[[f64; 6]],
+    at: &State,
+    weights: Weights,
+    out: &mut Assembler,
+) {
+    let stiffness = weights.stiffness;
+    let mut systems = out.lend(2 * N, stiffness != 0.0);
+    let mut scratch = Scratch::lent(N, I::CARRIES_BACK && !is_half_way(N, G), out);
+    let mut alone = None;
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
+        let posture = Posture::side_by_side(each_lane!(|k| elements[k].member()), at);
+        I::View::new(&posture).fill(&sum, stiffness, &mut scratch, &mut systems);
+        let count = LANES.min(batch.len() - start);
+        let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
+        out.add_lanes(first + start, count, &systems, is_mixed, |k, out| {
+            let work = alone.get_or_insert_with(|| workspace(batch));
+            elements[k].add::<I>(first + start + k, stresses_of(remembered, start + k), at, stiffness, work, out);
+        });
+    }
+    out.take_back(systems);
+    scratch.give_back(out);
+}
+
+/// Element systems to compute with, one element of the batch at a time.
+pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> (ElementSystem, Scratch) {
+    (ElementSystem::new(2 * N), Scratch::new(N))
+}
+
+/// The remembered stresses of the points of element k.
+pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
+    let own = remembered.get(k * G..(k + 1) * G)?;
+    Some(std::array::from_fn(|g| unpack(&own[g])))
+}
+
+/// The points of an element, or of several side by side, with the stresses that geometric parts are formed with where these are
+/// not the present ones.
+struct Sum<const N: usize, const G: usize, T> {
+    points: [ElasticPoint<N, T>; G],
+    stresses: Option<[Stress<T>; G]>,
+    free: T,
+}
+
+impl<const N: usize, const G: usize> Sum<N, G, Lanes> {
+    #[inline(always)]
+    fn side_by_side(elements: [&ElasticElement<N, G>; LANES], remembered: &[[f64; 6]], at: &State) -> Self {
+        let points = ElasticElement::points_side_by_side(elements);
+        let free = Lanes(each_lane!(|k| elements[k].free_amplitude(at)));
+        let none = Stress { n: Vec3::zero(), m: Vec3::zero() };
+        let mut stresses = (!remembered.is_empty()).then_some([none; G]);
+        if let Some(stresses) = &mut stresses {
+            for g in 0..G {
+                let stress = |k: usize| &remembered[(k * G + g).min(remembered.len() - 1)];
+                stresses[g] = unpack(&Pack::pack(each_lane!(|k| stress(k))));
+            }
+        }
+        Self { points, stresses, free }
+    }
+}
+
+impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
+    #[inline(always)]
+    fn add(&self, nodes: &[NodePlace<T>; N], stiffness: f64, out: &mut ElementSystem<T>) {
+        for g in 0..G {
+            let geometric = self.stresses.as_ref().map(|stresses| &stresses[g]);
+            self.points[g].add_elastic(nodes, self.free, geometric, stiffness, out);
+        }
+    }
+
+    #[inline(always)]
+    fn add_geometric(&self, nodes: &[NodePlace<T>; N], out: &mut ElementSystem<T>) -> bool {
+        let Some(stresses) = &self.stresses else { return false };
+        for g in 0..G {
+            let point = &self.points[g];
+            point.add_force(&point.configuration(nodes), &stresses[g], out);
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
+        let geometric = self.stresses.as_ref().map(|stresses| &stresses[0]);
+        is_half_way(N, G).then(|| HalfWay { point: &self.points[0], free: self.free, geometric })
+    }
+}
+
+#[inline(always)]
+fn unpack<T: Real>(s: &[T; 6]) -> Stress<T> {
+    Stress { n: Vec3([s[0], s[1], s[2]]), m: Vec3([s[3], s[4], s[5]]) }
+}
+
+#[inline(always)]
+pub(super) fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
+    let Stress { n, m } = stress;
+    [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]]
+}
+
+/// The stresses that the points of a batch are expected to have after the correction `dq`.
+fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    threads::each(batch.chunks(AT_ONCE).zip(out.chunks_mut(AT_ONCE * G)), |(batch, out)| {
+        let done = Instructions::here().run_side_by_side(
+            #[inline(always)]
+            || extrapolate_side_by_side::<I, _, _>(batch, at, dq, out),
+        );
+        if done.is_none() {
+            let each = batch.iter().zip(out.as_chunks_mut::<G>().0);
+            each.for_each(|(element, stresses)| element.extrapolate::<I>(at, dq, stresses));
+        }
+    });
+}
+
+#[inline(always)]
+fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let sum = Sum::side_by_side(elements, &[], at);
+        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| elements[k].member()), at));
+        let du: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].u)));
+        let dp: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].p)));
+        let stresses = view.extrapolated(&sum.points, sum.free, &du, &dp);
+        for g in 0..G {
+            let stress = packed(&stresses[g]);
+            for k in 0..LANES.min(batch.len() - start) {
+                out[(start + k) * G + g] = stress.map(|lanes| lanes.0[k]);
+            }
+        }
+        for (k, element) in elements.iter().enumerate().take(batch.len() - start) {
+            if at.mixed[element.connection.element as usize] != 0 {
+                element.extrapolate::<I>(at, dq, &mut out[(start + k) * G..]);
+            }
+        }
+    }
+}
+
+/// The strain energy of some elements.
+fn energy_of<I: Interpolation, const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> f64 {
+    let mut sum = 0.0;
+    let mut add = |energy: f64| sum += energy;
+    let done = Instructions::here().run_side_by_side(
+        #[inline(always)]
+        || each_energy::<I, _, _>(batch, at, &mut add),
+    );
+    if done.is_none() {
+        batch.iter().for_each(|element| add(element.energy::<I>(at)));
+    }
+    sum
+}
+
+/// Shows the strain energy of each element, in their order.
+#[inline(always)]
+fn each_energy<I: Interpolation, const N: usize, const G: usize>(
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    show: &mut dyn FnMut(f64),
+) {
+    for start in (0..batch.len()).step_by(LANES) {
+        let elements = side_by_side(batch, start);
+        let sum = Sum::side_by_side(elements, &[], at);
+        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| elements[k].member()), at));
+        let energies = strain_energy(&sum.points, view.nodes(), sum.free);
+        for (k, element) in elements.iter().enumerate().take(batch.len() - start) {
+            let mixed = at.mixed[element.connection.element as usize] != 0;
+            show(if mixed { element.energy::<I>(at) } else { energies.0[k] });
+        }
+    }
+}
+
+/// The strain energy of an element, by its points and the nodes that its kernel is shown.
+#[inline(always)]
+fn strain_energy<const N: usize, const G: usize, T: Real>(
+    points: &[ElasticPoint<N, T>; G],
+    nodes: &[NodePlace<T>; N],
+    free: T,
+) -> T {
+    let mut sum = T::zero();
+    for point in points {
+        sum += point.energy(nodes, free);
+    }
+    sum
+}
+
+impl<const N: usize, const G: usize> ElasticElement<N, G> {
+    pub(super) fn free_amplitude(&self, at: &State) -> f64 {
+        self.free().map_or(0.0, |number| at.amplitude[number])
+    }
+
+    /// Strain and stress at each integration point (material, global components).
+    pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
+        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
+        self.points().map(|point| point.strain_and_stress(view.nodes(), free))
+    }
+
+    #[inline(never)]
+    fn energy<I: Interpolation>(&self, at: &State) -> f64 {
+        strain_energy(&self.points(), I::see(self.member(), at).nodes(), self.free_amplitude(at))
+    }
+
+    /// The largest |dGamma| or |dK| length that increments of the unknowns make.
+    fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
+        let at_point = |point: &ElasticPoint<N>| {
+            let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
+            strain.gamma.norm().max(strain.kappa.norm() * length)
+        };
+        self.points().iter().map(at_point).fold(0.0, f64::max)
+    }
+
+    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
+    fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
+        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
+        let (free, length) = (self.free_amplitude(at), self.points().iter().map(|point| point.weight).sum::<f64>());
+        let at_point = |point: &ElasticPoint<N>| {
+            let elastic = point.elastic_strain(view.nodes(), free);
+            if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
+                return None;
+            }
+            let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
+            let stress = point.law.stiffness_at_rest().stress(&strain);
+            Some(point.weight * (stress.n.dot(strain.gamma) + stress.m.dot(strain.kappa)))
+        };
+        self.points().iter().map(at_point).sum()
+    }
+
+    /// Adds the element alone as instance `number`; its nodes may sit in different charts.
+    #[inline(never)]
+    pub(super) fn add<I: Interpolation>(
+        &self,
+        number: usize,
+        stresses: Option<[Stress; G]>,
+        at: &State,
+        stiffness: f64,
+        (system, scratch): &mut (ElementSystem, Scratch),
+        out: &mut Assembler,
+    ) {
+        let sum = Sum { points: self.points(), stresses, free: self.free_amplitude(at) };
+        I::evaluate(self.member(), at, stiffness, scratch, system, &sum);
+        out.add(number, system);
+    }
+
+    /// The stress that each point is expected to have after the correction `dq`.
+    #[inline(never)]
+    fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
+        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
+        let (du, dp) = self.connection.variations_in_one_chart(at, dq);
+        let stresses = view.extrapolated(&self.points(), free, &du, &dp);
+        out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));
+    }
+}

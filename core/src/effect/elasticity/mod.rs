@@ -1,0 +1,12 @@
+//! Beams as elastic bodies: their stresses, interpolated in two ways, and the damping of strain rates.
+
+mod beam;
+mod element;
+mod interpolation;
+mod planar;
+mod strain_rate_damping;
+
+pub use beam::{BeamElasticity, ElasticElements, StressField};
+pub use element::{BeamLaw, ElasticElement, ElasticPoint};
+pub use interpolation::{Interpolation, RelativeVectors, TotalVectors};
+pub use strain_rate_damping::StrainRateDamping;

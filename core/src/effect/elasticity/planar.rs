@@ -1,0 +1,203 @@
+//! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a node.
+
+use super::beam::{BeamElasticity, stresses_of, workspace};
+use super::element::{BeamLaw, ElasticElement};
+use super::interpolation::Interpolation;
+use crate::effect::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
+use crate::kernel::law::{PlanarStress, StoredLaw, Stress};
+use crate::kernel::planar::{PlanarNode, PlanarPoint, flattened, in_one_turn, in_space};
+use crate::kernel::{PlanarSystem, Weights};
+use crate::scalar::{Instructions, LANES, Lanes, Pack, Real, each_lane};
+use crate::system::{Assembler, Memory, Plane, Slot, State};
+use crate::tensor::Vec3;
+use crate::threads;
+use std::sync::Arc;
+
+/// The elements of an effect in space, side by side in their order. Where axes are turned in the plane, or nodes sit in
+/// different charts, the effect in space does the work.
+pub struct PlanarElasticity<I> {
+    plane: Plane,
+    spatial: Arc<BeamElasticity<I>>,
+    blocks: ByOrder<Block<2, 1>, Block<3, 2>, Block<4, 3>>,
+}
+
+/// An integration point of elements side by side.
+type PlanarPoints<const N: usize> = <PlanarPoint<N, f64, <BeamLaw as StoredLaw>::InPlane> as Pack>::Packed;
+
+/// Elements side by side.
+struct Block<const N: usize, const G: usize> {
+    u: [[Slot; LANES]; N],
+    p: [[Slot; LANES]; N],
+    points: [PlanarPoints<N>; G],
+}
+
+impl<I: Interpolation> PlanarElasticity<I> {
+    /// The elements of `spatial`, which lie in this plane.
+    pub fn new(spatial: Arc<BeamElasticity<I>>, plane: Plane) -> Self {
+        let elements = &spatial.elements;
+        let blocks = ByOrder {
+            two: blocks(&elements.two, &plane),
+            three: blocks(&elements.three, &plane),
+            four: blocks(&elements.four, &plane),
+        };
+        Self { plane, spatial, blocks }
+    }
+}
+
+fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane: &Plane) -> Vec<Block<N, G>> {
+    let block = |number: usize| {
+        let elements = &batch[number * LANES..batch.len().min((number + 1) * LANES)];
+        let all: [&ElasticElement<N, G>; LANES] = each_lane!(|k| &elements[k.min(elements.len() - 1)]);
+        let point = |g: usize| {
+            let points = all.map(|element| PlanarPoint::new(&element.points()[g], plane.axes()));
+            PlanarPoint::pack(points.each_ref())
+        };
+        Block {
+            u: std::array::from_fn(|i| all.map(|element| element.connection.nodes[i].u)),
+            p: std::array::from_fn(|i| all.map(|element| element.connection.nodes[i].p)),
+            points: std::array::from_fn(point),
+        }
+    };
+    threads::list(batch.len().div_ceil(LANES), block)
+}
+
+impl<const N: usize, const G: usize> Block<N, G> {
+    /// A field of slots at the nodes, in the plane.
+    #[inline(always)]
+    fn nodes(&self, field: &[Vec3], plane: &Plane) -> [PlanarNode<Lanes>; N] {
+        let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
+        let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
+        let mut out = [PlanarNode { u: [Lanes::zero(); 2], angle: Lanes::zero() }; N];
+        for i in 0..N {
+            let (u, p) = (at_slots(field, self.u[i]), at_slots(field, self.p[i]));
+            out[i] = PlanarNode { u: [along(u, a), along(u, b)], angle: along(p, e) };
+        }
+        out
+    }
+}
+
+/// The amplitudes of free strains of elements side by side.
+#[inline(always)]
+fn free<const N: usize, const G: usize>(elements: &[ElasticElement<N, G>], at: &State) -> Lanes {
+    Lanes(each_lane!(|k| elements[k.min(elements.len() - 1)].free_amplitude(at)))
+}
+
+/// The stresses that geometric parts are formed with, of the point with this number in each element.
+#[inline(always)]
+fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> PlanarStress<Lanes> {
+    let last = memory.len() / G - 1;
+    let of = each_lane!(|k| &memory[k.min(last) * G + g]);
+    let mut stress = Stress { n: Vec3::zero(), m: Vec3::zero() };
+    for c in 0..3 {
+        stress.n.0[c] = Lanes(each_lane!(|k| of[k][c]));
+        stress.m.0[c] = Lanes(each_lane!(|k| of[k][c + 3]));
+    }
+    flattened(&stress, plane.axes())
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn add_batch<I: Interpolation, const N: usize, const G: usize>(
+    plane: &Plane,
+    blocks: &[Block<N, G>],
+    batch: &[ElasticElement<N, G>],
+    first: usize,
+    memory: &[[f64; 6]],
+    at: &State,
+    weights: Weights,
+    out: &mut Assembler,
+) {
+    let (stiffness, mut alone, mut system) = (weights.stiffness, None, PlanarSystem::zero());
+    for number in own_blocks(first, batch.len(), out) {
+        let (block, start) = (&blocks[number], number * LANES);
+        let elements = &batch[start..batch.len().min(start + LANES)];
+        let mut nodes = block.nodes(&at.q, plane);
+        in_one_turn(&mut nodes);
+        let (free, own) = (free(elements, at), memory.get(start * G..).filter(|own| !own.is_empty()));
+        system.clear_for(stiffness);
+        for g in 0..G {
+            let geometric = own.map(|own| remembered::<G>(own, g, plane));
+            block.points[g].add(&nodes, free, geometric.as_ref(), stiffness, &mut system);
+        }
+        let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
+        out.add_planar(plane, first + start, elements.len(), &system, is_mixed, |k, out| {
+            let work = alone.get_or_insert_with(|| workspace(batch));
+            elements[k].add::<I>(first + start + k, stresses_of(memory, start + k), at, stiffness, work, out);
+        });
+    }
+}
+
+fn extrapolate_batch<const N: usize, const G: usize>(
+    plane: &Plane,
+    blocks: &[Block<N, G>],
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    let parts = blocks.chunks(AT_ONCE / LANES).zip(batch.chunks(AT_ONCE)).zip(out.chunks_mut(AT_ONCE * G));
+    threads::each(parts, |((blocks, batch), out)| {
+        Instructions::here().run(
+            #[inline(always)]
+            || extrapolate_blocks(plane, blocks, batch, at, dq, out),
+        );
+    });
+}
+
+#[inline(always)]
+fn extrapolate_blocks<const N: usize, const G: usize>(
+    plane: &Plane,
+    blocks: &[Block<N, G>],
+    batch: &[ElasticElement<N, G>],
+    at: &State,
+    dq: &[Vec3],
+    out: &mut [[f64; 6]],
+) {
+    for (number, block) in blocks.iter().enumerate() {
+        let start = number * LANES;
+        let elements = &batch[start..batch.len().min(start + LANES)];
+        let (mut nodes, change) = (block.nodes(&at.q, plane), block.nodes(dq, plane));
+        in_one_turn(&mut nodes);
+        for g in 0..G {
+            let stress = block.points[g].extrapolated_stress(&nodes, free(elements, at), &change);
+            let packed = super::beam::packed(&in_space(stress, plane.axes()));
+            for k in 0..elements.len() {
+                out[(start + k) * G + g] = packed.map(|lanes| lanes.0[k]);
+            }
+        }
+    }
+}
+
+impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
+        let (two, three) = (elements.two.len(), elements.three.len());
+        let known = |first: usize| {
+            let points = self.spatial.points_before(first);
+            self.spatial.remembered(memory).get(points..).unwrap_or_default()
+        };
+        Instructions::here().run(
+            #[inline(always)]
+            || {
+                add_batch::<I, 2, 1>(plane, &blocks.two, &elements.two, 0, known(0), at, weights, out);
+                add_batch::<I, 3, 2>(plane, &blocks.three, &elements.three, two, known(two), at, weights, out);
+                let first = two + three;
+                add_batch::<I, 4, 3>(plane, &blocks.four, &elements.four, first, known(first), at, weights, out);
+            },
+        );
+    }
+
+    fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
+        let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
+        let (two, rest) = memory.points.split_at_mut(elements.two.len());
+        let (three, four) = rest.split_at_mut(2 * elements.three.len());
+        extrapolate_batch(plane, &blocks.two, &elements.two, at, dq, two);
+        extrapolate_batch(plane, &blocks.three, &elements.three, at, dq, three);
+        extrapolate_batch(plane, &blocks.four, &elements.four, at, dq, four);
+        memory.valid = true;
+    }
+}

@@ -1,0 +1,98 @@
+//! Forces of inertia and damping of a structure that a static stage finds in motion: they fade with its load factor.
+//!
+//! A static stage knows no inertia. Where it follows a dynamic one the state that it begins with is out of balance by all that inertia and
+//! damping carried, and no smaller load level would bring balance nearer. So the stage begins in balance with these forces, and takes them
+//! away from load factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that this had: they have a
+//! potential, and their tangent is zero until the chart changes.
+
+use crate::effect::{Effect, Roles, TangentForm, one_by_one, own_part};
+use crate::kernel::load::force_on_complement;
+use crate::kernel::{ElementSystem, Weights};
+use crate::rotation::complement;
+use crate::system::{
+    Assembler, Category, Connectivity, Fading, Memory, MirrorData, Slot, StageContext, StageSet, State,
+};
+use crate::tensor::{Mat3, Vec3};
+
+/// The forces at all slots of nodes, see [`State::fading`].
+#[derive(Clone, Debug)]
+pub struct FadingInertia {
+    /// The slots, each with whether it is one of a rotation
+    pub slots: Vec<(Slot, bool)>,
+    /// The static stages that may begin in motion
+    pub stages: StageSet,
+}
+
+impl Effect for FadingInertia {
+    fn name(&self) -> &'static str {
+        "fading inertia"
+    }
+
+    fn category(&self) -> Category {
+        Category::External
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        one_by_one(&self.slots)
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::Symmetric
+    }
+
+    fn acts(&self, stage: &StageContext) -> bool {
+        stage.kind.ramps_load() && self.stages.contains(stage.number)
+    }
+
+    /// Motion that lies in a plane has forces that do.
+    fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        if at.fading.is_empty() {
+            return;
+        }
+        let (share, mut system) = (1.0 - at.load, ElementSystem::new(1));
+        for k in own_part(0, self.slots.len(), &out.instances()) {
+            let (slot, turns) = self.slots[k];
+            let (force, tangent) = fading_force(&at.fading[slot as usize], turns, at.q[slot as usize]);
+            system.clear();
+            system.add_force(0, force * share);
+            system.add_tangent(0, 0, tangent * (share * weights.stiffness));
+            out.add(k, &system);
+        }
+    }
+
+    fn strain_of(&self, _at: &State, _field: &[Vec3], _length: f64) -> f64 {
+        0.0
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
+    }
+}
+
+/// The whole force over the present unknowns, and its tangent.
+pub fn fading_force(fading: &Fading, turns: bool, q: Vec3) -> (Vec3, Mat3) {
+    let is_far = |p: Vec3| (complement(p) - fading.at).squared() < (p - fading.at).squared();
+    match turns && q != Vec3::ZERO && is_far(q) {
+        true => force_on_complement(q, fading.force),
+        false => (fading.force, Mat3::ZERO),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The work of a force along a motion does not depend on the chart that its node has come to.
+    #[test]
+    fn a_change_of_chart_changes_no_work() {
+        let fading = Fading { force: Vec3([1.0, -2.0, 0.5]), at: Vec3([0.2, 2.9, 0.3]) };
+        let (p, increment) = (Vec3([0.3, 3.2, 0.4]), Vec3([1e-6, 2e-6, -3e-6]));
+        let work = |from: Vec3, to: Vec3| fading_force(&fading, true, from).0.dot(to - from);
+        let (near, far) = (work(p, p + increment), work(complement(p), complement(p + increment)));
+        assert!((near - far).abs() < 1e-11 && near.abs() > 1e-6, "{near} {far}");
+        assert_eq!(fading_force(&fading, true, Vec3::ZERO), (fading.force, Mat3::ZERO));
+        assert_eq!(fading_force(&fading, false, complement(p)), (fading.force, Mat3::ZERO));
+    }
+}

@@ -1,0 +1,27 @@
+//! Mass of beams and bodies: inertia at rest and in rotating frames, the damping that goes with mass, and inertia that fades.
+
+mod beam_mass;
+mod fading;
+mod mass_damping;
+mod planar;
+mod rigid_body;
+mod rotary;
+mod rotating_frame;
+mod section;
+
+pub use beam_mass::BeamMass;
+pub use fading::{FadingInertia, fading_force};
+pub use mass_damping::{BeamMassDamping, BodyMassDamping};
+pub use rigid_body::{Body, RigidBody};
+pub use rotary::RotaryInertia;
+pub use rotating_frame::RotatingFrame;
+pub use section::SectionInertia;
+
+use crate::kernel::inertia::Inertia;
+use crate::system::MirrorData;
+
+/// Shows the mass properties that decide whether a scene lies in a plane.
+pub(super) fn inertia_mirror_data(inertia: &Inertia, show: &mut dyn FnMut(MirrorData)) {
+    show(MirrorData::Vector(inertia.offset));
+    show(MirrorData::Tensor(inertia.about_node));
+}

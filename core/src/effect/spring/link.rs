@@ -1,0 +1,166 @@
+//! Springs and cables between two nodes: a force along the line that joins them,
+//!
+//! ```text
+//! n = (x_b - x_a)/l,   F = k (l - l0) + c dl/dt,   f_b = F n = -f_a
+//! ```
+
+use crate::effect::{Effect, Energy, Roles, TangentForm};
+use crate::kernel::{ElementSystem, Weights};
+use crate::scalar::Real;
+use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, State};
+use crate::tensor::{Mat3, Vec3};
+
+/// A spring or cable between two nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// The nodes at its ends
+    pub nodes: [Node; 2],
+    /// Their initial places
+    pub places: [Vec3; 2],
+    /// k, force per length
+    pub stiffness: f64,
+    /// c, force per velocity
+    pub damping: f64,
+    /// l0, its length without force
+    pub length: f64,
+    /// A cable does not push.
+    pub tension_only: bool,
+    /// The number of its amplitude: 0 in stages where it is absent, else 1
+    pub amplitude: usize,
+}
+
+/// All springs and cables between nodes.
+#[derive(Clone, Debug)]
+pub struct Links {
+    /// The springs and cables
+    pub links: Vec<Link>,
+}
+
+/// The force at the second node and its derivatives over its place and velocity, relative to the first.
+#[derive(Clone, Copy, Debug)]
+pub struct Pull<T = f64> {
+    /// k (l - l0) n
+    pub elastic: Vec3<T>,
+    /// c dl/dt n
+    pub damping: Vec3<T>,
+    /// Over the place
+    pub over_place: Mat3<T>,
+    /// Over the velocity
+    pub over_velocity: Mat3<T>,
+}
+
+impl Link {
+    /// The pull over the vector `d` from the first node to the second, and its rate.
+    pub fn pull<T: Real>(&self, d: Vec3<T>, rate: Vec3<T>) -> Pull<T> {
+        let zero = Pull {
+            elastic: Vec3::zero(),
+            damping: Vec3::zero(),
+            over_place: Mat3::zero(),
+            over_velocity: Mat3::zero(),
+        };
+        let length = d.norm();
+        let slack = self.tension_only && length.largest() <= self.length;
+        if slack {
+            return zero;
+        }
+        if length.largest() == 0.0 {
+            // No direction of its own: as if it had no length.
+            return Pull { over_place: Mat3::identity().scale(self.stiffness), ..zero };
+        }
+        let inverse = T::one() / length;
+        let n = d * inverse;
+        let along = n.outer(n);
+        let force = (length - T::constant(self.length)) * self.stiffness;
+        let speed = n.dot(rate);
+        let drag = speed * self.damping;
+        let across = (Mat3::identity() - along) * ((force + drag) * inverse);
+        let turning = n.outer(rate - n * speed) * (inverse * self.damping);
+        Pull {
+            elastic: n * force,
+            damping: n * drag,
+            over_place: along.scale(self.stiffness) + across + turning,
+            over_velocity: along.scale(self.damping),
+        }
+    }
+
+    fn between(&self, at: &State) -> (Vec3, Vec3) {
+        let [a, b] = self.nodes.map(|node| node.u as usize);
+        (self.places[1] - self.places[0] + (at.q[b] - at.q[a]), at.v[b] - at.v[a])
+    }
+}
+
+impl Effect for Links {
+    fn name(&self) -> &'static str {
+        "springs and cables between nodes"
+    }
+
+    fn category(&self) -> Category {
+        Category::Internal
+    }
+
+    fn damps(&self) -> bool {
+        self.links.iter().any(|link| link.damping != 0.0)
+    }
+
+    fn connectivity(&self) -> Connectivity {
+        let mut connectivity = Connectivity::default();
+        self.links.iter().for_each(|link| connectivity.push(link.nodes.map(|node| node.u)));
+        connectivity
+    }
+
+    fn tangent(&self) -> TangentForm {
+        TangentForm::symmetric(!self.damps())
+    }
+
+    fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
+        self.links.iter().flat_map(|link| link.places).for_each(|place| show(MirrorData::Place(place)));
+    }
+
+    fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
+        let mut system = ElementSystem::new(2);
+        for (k, link) in self.links.iter().enumerate() {
+            let on = at.amplitude[link.amplitude];
+            let (d, rate) = link.between(at);
+            let pull = link.pull(d, rate);
+            let tangent =
+                pull.over_place.scale(weights.stiffness * on) + pull.over_velocity.scale(weights.damping * on);
+            system.clear();
+            system.add_force(0, -pull.elastic * on);
+            system.add_force(1, pull.elastic * on);
+            for (row, column, sign) in [(0, 0, 1.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)] {
+                system.add_tangent(row, column, tangent.scale(sign));
+            }
+            out.add(k, &system);
+            if link.damping != 0.0 {
+                out.add_damping(k, &[-pull.damping * on, pull.damping * on]);
+            }
+        }
+    }
+
+    fn energy(&self, at: &State) -> Energy {
+        let one = |link: &Link| {
+            let stretch = link.between(at).0.norm() - link.length;
+            let slack = link.tension_only && stretch <= 0.0;
+            if slack { 0.0 } else { 0.5 * link.stiffness * stretch * stretch * at.amplitude[link.amplitude] }
+        };
+        Energy { kinetic: 0.0, strain: self.links.iter().map(one).sum() }
+    }
+
+    fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
+        let one = |link: &Link| {
+            let [a, b] = link.nodes.map(|node| field[node.u as usize]);
+            let (d, change) = (link.between(at).0, b - a);
+            let distance = d.norm();
+            let slack = link.tension_only && distance <= link.length;
+            // Ends in one place have no direction of their own.
+            let stretch = if distance == 0.0 { change.norm() } else { d.dot(change).abs() / distance };
+            if slack || link.stiffness == 0.0 { 0.0 } else { stretch / length }
+        };
+        let acting = self.links.iter().filter(|link| at.amplitude[link.amplitude] != 0.0);
+        acting.map(one).fold(0.0, f64::max)
+    }
+
+    fn roles(&self) -> Roles<'_> {
+        Roles::NONE
+    }
+}

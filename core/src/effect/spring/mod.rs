@@ -1,0 +1,7 @@
+//! Springs and dampers: from nodes to ground, and between nodes, cables among them.
+
+mod ground;
+mod link;
+
+pub use ground::{GroundSpring, GroundSprings, rotational};
+pub use link::{Link, Links, Pull};

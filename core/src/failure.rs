@@ -1,0 +1,86 @@
+//! What a run can end with: names that are part of the contract with users, each said once.
+
+/// Who is to act after a failure; exit statuses follow it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The deck asks for what cannot be.
+    Deck,
+    /// The numerics gave up.
+    Numerics,
+    /// A file could not be read or written.
+    File,
+    /// A signal stopped the run.
+    Signal,
+}
+
+/// The enum of kinds from a table: what each means, its variant, its name, its cause.
+macro_rules! failure_kinds {
+    ($($(#[doc = $meaning:literal])+ $kind:ident: $name:literal, $cause:ident;)+) => {
+        /// Kinds of failures.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum FailureKind {
+            $($(#[doc = $meaning])+ $kind,)+
+        }
+
+        impl FailureKind {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$kind),+];
+
+            /// Its name in run.json, in decks and on the terminal.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kind => $name,)+
+                }
+            }
+
+            /// Its cause.
+            pub const fn cause(self) -> Cause {
+                match self {
+                    $(Self::$kind => Cause::$cause,)+
+                }
+            }
+        }
+    };
+}
+
+failure_kinds! {
+    /// The deck is wrong, or asks for a stage that cannot begin.
+    Deck: "deck", Deck;
+    /// Neighbouring nodes turn too far against each other.
+    MeshTooCoarse: "mesh_too_coarse", Numerics;
+    /// No balance was found, or no step that is short enough.
+    NotConverged: "not_converged", Numerics;
+    /// A mechanism or a loose part.
+    Singular: "singular", Numerics;
+    /// A force, a motion or a result is not finite.
+    NonFinite: "non_finite", Numerics;
+    /// The total energy grows where nothing brings any.
+    EnergyGrowth: "energy_growth", Numerics;
+    /// Larger than the stated bounds.
+    Limit: "limit", Deck;
+    /// A file could not be read or written.
+    Io: "io", File;
+    /// A signal stopped the run.
+    Interrupted: "interrupted", Signal;
+}
+
+impl FailureKind {
+    /// The kind of this name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|kind| kind.name() == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_words() {
+        for kind in FailureKind::ALL {
+            assert!(kind.name().chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{kind:?}");
+            assert_eq!(FailureKind::of(kind.name()), Some(*kind));
+        }
+        assert_eq!(FailureKind::of("finished"), None);
+    }
+}

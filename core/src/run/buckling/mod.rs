@@ -1,0 +1,305 @@
+//! Where the path of equilibrium loses its stiffness: K(q(load), load) x = 0.
+//!
+//! About the present state the tangent varies along the path as K + m K', with K' its derivative
+//! over the load factor; the eigenvalues m of K x = -m K' x tell how far away the critical loads
+//! are. Each is then followed: the path is continued to the load found, and looked at again from
+//! there, until it is reached.
+
+mod search;
+mod spectrum;
+mod walk;
+
+use self::search::{CriticalSearch, Sight};
+use self::spectrum::{critical_loads, negative_pivots, rank};
+use self::walk::{Walked, continue_path, has_leapt};
+use super::distance::distance;
+use super::failure::Failure;
+use super::results::{CriticalKind, CriticalLoad, StageResult};
+use super::stage_run::{Analysis, StageRun};
+use super::statics::PathDirection;
+use crate::system::State;
+use crate::warning::WarningKind;
+
+/// Looks at one critical load
+const MOST_LOOKS: usize = 80;
+/// Where pivots cannot be counted: an estimate this near to where it was made; what is left over is
+/// its square.
+const NEAR: f64 = 1e-4;
+/// The motion by a unit of load just before a limit point, over that at the start: the root of one
+/// over the part of a load to which it is closed in.
+const RUNS_AWAY: f64 = 50.0;
+/// The way, over a load, that a path goes on behind it where it has no limit point there.
+const BEHIND: f64 = 1e-4;
+/// The part of a load to which the tangent next to it must foresee it: then it is critical for all
+/// that can be told.
+const FORESEEN: f64 = 1e-4;
+/// The part of a load to which the tangent foresees it where an imperfection turns the path aside.
+const ASIDE: f64 = 1e-2;
+/// The largest distance of states on both sides of a critical load that lie on one path.
+const APART: f64 = 1e-3;
+/// Where the tangent is extrapolated: the part of the way to where it would be singular between two
+/// looks.
+const STRIDE_AHEAD: f64 = 0.15;
+/// The part of a critical load by which the last extrapolation lies before it.
+const NEAREST_EXTRAPOLATION: f64 = 5e-3;
+/// Looks of one extrapolation.
+const MOST_EXTRAPOLATIONS: usize = 48;
+
+/// The message about a scene without critical loads.
+const NOTHING_BUCKLES: &str = "no load of this scene takes stiffness away: nothing can buckle (under following loads it may flutter: see a modal \
+                               stage)";
+
+/// A buckling stage.
+pub(super) struct Buckling<'s, 'r> {
+    pub stage: &'s mut StageRun<'r>,
+    /// The number of critical loads that are asked for
+    pub modes: usize,
+}
+
+impl<'r> Analysis<'r> for Buckling<'_, 'r> {
+    fn stage(&mut self) -> &mut StageRun<'r> {
+        self.stage
+    }
+
+    /// Finds the critical loads nearest above the present one, then those below it.
+    fn run(&mut self) -> Result<(), Failure> {
+        self.stand_still()?;
+        let load = self.stage.state.load;
+        let loads = critical_loads(self.stage, self.modes)?;
+        if loads.is_empty() {
+            return Err(Failure::Deck(NOTHING_BUCKLES.into()));
+        }
+        let start = self.stage.state.clone();
+        // Next to a critical load round-off moves the scene along; the load itself is closed in by
+        // pivots.
+        let uncertainty = self.stage.counters.work.uncertainty;
+        let mut found = Vec::new();
+        for number in 0..loads.len() {
+            found.push(self.find(&loads, number, &start)?);
+        }
+        self.stage.counters.work.uncertainty = uncertainty;
+        found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
+        self.stage.counters.steps += 1;
+        self.stage.observer.found(self.stage.number + 1, &StageResult::CriticalLoads(found))
+    }
+
+    fn judge(&mut self) {
+        self.stage.warn_of_standstill();
+    }
+}
+
+impl Buckling<'_, '_> {
+    /// Paths are followed from rest.
+    fn stand_still(&mut self) -> Result<(), Failure> {
+        let StageRun { model, state, fresh, schedule, .. } = &mut *self.stage;
+        state.stand_still();
+        if *fresh {
+            state.load = 0.0;
+        }
+        let (time, load) = (state.time, state.load);
+        let held = state.q.clone();
+        schedule.set_clock(model, state, time, load);
+        state.q = held;
+        self.stage.change_charts(None);
+        self.stage.open_account()?;
+        self.stage.warn_out_of_balance();
+        Ok(())
+    }
+
+    /// The critical load that looks from the start as number `number` of these. The state is then
+    /// the start again.
+    fn find(&mut self, loads: &[f64], number: usize, start: &State) -> Result<CriticalLoad, Failure> {
+        let is_back = |load: f64| load < start.load;
+        // Of the loads on this side of the present one it is number `before`.
+        let before = loads[..number].iter().filter(|&&load| is_back(load) == is_back(loads[number])).count();
+        // The look from the start is as much work as a search.
+        let count = loads.len() as f64;
+        let done = |come: f64| (1.0 + number as f64 + come) / (1.0 + count);
+        let mut critical = self.follow(loads[number], before, &done)?;
+        self.stage.go_back_to(start);
+        if critical.kind == CriticalKind::Estimate {
+            critical.load = self.extrapolate(loads[number], before)?.unwrap_or(critical.load);
+            self.stage.go_back_to(start);
+        }
+        Ok(critical)
+    }
+
+    /// Follows the path to the critical load behind which `before` + 1 more pivots are negative.
+    /// Every attempt starts from the last point before it, since behind it the way back is not sure
+    /// to be the same. `done` tells the part of the stage that lies behind with some part of this.
+    fn follow(&mut self, estimate: f64, before: usize, done: &dyn Fn(f64) -> f64) -> Result<CriticalLoad, Failure> {
+        let start_rate = self.size_of_rate()?;
+        let none = negative_pivots(self.stage);
+        let mut search = CriticalSearch::new(self.stage.state.clone(), estimate);
+        for _ in 0..MOST_LOOKS {
+            if let Some(found) = search.found() {
+                let off = if search.ended.is_some() { self.foreseen(&search, found, before)? } else { 0.0 };
+                if off > FORESEEN && self.goes_on(&search, found, none.map(|none| none + before))? {
+                    if off < ASIDE {
+                        self.warn_of_turn_aside(found);
+                    }
+                    // A step from further away came down elsewhere, or nowhere.
+                    let ahead = self.next_critical(search.way, before)?;
+                    search.go_on_from(self.stage.state, ahead);
+                    continue;
+                }
+                let is_apart = |behind: &State| distance(self.stage.model, &search.here, behind) > APART;
+                if search.is_a_limit(found) && !search.behind.as_ref().is_some_and(is_apart) {
+                    self.stage.state.copy_from(&search.here);
+                    self.stage.judge_mesh()?;
+                    let kind = self.kind_of_critical(start_rate)?;
+                    return Ok(CriticalLoad { load: found, kind });
+                }
+                break;
+            }
+            let target = search.target();
+            self.stage.go_back_to(&search.here);
+            self.stage.tell_progress(done(search.come()))?;
+            let walked = continue_path(self.stage, target);
+            if walked != Walked::There || has_leapt(self.stage, &search.here)? {
+                // Load control ends at limit points, or comes down on another branch.
+                search.end_at(target, walked);
+                continue;
+            }
+            let count = negative_pivots(self.stage);
+            let Some(passed) = none.zip(count).map(|(none, count)| count.saturating_sub(none)) else {
+                // Without a count of pivots the tangent itself must do.
+                self.stage.go_back_to(&search.here);
+                return self.follow_nearest(search.estimate, before, done);
+            };
+            if passed > before {
+                search.close_at(target, self.stage.state.clone());
+            } else {
+                let ahead = self.next_critical(search.way, before - passed)?;
+                search.advance(self.stage.state, ahead);
+            }
+        }
+        self.warn_of_estimate(search.here.load, search.ended);
+        Ok(CriticalLoad { load: search.estimate, kind: CriticalKind::Estimate })
+    }
+
+    /// How far from a load, relative to it, the tangent of the last point before it looks singular.
+    /// A structure with a small imperfection has no critical point there, but its path runs aside
+    /// as if it had, the more sharply the smaller the imperfection.
+    fn foreseen(&mut self, search: &CriticalSearch, load: f64, before: usize) -> Result<f64, Failure> {
+        self.stage.state.copy_from(&search.here);
+        let seen = critical_loads(self.stage, before + 4)?;
+        Ok(seen.into_iter().map(|seen| (seen - load).abs() / load.abs()).fold(f64::INFINITY, f64::min))
+    }
+
+    /// True if load control follows the path past a load from next to it, with so many negative
+    /// pivots. The state is then that point.
+    fn goes_on(&mut self, search: &CriticalSearch, load: f64, negative: Option<usize>) -> Result<bool, Failure> {
+        self.stage.go_back_to(&search.here);
+        let walked = continue_path(self.stage, load + search.way * BEHIND * load.abs());
+        Ok(walked == Walked::There
+            && !has_leapt(self.stage, &search.here)?
+            && negative.is_some_and(|most| negative_pivots(self.stage).is_some_and(|count| count <= most)))
+    }
+
+    /// The critical load with `before` others between it and the present one, as it looks from
+    /// here.
+    fn next_critical(&mut self, way: f64, before: usize) -> Result<Option<f64>, Failure> {
+        let load = self.stage.state.load;
+        let ahead = critical_loads(self.stage, before + 4)?;
+        Ok(ahead.into_iter().filter(|critical| (critical - load) * way > 0.0).nth(before))
+    }
+
+    /// The kind of the critical load just ahead of the present state: towards a limit point the
+    /// path moves without bounds.
+    fn kind_of_critical(&mut self, start_rate: f64) -> Result<CriticalKind, Failure> {
+        let runs_away = self.size_of_rate()? > RUNS_AWAY * start_rate;
+        Ok(if runs_away { CriticalKind::Limit } else { CriticalKind::Branch })
+    }
+
+    /// How far a unit of load moves the scene at the present state, in lengths of it and radians.
+    fn size_of_rate(&mut self) -> Result<f64, Failure> {
+        let Some(PathDirection { rate, .. }) = self.stage.path_direction()? else { return Ok(0.0) };
+        let sizes = rate.iter().zip(self.stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+        Ok(sizes.map(|(rate, kind)| rate.norm() / kind.scale(self.stage.model.length)).fold(0.0, f64::max))
+    }
+
+    /// A structure that an imperfection lets turn aside has no critical point. From smaller loads
+    /// its tangent looks like that of the perfect one: there the load at which it seems to be
+    /// singular does not move, until the imperfection is felt. That load, of the critical load with
+    /// `before` others below it; `None` where nothing is seen.
+    fn extrapolate(&mut self, first: f64, before: usize) -> Result<Option<f64>, Failure> {
+        let way = (first - self.stage.state.load).signum();
+        let mut last: Option<Sight> = None;
+        let (mut least_drift, mut steadiest) = (f64::INFINITY, None);
+        for _ in 0..MOST_EXTRAPOLATIONS {
+            let load = self.stage.state.load;
+            let Some(critical) = self.next_critical(way, before)? else { break };
+            let now = Sight { from: load, critical };
+            let drift = last.as_ref().map_or(f64::MAX, |last| now.drift_since(last));
+            if drift < least_drift {
+                least_drift = drift;
+                steadiest = Some(last.map_or(critical, |last| 0.5 * (critical + last.critical)));
+            }
+            last = Some(now);
+            if (critical - load).abs() < NEAREST_EXTRAPOLATION * critical.abs() {
+                break;
+            }
+            let none = negative_pivots(self.stage);
+            self.stage.good.copy_from(self.stage.state);
+            if continue_path(self.stage, load + STRIDE_AHEAD * (critical - load)) != Walked::There
+                || negative_pivots(self.stage) != none
+            {
+                break;
+            }
+        }
+        Ok(steadiest)
+    }
+
+    /// Goes from estimate to estimate, each what the critical load looks like from the last.
+    fn follow_nearest(
+        &mut self,
+        mut critical: f64,
+        before: usize,
+        done: &dyn Fn(f64) -> f64,
+    ) -> Result<CriticalLoad, Failure> {
+        let mut walked = Walked::There;
+        for _ in 0..MOST_LOOKS {
+            self.stage.tell_progress(done(0.0))?;
+            let from = self.stage.state.load;
+            let near = critical_loads(self.stage, before + 4)?;
+            // Those that were passed lie behind: it is the one that looks most like the last
+            // estimate.
+            let off = |load: &f64| (load - critical).abs();
+            let Some(next) = near.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else { break };
+            critical = next;
+            if (critical - from).abs() <= NEAR * critical.abs() {
+                return Ok(CriticalLoad { load: critical, kind: CriticalKind::Branch });
+            }
+            let target = critical - 0.5 * NEAR * (critical - self.stage.state.load).signum() * critical.abs();
+            walked = continue_path(self.stage, target);
+            if walked != Walked::There {
+                break;
+            }
+        }
+        self.warn_of_estimate(self.stage.state.load, Some(walked));
+        Ok(CriticalLoad { load: critical, kind: CriticalKind::Estimate })
+    }
+
+    fn warn_of_turn_aside(&mut self, load: f64) {
+        let message = format!(
+            "next to load factor {load} the path turns aside, as where a structure with a smaller imperfection buckles; the buckling load \
+             that is listed lies further on"
+        );
+        self.stage.warn(WarningKind::BucklingEstimate, message);
+    }
+
+    fn warn_of_estimate(&mut self, from: f64, ended: Option<Walked>) {
+        let coarse = ended == Some(Walked::TooCoarse);
+        let why = if coarse {
+            "beyond it the mesh is too coarse for the shape: use more `elements`"
+        } else {
+            "a structure with a small imperfection bends aside and has none"
+        };
+        let message = format!(
+            "a buckling load is an estimate, extrapolated from smaller loads: no critical point was found on the path up to load factor \
+             {from} ({why})"
+        );
+        self.stage.warn(WarningKind::BucklingEstimate, message);
+    }
+}

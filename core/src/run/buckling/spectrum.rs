@@ -1,0 +1,110 @@
+//! Critical loads as they look from a state: the eigenvalues of its tangent and of how that varies
+//! along the path.
+
+use crate::kernel::Weights;
+use crate::run::failure::Failure;
+use crate::run::stage_run::StageRun;
+use crate::run::statics::PathDirection;
+use crate::solve::{LinearSolver, Operator, Tangent, is_symmetric, largest_eigenvalues, mechanism};
+use crate::system::System;
+use crate::tensor::Vec3;
+use nalgebra::Complex;
+
+/// How far the state is moved along the path to see the tangent vary: lengths of the scene, and
+/// radians.
+const PROBE: f64 = 1e-5;
+/// Imaginary part up to which a critical load counts as real, relative; double ones come apart a
+/// little.
+const REAL: f64 = 1e-3;
+
+/// The number of negative pivots of the tangent at the present state; `None` where it is not
+/// symmetric.
+pub fn negative_pivots(stage: &mut StageRun) -> Option<usize> {
+    let StageRun { assembly, newton, state, .. } = stage;
+    assembly.forget();
+    assembly.evaluate(state, Weights::STIFFNESS, None);
+    newton.solver.negative_pivots(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS))
+}
+
+/// The critical loads as they look from the present state.
+pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Failure> {
+    let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(Vec::new()) };
+    let length = stage.model.length;
+    let moving = direction.iter().zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+    let size = moving.map(|(d, kind)| d.norm() * kind.arm(length) / length).fold(0.0, f64::max);
+    let reach = if size > 0.0 { (PROBE / size).min(1e6) } else { 1.0 };
+    let varied = varied_tangent(stage, &direction, reach);
+    let StageRun { assembly, newton, model, state, counters, .. } = stage;
+    assembly.evaluate(state, Weights::STIFFNESS, None);
+    counters.work.factorisations += 1;
+    let done = newton.solver.factorise_surely(&assembly.system);
+    let mut tangent = Tangent::that_stays(assembly, state);
+    if !done {
+        let vector = mechanism(&mut newton.solver, &mut tangent, model);
+        return Err(stage.name_mechanism(vector, &stage.assembly.system));
+    }
+    // A stable state of a conservative scene: the tangent is an inner product in which everything
+    // is symmetric.
+    let stable = newton.solver.negative_pivots(&mut tangent) == Some(0);
+    let system = &assembly.system;
+    let symmetric = stable && model.multipliers.is_empty();
+    let symmetric = symmetric && is_symmetric(&system.pattern, &varied);
+    let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
+    let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default().values;
+    let load = state.load;
+    let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
+    let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();
+    loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));
+    loads.truncate(modes);
+    Ok(loads)
+}
+
+/// (K(q + r dq, load + r) - K(q - r dq, load - r)) / 2r
+fn varied_tangent(stage: &mut StageRun, direction: &[Vec3], reach: f64) -> Vec<f64> {
+    let StageRun { assembly, model, state: here, schedule, .. } = stage;
+    assembly.forget();
+    let mut tangent = |reach: f64| {
+        let mut state = (*here).clone();
+        schedule.set_clock(model, &mut state, here.time, here.load + reach);
+        state.q.copy_from_slice(&here.q);
+        state.q.iter_mut().zip(direction).for_each(|(q, &d)| *q += d * reach);
+        assembly.evaluate(&state, Weights::STIFFNESS, None);
+        assembly.system.values.clone()
+    };
+    let (after, before) = (tangent(reach), tangent(-reach));
+    after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * reach)).collect()
+}
+
+/// Loads above the present one come first, nearest first, then the others.
+pub fn rank(critical: f64, load: f64) -> f64 {
+    let distance = critical - load;
+    if distance > 0.0 { -1.0 / distance } else { -distance }
+}
+
+/// K^-1 K': its eigenvalues are -1/m.
+struct Softening<'a> {
+    system: &'a System,
+    varied: &'a [f64],
+    solver: &'a mut LinearSolver,
+    symmetric: bool,
+}
+
+impl Operator for Softening<'_> {
+    fn size(&self) -> usize {
+        self.system.pattern.dof_map.count()
+    }
+
+    fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+        let mut out = self.system.multiply(self.varied, x);
+        out.iter_mut().for_each(|v| *v = -*v);
+        self.solver.solve_once(self.system, &mut out).then_some(out)
+    }
+
+    fn weigh(&mut self, x: &[f64]) -> Vec<f64> {
+        if self.symmetric { self.system.multiply(&self.system.values, x) } else { x.to_vec() }
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.symmetric
+    }
+}

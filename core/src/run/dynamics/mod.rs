@@ -1,0 +1,394 @@
+//! Dynamic stages: time steps, fixed or such that adapt to their local error.
+
+mod adaptive;
+mod grid;
+mod judgement;
+mod start;
+
+use self::adaptive::Control;
+use self::grid::Grid;
+use super::energy::{EnergyGuard, Growth};
+use super::failure::Failure;
+use super::plan::TimeStepping;
+use super::stage_run::{Analysis, StageRun};
+use crate::integrate::{Increments, Predictor, Rotations, Step, TimeError};
+use crate::kernel::Weights;
+use crate::solve::NewtonFailure;
+use crate::system::{Slot, State};
+use crate::tensor::Vec3;
+use crate::warning::WarningKind;
+use std::f64::consts::PI;
+
+/// The smallest part in which a fixed step that fails is taken.
+const SMALLEST_PART: f64 = 1.0 / 64.0;
+
+/// Strains that Newton may leave where an iteration ends.
+const TOLERATED_STRAIN: f64 = 1e-9;
+
+/// A dynamic stage.
+pub(super) struct Dynamics<'s, 'r> {
+    stage: &'s mut StageRun<'r>,
+    settings: TimeStepping,
+    /// The length of the last step
+    last_length: f64,
+    /// The unknowns of time steps where those are increments of rotation
+    increments: Option<Increments>,
+    predictor: Predictor,
+    /// By slot: its accelerations mean something.
+    massive: Vec<bool>,
+    /// The slots whose velocities enter no force: they have neither inertia nor damping.
+    rateless: Vec<usize>,
+    /// Watches the energy of time steps; that of the full theory is not that of a linear stage.
+    guard: Option<EnergyGuard>,
+}
+
+impl<'s, 'r> Dynamics<'s, 'r> {
+    /// Before the start of the stage.
+    pub fn new(stage: &'s mut StageRun<'r>, settings: TimeStepping) -> Self {
+        let guard = (!stage.is_linear()).then(|| energy_guard(stage, settings.energy_limit));
+        stage.keeps_account |= guard.is_some();
+        let has_increments = settings.scheme.rotations == Rotations::Increments;
+        Self {
+            last_length: settings.step,
+            settings,
+            increments: has_increments
+                .then(|| Increments::new(stage.model, stage.schedule.kind(), &stage.assembly.system.pattern.dof_map)),
+            predictor: Predictor::new(stage.model),
+            massive: Vec::new(),
+            rateless: Vec::new(),
+            guard,
+            stage,
+        }
+    }
+}
+
+/// Strains that Newton leaves have an energy of their own, of the stiffest section along the length
+/// of the scene.
+fn energy_guard(stage: &StageRun, limit: f64) -> EnergyGuard {
+    let round_off = stage.assembly.round_off(stage.state).force;
+    let stiffest = round_off / f64::EPSILON;
+    EnergyGuard::new(limit, stiffest * stage.model.length * TOLERATED_STRAIN * TOLERATED_STRAIN, round_off)
+}
+
+impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
+    fn stage(&mut self) -> &mut StageRun<'r> {
+        self.stage
+    }
+
+    fn run(&mut self) -> Result<(), Failure> {
+        self.start()?;
+        self.find_rates();
+        match self.settings.adaptive {
+            None => {
+                self.follow_errors();
+                self.run_fixed()
+            }
+            Some(tolerance) => {
+                let span = self.settings.end - self.stage.state.time;
+                let control =
+                    Control::new(tolerance, span, self.settings.step, self.settings.scheme, self.massive.clone());
+                self.run_adaptive(control)
+            }
+        }
+    }
+
+    fn judge(&mut self) {
+        self.warn_of_imbalance();
+        self.judge_steps();
+    }
+}
+
+impl Dynamics<'_, '_> {
+    /// The first step.
+    fn first_step(&self) -> Step {
+        Step { scheme: self.settings.scheme, length: self.settings.step }
+    }
+
+    /// The errors of fixed steps are estimated from here on.
+    fn follow_errors(&mut self) {
+        let first = self.first_step();
+        let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
+        let start = (&**state, self.increments.as_ref());
+        let duration = self.settings.end - state.time;
+        newton.time_error = Some(TimeError::new(model, assembly, start, &self.massive, (first, duration)));
+    }
+
+    /// Rows at start + k step, the last one at `end`.
+    fn run_fixed(&mut self) -> Result<(), Failure> {
+        while self.stage.state.time < self.settings.end {
+            let grid = self.next_grid();
+            for number in 1..=grid.steps {
+                let (next, length) = grid.step(number);
+                let last = self.stride(Step { scheme: self.settings.scheme, length }, next)?;
+                if self.complete(&last)? {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A step of the grid at once, or where that fails in halves, and halves of halves. Returns the
+    /// last of them, which is not settled yet. `next` is the time it ends at.
+    fn stride(&mut self, whole: Step, next: f64) -> Result<Step, Failure> {
+        // Parts are counted: the clock is rounded, and late in a run a short step is not much
+        // longer than that.
+        let mut step = whole;
+        let mut parts = 1;
+        loop {
+            let target = if parts == 1 { next } else { self.stage.state.time + step.length };
+            self.tell_time(target)?;
+            match self.advance(step, target) {
+                Ok(()) => {
+                    self.last_length = step.length;
+                    parts -= 1;
+                    if parts == 0 {
+                        return Ok(step);
+                    }
+                    self.settle(&step)?;
+                    self.close_joints()?;
+                }
+                Err(failure) => {
+                    step.length *= 0.5;
+                    parts *= 2;
+                    if step.length < SMALLEST_PART * whole.length {
+                        return Err(self.give_up(failure));
+                    }
+                    self.warn_of_subdivision();
+                    self.stage.state.copy_from(self.stage.good);
+                    self.stage.counters.cutbacks += 1;
+                }
+            }
+        }
+    }
+
+    /// Settles a step that is taken, written or not.
+    fn settle(&mut self, step: &Step) -> Result<(), Failure> {
+        self.stage.accept()?;
+        self.settle_charts(step);
+        Ok(())
+    }
+
+    fn settle_charts(&mut self, step: &Step) {
+        let totals = self.increments.is_none();
+        if let Some(error) = self.stage.newton.time_error.as_mut().filter(|_| totals) {
+            error.change_charts(self.stage.state, &self.stage.charted.rotations);
+        }
+        let switched = self.stage.change_charts(totals.then_some(step.scheme.lag() * step.length));
+        if totals && switched > 0 {
+            self.predictor.forget();
+        }
+    }
+
+    /// A row a step; a step that fails, or whose error is too large, is tried again with a smaller
+    /// one.
+    fn run_adaptive(&mut self, mut control: Control) -> Result<(), Failure> {
+        while self.stage.state.time < self.settings.end {
+            let (next, length) = control.propose(self.stage.state.time, self.next_corner());
+            self.tell_time(next)?;
+            let step = Step { scheme: control.scheme, length };
+            let tried = self.advance(step, next);
+            let at_floor = control.is_smallest(length);
+            let taken = match tried {
+                Ok(()) => {
+                    let increments = self.increments.as_ref();
+                    let (error, slot) =
+                        control.error(self.stage.model, increments, self.stage.good, self.stage.state, length);
+                    let taken = control.judge(length, error);
+                    if !taken && at_floor {
+                        let failure = NewtonFailure::StepTooSmall { slot, error, share: control.share(length) };
+                        return Err(self.give_up(failure));
+                    }
+                    taken
+                }
+                Err(failure) if at_floor => return Err(self.give_up(failure)),
+                Err(_) => control.fail(length),
+            };
+            if taken {
+                self.last_length = length;
+                if self.complete(&step)? {
+                    return Ok(());
+                }
+                // Where velocities leave the joints by the error of a step, accelerations of a
+                // shorter one must jump to bring them back, more and more the shorter it is.
+                self.close_joints()?;
+            } else {
+                self.predictor.withdraw();
+                self.stage.state.copy_from(self.stage.good);
+                self.stage.counters.cutbacks += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// One attempt at a step; what was foreseen of it may not be what it fails for.
+    fn advance(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
+        self.stage.good.copy_from(self.stage.state);
+        self.predictor.reset();
+        let mut result = self.attempt_step(step, next);
+        if result.is_err() && self.predictor.has_foreseen() {
+            self.predictor.fail();
+            self.stage.state.copy_from(self.stage.good);
+            result = self.attempt_step(step, next);
+        }
+        if result.is_err() {
+            // It may have come to an end that is refused.
+            self.predictor.fail();
+        }
+        result
+    }
+
+    /// Predict, prescribe, iterate.
+    fn attempt_step(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
+        self.predict(step, next)?;
+        let StageRun { assembly, newton, state, model, counters, .. } = &mut *self.stage;
+        self.predictor.begin(&assembly.system.pattern.dof_map, state, &step, newton.scratch());
+        newton.solve(model, assembly, state, &step, None, &mut counters.work)?;
+        self.predictor.end(&assembly.system.pattern.dof_map, state, &step);
+        self.refuse_massless_turns()?;
+        self.settle_rates(&step);
+        self.refuse_turns(step.length)?;
+        self.stage.refuse_leaps()?;
+        let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
+        newton.end_step(&assembly.system, (good, state), &step, self.increments.as_ref());
+        Ok(())
+    }
+
+    /// Predicts the state at the end of a step by its scheme, and puts prescribed directions where
+    /// they belong.
+    fn predict(&mut self, step: Step, next: f64) -> Result<(), NewtonFailure> {
+        let StageRun { newton, state, model, schedule, .. } = &mut *self.stage;
+        if !self.rateless.is_empty() {
+            model.steady(state);
+        }
+        if let Some(error) = &mut newton.time_error {
+            error.begin(&step, self.last_length);
+        }
+        if let Some(increments) = &mut self.increments {
+            increments.begin(state, &step, self.last_length);
+        }
+        step.predict(state, self.last_length);
+        match schedule.set_clock(model, state, next, 1.0) {
+            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot: slot as usize, angle }),
+            None => Ok(()),
+        }
+    }
+
+    /// After an iteration: total vectors take the place of increments, and velocities that enter no
+    /// force are those of the way.
+    fn settle_rates(&mut self, step: &Step) {
+        let StageRun { assembly, state, good, counters, .. } = &mut *self.stage;
+        if let Some(increments) = &mut self.increments {
+            let switched = increments.end(state, good);
+            counters.work.chart_switches += switched as u64;
+            // Forces conjugate to total vectors, for reactions and the energy account.
+            assembly.evaluate(state, Weights::NONE, None);
+        } else if !self.rateless.is_empty() {
+            // A rule for accelerations makes velocities that nothing resists swing from step to
+            // step, more and more.
+            let State { q, v, a, algorithmic, .. } = &mut **state;
+            let (v, rates2) = (&mut v[..], [&mut a[..], &mut algorithmic[..]]);
+            self.rateless.iter().for_each(|&slot| v[slot] = (q[slot] - good.q[slot]) * (1.0 / step.length));
+            let kept = rates2.into_iter().filter(|rates| !rates.is_empty());
+            kept.for_each(|rates| self.rateless.iter().for_each(|&slot| rates[slot] = Vec3::ZERO));
+        }
+    }
+
+    /// Beyond half a turn in a step nobody could count the turns of a node.
+    fn refuse_turns(&self, length: f64) -> Result<(), NewtonFailure> {
+        let turning = self.stage.charted.rotations.iter().copied();
+        turns_within(self.stage.state, turning.filter(|&slot| self.massive[slot as usize]), length)
+    }
+
+    /// Rotations without inertia have no spin to speak of: they go where balance is. While a step
+    /// is iterated the unknown is the increment, or a total vector in the chart it began in.
+    fn refuse_massless_turns(&self) -> Result<(), NewtonFailure> {
+        let massless = self.stage.charted.rotations.iter().copied().filter(|&slot| !self.massive[slot as usize]);
+        let mut turned = massless.map(|slot| {
+            let (k, q) = (slot as usize, self.stage.state.q[slot as usize]);
+            (k, if self.stage.state.turn(slot).is_some() { q.norm() } else { (q - self.stage.good.q[k]).norm() })
+        });
+        match turned.find(|&(_, angle)| angle > PI) {
+            Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot, angle }),
+            None => Ok(()),
+        }
+    }
+
+    /// Completes a step that is taken: account, row, charts. True if the stage is over.
+    fn complete(&mut self, step: &Step) -> Result<bool, Failure> {
+        self.stage.accept()?;
+        self.stage.counters.steps += 1;
+        self.stage.show()?;
+        self.refuse_growth()?;
+        if self.stage.is_over() {
+            return Ok(true);
+        }
+        self.settle_charts(step);
+        Ok(false)
+    }
+
+    /// A scheme that makes energy from nothing ends the run while its results can still be told
+    /// from round-off.
+    fn refuse_growth(&mut self) -> Result<(), Failure> {
+        let Some(guard) = &mut self.guard else { return Ok(()) };
+        let moved = self.stage.model.farthest(self.stage.good, self.stage.state);
+        let Some(Growth { grown, largest }) = guard.judge(self.stage.bookkeeper.ledger(), moved) else { return Ok(()) };
+        Err(Failure::EnergyGrowth { at: self.stage.moment(), grown, largest })
+    }
+
+    /// Names the failure and goes back to the last good state.
+    fn give_up(&mut self, failure: NewtonFailure) -> Failure {
+        let named = self.stage.name_failure(failure, &self.stage.assembly.system);
+        self.stage.state.copy_from(self.stage.good);
+        named
+    }
+
+    /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the
+    /// next of those.
+    fn next_grid(&self) -> Grid {
+        let stop = self.next_stop();
+        let over = if self.stage.plan.interval.is_some() { Grid::equal } else { Grid::over };
+        over(self.stage.state.time, stop, self.settings.step)
+    }
+
+    /// The next instant that must be hit.
+    fn next_stop(&self) -> f64 {
+        let Some(interval) = self.stage.plan.interval else { return self.settings.end };
+        let next = ((self.stage.state.time / interval + 1e-9).floor() + 1.0) * interval;
+        if next >= self.settings.end - 1e-9 * interval { self.settings.end } else { next }
+    }
+
+    /// The next instant that must be hit, or at which a load or a motion takes another course: what
+    /// begins and ends within a step would leave no trace in the accelerations at its ends.
+    fn next_corner(&self) -> f64 {
+        let stop = self.next_stop();
+        self.stage.schedule.next_corner(self.stage.model, self.stage.state.time).map_or(stop, |corner| corner.min(stop))
+    }
+
+    /// Tells the observer the part of the stage that lies behind at a time.
+    fn tell_time(&mut self, time: f64) -> Result<(), Failure> {
+        let done = if self.settings.end > 0.0 { (time / self.settings.end).clamp(0.0, 1.0) } else { 1.0 };
+        self.stage.tell_progress(done)
+    }
+
+    /// A fixed step fails, and is not the last that does.
+    fn warn_of_subdivision(&mut self) {
+        if !std::mem::replace(&mut self.stage.issued.subdivision, true) {
+            let at = self.stage.moment();
+            let message = format!("a step fails at {at} and is taken in smaller ones, as are others that fail");
+            self.stage.warn(WarningKind::StepSubdivided, message);
+        }
+    }
+}
+
+/// Refuses rotations by more than half a turn in a step of some length.
+fn turns_within(state: &State, rotations: impl Iterator<Item = Slot>, length: f64) -> Result<(), NewtonFailure> {
+    // A spin is no faster than the total rotation vector: the tangent T makes no vector longer.
+    let is_quick = |slot: Slot| state.v[slot as usize].norm() * length > PI;
+    let turned = |slot: Slot| (slot as usize, state.spin(slot).omega.norm() * length);
+    let mut turned = rotations.filter(|&slot| is_quick(slot)).map(turned);
+    match turned.find(|&(_, angle)| angle > PI) {
+        Some((slot, angle)) => Err(NewtonFailure::TurnsTooFar { slot, angle }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,293 @@
+//! The start of a dynamic stage: velocities, and accelerations from equilibrium at its first
+//! instant.
+
+use super::Dynamics;
+use crate::integrate::Method;
+use crate::kernel::Weights;
+use crate::model::{LARGEST_GAP, Model, SlotKind, StageError};
+use crate::run::failure::Failure;
+use crate::run::spatial::SpatialLook;
+use crate::run::stage_run::StageRun;
+use crate::solve::{NewtonFailure, SoftMode, Tangent, mechanism};
+use crate::system::{DofMap, Slot, System};
+use crate::tensor::{Mat3, Vec3};
+use crate::threads;
+use crate::warning::WarningKind;
+use nalgebra::{Matrix3, SymmetricEigen};
+
+impl Dynamics<'_, '_> {
+    /// Gives velocities, sets the clock, and finds the accelerations of the start.
+    pub(super) fn start(&mut self) -> Result<(), Failure> {
+        let begins = self.set_in_motion();
+        self.set_clock()?;
+        self.stage.change_charts(None);
+        self.stage.linearise()?;
+        let step = self.first_step();
+        self.refuse_loose(&step)?;
+        // Time steps do not look out of the plane again.
+        SpatialLook::default().refuse_loose(self.stage, step.weights())?;
+        self.close_joints()?;
+        self.solve_accelerations()?;
+        self.settings.scheme.start(self.stage.state);
+        if let Some(increments) = &self.increments {
+            increments.start(self.stage.state);
+        }
+        if begins {
+            self.stage.bookkeeper.bring_in(self.stage.model, self.stage.state);
+        }
+        self.stage.open_account()?;
+        self.open_guard();
+        Ok(())
+    }
+
+    /// The first dynamic stage gives the initial velocities; whether it is this one. Held
+    /// directions have none.
+    fn set_in_motion(&mut self) -> bool {
+        let StageRun { plan, state, past, assembly, .. } = &mut *self.stage;
+        let begins = !std::mem::replace(&mut past.moving, true);
+        if begins {
+            plan.initial.iter().for_each(|motion| motion.give_to(state));
+        }
+        let dof_map = &assembly.system.pattern.dof_map;
+        threads::each_part(&mut state.v, |start, part| {
+            (start..).zip(part).for_each(|(slot, v)| *v -= dof_map.held_part(slot as Slot, *v));
+        });
+        begins
+    }
+
+    /// Sets the clock; motors must not jump.
+    fn set_clock(&mut self) -> Result<(), Failure> {
+        let StageRun { model, state, schedule, .. } = &mut *self.stage;
+        state.a.fill(Vec3::ZERO);
+        let (time, amplitude) = (state.time, state.amplitude.clone());
+        schedule.set_clock(model, state, time, 1.0);
+        match model.motor_jumps(&amplitude, state).into_iter().next() {
+            Some(jump) => Err(self.stage.describe(StageError::MotorJump(jump))),
+            None => Ok(()),
+        }
+    }
+
+    /// From here on the energy is watched.
+    fn open_guard(&mut self) {
+        let StageRun { model, bookkeeper, assembly, .. } = &*self.stage;
+        let first = bookkeeper.first().unwrap_or_default();
+        if let Some(guard) = &mut self.guard {
+            let force = model.largest_force(&assembly.system);
+            guard.open(bookkeeper.ledger(), first, f64::EPSILON * force * model.length);
+        }
+    }
+
+    /// Velocities that the gaps of joints allow: those given, changed by the impulses that closing
+    /// the joints takes, [M G^T; G 0] [dv; impulse] = [0; -dg/dt].
+    pub(super) fn close_joints(&mut self) -> Result<(), Failure> {
+        if self.stage.model.multipliers.is_empty() {
+            return Ok(());
+        }
+        let [rates, _] = self.stage.assembly.drift(self.stage.state);
+        self.stage.assembly.evaluate(self.stage.state, Weights::MASS, None);
+        self.refuse_open_joints()?;
+        self.stage.assembly.system.forget_forces();
+        let Some(impulse) = self.solve_with_mass(&rates)? else { return Ok(()) };
+        let moves = self.stage.model.kinds.iter().map(|kind| !kind.is_multiplier());
+        for ((v, impulse), _) in self.stage.state.v.iter_mut().zip(impulse).zip(moves).filter(|(_, moves)| *moves) {
+            *v += impulse;
+        }
+        Ok(())
+    }
+
+    /// A dynamic stage never jumps: neither do joints that a stage before has left open.
+    fn refuse_open_joints(&self) -> Result<(), Failure> {
+        for &slot in &self.stage.model.multipliers {
+            let kind = self.stage.model.kinds[slot as usize];
+            let size = if kind == SlotKind::Force { self.stage.model.length } else { 1.0 };
+            let gap = self.stage.assembly.system.total(slot as usize).norm();
+            if gap > LARGEST_GAP * size {
+                let at = self.stage.moment();
+                return Err(Failure::Deck(format!(
+                    "the {} is open by {gap:.3e} where the stage begins ({at}), and would have to jump",
+                    self.stage.model.node_at(slot as usize)
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn solve_accelerations(&mut self) -> Result<(), Failure> {
+        let StageRun { assembly, state, .. } = &mut *self.stage;
+        assembly.forget();
+        let [_, rates2] = assembly.drift(state);
+        assembly.evaluate(state, Weights::MASS, None);
+        if (0..state.q.len()).any(|slot| !assembly.system.total(slot).is_finite()) {
+            let failure = NewtonFailure::not_finite(assembly, state);
+            return Err(self.stage.name_failure(failure, &self.stage.assembly.system));
+        }
+        let Some(solved) = self.solve_with_mass(&rates2)? else {
+            self.stage.warn(
+                WarningKind::NoStartAccelerations,
+                "mass does not determine the accelerations at the start (a point mass with an offset and without inertia?): the motion \
+                 begins without them",
+            );
+            self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
+            return Ok(());
+        };
+        let StageRun { model, state, .. } = &mut *self.stage;
+        for (slot, kind) in model.kinds.iter().enumerate() {
+            let field = if kind.is_multiplier() { &mut state.q[..] } else { &mut state.a[..] };
+            field[slot] += solved[slot];
+        }
+        // The forces of the start, for reactions and the energy account.
+        self.stage.assembly.evaluate(self.stage.state, Weights::NONE, None);
+        Ok(())
+    }
+
+    /// Solves with the mass matrix, bordered by the gaps of joints, whose rows ask for -`gaps`;
+    /// `None` where mass alone does not tell the solution, but stiffness holds everything.
+    fn solve_with_mass(&mut self, gaps: &[Vec3]) -> Result<Option<Vec<Vec3>>, Failure> {
+        let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
+        let (solver, system) = (&mut newton.solver, &mut assembly.system);
+        for &slot in &model.multipliers {
+            system.replace_force(slot, gaps[slot as usize]);
+        }
+        let mut right_hand_side = vec![0.0; system.pattern.dof_map.count()];
+        system.right_hand_side(&mut right_hand_side);
+        let additions = massless_blocks(system, model, &mut right_hand_side);
+        additions.iter().for_each(|(slot, block)| system.add_to_own_block(*slot, block));
+        counters.work.factorisations += 1;
+        let mut mass = Tangent::that_may_go(assembly, state, Weights::MASS).with(&additions);
+        // Along no axis round-off leaves pivots where the mass matrix is singular: solved with,
+        // they give accelerations of 1e16.
+        let massless = solver.null_vector(&mut mass);
+        let factorised = massless.is_none() && solver.factorise_new(&mut mass).0;
+        let system = mass.system();
+        if !factorised || !solver.solve(system, &mut right_hand_side) {
+            let named = self.stage.name_mechanism(massless, &self.stage.assembly.system);
+            return if self.is_held(&named) { Ok(None) } else { Err(named) };
+        }
+        let mut solved = vec![Vec3::ZERO; state.q.len()];
+        system.pattern.dof_map.scatter(&right_hand_side, None, &mut solved);
+        Ok(Some(solved))
+    }
+
+    /// True if stiffness holds the motions that mass does not resist; a condition of joints that is
+    /// said twice is none of its business.
+    fn is_held(&mut self, without_mass: &Failure) -> bool {
+        if matches!(without_mass, Failure::Singular { place: Some(place), .. } if place.is_joint()) {
+            return false;
+        }
+        let StageRun { assembly, newton, model, state, .. } = &mut *self.stage;
+        assembly.evaluate(state, Weights::STIFFNESS, None);
+        let mut tangent = Tangent::that_may_go(assembly, state, Weights::STIFFNESS);
+        newton.solver.factorise_new(&mut tangent).0
+            && SoftMode::find(&mut newton.solver, &mut tangent, model, false)
+                .is_none_or(|soft_mode| !soft_mode.is_loose())
+    }
+}
+
+/// Directions without mass take no acceleration: their part of the mass matrix is replaced by one
+/// that leaves them at zero. They are the null directions of the diagonal blocks; what is to be
+/// added to these.
+fn massless_blocks(system: &System, model: &Model, right_hand_side: &mut [f64]) -> Vec<(Slot, Mat3)> {
+    let mut additions = Vec::new();
+    let is_massive = threads::list(model.slots(), |slot| is_regular(&with_mass_where_held(system, slot as Slot).0));
+    for slot in (0..model.slots()).filter(|&slot| !(is_massive[slot] || model.kinds[slot].is_multiplier())) {
+        let numbers = system.pattern.dof_map.of(slot as Slot);
+        let free: Vec<usize> = (0..3).filter(|&k| numbers[k] != DofMap::HELD).collect();
+        let (block, weight) = with_mass_where_held(system, slot as Slot);
+        let mut addition = Mat3::ZERO;
+        let symmetric = Matrix3::from_fn(|i, j| 0.5 * (block.0[i][j] + block.0[j][i]));
+        let eigen = SymmetricEigen::new(symmetric);
+        for k in 0..3 {
+            let v = eigen.eigenvectors.column(k);
+            if eigen.eigenvalues[k].abs() > 1e-12 * weight {
+                continue;
+            }
+            let along: f64 = free.iter().map(|&i| v[i] * right_hand_side[numbers[i] as usize]).sum();
+            free.iter().for_each(|&i| right_hand_side[numbers[i] as usize] -= along * v[i]);
+            let direction = Vec3([v[0], v[1], v[2]]);
+            addition += direction.outer(direction).scale(weight);
+        }
+        additions.push((slot as Slot, addition));
+    }
+    additions
+}
+
+/// The diagonal block of a mass matrix at a slot, and its largest entry. A held direction is given
+/// as much, so that it does not count as massless.
+fn with_mass_where_held(system: &System, slot: Slot) -> (Mat3, f64) {
+    let (mut block, numbers) = (system.own_block(slot), system.pattern.dof_map.of(slot));
+    let weight = if block.max_abs() > 0.0 { block.max_abs() } else { 1.0 };
+    for k in (0..3).filter(|&k| numbers[k] == DofMap::HELD) {
+        block.0[k][k] += weight;
+    }
+    (block, weight)
+}
+
+/// True if a matrix has no eigenvalue that is next to nothing beside its entries: none is larger
+/// than three times the largest of these.
+fn is_regular(matrix: &Mat3) -> bool {
+    let [a, b, c] = matrix.0.map(Vec3);
+    a.dot(b.cross(c)).abs() > 1e-9 * matrix.max_abs().powi(3)
+}
+
+impl Dynamics<'_, '_> {
+    /// Refuses what neither stiffness nor mass resists, and joints that hold what is held already:
+    /// round-off would move them. It is looked at without velocities, whose forces come and go with
+    /// them.
+    fn refuse_loose(&mut self, method: &dyn Method) -> Result<(), Failure> {
+        let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
+        let still = state.at_rest();
+        assembly.forget();
+        assembly.evaluate(&still, method.weights(), None);
+        counters.work.factorisations += 1;
+        let mut tangent = Tangent::that_may_go(assembly, &still, method.weights());
+        let loose = mechanism(&mut newton.solver, &mut tangent, model);
+        loose.map_or(Ok(()), |vector| Err(self.stage.name_mechanism(Some(vector), &self.stage.assembly.system)))
+    }
+
+    /// Finds the slots whose accelerations mean something: their unknowns have inertia, or their
+    /// motion is prescribed; and those whose velocities do not, either.
+    pub(super) fn find_rates(&mut self) {
+        let StageRun { assembly, model, state, .. } = &mut *self.stage;
+        let mut moves = vec![false; model.slots()];
+        model.motions.iter().for_each(|motion| moves[motion.slot as usize] = true);
+        let mut touched = |weights: Weights| -> Vec<bool> {
+            // Factors may have taken the place of the one that is there.
+            assembly.form_again(state, weights);
+            let system = &assembly.system;
+            threads::list(moves.len(), |slot| {
+                let moves = moves[slot] && !system.pattern.dof_map.is_plain(slot as Slot);
+                moves || system.own_block(slot as Slot).max_abs() > 0.0
+            })
+        };
+        let massive = touched(Weights::MASS);
+        let damped = touched(Weights::DAMPING);
+        assembly.evaluate(state, Weights::NONE, None);
+        let rateless = |&slot: &usize| !(massive[slot] || damped[slot] || model.kinds[slot].is_multiplier());
+        self.rateless = (0..massive.len()).filter(rateless).collect();
+        self.massive = massive;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rotation::Rotation;
+
+    #[test]
+    fn what_is_regular_has_no_eigenvalue_next_to_nothing() {
+        let turn = Rotation::new(Vec3([0.3, -1.1, 0.7])).r;
+        let with = |eigenvalues: [f64; 3]| turn * Mat3::diagonal(eigenvalues) * turn.transpose() * 1e5;
+        let smallest = |matrix: &Mat3| {
+            let eigen = SymmetricEigen::new(Matrix3::from_fn(|i, j| matrix.0[i][j])).eigenvalues;
+            eigen.iter().fold(f64::INFINITY, |m: f64, e| m.min(e.abs())) / matrix.max_abs()
+        };
+        for (third, regular) in [(1.0, true), (1e-3, true), (1e-8, true), (1e-11, false), (1e-13, false), (0.0, false)]
+        {
+            let matrix = with([2.0, 1.0, third]);
+            assert_eq!(is_regular(&matrix), regular, "{third}");
+            assert!(!is_regular(&matrix) || smallest(&matrix) > 1e-12, "{third}");
+        }
+        let none = [Mat3::ZERO, with([f64::NAN, 1.0, 1.0]), Mat3::ZERO * f64::NAN];
+        assert!(!none.iter().any(is_regular));
+    }
+}

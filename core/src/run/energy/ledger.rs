@@ -1,0 +1,189 @@
+//! The energy account: what was stored, and the work that came in.
+
+use crate::model::charts::HALF_TURN;
+use crate::model::{Model, SlotKind};
+use crate::rotation::{Rotation, log, unwound};
+use crate::system::{Category, DofMap, Slot, State, System};
+use crate::tensor::{Vec3, zeros};
+use crate::threads::{self, PART};
+
+/// Energies of one state and the work of loads, gravity and motions so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ledger {
+    /// Kinetic energy
+    pub kinetic: f64,
+    /// Strain energy, springs included
+    pub strain: f64,
+    /// Work done from outside so far, by the trapezoidal rule from row to row
+    pub external: f64,
+    /// Energy taken by damping so far
+    pub damped: f64,
+}
+
+impl Ledger {
+    /// kinetic + strain + damped - external: constant in an exact solution.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.strain + self.damped - self.external
+    }
+}
+
+/// Keeps the account from step to step.
+#[derive(Clone, Debug, Default)]
+pub struct Bookkeeper {
+    ledger: Ledger,
+    /// The total that an exact solution keeps; known while the account is open
+    first: Option<f64>,
+    /// The largest kinetic + strain energy, or work from outside, of the run so far
+    scale: f64,
+    q: Vec<Vec3>,
+    unwrapped: Vec<Vec3>,
+    force: Vec<Vec3>,
+    drag: Vec<Vec3>,
+    drives: Vec<(f64, f64)>,
+}
+
+impl Bookkeeper {
+    /// Initial motions have set a scene in motion, in a stage that is opened next: the kinetic
+    /// energy that is new belongs to the account.
+    pub fn bring_in(&mut self, model: &Model, state: &State) {
+        if let Some(first) = &mut self.first {
+            *first += model.energy(state).kinetic - self.ledger.kinetic;
+        }
+    }
+
+    /// A stage begins whose work is not booked: the account begins anew behind it.
+    pub fn close(&mut self) {
+        self.first = None;
+    }
+
+    /// Opens a stage: energies are taken, no work is added.
+    pub fn open(&mut self, model: &Model, state: &State, system: &System) {
+        self.drives = model.drives(state);
+        self.force = zeros(state.q.len());
+        threads::each_part(&mut self.force, |start, part| {
+            for (slot, force) in (start..).zip(part) {
+                put(force, outside(system, slot));
+            }
+        });
+        // Where nothing damps it is empty.
+        threads::copy(&mut self.drag, &system.force[Category::Damping as usize]);
+        self.take(model, state);
+        self.first.get_or_insert(self.ledger.total());
+    }
+
+    /// Adds the work of the step that ends here.
+    pub fn add_step(&mut self, model: &Model, state: &State, system: &System) {
+        let Self { ledger, q, unwrapped, force, drag, .. } = self;
+        let way = Way { kinds: &model.kinds, from: (q, unwrapped), to: (&state.q, &state.unwrapped) };
+        ledger.external += way.work(force, |slot| outside(system, slot));
+        ledger.damped += way.work(drag, |slot| system.part_of(Category::Damping, slot));
+        let drives = model.drives(state);
+        for ((x0, f0), (x1, f1)) in self.drives.iter().zip(&drives) {
+            ledger.external += 0.5 * (f0 + f1) * (x1 - x0);
+        }
+        self.drives = drives;
+        self.take(model, state);
+    }
+
+    /// Books the energy that an artificial resistance took on the way to a state of rest: all that
+    /// is missing from the `total` before.
+    pub fn damp_to(&mut self, total: f64) {
+        self.ledger.damped += total - self.ledger.total();
+    }
+
+    pub fn ledger(&self) -> Ledger {
+        self.ledger
+    }
+
+    /// The total that an exact solution keeps; `None` where no account is open.
+    pub fn first(&self) -> Option<f64> {
+        self.first
+    }
+
+    /// The largest kinetic + strain energy, or work from outside, of the run so far.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Takes the energies of a state, and where it is.
+    fn take(&mut self, model: &Model, state: &State) {
+        threads::copy(&mut self.q, &state.q);
+        threads::copy(&mut self.unwrapped, &state.unwrapped);
+        let energy = model.energy(state);
+        (self.ledger.kinetic, self.ledger.strain) = (energy.kinetic, energy.strain);
+        self.scale = self.scale.max(energy.kinetic + energy.strain).max(self.ledger.external.abs());
+    }
+}
+
+/// The way of all slots from one state to the next, by their unknowns and their unwrapped rotation
+/// vectors where they have some.
+struct Way<'a> {
+    kinds: &'a [SlotKind],
+    from: (&'a [Vec3], &'a [Vec3]),
+    to: (&'a [Vec3], &'a [Vec3]),
+}
+
+impl Way<'_> {
+    /// The work of forces, which are `after` where it ends and take the place of those `before`.
+    fn work(&self, before: &mut [Vec3], after: impl Fn(usize) -> Vec3 + Send + Sync) -> f64 {
+        let ((q0, wound0), (q1, wound1)) = (self.from, self.to);
+        let of_part = |(number, before): (usize, &mut [Vec3])| {
+            let mut sum = 0.0;
+            for (slot, before) in (PART * number..).zip(before) {
+                let after = after(slot);
+                let before = put(before, after);
+                let unwrapped = *wound1.get(slot).unwrap_or(&q1[slot]) - *wound0.get(slot).unwrap_or(&q0[slot]);
+                sum += work(self.kinds[slot], (q0[slot], before), (q1[slot], after), unwrapped);
+            }
+            sum
+        };
+        let mut sum = 0.0;
+        threads::in_order(before.chunks_mut(PART).enumerate(), of_part, |part: f64| sum += part);
+        sum
+    }
+}
+
+/// Puts a force in the place of another one, which it gives back. Most are zero and stay so, in
+/// memory that nobody writes to.
+#[inline(always)]
+fn put(place: &mut Vec3, force: Vec3) -> Vec3 {
+    let before = *place;
+    if before != force {
+        *place = force;
+    }
+    before
+}
+
+/// The force from outside at a slot: loads, and the forces that hold or move constrained
+/// directions.
+fn outside(system: &System, slot: usize) -> Vec3 {
+    let dof_map: &DofMap = &system.pattern.dof_map;
+    let external = system.part_of(Category::External, slot);
+    match dof_map.is_plain(slot as Slot) {
+        true => -external,
+        false => dof_map.held_part(slot as Slot, system.total(slot)) - external,
+    }
+}
+
+/// Work of a force over the way from the one place to the other, by the trapezoidal rule. A
+/// rotation tells by `unwrapped` how far it has gone.
+fn work(kind: SlotKind, (q0, f0): (Vec3, Vec3), (q1, f1): (Vec3, Vec3), unwrapped: Vec3) -> f64 {
+    if f0 == Vec3::ZERO && f1 == Vec3::ZERO {
+        return 0.0;
+    }
+    match kind {
+        SlotKind::Displacement => 0.5 * (f0 + f1).dot(q1 - q0),
+        SlotKind::Rotation => turning_work(q0, f0, q1, f1, unwrapped),
+        SlotKind::Force | SlotKind::Moment => 0.0,
+    }
+}
+
+/// Work of a moment over a rotation, in a form that no change of chart disturbs: with the spatial
+/// moment m = T^-1 f and the spatial rotation vector from the one state to the other.
+fn turning_work(p0: Vec3, f0: Vec3, p1: Vec3, f1: Vec3, unwrapped: Vec3) -> f64 {
+    let (before, after) = (Rotation::new(p0), Rotation::new(p1));
+    let shortest = log(after.r * before.r.transpose());
+    let turned = if unwrapped.norm() > HALF_TURN { unwound(shortest, unwrapped) } else { shortest };
+    let (m0, m1) = (before.t_inverse() * f0, after.t_inverse() * f1);
+    0.5 * (m0 + m1).dot(turned)
+}

@@ -1,0 +1,42 @@
+//! Warnings that a run has given already.
+
+/// Warnings that have been given already, and how bad what they tell of was.
+#[derive(Clone, Debug)]
+pub(super) struct IssuedWarnings {
+    /// That an element turns far from node to node
+    pub coarse: bool,
+    /// How many limit and branch points
+    pub points: usize,
+    /// How uncertain round-off leaves displacements; below the first value nothing is worth a
+    /// warning.
+    pub uncertainty: f64,
+    /// By how much strains depend on the orientation; below the first value nothing is worth a
+    /// warning.
+    pub frame: f64,
+    pub soft: bool,
+    pub axis: bool,
+    pub subdivision: bool,
+    /// How far a node has gone in a dynamic stage of fixed steps
+    pub moved: f64,
+    /// That the account of the energy is off
+    pub unbalanced: bool,
+    /// The stage in which the plane would be left
+    pub unstable: Option<usize>,
+}
+
+impl Default for IssuedWarnings {
+    fn default() -> Self {
+        Self {
+            coarse: false,
+            points: 0,
+            uncertainty: 1e-7,
+            frame: 1e-2,
+            soft: false,
+            axis: false,
+            subdivision: false,
+            moved: 0.0,
+            unbalanced: false,
+            unstable: None,
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Small motions about the state that was reached: (s^2 M + s C + K) x = 0.
+
+mod rigid;
+mod search;
+mod vibrations;
+
+pub(super) use vibrations::{Vibrations, vibrations};
+
+use self::rigid::{free_spins, rigid_motions};
+use self::search::{Found, find_modes, first_shift, grows, matrices};
+use super::failure::Failure;
+use super::results::{Mode, StageResult};
+use super::stage_run::{Analysis, StageRun, Teller};
+use crate::model::StageError;
+use crate::solve::{Matrices, ModeSearch, ModeShape, SmallMotion, Tangent, mechanism};
+use crate::tensor::Vec3;
+use crate::warning::WarningKind;
+use nalgebra::Complex;
+
+/// Relative uncertainty of a frequency that is told.
+const TOLD_UNCERTAINTY: f64 = 1e-3;
+/// Two frequencies that agree to this are one, and the more unstable mode comes first.
+const SAME_FREQUENCY: f64 = 1e-7;
+
+/// A modal stage.
+pub(super) struct Modal<'s, 'r> {
+    pub stage: &'s mut StageRun<'r>,
+    /// The number of modes that are asked for
+    pub modes: usize,
+}
+
+impl<'r> Analysis<'r> for Modal<'_, 'r> {
+    fn stage(&mut self) -> &mut StageRun<'r> {
+        self.stage
+    }
+
+    /// Finds the modes with the lowest frequencies, and all unstable ones.
+    fn run(&mut self) -> Result<(), Failure> {
+        self.stage.tell_progress(0.0)?;
+        let moving = self.stage.state.clone();
+        self.stand_still()?;
+        let matrices = self.matrices()?;
+        let found = self.find(&matrices)?;
+        let mut listed = listed(&found, self.modes);
+        listed.iter_mut().for_each(|motion| self.refine(motion));
+        self.warn_of_modes(&found, &listed);
+        self.stage.counters.steps += 1;
+        // What moved moves on.
+        self.stage.state.copy_rates(&moving);
+        let listed = listed.iter().map(mode).collect();
+        self.stage.observer.found(self.stage.number + 1, &StageResult::Modes(listed))
+    }
+
+    /// Nothing is off: motions go on behind a modal stage.
+    fn judge(&mut self) {}
+}
+
+impl Modal<'_, '_> {
+    /// Modes are those of the state at rest.
+    fn stand_still(&mut self) -> Result<(), Failure> {
+        let StageRun { model, state, schedule, .. } = &mut *self.stage;
+        state.stand_still();
+        let (time, load) = (state.time, state.load);
+        schedule.set_clock(model, state, time, load);
+        self.stage.change_charts(None);
+        self.stage.open_account()?;
+        self.stage.warn_out_of_balance();
+        Ok(())
+    }
+
+    fn matrices(&mut self) -> Result<Matrices, Failure> {
+        let StageRun { assembly, state, model, .. } = &mut *self.stage;
+        let matrices = matrices(assembly, state, model);
+        if matrices.is_massless() { Err(self.stage.describe(StageError::NoMass)) } else { Ok(matrices) }
+    }
+
+    fn find(&mut self, matrices: &Matrices) -> Result<Found, Failure> {
+        let StageRun { assembly, model, state, plan, .. } = &*self.stage;
+        let mut rigid = rigid_motions(&assembly.system, model, state, &plan.places);
+        rigid.extend(free_spins(&assembly.system, model, state));
+        self.refuse_massless_mechanisms(matrices)?;
+        let moment = self.stage.moment();
+        let StageRun { assembly, newton, observer, counters, number, plan, .. } = &mut *self.stage;
+        let mut teller = Teller { observer: &mut **observer, at: moment, number: *number, stages: plan.stages.len() };
+        let shift = first_shift(matrices, &assembly.system);
+        let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid);
+        let tell = &mut |done| teller.tell(done);
+        let found = find_modes(&mut search, shift, self.modes, tell, &mut counters.work)?;
+        found.ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))
+    }
+
+    /// Refuses motions that neither stiffness nor mass holds.
+    fn refuse_massless_mechanisms(&mut self, matrices: &Matrices) -> Result<(), Failure> {
+        let StageRun { assembly, newton, model, state, counters, .. } = &mut *self.stage;
+        let shift = first_shift(matrices, &assembly.system);
+        matrices.combine(shift, &mut assembly.system.values);
+        counters.work.factorisations += 1;
+        let done = newton.solver.factorise_surely(&assembly.system);
+        let loose = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, state), model);
+        if done && loose.is_none() {
+            return Ok(());
+        }
+        Err(self.stage.name_mechanism(loose, &self.stage.assembly.system))
+    }
+
+    /// Rayleigh's quotient of a motion with its stiffness from strains: digits that the tangent has
+    /// lost are there again, as far as the shape is right.
+    fn refine(&mut self, motion: &mut SmallMotion) {
+        let Some(ModeShape { unknowns, mass }) = motion.shape.take() else { return };
+        let StageRun { assembly, state, .. } = &mut *self.stage;
+        let mut field = vec![Vec3::ZERO; state.q.len()];
+        assembly.system.pattern.dof_map.scatter(&unknowns, None, &mut field);
+        let Some(stiffness) = assembly.stiffness_along(state, &field) else { return };
+        let square = -stiffness / mass;
+        motion.exponent = match square < 0.0 {
+            true => Complex::new(0.0, (-square).sqrt()),
+            false => Complex::new(square.sqrt(), 0.0),
+        };
+        // What is wrong with the shape enters squared.
+        motion.uncertainty *= motion.uncertainty;
+    }
+
+    fn warn_of_modes(&mut self, found: &Found, listed: &[SmallMotion]) {
+        let stage = self.stage.number + 1;
+        if found.missing > 0 {
+            let missing = found.missing;
+            let message = format!("stage {stage}: {missing} more unstable mode(s) exist and were not found");
+            self.stage.warn(WarningKind::MissingModes, message);
+        }
+        if found.is_short {
+            let message = format!(
+                "stage {stage}: a mode among those that are asked for was not found: pivots count more of them (very slender beams on \
+                 very fine meshes lose digits: use fewer elements of a higher order)"
+            );
+            self.stage.warn(WarningKind::MissingModes, message);
+        }
+        let worst = listed.iter().enumerate().max_by(|a, b| a.1.uncertainty.total_cmp(&b.1.uncertainty));
+        if let Some((number, motion)) = worst.filter(|(_, motion)| motion.uncertainty > TOLD_UNCERTAINTY) {
+            let message = format!(
+                "stage {stage}: round-off makes the frequency of mode {} uncertain by about {:.1} % (very slender beams on very \
+                 fine meshes lose digits: use fewer elements of a higher order)",
+                number + 1,
+                100.0 * motion.uncertainty
+            );
+            self.stage.warn(WarningKind::LostDigits, message);
+        }
+    }
+}
+
+/// The first modes by frequency, of those that are slowest or unstable, and all other unstable ones
+/// behind them.
+fn listed(found: &Found, modes: usize) -> Vec<SmallMotion> {
+    let rigid = SmallMotion { exponent: Complex::default(), uncertainty: 0.0, shape: None };
+    let mut stable: Vec<SmallMotion> = found.motions.iter().filter(|motion| !grows(motion)).cloned().collect();
+    stable.extend(std::iter::repeat_n(rigid, found.rigid));
+    stable.sort_by(|a, b| a.exponent.norm().total_cmp(&b.exponent.norm()));
+    stable.truncate(modes);
+    let mut all: Vec<SmallMotion> =
+        found.motions.iter().filter(|motion| grows(motion)).cloned().chain(stable).collect();
+    sort(&mut all);
+    let is_listed = |(number, motion): &(usize, SmallMotion)| *number < modes || grows(motion);
+    all.into_iter().enumerate().filter(is_listed).map(|(_, motion)| motion).collect()
+}
+
+fn mode(motion: &SmallMotion) -> Mode {
+    Mode { omega: motion.exponent.im, growth: motion.exponent.re }
+}
+
+/// By frequency; of equal frequencies the more unstable first.
+fn sort(motions: &mut [SmallMotion]) {
+    motions.sort_by(|a, b| a.exponent.im.total_cmp(&b.exponent.im));
+    let mut start = 0;
+    for k in 1..=motions.len() {
+        let apart = k == motions.len()
+            || motions[k].exponent.im - motions[start].exponent.im > SAME_FREQUENCY * motions[k].exponent.im;
+        if apart {
+            motions[start..k].sort_by(|a, b| b.exponent.re.total_cmp(&a.exponent.re));
+            start = k;
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Rigid motions of free parts: motions against which nothing acts, whatever the state.
+//!
+//! A part may move rigidly where no support holds it and where all forces on it follow: when a part
+//! turns by an infinitesimal rotation w, its forces f turn with it. With the gradients g_u = f and
+//! g_P = T^T m of a node (m: material moment) this says
+//!
+//! ```text
+//! K r = dg,   r_u = d + w x (x - c),   r_P = T^-1 R^T w,   dg_u = w x f,   dg_P = D_P(T^T m) r_P
+//! ```
+//!
+//! It holds in balance and out of it, under pretension and under following loads, but for dead
+//! loads that turning changes.
+
+use crate::effect::SomeIncrements;
+use crate::model::Model;
+use crate::rotation::Rotation;
+use crate::system::{Node, State, System};
+use crate::tensor::Vec3;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// A motion is held where it moves a held direction by more than this part of itself.
+const HELD: f64 = 1e-7;
+
+/// Forces against a motion that are smaller than this part of their terms are round-off.
+const NO_FORCE: f64 = 1e-11;
+
+/// Parts in a scene of more are not looked at: each look goes over all unknowns. Their rigid
+/// motions are found as other slow modes are.
+const MOST_PARTS: usize = 64;
+
+/// Directions of motion of one free part.
+const MOTIONS: usize = 6;
+
+/// Forces against a spin that are smaller than this part of their terms are what the tolerance of
+/// balance leaves.
+const NO_FORCE_OF_SPIN: f64 = 1e-8;
+
+/// The spins of straight parts about their own axes against which nothing acts, one number an
+/// equation each. The system holds the stiffness of the state.
+pub fn free_spins(system: &System, model: &Model, state: &State) -> Vec<Vec<f64>> {
+    let dof_map = &system.pattern.dof_map;
+    let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+    let mut found = Vec::new();
+    let mut field = vec![Vec3::ZERO; state.q.len()];
+    let mut look = |increments: &SomeIncrements| {
+        increments.iter().for_each(|&(slot, increment)| field[slot as usize] = increment);
+        let mut motion = vec![0.0; dof_map.count()];
+        dof_map.gather(|slot| field[slot], &mut motion);
+        increments.iter().for_each(|&(slot, _)| field[slot as usize] = Vec3::ZERO);
+        let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
+        let (force, terms) = (system.multiply(&system.values, &motion), system.multiply(&sizes, &absolute));
+        if force.iter().zip(&terms).all(|(force, terms)| force.abs() <= NO_FORCE_OF_SPIN * terms) {
+            found.push(motion);
+        }
+    };
+    let spins = model.effects.iter().filter_map(|effect| effect.roles().spins);
+    spins.for_each(|spins| spins.free_motions(state, &mut look));
+    found
+}
+
+/// The rigid motions of all free parts, one number an equation each. The system holds forces and
+/// stiffness of the state.
+pub fn rigid_motions(system: &System, model: &Model, state: &State, places: &[(Node, Vec3)]) -> Vec<Vec<f64>> {
+    let parts = parts(system, places);
+    if parts.len() > MOST_PARTS {
+        return Vec::new();
+    }
+    parts.iter().flat_map(|part| FreePart::new(part, system, model, state).motions()).collect()
+}
+
+/// Nodes that are connected, by what acts between them.
+fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
+    let node_blocks = &system.pattern.node_blocks;
+    let mut part_of: Vec<usize> = (0..node_blocks.count()).collect();
+    fn root(part_of: &mut [usize], mut group: usize) -> usize {
+        while part_of[group] != group {
+            part_of[group] = part_of[part_of[group]];
+            group = part_of[group];
+        }
+        group
+    }
+    let mut join = |a: usize, b: usize| {
+        let (a, b) = (root(&mut part_of, a), root(&mut part_of, b));
+        part_of[a.max(b)] = a.min(b);
+    };
+    for column in 0..node_blocks.count() {
+        system.pattern.rows_of(column).iter().for_each(|&row| join(row as usize, column));
+    }
+    // Nodes that share a displacement are one part.
+    places.iter().for_each(|(node, _)| join(node_blocks.of(node.u).0, node_blocks.of(node.p).0));
+    let mut parts: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
+    for &(node, place) in places {
+        parts.entry(root(&mut part_of, node_blocks.of(node.u).0)).or_default().push((node, place));
+    }
+    parts.into_values().collect()
+}
+
+/// A free part of a structure in a state: nodes that are connected.
+struct FreePart<'p> {
+    nodes: &'p [(Node, Vec3)],
+    system: &'p System,
+    state: &'p State,
+    centre: Vec3,
+    /// The distance of the farthest node from the centre; turns are measured by what they move, so
+    /// that all motions compare
+    extent: f64,
+}
+
+impl<'p> FreePart<'p> {
+    fn new(nodes: &'p [(Node, Vec3)], system: &'p System, model: &Model, state: &'p State) -> Self {
+        let now = |(node, place): &(Node, Vec3)| *place + state.q[node.u as usize];
+        let centre = nodes.iter().fold(Vec3::ZERO, |sum, node| sum + now(node)) * (1.0 / nodes.len() as f64);
+        let extent = nodes.iter().map(|node| (now(node) - centre).norm()).fold(0.0, f64::max);
+        let extent = if extent > 0.0 { extent } else { model.length };
+        Self { nodes, system, state, centre, extent }
+    }
+
+    /// The motions against which nothing acts, one number an equation.
+    fn motions(&self) -> Vec<Vec<f64>> {
+        let Some(allowed) = null_space(self.held(), HELD * HELD) else { return Vec::new() };
+        let fields: Vec<Vec<f64>> = (0..MOTIONS).map(|number| self.field(number)).collect();
+        let combined = combine(&fields, &allowed);
+        let Some(free) = null_space(self.resisted(&combined, &allowed), NO_FORCE * NO_FORCE) else {
+            return Vec::new();
+        };
+        combine(&combined, &free)
+    }
+
+    /// The size of a motion as it is measured.
+    fn unit(&self, number: usize) -> f64 {
+        if number < 3 { 1.0 } else { 1.0 / self.extent }
+    }
+
+    /// A rigid motion of a node: its displacement and the change of its rotation vector.
+    fn moved(&self, (node, place): &(Node, Vec3), number: usize) -> (Vec3, Vec3) {
+        let axis = Vec3::UNIT[number % 3];
+        if number < 3 {
+            return (axis, Vec3::ZERO);
+        }
+        let from_centre = *place + self.state.q[node.u as usize] - self.centre;
+        let rotation = Rotation::new(self.state.q[node.p as usize]);
+        (axis.cross(from_centre), rotation.t_inverse() * rotation.r.transpose_mul(axis))
+    }
+
+    /// The Gram matrix of what the motions do to held directions.
+    fn held(&self) -> DMatrix<f64> {
+        let dof_map = &self.system.pattern.dof_map;
+        let mut held = DMatrix::<f64>::zeros(MOTIONS, MOTIONS);
+        for node in self.nodes {
+            let held_parts: [[f64; 6]; MOTIONS] = std::array::from_fn(|number| {
+                let (u, p) = self.moved(node, number);
+                let u = dof_map.held_part(node.0.u, u);
+                let p = dof_map.held_part(node.0.p, p) * self.extent;
+                let [a, b] = [u.0, p.0].map(|v| v.map(|v| v * self.unit(number)));
+                [a[0], a[1], a[2], b[0], b[1], b[2]]
+            });
+            add_gram(&mut held, &held_parts);
+        }
+        held
+    }
+
+    /// A motion of the part, one number an equation.
+    fn field(&self, number: usize) -> Vec<f64> {
+        let dof_map = &self.system.pattern.dof_map;
+        let mut out = vec![0.0; dof_map.count()];
+        let mut motion = vec![Vec3::ZERO; self.state.q.len()];
+        for node in self.nodes {
+            let (u, p) = self.moved(node, number);
+            motion[node.0.u as usize] = u * self.unit(number);
+            motion[node.0.p as usize] = p * self.unit(number);
+        }
+        dof_map.gather(|slot| motion[slot], &mut out);
+        out
+    }
+
+    /// The Gram matrix of the forces against motions, which are combined with the columns of
+    /// `allowed`; each force over its terms.
+    fn resisted(&self, motions: &[Vec<f64>], allowed: &DMatrix<f64>) -> DMatrix<f64> {
+        let system = self.system;
+        let count = system.pattern.dof_map.count();
+        let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
+        let mut scale = vec![0.0_f64; count];
+        let mut forces: Vec<Vec<f64>> = Vec::new();
+        for (k, motion) in motions.iter().enumerate() {
+            let mut force = system.multiply(&system.values, motion);
+            let turn = Vec3([3, 4, 5].map(|number| allowed[(number, k)] / self.extent));
+            let expected = self.turned_forces(motion, turn);
+            force.iter_mut().zip(&expected).for_each(|(force, expected)| *force -= expected);
+            let absolute: Vec<f64> = motion.iter().map(|v| v.abs()).collect();
+            let terms = system.multiply(&sizes, &absolute);
+            scale
+                .iter_mut()
+                .zip(terms)
+                .zip(&expected)
+                .for_each(|((scale, term), e)| *scale = scale.max(term + e.abs()));
+            forces.push(force);
+        }
+        let mut resisted = DMatrix::<f64>::zeros(forces.len(), forces.len());
+        for row in (0..count).filter(|&row| scale[row] > 0.0) {
+            let parts: Vec<f64> = forces.iter().map(|force| force[row] / scale[row]).collect();
+            for (i, a) in parts.iter().enumerate() {
+                parts.iter().enumerate().for_each(|(j, b)| resisted[(i, j)] += a * b);
+            }
+        }
+        resisted
+    }
+
+    /// The change of the forces on the part where they turn with it, one number an equation.
+    fn turned_forces(&self, motion: &[f64], turn: Vec3) -> Vec<f64> {
+        let dof_map = &self.system.pattern.dof_map;
+        let mut field = vec![Vec3::ZERO; self.state.q.len()];
+        let mut change = field.clone();
+        dof_map.scatter(motion, None, &mut field);
+        for (node, _) in self.nodes {
+            let (u, p) = (node.u as usize, node.p as usize);
+            change[u] = turn.cross(self.system.total(u));
+            let rotation = Rotation::new(self.state.q[p]);
+            let moment = rotation.t_inverse().transpose_mul(self.system.total(p));
+            change[p] = rotation.c2(moment) * field[p];
+        }
+        let mut out = vec![0.0; dof_map.count()];
+        dof_map.gather(|slot| change[slot], &mut out);
+        out
+    }
+}
+
+/// The sums of fields with the coefficients of each column.
+fn combine(fields: &[Vec<f64>], coefficients: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let sum = |column: usize| {
+        let mut sum = vec![0.0; fields[0].len()];
+        for (number, field) in fields.iter().enumerate() {
+            sum.iter_mut().zip(field).for_each(|(sum, v)| *sum += coefficients[(number, column)] * v);
+        }
+        sum
+    };
+    (0..coefficients.ncols()).map(sum).collect()
+}
+
+fn add_gram(gram: &mut DMatrix<f64>, columns: &[[f64; 6]; MOTIONS]) {
+    for i in 0..MOTIONS {
+        for j in 0..MOTIONS {
+            gram[(i, j)] += columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
+}
+
+/// The vectors, as columns, whose squares a Gram matrix makes no larger than `least`; `None` where
+/// there are none.
+fn null_space(gram: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
+    let eigen = gram.symmetric_eigen();
+    let small: Vec<_> = (0..eigen.eigenvalues.len()).filter(|&k| eigen.eigenvalues[k] <= least).collect();
+    let columns: Vec<_> = small.into_iter().map(|k| eigen.eigenvectors.column(k).into_owned()).collect();
+    (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
+}

@@ -1,0 +1,207 @@
+//! A search for small motions: the slowest ones, and all that grow.
+
+use crate::kernel::Weights;
+use crate::model::{Assembly, Model};
+use crate::run::failure::Failure;
+use crate::solve::{Matrices, ModeSearch, SmallMotion, Work, timed};
+use crate::system::{State, System};
+
+/// Part of the lowest frequencies at which the first look is taken.
+const FIRST_SHIFT: f64 = 1e-4;
+/// Part of the lowest frequency found at which the others are taken: near enough to tell rigid
+/// motions from elastic ones.
+const SHIFT: f64 = 0.3;
+/// A shift is near enough if it is not larger than this part of the lowest frequency.
+const NEAR_SHIFT: f64 = 0.5;
+/// Looks until the shift is near enough
+const MOST_LOOKS: usize = 6;
+/// More than asked for are searched where the number of unstable ones is not known.
+const SPARE: usize = 24;
+/// Shifts further out from which unstable modes are searched then, times the first
+const FURTHER: [f64; 2] = [10.0, 100.0];
+/// Times that a shift is moved up until nothing grows faster
+const MOST_DOUBLINGS: usize = 64;
+/// Times that more modes are searched where some are missing.
+const MOST_SEARCHES: usize = 4;
+/// Exponents that agree to this, relative, are one that two looks have found.
+const SAME: f64 = 1e-6;
+/// Growth above this part of |s| is no round-off.
+const GROWS: f64 = 1e-6;
+/// Motions slower than this part of the others tell nothing of their frequencies.
+const FREE: f64 = 1e-4;
+
+/// The modes of a stage, and what is known about them.
+#[derive(Default)]
+pub struct Found {
+    pub motions: Vec<SmallMotion>,
+    /// Rigid motions of free parts
+    pub rigid: usize,
+    /// Unstable modes that are known to be there and were not found
+    pub missing: usize,
+    /// Pivots count more among those that are asked for than were found.
+    pub is_short: bool,
+}
+
+impl Found {
+    pub fn growing(&self) -> usize {
+        self.motions.iter().filter(|motion| grows(motion)).count()
+    }
+}
+
+/// K, C and M of a state; the system is left with K and the forces.
+pub fn matrices(assembly: &mut Assembly, state: &State, model: &Model) -> Matrices {
+    let mut part = |weights: Weights| {
+        assembly.evaluate(state, weights, None);
+        assembly.system.values.clone()
+    };
+    let damping = part(Weights::DAMPING);
+    let mut mass = part(Weights::MASS);
+    let stiffness = part(Weights::STIFFNESS);
+    drop_multipliers(&assembly.system, model, &mut mass);
+    Matrices { stiffness, damping, mass }
+}
+
+/// Multipliers have no mass.
+fn drop_multipliers(system: &System, model: &Model, values: &mut [f64]) {
+    let pattern = &system.pattern;
+    let is_multiplier: Vec<bool> = (0..pattern.dof_map.count())
+        .map(|k| model.kinds[pattern.dof_map.direction(k).slot as usize].is_multiplier())
+        .collect();
+    for (column, &own) in is_multiplier.iter().enumerate() {
+        for entry in pattern.entries(column as u32).filter(|entry| own || is_multiplier[entry.row as usize]) {
+            values[entry.place] = 0.0;
+        }
+    }
+}
+
+/// A few looks place the shift below the lowest frequency, from `shift` on; then all modes are
+/// searched from there. `tell` is told the part of the search that lies behind. `None` where a
+/// solve with the tangent fails.
+pub fn find_modes(
+    search: &mut ModeSearch,
+    mut shift: f64,
+    modes: usize,
+    tell: &mut dyn FnMut(f64) -> Result<(), Failure>,
+    work: &mut Work,
+) -> Result<Option<Found>, Failure> {
+    for look in 0..MOST_LOOKS {
+        tell(0.5 * look as f64 / MOST_LOOKS as f64)?;
+        let Some(sizes) = search.factorise(shift).then(|| search.roughly_nearest()).flatten() else {
+            return Ok(None);
+        };
+        let Some(lowest) = lowest(&sizes) else { break };
+        if look > 0 && shift <= NEAR_SHIFT * lowest {
+            break;
+        }
+        shift = SHIFT * lowest;
+    }
+    tell(0.5)?;
+    let found = timed(&mut work.solve_seconds, || find_all(search, shift, modes));
+    work.factorisations += search.factorisations;
+    Ok(found)
+}
+
+/// Where the first look is taken.
+pub fn first_shift(matrices: &Matrices, system: &System) -> f64 {
+    let shift = FIRST_SHIFT * matrices.softest_frequency(system);
+    // Else nothing holds anything: every mode is a free motion.
+    if shift > 0.0 && shift.is_finite() { shift } else { 1.0 }
+}
+
+/// All modes that are asked for, and all unstable ones: where pivots count them, until they are
+/// complete; else among more than are asked for, and from shifts further out. `None` where a
+/// solution fails.
+fn find_all(search: &mut ModeSearch, shift: f64, modes: usize) -> Option<Found> {
+    let mut found = Found { rigid: search.rigid(), ..Found::default() };
+    if !search.factorise(shift) {
+        return None;
+    }
+    let Some(unstable) = search.growing() else {
+        let is_held = search.is_held();
+        found.motions = search.nearest(modes + SPARE)?;
+        let further = FURTHER.map(|times| times * shift);
+        let unseen = further.into_iter().filter(|&further| !is_held && !search.reaches(&found.motions, further));
+        for further in unseen.collect::<Vec<f64>>() {
+            add_new(&mut found.motions, growing_from(search, further, SPARE));
+        }
+        return Some(found);
+    };
+    let mut wanted = modes + unstable + 2;
+    for _ in 0..MOST_SEARCHES {
+        found.motions = look(search, shift, wanted)?;
+        if found.growing() < unstable {
+            find_growing(search, shift, &mut found, unstable);
+        }
+        found.missing = unstable.saturating_sub(found.growing());
+        found.is_short = found.missing == 0 && !is_complete(search, &found, modes);
+        if found.missing == 0 && !found.is_short {
+            break;
+        }
+        wanted *= 2;
+    }
+    Some(found)
+}
+
+/// The motions nearest to a shift; `None` where a solution fails.
+fn look(search: &mut ModeSearch, shift: f64, wanted: usize) -> Option<Vec<SmallMotion>> {
+    if search.factorise(shift) { search.nearest(wanted) } else { None }
+}
+
+/// The motions nearest to a shift that grow; none where the shift hits a motion.
+fn growing_from(search: &mut ModeSearch, shift: f64, wanted: usize) -> Vec<SmallMotion> {
+    look(search, shift, wanted).unwrap_or_default().into_iter().filter(grows).collect()
+}
+
+/// From above: at a shift behind which nothing grows any faster. All of them are there then, or
+/// those that are new are added.
+fn find_growing(search: &mut ModeSearch, shift: f64, found: &mut Found, unstable: usize) {
+    let mut above = shift;
+    for _ in 0..MOST_DOUBLINGS {
+        above *= 4.0;
+        match search.factorise(above).then(|| search.growing()).flatten() {
+            Some(0) => break,
+            Some(_) => {}
+            None => return,
+        }
+    }
+    let fastest = growing_from(search, above, unstable + 2);
+    if fastest.len() >= unstable {
+        found.motions.retain(|motion| !grows(motion));
+        found.motions.extend(fastest);
+    } else {
+        add_new(&mut found.motions, fastest);
+    }
+}
+
+/// True if no mode is missing among those that are asked for: as many pivots are negative at a
+/// frequency behind them.
+fn is_complete(search: &mut ModeSearch, found: &Found, modes: usize) -> bool {
+    let mut omegas: Vec<f64> = found.motions.iter().filter(|motion| !grows(motion)).map(|m| m.exponent.im).collect();
+    omegas.sort_by(f64::total_cmp);
+    let first = modes.saturating_sub(found.rigid + found.growing()).max(1);
+    // The widest gap behind the last mode that is asked for.
+    let gaps = (first..omegas.len()).map(|k| (omegas[k] - omegas[k - 1], k));
+    let Some((gap, behind)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else { return true };
+    let at = omegas[behind] - 0.5 * gap;
+    gap <= SAME * at || search.slower(at).is_none_or(|count| count == found.rigid + found.growing() + behind)
+}
+
+/// The slowest motion that something holds.
+fn lowest(sizes: &[f64]) -> Option<f64> {
+    let highest = sizes.iter().copied().fold(0.0, f64::max);
+    sizes.iter().copied().filter(|&size| size > FREE * highest).reduce(f64::min)
+}
+
+pub fn grows(motion: &SmallMotion) -> bool {
+    motion.exponent.re > GROWS * motion.exponent.norm()
+}
+
+/// Adds motions that are not known yet.
+fn add_new(motions: &mut Vec<SmallMotion>, more: Vec<SmallMotion>) {
+    for motion in more {
+        let same = |known: &SmallMotion| (known.exponent - motion.exponent).norm() <= SAME * motion.exponent.norm();
+        if !motions.iter().any(same) {
+            motions.push(motion);
+        }
+    }
+}

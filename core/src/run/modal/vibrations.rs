@@ -1,0 +1,100 @@
+//! Small vibrations about the end of a static stage, which tell its stability where negative pivots
+//! do not.
+//!
+//! Under an unsymmetric tangent K the motions x exp(s t) with (s^2 M + s C + K) x = 0 tell (Bolotin
+//! 1963, Nonconservative Problems of the Theory of Elastic Stability). A real s > 0 is divergence,
+//! a complex one with a positive real part is flutter. Where det K < 0 there is a real s > 0,
+//! whatever masses M and dampers C there are: det(s^2 M + s C + K) is negative at s = 0 and
+//! positive for large s. Without masses no more is known: for each K that is not symmetric there
+//! are masses with which something grows.
+
+use super::search::{find_modes, first_shift, grows, matrices};
+use crate::model::{Assembly, StageContext, StageKind};
+use crate::run::failure::Failure;
+use crate::run::results::Mode;
+use crate::run::stage_run::{StageRun, Teller};
+use crate::solve::{LinearSolver, ModeSearch, Signature, SmallMotion, Tangent};
+
+/// Modes that are looked for at least, slowest first.
+const MODES: usize = 8;
+
+/// Growth that is less than so many times what round-off may have taken of |s| is in doubt.
+const SURELY: f64 = 10.0;
+
+/// With more unknowns no modes are looked for: that would take longer than the stage.
+const MOST_UNKNOWNS: usize = 20_000;
+
+/// Small vibrations about an equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::run) enum Vibrations {
+    /// The number of negative eigenvalues of the tangent, which is symmetric
+    Counted(usize),
+    /// None of those that were looked at grows.
+    Bounded,
+    /// This one grows fastest.
+    Growing(Mode),
+    /// Some grow, whatever masses there are.
+    Diverging,
+    /// Not known
+    Unknown,
+}
+
+/// Small vibrations about the state of a stage, in space and with the masses and dampers of the
+/// scene. `signature`: of the tangent as the stage is treated.
+pub(in crate::run) fn vibrations(stage: &mut StageRun, signature: Option<Signature>) -> Result<Vibrations, Failure> {
+    if stage.is_linear() {
+        return Ok(Vibrations::Unknown);
+    }
+    let own = stage.stage().context(stage.number);
+    let context = StageContext { kind: StageKind::Modal, ..own };
+    let dof_map = stage.schedule.dof_map(stage.model, None).map_err(|error| stage.describe(error))?;
+    let is_massless = stage.model.lacks_mass(&context, &dof_map);
+    let is_even_in_space = stage.plane.is_none() && signature.is_some_and(|signature| !signature.tells_unstable());
+    if dof_map.count() > MOST_UNKNOWNS || (is_massless && is_even_in_space) {
+        return Ok(Vibrations::Unknown);
+    }
+    let mut assembly = Assembly::new(&context, dof_map, stage.model);
+    let Some(mut solver) = LinearSolver::new(&assembly.system, &stage.model.multipliers) else {
+        return Ok(Vibrations::Unknown);
+    };
+    let matrices = matrices(&mut assembly, stage.state, stage.model);
+    stage.counters.work.factorisations += 1;
+    // Without digits signs tell nothing, nor where a motion has no stiffness, such as a spin that
+    // statics holds.
+    let is_sure = solver.factorise_surely(&assembly.system);
+    if !is_sure || solver.null_vector(&mut Tangent::that_stays(&mut assembly, stage.state)).is_some() {
+        return Ok(Vibrations::Unknown);
+    }
+    // In a plane no direction out of it takes part.
+    if let Some(Signature::Parity { is_odd: true }) = signature {
+        return Ok(Vibrations::Diverging);
+    }
+    match solver.signature(&mut Tangent::that_stays(&mut assembly, stage.state)) {
+        Some(Signature::Negative(count)) => return Ok(Vibrations::Counted(count)),
+        Some(Signature::Parity { is_odd: true }) => return Ok(Vibrations::Diverging),
+        Some(Signature::Parity { is_odd: false }) | None => {}
+    }
+    if is_massless || matrices.is_massless() {
+        return Ok(Vibrations::Unknown);
+    }
+    let at = stage.moment();
+    let StageRun { observer, counters, number, plan, .. } = stage;
+    let mut teller = Teller { observer: &mut **observer, at, number: *number, stages: plan.stages.len() };
+    let shift = first_shift(&matrices, &assembly.system);
+    let mut search = ModeSearch::new(&mut assembly.system, &mut solver, &matrices, Vec::new());
+    // The stage itself lies behind.
+    let found = find_modes(&mut search, shift, MODES, &mut |_| teller.tell(1.0), &mut counters.work)?;
+    Ok(found.map_or(Vibrations::Unknown, |found| judge(&found.motions)))
+}
+
+/// The verdict of these motions.
+fn judge(motions: &[SmallMotion]) -> Vibrations {
+    let surely = |motion: &&SmallMotion| motion.exponent.re > SURELY * motion.uncertainty * motion.exponent.norm();
+    let growing = || motions.iter().filter(|motion| grows(motion));
+    let fastest = growing().filter(surely).max_by(|a, b| a.exponent.re.total_cmp(&b.exponent.re));
+    match fastest {
+        Some(motion) => Vibrations::Growing(Mode { omega: motion.exponent.im, growth: motion.exponent.re }),
+        None if motions.is_empty() || growing().next().is_some() => Vibrations::Unknown,
+        None => Vibrations::Bounded,
+    }
+}

@@ -1,0 +1,123 @@
+//! A run from its plan: the stages one after the other, watched by an observer.
+
+use super::buckling::Buckling;
+use super::dynamics::Dynamics;
+use super::energy::Bookkeeper;
+use super::failure::Failure;
+use super::issued::IssuedWarnings;
+use super::modal::Modal;
+use super::naming::describe;
+use super::observer::{Counters, Observer};
+use super::plan::{Plan, StageWork};
+use super::rehearsal::lacking;
+use super::stage_run::{Analysis, EarlierStages, StageRun, newton_for};
+use super::statics::{ArcLength, LoadLevels};
+use crate::model::{Assembly, Model, Schedule};
+use crate::system::State;
+use std::sync::Arc;
+
+/// A run in progress, between its stages.
+pub struct Run<'o> {
+    plan: Plan,
+    model: Arc<Model>,
+    /// The courses of loads and motions
+    schedule: Schedule,
+    state: State,
+    /// The last converged state
+    good: State,
+    observer: &'o mut dyn Observer,
+    counters: Counters,
+    issued: IssuedWarnings,
+    bookkeeper: Bookkeeper,
+    past: EarlierStages,
+}
+
+impl<'o> Run<'o> {
+    /// A run at its start.
+    pub fn new(plan: Plan, observer: &'o mut dyn Observer) -> Self {
+        let model = plan.model.clone();
+        let state = model.rest();
+        Self {
+            plan,
+            schedule: Schedule::new(&model),
+            model,
+            good: state.clone(),
+            state,
+            observer,
+            counters: Counters::default(),
+            issued: IssuedWarnings::default(),
+            bookkeeper: Bookkeeper::default(),
+            past: EarlierStages::default(),
+        }
+    }
+
+    /// Runs all stages. Whatever happens, the counters tell how far it came.
+    pub fn finish(mut self) -> (Result<(), Failure>, Counters) {
+        let result = (0..self.plan.stages.len()).try_for_each(|number| self.run_stage(number));
+        (result, self.counters)
+    }
+
+    /// Runs stage number `number`, from 0.
+    fn run_stage(&mut self, number: usize) -> Result<(), Failure> {
+        let work = self.plan.stages[number].work;
+        let mut run = self.open_stage(number)?;
+        let stage = &mut run;
+        match work {
+            StageWork::Static { steps, approach } => carry_out(LoadLevels { stage, steps, approach }),
+            StageWork::Path { steps, max_steps } => carry_out(ArcLength { stage, steps, max_steps }),
+            StageWork::Modal { modes } => carry_out(Modal { stage, modes }),
+            StageWork::Buckling { modes } => carry_out(Buckling { stage, modes }),
+            StageWork::Dynamic(steps) => carry_out(Dynamics::new(stage, steps)),
+        }?;
+        run.hand_over();
+        self.schedule.end_stage(&self.model, &self.state);
+        Ok(())
+    }
+
+    /// Settles loads and constraints of a stage, and analyses the pattern of its unknowns.
+    fn open_stage(&mut self, number: usize) -> Result<StageRun<'_>, Failure> {
+        let stage = &self.plan.stages[number];
+        let fresh = number == 0 || self.schedule.has_fresh_loads(&self.model, number);
+        let begun = self.schedule.begin_stage(&self.model, number, stage.work.kind(), &self.state);
+        let dof_map = begun.map_err(|error| describe(error, &self.model, number))?;
+        let fading = !self.state.fading.is_empty();
+        if let Some(error) = lacking(&self.model, &self.schedule, stage, number, fading, || Some(dof_map.clone())) {
+            return Err(describe(error, &self.model, number));
+        }
+        let plane = dof_map.plane().copied();
+        let assembly = Assembly::new(&stage.context(number), dof_map, &self.model);
+        let newton = newton_for(stage, &assembly, &self.model)?;
+        let mut run = StageRun {
+            keeps_account: self.plan.energy,
+            plan: &self.plan,
+            number,
+            model: &self.model,
+            charted: self.model.charted(stage.work.kind()),
+            schedule: &mut self.schedule,
+            state: &mut self.state,
+            good: &mut self.good,
+            observer: &mut *self.observer,
+            cutbacks_before: self.counters.cutbacks,
+            counters: &mut self.counters,
+            issued: &mut self.issued,
+            bookkeeper: &mut self.bookkeeper,
+            past: &mut self.past,
+            assembly,
+            newton,
+            plane,
+            fresh,
+            soft: false,
+            prescribed_increment: Vec::new(),
+        };
+        run.warn_of_space();
+        Ok(run)
+    }
+}
+
+/// Runs an analysis, sums up its work, and warns of what shows behind it, however it ended.
+fn carry_out<'r>(mut analysis: impl Analysis<'r>) -> Result<(), Failure> {
+    let result = analysis.run();
+    analysis.stage().close();
+    analysis.judge();
+    result
+}

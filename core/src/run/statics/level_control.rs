@@ -1,0 +1,237 @@
+//! Load control: equal levels, approached in smaller steps where Newton fails, and along the path
+//! where those fail too.
+
+use super::arc_length::{Arrival, detour};
+use super::begin;
+use super::levels::{Levels, ReachedBy};
+use super::rest;
+use super::stability::{Stability, conclude, tell_of_points};
+use crate::run::failure::Failure;
+use crate::run::plan::Approach;
+use crate::run::spatial::SpatialLook;
+use crate::run::stage_run::{Analysis, StageRun};
+use crate::solve::{NewtonFailure, Signature};
+use crate::warning::WarningKind;
+
+/// The words about a stage that took over much from a motion.
+const IN_MOTION: &str =
+    " (the stage began in motion, whose forces fade: `[damping]` in the dynamic stage before it leaves less of them)";
+
+/// The outcome of a step.
+enum StepOutcome {
+    /// Balance, with these signs of pivots
+    Good(Option<Signature>),
+    /// Balance, perhaps on another branch
+    Jumped(Option<Signature>),
+    /// Balance, by an iteration that has not gone straight to it
+    Strayed(Option<Signature>),
+    /// No balance
+    Failed(NewtonFailure),
+}
+
+/// How a level was reached.
+#[derive(PartialEq)]
+enum Reached {
+    /// By load control
+    Level,
+    /// Along the path, which has shown its rows
+    Along,
+    /// The stage's `until` came true on the way.
+    Over,
+}
+
+/// A static stage by load levels.
+pub(in crate::run) struct LoadLevels<'s, 'r> {
+    pub stage: &'s mut StageRun<'r>,
+    /// The number of levels
+    pub steps: usize,
+    pub approach: Approach,
+}
+
+impl<'r> Analysis<'r> for LoadLevels<'_, 'r> {
+    fn stage(&mut self) -> &mut StageRun<'r> {
+        self.stage
+    }
+
+    fn run(&mut self) -> Result<(), Failure> {
+        let mut space = SpatialLook::default();
+        let loose = begin(self.stage, &mut space)?;
+        let levels = Levels::new(self.stage.state.kept(), self.steps, self.approach);
+        let stability = Stability::new(self.stage);
+        LevelControl { stage: self.stage, space, levels, stability, loose }.go(self.steps)
+    }
+
+    fn judge(&mut self) {
+        self.stage.warn_of_standstill();
+    }
+}
+
+/// Load control under way.
+struct LevelControl<'s, 'r> {
+    stage: &'s mut StageRun<'r>,
+    space: SpatialLook,
+    levels: Levels,
+    stability: Stability,
+    /// The mechanism that nothing holds before the first level
+    loose: Option<Failure>,
+}
+
+impl LevelControl<'_, '_> {
+    /// Goes through all levels.
+    fn go(&mut self, steps: usize) -> Result<(), Failure> {
+        let at_start = self.stability.signature;
+        self.stage.good.copy_from(self.stage.state);
+        for number in 1..=steps {
+            let reached = self.reach(number as f64 / steps as f64)?;
+            if reached == Reached::Level {
+                self.stage.counters.steps += 1;
+                self.stage.show()?;
+            }
+            if reached == Reached::Over || self.stage.is_over() {
+                break;
+            }
+        }
+        // What is linear keeps the tangent of its start.
+        let signature = if self.stage.is_linear() { at_start } else { self.stability.signature };
+        conclude(self.stage, &mut self.space, signature, false)
+    }
+
+    /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or
+    /// along the path.
+    fn reach(&mut self, target: f64) -> Result<Reached, Failure> {
+        debug_assert!(
+            self.stage.state.q == self.stage.good.q && self.stage.state.load == self.stage.good.load,
+            "the last state is not the good one"
+        );
+        if let Some(loose) = self.loose.take() {
+            return self.rest_at(target, loose);
+        }
+        while self.stage.good.load < target {
+            let next = self.levels.next(self.stage.good.load, target);
+            self.stage.tell_progress(next)?;
+            match self.try_step(next) {
+                StepOutcome::Good(signature) => self.take_step(signature)?,
+                _ if self.levels.halve(self.stage.soft) => {
+                    self.stage.counters.cutbacks += 1;
+                    self.stage.state.copy_all_but_rates(self.stage.good);
+                }
+                // Nothing tells better.
+                StepOutcome::Strayed(signature) => self.take_step(signature)?,
+                StepOutcome::Jumped(signature) if self.levels.approach != Approach::Path => {
+                    self.take_step(signature)?;
+                }
+                StepOutcome::Jumped(_) => return self.go_around(target, None),
+                StepOutcome::Failed(failure) => return self.go_around(target, Some(failure)),
+            }
+        }
+        Ok(Reached::Level)
+    }
+
+    /// A level is reached by a motion to a state of rest, where there is one that its loads hold;
+    /// else the stage ends with `failure`.
+    fn rest_at(&mut self, target: f64, failure: Failure) -> Result<Reached, Failure> {
+        let total = self.stage.bookkeeper.ledger().total();
+        let may_rest = !self.stage.is_linear()
+            && self.levels.approach != Approach::Straight
+            && self.levels.reached_by != ReachedBy::Levels;
+        if !may_rest || !rest::come_to_rest(self.stage, target)? {
+            return Err(failure);
+        }
+        rest::refuse_loose(self.stage, &mut self.space)?;
+        let at = self.stage.moment();
+        let why = if let Failure::Singular { place: Some(place), .. } = &failure {
+            format!("nothing but its loads holds {place}")
+        } else {
+            "load levels lead to no balance".into()
+        };
+        let message = format!(
+            "{why}: the state at {at} is where the structure came to rest, moved by all forces against an artificial resistance; it is in \
+             balance without that"
+        );
+        self.stage.warn(WarningKind::CameToRest, message);
+        self.stability.signature = self.stability.look(self.stage);
+        self.levels.reached_by = ReachedBy::Rest;
+        self.take_step(self.stability.signature)?;
+        self.stage.bookkeeper.damp_to(total);
+        Ok(Reached::Level)
+    }
+
+    fn try_step(&mut self, next: f64) -> StepOutcome {
+        if let Err(failure) = self.stage.attempt(next) {
+            return StepOutcome::Failed(failure);
+        }
+        let signature = self.stability.look(self.stage);
+        let StageRun { model, good, state, newton, soft, .. } = &*self.stage;
+        let changes = self.stability.changes_to(signature);
+        if *soft {
+            StepOutcome::Good(signature)
+        } else if self.levels.may_have_jumped(model, [good, state], &newton.first, changes) {
+            StepOutcome::Jumped(signature)
+        } else if self.stability.may_have_strayed(newton.contraction, signature) {
+            StepOutcome::Strayed(signature)
+        } else {
+            StepOutcome::Good(signature)
+        }
+    }
+
+    fn take_step(&mut self, signature: Option<Signature>) -> Result<(), Failure> {
+        self.stage.accept()?;
+        let before = std::mem::replace(&mut self.stability.signature, signature);
+        tell_of_points(self.stage, &mut self.space, None, before, signature)?;
+        self.stage.good.copy_all_but_rates(self.stage.state);
+        self.levels.reached_by = self.levels.reached_by.max(ReachedBy::Levels);
+        // Where pivots were looked at the stiffness is that of this state.
+        if signature.is_some() {
+            self.stage.newton.begin_with(&self.stage.assembly.system);
+        }
+        self.levels.double();
+        Ok(())
+    }
+
+    /// Where load control stands still the path is followed by arc length until it comes to the
+    /// level. `failure` is what load control ended with, if it did not only seem to jump.
+    fn go_around(&mut self, target: f64, failure: Option<NewtonFailure>) -> Result<Reached, Failure> {
+        let named = failure.map(|failure| self.stage.name_failure(failure, &self.stage.assembly.system));
+        self.stage.state.copy_from(self.stage.good);
+        let hopeless = self.levels.approach != Approach::Path || self.stage.soft;
+        match named {
+            Some(named) if self.levels.approach == Approach::Straight || !named.is_of_balance() => return Err(named),
+            Some(named) if hopeless => return self.rest_at(target, named),
+            _ => {}
+        }
+        let (at, steps) = (self.stage.moment(), self.stage.counters.steps);
+        let motion = if self.stage.state.fading.is_empty() { "" } else { IN_MOTION };
+        let message =
+            format!("load control stands still at {at}: the path is followed by arc length from there{motion}");
+        self.stage.warn(WarningKind::ArcLengthDetour, message);
+        let arrival = detour(self.stage, &mut self.space, &self.levels, target);
+        let (end, increments) = (self.stage.moment(), self.stage.counters.steps - steps);
+        let limit = Failure::LimitPoint { at, goal: target, increments, end };
+        match arrival {
+            Ok(Arrival::Until) => {
+                self.stability.signature = self.stability.look(self.stage);
+                Ok(Reached::Over)
+            }
+            Ok(Arrival::Goal) => {
+                self.resume(target, increments);
+                Ok(Reached::Along)
+            }
+            Ok(Arrival::OutOfSteps) => Err(limit),
+            Ok(Arrival::Nowhere) => self.rest_at(target, named.unwrap_or(limit)),
+            Err(failure) if !failure.is_of_balance() => Err(failure),
+            Err(_) if increments > 0 => self.rest_at(target, limit),
+            Err(failure) => self.rest_at(target, named.unwrap_or(failure)),
+        }
+    }
+
+    /// Load control goes on where a detour has come to its level.
+    fn resume(&mut self, target: f64, increments: u64) {
+        self.stage.good.copy_from(self.stage.state);
+        self.stability.signature = self.stability.look(self.stage);
+        self.levels.restart();
+        self.stage.warn(
+            WarningKind::LoadControlResumed,
+            format!("load control goes on at load factor {target}, after {increments} increments of arc length"),
+        );
+    }
+}

@@ -1,0 +1,424 @@
+//! Arc-length control: paths of equilibrium that turn back in load or in displacement.
+//!
+//! Along a path the state q and the load factor are both unknown; a step goes a given length ds
+//! along the tangent t of the last point and then back to the path in the plane normal to it (Riks
+//! 1979, doi:10.1016/0020-7683(79)90081-7):
+//!
+//! ```text
+//! <t_u, u - u_n>/U^2 + t_l (l - l_n) = ds,     K dq = -g - g_l dl
+//! ```
+//!
+//! Lengths are measured in displacements, over what a unit of load moves at the start (U), and in
+//! the load factor; rotation vectors follow through the equations, so that no chart enters.
+
+use super::load_control::PathDirection;
+use crate::kernel::Weights;
+use crate::model::{SlotKind, charts};
+use crate::run::failure::Failure;
+use crate::run::stage_run::StageRun;
+use crate::solve::{self, NewtonFailure, Signature, Tangent, Verdict, mechanism, timed};
+use crate::system::State;
+use crate::tensor::Vec3;
+
+/// Iterations of a step after which the next one stays as long
+const EASY: f64 = 5.0;
+/// The longest step, over the first one.
+const LONGEST: f64 = 2.0;
+/// The longest step where the path is straight and brings little load, over [`LONGEST`].
+const STRETCH: f64 = 8.0;
+/// The cosine between tangents above which the path is straight.
+const STRAIGHT: f64 = 0.995;
+/// The shortest step, over the first one.
+const SHORTEST: f64 = 1.0 / 16384.0;
+/// The cosine between tangents, or between a tangent and its chord, below which a step was too
+/// long: it may have come down on another branch.
+const MIN_COSINE: f64 = 0.8;
+/// Part of the first step below which a change of pivots is believed that no limit point explains.
+const BELIEVED: f64 = 1.0 / 1024.0;
+/// Attempts to come nearer to a special point
+const MOST_LOOKS: usize = 40;
+/// The size of a correction, over the step, beyond which it is a flight.
+const FLIGHT: f64 = 100.0;
+/// The length, over the step, to which a special point is located.
+const LOCATED: f64 = 1e-9;
+
+/// A point of the path and its unit tangent.
+#[derive(Clone)]
+pub struct PathPoint {
+    pub state: State,
+    tangent: Vec<Vec3>,
+    /// The tangent's part in the load factor
+    pub load_rate: f64,
+    /// The rate of the displacement that the loads do work on
+    pub work_rate: f64,
+    pub signature: Option<Signature>,
+    /// It is a limit point: one pivot is next to zero, with the sign of round-off
+    pub on_limit: bool,
+}
+
+/// A special point between two points of a path, as a function that changes its sign there.
+#[derive(Clone, Copy, PartialEq)]
+pub enum PathTarget {
+    Limit,
+    Turning,
+    Load(f64),
+}
+
+impl PathTarget {
+    pub fn value(self, point: &PathPoint) -> f64 {
+        match self {
+            Self::Limit => point.load_rate,
+            Self::Turning => point.work_rate,
+            Self::Load(load) => point.state.load - load,
+        }
+    }
+}
+
+/// A path being followed.
+pub struct Path {
+    /// The load factor at which it was begun
+    pub begun: f64,
+    pub here: PathPoint,
+    /// The length of the next step
+    length: f64,
+    /// Length of the first step
+    first: f64,
+    /// The tangent's part in the load factor at the beginning
+    first_rate: f64,
+    /// 1/U^2
+    scale: f64,
+}
+
+impl Path {
+    /// `None` where nothing grows with the load factor.
+    pub fn new(stage: &mut StageRun, steps: usize) -> Result<Option<Self>, Failure> {
+        let Some(PathDirection { rate: direction, .. }) = stage.path_direction()? else { return Ok(None) };
+        let mut path = Self::with_measure(stage, direction);
+        path.here = path.look(stage, &path.here.clone())?;
+        let first = 1.0 / (steps as f64 * path.here.load_rate.abs());
+        path.begin_with(stage, first).map(Some)
+    }
+
+    /// From the run's state on. Lengths are measured in what a unit of load has moved since `from`:
+    /// near a limit point the tangent moves without bounds.
+    pub fn onward(stage: &mut StageRun, from: &State, increment: f64) -> Result<Option<Self>, Failure> {
+        let risen = stage.state.load - from.load;
+        if risen <= 0.0 {
+            return Self::new(stage, (1.0 / increment).ceil() as usize);
+        }
+        let secant = stage.state.q.iter().zip(&from.q).map(|(q, before)| (*q - *before) * (1.0 / risen)).collect();
+        let mut path = Self::with_measure(stage, secant);
+        // Load control has come here from a lower load: onward is where the load grows.
+        path.here.tangent.fill(Vec3::ZERO);
+        path.here = path.look(stage, &path.here.clone())?;
+        path.begin_with(stage, std::f64::consts::SQRT_2 * increment).map(Some)
+    }
+
+    /// With its first length. Forces near the limits of floating point have no measure of
+    /// displacements: then lengths are no numbers, and no search for a shorter one would end.
+    fn begin_with(mut self, stage: &StageRun, first: f64) -> Result<Self, Failure> {
+        (self.first, self.length, self.first_rate) = (first, first, self.here.load_rate);
+        if first.is_finite() && self.here.load_rate.is_finite() {
+            return Ok(self);
+        }
+        let sizes = self.here.tangent.iter().map(|t| t.norm());
+        let largest = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(slot, _)| slot);
+        let node = stage.model.node_at(largest);
+        Err(Failure::NonFinite { at: stage.moment(), effect: Some("what a unit of load moves"), node })
+    }
+
+    /// With what a unit of load moves, by `rate`, as measure of displacements, and as direction to
+    /// go on in.
+    fn with_measure(stage: &StageRun, rate: Vec<Vec3>) -> Self {
+        let moved = squared(stage, &rate);
+        let rotated = stage.model.kinds.iter().zip(&rate).filter(|(kind, _)| **kind == SlotKind::Rotation);
+        let turned = rotated.map(|(_, d)| d.norm() * stage.model.length).fold(0.0, f64::max);
+        // Displacements that are only round-off beside the rotations measure nothing.
+        let moved = if moved.sqrt() > 1e-9 * turned { moved } else { 0.0 };
+        let here = PathPoint {
+            state: stage.state.clone(),
+            tangent: rate,
+            load_rate: 1.0,
+            work_rate: 1.0,
+            signature: None,
+            on_limit: false,
+        };
+        Self {
+            begun: stage.state.load,
+            here,
+            length: 0.0,
+            first: 0.0,
+            first_rate: 1.0,
+            scale: if moved > 0.0 { 1.0 / moved } else { 0.0 },
+        }
+    }
+
+    /// Takes the next increment half as long; `false` where it may not be.
+    pub fn shorten(&mut self) -> bool {
+        let may = 0.5 * self.length >= SHORTEST * self.first;
+        self.length *= if may { 0.5 } else { 1.0 };
+        may
+    }
+
+    /// The point at the run's state: its tangent goes on in the direction of `before`.
+    fn look(&mut self, stage: &mut StageRun, before: &PathPoint) -> Result<PathPoint, Failure> {
+        let slots = stage.state.q.len();
+        let PathDirection { rate, pull } = stage.path_direction()?.unwrap_or_else(|| PathDirection::none(slots));
+        // The tangent of the last evaluation tells the pivots.
+        let StageRun { assembly, newton, .. } = stage;
+        let mut tangent = Tangent::that_may_go(assembly, stage.state, Weights::STIFFNESS);
+        let signature = newton.solver.signature(&mut tangent);
+        let along = dot(stage, &rate, &before.tangent) * self.scale + before.load_rate;
+        let size = (squared(stage, &rate) * self.scale + 1.0).sqrt();
+        let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
+        // Of prescribed motions alone no displacement is known that loads would do work on.
+        let work = work_of_loads(stage, &pull, &rate).unwrap_or(load_rate.signum());
+        let tangent = rate.into_iter().map(|d| d * load_rate).collect();
+        Ok(PathPoint {
+            state: stage.state.clone(),
+            tangent,
+            load_rate,
+            work_rate: work * load_rate,
+            signature,
+            on_limit: false,
+        })
+    }
+
+    /// One step that is neither too hard nor too bent; its length.
+    pub fn step(&mut self, stage: &mut StageRun) -> Result<(PathPoint, f64), Failure> {
+        loop {
+            let length = self.length;
+            let failure = match self.advance(stage, length) {
+                Ok(iterations) => {
+                    let next = match self.look(stage, &self.here.clone()) {
+                        Ok(next) => next,
+                        Err(failure) => {
+                            stage.state.copy_from(&self.here.state);
+                            return Err(failure);
+                        }
+                    };
+                    let cosine = dot(stage, &next.tangent, &self.here.tangent) * self.scale
+                        + next.load_rate * self.here.load_rate;
+                    let straight = cosine.min(length / self.chord(stage, &next)) >= MIN_COSINE;
+                    let fine = straight && !self.may_have_jumped(&next, length);
+                    if fine || length <= SHORTEST * self.first {
+                        let factor = (EASY / iterations.max(1) as f64).sqrt().clamp(0.5, 2.0);
+                        let is_easy = iterations <= 2 && cosine >= STRAIGHT;
+                        let longest = if is_easy { self.longest(next.load_rate) } else { LONGEST * self.first };
+                        self.length = (length * factor).min(longest.max(length));
+                        return Ok((next, length));
+                    }
+                    None
+                }
+                Err(failure) => Some(failure),
+            };
+            stage.counters.cutbacks += 1;
+            self.length = 0.5 * length;
+            if let (Some(failure), true) = (failure, self.length < SHORTEST * self.first) {
+                let named = stage.name_failure(failure, &stage.assembly.system);
+                stage.state.copy_from(&self.here.state);
+                return Err(named);
+            }
+        }
+    }
+
+    /// True if a motion is not longer than the next step.
+    pub fn is_within_a_step(&self, stage: &StageRun, moved: &[Vec3]) -> bool {
+        squared(stage, moved) * self.scale <= self.length * self.length
+    }
+
+    /// The longest step where the path is straight: it brings as much load as the longest one at
+    /// the beginning.
+    fn longest(&self, load_rate: f64) -> f64 {
+        LONGEST * self.first * (self.first_rate / load_rate).abs().clamp(1.0, STRETCH)
+    }
+
+    /// How far a point is from here; over its length along the tangent, the cosine between both.
+    fn chord(&self, stage: &StageRun, next: &PathPoint) -> f64 {
+        let moved: Vec<Vec3> = next.state.q.iter().zip(&self.here.state.q).map(|(q, here)| *q - *here).collect();
+        let risen = next.state.load - self.here.state.load;
+        (squared(stage, &moved) * self.scale + risen * risen).sqrt()
+    }
+
+    /// True if a step of this length may have gone to another branch: along a path one pivot
+    /// changes its sign where the load turns, and else only where another branch begins, which a
+    /// short step passes by.
+    fn may_have_jumped(&self, next: &PathPoint, length: f64) -> bool {
+        let (Some(before), Some(after)) = (self.here.signature, next.signature) else { return false };
+        // On a limit point the load has turned already.
+        let turned = !self.here.on_limit && (next.load_rate > 0.0) != (self.here.load_rate > 0.0);
+        before.changes_to(after) != usize::from(turned) && length > BELIEVED * self.first
+    }
+
+    /// Goes `length` along the tangent and back to the path; leaves the run's state there and
+    /// returns the iterations.
+    fn advance(&self, stage: &mut StageRun, length: f64) -> Result<usize, NewtonFailure> {
+        let mut load = self.predict(stage, length);
+        stage.assembly.forget();
+        let round_off = stage.assembly.round_off(stage.state);
+        let mut last = None;
+        let (mut iterations, mut history) = (0, Vec::new());
+        loop {
+            // Held directions are put where they belong, free of the round-off of predictor and
+            // corrections.
+            stage.schedule.set_clock(stage.model, stage.state, self.here.state.time, load);
+            let pull = stage.load_derivative();
+            let StageRun { assembly, newton, prescribed_increment, .. } = stage;
+            let seconds = &mut stage.counters.work.evaluation_seconds;
+            timed(seconds, || assembly.evaluate(stage.state, Weights::STIFFNESS, Some(prescribed_increment)));
+            let (verdict, residual) = newton.convergence.judge(stage.model, &assembly.system, round_off, last);
+            history.push(residual.ratio);
+            match verdict {
+                Verdict::Converged | Verdict::Noisy => return Ok(iterations),
+                Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, stage.state)),
+                Verdict::Continue if iterations == newton.max_iterations => {
+                    return Err(NewtonFailure::NotConverged { residual, history });
+                }
+                Verdict::Continue => {}
+            }
+            let (dq, dl) = self.correction(stage, &pull)?;
+            let wild = dq.iter().any(|d| !d.is_finite()) || !dl.is_finite();
+            if wild || squared(stage, &dq) * self.scale + dl * dl > (FLIGHT * length).powi(2) {
+                return Err(NewtonFailure::NotConverged { residual, history });
+            }
+            load += dl;
+            let switched = correct(stage, &dq);
+            // What was a correction before is none in a new chart.
+            last = Some(if switched { f64::INFINITY } else { solve::size(stage.model, &dq) });
+            iterations += 1;
+        }
+    }
+
+    /// The state `length` along the tangent; its load factor.
+    fn predict(&self, stage: &mut StageRun, length: f64) -> f64 {
+        let here = &self.here;
+        stage.state.copy_from(&here.state);
+        let ahead: Vec<Vec3> = here.tangent.iter().map(|t| *t * length).collect();
+        charts::carry(stage.state, &ahead, &stage.charted.rotations);
+        stage.state.q.iter_mut().zip(&ahead).for_each(|(q, d)| *q += *d);
+        here.state.load + here.load_rate * length
+    }
+
+    /// The correction of Newton within the plane normal to the tangent: of the unknowns, and of the
+    /// load factor. The assembly holds forces and tangent of the run's state.
+    fn correction(&self, stage: &mut StageRun, pull: &[Vec3]) -> Result<(Vec<Vec3>, f64), NewtonFailure> {
+        let StageRun { assembly, newton, prescribed_increment, .. } = stage;
+        let (system, solver, work) = (&assembly.system, &mut newton.solver, &mut stage.counters.work);
+        let slots = pull.len();
+        let mut back = vec![0.0; system.pattern.dof_map.count()];
+        let mut along = back.clone();
+        system.right_hand_side_of(pull, &mut along);
+        // The residual's own right-hand side takes no part of prescribed increments.
+        let total: Vec<Vec3> = (0..slots).map(|slot| system.total(slot)).collect();
+        system.right_hand_side_without_lift(&total, &mut back);
+        work.factorisations += 1;
+        work.iterations += 1;
+        let solved = timed(&mut work.solve_seconds, || {
+            solver.factorise(system) && solver.solve(system, &mut back) && solver.solve(system, &mut along)
+        });
+        if !solved {
+            return Err(NewtonFailure::Singular(mechanism(
+                solver,
+                &mut Tangent::that_stays(assembly, stage.state),
+                stage.model,
+            )));
+        }
+        let (mut a, mut b) = (vec![Vec3::ZERO; slots], vec![Vec3::ZERO; slots]);
+        system.pattern.dof_map.scatter(&back, None, &mut a);
+        system.pattern.dof_map.scatter(&along, Some(prescribed_increment), &mut b);
+        let part = |d: &[Vec3]| dot(stage, &self.here.tangent, d) * self.scale;
+        let dl = -part(&a) / (part(&b) + self.here.load_rate);
+        Ok((a.iter().zip(&b).map(|(a, b)| *a + *b * dl).collect(), dl))
+    }
+
+    /// The nearest of the special points between here and `next`, or `next` itself.
+    pub fn nearest(
+        &mut self,
+        stage: &mut StageRun,
+        next: PathPoint,
+        length: f64,
+        targets: &[PathTarget],
+    ) -> (PathPoint, Option<PathTarget>) {
+        let mut best = (next, length, None);
+        for &target in targets {
+            if let Some((point, at)) = self.locate(stage, &best.0, best.1, target) {
+                best = (point, at, Some(target));
+            }
+        }
+        (best.0, best.2)
+    }
+
+    /// Where a function of the path has its zero between here and a point `length` ahead (Illinois'
+    /// regula falsi); `None` where it has none.
+    fn locate(
+        &mut self,
+        stage: &mut StageRun,
+        end: &PathPoint,
+        length: f64,
+        target: PathTarget,
+    ) -> Option<(PathPoint, f64)> {
+        let mut low = Bracket { at: 0.0, value: target.value(&self.here) };
+        let mut high = Bracket { at: length, value: target.value(end) };
+        if low.value * high.value > 0.0 {
+            return None;
+        }
+        let size = low.value.abs().max(high.value.abs());
+        let mut found = (end.clone(), length);
+        for _ in 0..MOST_LOOKS {
+            let share = if high.value == low.value { 0.5 } else { -low.value / (high.value - low.value) };
+            let at = low.at + (high.at - low.at) * share.clamp(0.02, 0.98);
+            self.advance(stage, at).ok()?;
+            let point = self.look(stage, &self.here.clone()).ok()?;
+            let value = target.value(&point);
+            found = (point, at);
+            if value.abs() <= LOCATED * size || (high.at - low.at).abs() <= LOCATED * length {
+                break;
+            }
+            if value * high.value <= 0.0 {
+                low = high;
+            } else {
+                low.value *= 0.5;
+            }
+            high = Bracket { at, value };
+        }
+        Some(found)
+    }
+}
+
+/// A length along the tangent, and the value that is looked for there.
+#[derive(Clone, Copy)]
+struct Bracket {
+    at: f64,
+    value: f64,
+}
+
+/// Adds a correction; whether nodes changed their charts by it.
+fn correct(stage: &mut StageRun, dq: &[Vec3]) -> bool {
+    stage.assembly.extrapolate(stage.state, dq);
+    charts::carry(stage.state, dq, &stage.charted.rotations);
+    stage.state.q.iter_mut().zip(dq).for_each(|(q, d)| *q += *d);
+    let switched = charts::switch(stage.state, &stage.charted.rotations, charts::STATIC_BAND, None);
+    if switched > 0 {
+        stage.counters.work.chart_switches += switched as u64;
+        charts::freeze(stage.state, &stage.charted.elements);
+    }
+    switched > 0
+}
+
+/// The rate of the displacement that the loads do work on; `None` without loads. What stands at
+/// multipliers are gaps of motors, not forces.
+fn work_of_loads(stage: &StageRun, pull: &[Vec3], rate: &[Vec3]) -> Option<f64> {
+    let acting = || pull.iter().zip(rate).zip(stage.model.kinds.iter()).filter(|(_, kind)| !kind.is_multiplier());
+    let loaded = acting().any(|((force, _), _)| *force != Vec3::ZERO);
+    loaded.then(|| acting().map(|((force, d), _)| -force.dot(*d)).sum())
+}
+
+/// The sum over displacements of squares; rotations follow.
+fn squared(stage: &StageRun, field: &[Vec3]) -> f64 {
+    dot(stage, field, field)
+}
+
+fn dot(stage: &StageRun, a: &[Vec3], b: &[Vec3]) -> f64 {
+    let slots = stage.model.kinds.iter().zip(a.iter().zip(b));
+    slots.filter(|(kind, _)| **kind == SlotKind::Displacement).map(|(_, (a, b))| a.dot(*b)).sum()
+}

@@ -1,0 +1,34 @@
+//! Factorisations in blocks, of whatever kind.
+
+use super::elimination::Elimination;
+use crate::system::{Matrix, System};
+
+/// The numbers of a factorisation.
+pub trait Factor: Send {
+    /// Its name, in a word.
+    fn name(&self) -> &'static str;
+
+    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
+    fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool;
+
+    /// See [`super::BlockSolver::can_stay_within`].
+    fn can_stay_within(&self, elimination: &Elimination, system: &System) -> bool;
+
+    /// See [`super::BlockSolver::factorise_within`].
+    fn factorise_within(&mut self, elimination: &Elimination, system: &mut System) -> bool;
+
+    /// See [`super::BlockSolver::negative`].
+    fn negative(&self) -> Option<usize>;
+
+    /// See [`super::BlockSolver::has_negative_determinant`].
+    fn has_negative_determinant(&self) -> Option<bool>;
+
+    /// See [`super::BlockSolver::is_sure`].
+    fn is_sure(&self) -> bool;
+
+    /// See [`super::BlockSolver::is_symmetric`].
+    fn is_symmetric(&self) -> bool;
+
+    /// Solves with the last factorisation, which is that of `matrix`, row by row.
+    fn solve(&self, elimination: &Elimination, matrix: Matrix, x: &mut [f64]);
+}

@@ -1,0 +1,156 @@
+//! Errors of commands. Each has a name, a message for the last line, and an exit status.
+
+use super::console;
+use super::status::Status;
+use crate::output::OutputError;
+use crate::study::StudyError;
+use beamsim_core::failure::FailureKind;
+use beamsim_core::run::Failure;
+use thiserror::Error;
+
+/// Why a command could not do what it was asked for.
+#[derive(Debug, Error)]
+pub enum CommandError {
+    /// The command line is wrong.
+    #[error("{0}")]
+    Usage(String),
+    /// A deck cannot be read, or describes no scene.
+    #[error("{}", .0.message)]
+    Deck(DeckError),
+    /// A file could not be read or written.
+    #[error("{0}")]
+    Io(String),
+    /// A simulation failed.
+    #[error("{0}")]
+    Run(Failure),
+    /// A signal stopped the command between simulations.
+    #[error("{message}")]
+    Stopped {
+        /// SIGINT is 2, SIGTERM 15
+        signal: i32,
+        /// The last line
+        message: String,
+    },
+    /// The search for an accuracy ended before it came to its end.
+    #[error("the search was stopped: {missed}")]
+    SearchStopped {
+        /// The failure that stopped it
+        by: Failure,
+        /// How far the best result is from the wanted accuracy
+        missed: String,
+    },
+    /// A wanted accuracy was not reached.
+    #[error("{0}")]
+    Missed(String),
+    /// An expectation or comparison failed.
+    #[error("{0}")]
+    Unexpected(String),
+    /// Some points of a sweep failed.
+    #[error("{0}")]
+    Sweep(String),
+    /// There were warnings, and `--deny-warnings` was given.
+    #[error("{0} warning(s), which --deny-warnings treats as a failure")]
+    Warnings(usize),
+}
+
+/// The errors of one deck.
+#[derive(Debug, Default)]
+pub struct DeckError {
+    /// The last line
+    pub message: String,
+    /// The errors with their lines of the deck; empty where there is nothing to show
+    pub details: String,
+    /// True if the deck only exceeds supported limits
+    pub is_limit: bool,
+    /// Failures that the deck itself expects
+    pub expected: Vec<String>,
+}
+
+impl CommandError {
+    /// An error of a deck without lines to show.
+    pub fn deck(message: impl ToString) -> Self {
+        Self::Deck(DeckError { message: message.to_string(), ..DeckError::default() })
+    }
+
+    /// A deck or file that exceeds a supported limit.
+    pub fn limit(message: String) -> Self {
+        Self::Deck(DeckError { message, is_limit: true, ..DeckError::default() })
+    }
+
+    /// A file that could not be read or written; the message of the error names it.
+    pub fn io(error: impl Into<OutputError>) -> Self {
+        Self::Io(error.into().to_string())
+    }
+
+    /// The word in brackets of the last line.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Usage(_) => "usage",
+            Self::Deck(error) if error.is_limit => FailureKind::Limit.name(),
+            Self::Deck(_) => FailureKind::Deck.name(),
+            Self::Io(_) => FailureKind::Io.name(),
+            Self::Run(failure) | Self::SearchStopped { by: failure, .. } => failure.name(),
+            Self::Stopped { .. } => FailureKind::Interrupted.name(),
+            Self::Missed(_) => "accuracy",
+            Self::Unexpected(_) => "unexpected",
+            Self::Sweep(_) => "sweep",
+            Self::Warnings(_) => "warnings",
+        }
+    }
+
+    /// The exit status.
+    pub fn status(&self) -> Status {
+        match self {
+            Self::Usage(_) | Self::Deck(_) => Status::Wrong,
+            Self::Io(_) => Status::Io,
+            Self::Run(failure) | Self::SearchStopped { by: failure, .. } => Status::of_failure(failure),
+            Self::Stopped { signal, .. } => Status::after(*signal),
+            Self::Missed(_) => Status::Missed,
+            Self::Unexpected(_) | Self::Warnings(_) => Status::Unexpected,
+            Self::Sweep(_) => Status::GaveUp,
+        }
+    }
+
+    /// Messages that are printed before the last line; empty where there are none.
+    pub fn details(&self) -> &str {
+        match self {
+            Self::Deck(error) => &error.details,
+            Self::Usage(_)
+            | Self::Io(_)
+            | Self::Run(_)
+            | Self::Stopped { .. }
+            | Self::SearchStopped { .. }
+            | Self::Missed(_)
+            | Self::Unexpected(_)
+            | Self::Sweep(_)
+            | Self::Warnings(_) => "",
+        }
+    }
+
+    /// Prints the last line.
+    pub fn print(&self) {
+        console::error(self.name(), &self.to_string());
+    }
+}
+
+impl From<OutputError> for CommandError {
+    fn from(error: OutputError) -> Self {
+        Self::io(error)
+    }
+}
+
+/// An error of a study without the text of its deck: a diagnostic keeps its message and loses its
+/// line.
+impl From<StudyError> for CommandError {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Failure(failure) => Self::Run(failure),
+            StudyError::Output(error) => Self::io(error),
+            StudyError::Deck(_)
+            | StudyError::NoScene(_)
+            | StudyError::OtherOutputs
+            | StudyError::Comparison(_)
+            | StudyError::Sweep(_) => Self::deck(error),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! `beamsim new`
+
+use super::console;
+use super::status::Status;
+use crate::deck::SCHEMA;
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// Starter decks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Template {
+    /// A rod, clamped at one end, with a force at the other
+    #[default]
+    Cantilever,
+    /// A portal that sways, with a distributed load, to its critical load
+    Frame,
+    /// A crank, driven by a motor through two joints
+    Mechanism,
+    /// A blade on a hub that spins up, and its modes while it turns
+    RotatingBlade,
+    /// A rod that flies freely, turned and bent
+    FreeBody,
+    /// A closed ring, squeezed by springs
+    Ring,
+}
+
+impl Template {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Cantilever => include_str!("templates/cantilever.toml"),
+            Self::Frame => include_str!("templates/frame.toml"),
+            Self::Mechanism => include_str!("templates/mechanism.toml"),
+            Self::RotatingBlade => include_str!("templates/rotating-blade.toml"),
+            Self::FreeBody => include_str!("templates/free-body.toml"),
+            Self::Ring => include_str!("templates/ring.toml"),
+        }
+    }
+}
+
+/// Writes a starter deck; a file that exists is left as it is.
+pub fn new(template: Template, out: Option<&Path>) -> Status {
+    use clap::ValueEnum;
+    let name = template.to_possible_value().map_or(String::new(), |value| value.get_name().to_string());
+    let path = out.map_or_else(|| PathBuf::from(format!("{name}.toml")), Path::to_path_buf);
+    let file = OpenOptions::new().write(true).create_new(true).open(&path);
+    match file.and_then(|mut file| file.write_all(template.text().as_bytes())).and_then(|()| schema_beside(&path)) {
+        Ok(()) => {
+            let path = path.display();
+            console::line(&format!("{path}: next `beamsim check {path}`, then `beamsim run {path}`"));
+            Status::Fine
+        }
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            console::error(
+                "io",
+                &format!("{}: already exists and is not overwritten (use --out for another name)", path.display()),
+            );
+            Status::Io
+        }
+        Err(error) => {
+            console::error("io", &format!("{}: {error}", path.display()));
+            Status::Io
+        }
+    }
+}
+
+/// The schema that the deck names in its first line, for editors.
+fn schema_beside(path: &Path) -> std::io::Result<()> {
+    let schema = path.with_file_name("beamsim.schema.json");
+    if schema.exists() { Ok(()) } else { std::fs::write(schema, SCHEMA) }
+}

@@ -1,0 +1,45 @@
+//! `[output]`: nodes, columns and rows that are written.
+
+use super::diagnostic::Spanned;
+use super::reader::{Context, Table};
+use super::stage::MOST_STEPS;
+
+/// `[output]`
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// The nodes that are written; default: every named point that is a node
+    pub nodes: Option<Vec<Spanned<String>>>,
+    /// The groups of columns; default: u and r
+    pub columns: Option<Vec<Spanned<String>>>,
+    /// Each n-th row
+    pub every: usize,
+    /// Rows at multiples of this time
+    pub interval: Option<f64>,
+    /// True where the whole shape is written for ParaView
+    pub vtk: bool,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { nodes: None, columns: None, every: 1, interval: None, vtk: false }
+    }
+}
+
+/// Keys of `[output]`.
+pub(super) const KEYS: [&str; 5] = ["nodes", "columns", "every", "interval", "vtk"];
+
+pub(super) fn read_output(top: &Table) -> Output {
+    let Some(item) = top.get("output") else { return Output::default() };
+    let Some(table) = Table::new(top.context, item, "[output]", &KEYS) else { return Output::default() };
+    if table.has("every") {
+        table.refuse("interval", "give `every` or `interval`, not both");
+    }
+    let texts = |key: &str| table.optional(key, Context::texts).flatten();
+    Output {
+        nodes: texts("nodes"),
+        columns: texts("columns"),
+        every: table.whole_or("every", 1..=MOST_STEPS, 1).unwrap_or(1),
+        interval: table.positive("interval").map(|v| v.value),
+        vtk: table.flag_or("vtk", false).unwrap_or(false),
+    }
+}

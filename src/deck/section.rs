@@ -1,0 +1,216 @@
+//! `[section.NAME]`: stiffness and mass of a cross-section.
+
+use super::diagnostic::Spanned;
+use super::reader::{Context, Item, Table, joined, kind_of};
+use super::words::{Words, words};
+use toml::de::DeValue;
+
+/// `[section.NAME]`
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// Name of the table
+    pub name: Spanned<String>,
+    /// Stiffness and mass in one of three ways
+    pub body: SectionBody,
+}
+
+/// The three ways to give a section.
+#[derive(Clone, Debug)]
+pub enum SectionBody {
+    /// Resultants
+    Resultants {
+        /// EA, GA2, GA3, GJ, EI2, EI3
+        stiffness: [f64; 6],
+        /// Mass per length
+        mass: Option<f64>,
+        /// Rotary inertia per length about 1, 2, 3
+        rotary: Option<[f64; 3]>,
+    },
+    /// Full matrices in the order Gamma1 Gamma2 Gamma3 K1 K2 K3
+    Full {
+        /// 6x6 stiffness
+        stiffness: [[f64; 6]; 6],
+        /// 6x6 mass
+        mass: Option<[[f64; 6]; 6]>,
+    },
+    /// Shape and material
+    Shaped {
+        /// Shape with its dimensions
+        shape: Shape,
+        /// Name of the material
+        material: Spanned<String>,
+        /// Shear factors along 2 and 3, if not Cowper's
+        shear_factor: Option<[f64; 2]>,
+    },
+}
+
+/// A cross-section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Solid circle
+    Circle {
+        /// Radius
+        radius: f64,
+    },
+    /// Ring
+    Tube {
+        /// Outer radius
+        radius: f64,
+        /// Wall
+        thickness: f64,
+    },
+    /// Solid rectangle
+    Rectangle {
+        /// Along axis 2
+        width: f64,
+        /// Along axis 3
+        height: f64,
+    },
+}
+
+words! {
+    /// `shape = …`
+    pub enum ShapeWord {
+        /// Solid circle
+        Circle = "circle",
+        /// Ring
+        Tube = "tube",
+        /// Solid rectangle
+        Rectangle = "rectangle",
+    }
+}
+
+impl ShapeWord {
+    /// Keys of the dimensions of a shape.
+    fn keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Circle => &["radius"],
+            Self::Tube => &["radius", "thickness"],
+            Self::Rectangle => &["width", "height"],
+        }
+    }
+}
+
+const RESULTANT_KEYS: [&str; 6] = ["EA", "GA", "GJ", "EI", "rhoA", "rhoJ"];
+const FULL_KEYS: [&str; 2] = ["stiffness", "mass"];
+const SHAPE_KEYS: [&str; 7] = ["material", "shape", "radius", "thickness", "width", "height", "shear_factor"];
+const DIMENSIONS: [&str; 4] = ["radius", "thickness", "width", "height"];
+
+/// Keys of `[section.NAME]`.
+pub(super) const KEYS: [&str; 15] = joined(&[&RESULTANT_KEYS, &FULL_KEYS, &SHAPE_KEYS]);
+
+pub(super) fn read_section<'a>(context: &'a Context, name: Spanned<String>, item: &'a Item<'a>) -> Option<Section> {
+    let table = Table::new(context, item, format!("[section.{}]", name.value), &KEYS)?;
+    let first_of = |keys: &[&'static str]| keys.iter().copied().find(|key| table.has(key));
+    let by_resultants = first_of(&RESULTANT_KEYS);
+    let by_matrices = first_of(&FULL_KEYS);
+    let by_shape = first_of(&SHAPE_KEYS);
+    let body = match (by_resultants, by_matrices, by_shape) {
+        (Some(_), None, None) => read_resultants(&table),
+        (None, Some(_), None) => read_full(&table),
+        (None, None, Some(_)) => read_shaped(&table),
+        (None, None, None) => table.wrong(format!(
+            "{} needs resultants (EA, GA, GJ, EI), or `stiffness`, or `material` and `shape`",
+            table.what
+        )),
+        (Some(_), Some(second), _) | (Some(_), None, Some(second)) | (None, Some(_), Some(second)) => table.wrong_key(
+            second,
+            format!("{} is given in two ways; keep resultants, or `stiffness`, or `shape`", table.what),
+        ),
+    };
+    Some(Section { name, body: body? })
+}
+
+/// Two positive numbers, or one for both.
+fn read_pair(table: &Table, key: &str) -> Option<[f64; 2]> {
+    let item = table.required(key)?;
+    let values = match item.get_ref() {
+        DeValue::Array(_) => table.context.vector::<2>(item)?,
+        _ => table.context.number(item)?.map(|v| [v, v]),
+    };
+    if values.value.iter().all(|&v| v > 0.0) {
+        return Some(values.value);
+    }
+    table.context.wrong(values.span, format!("`{key}` must be positive"))
+}
+
+fn read_resultants(table: &Table) -> Option<SectionBody> {
+    let extension = table.required_positive("EA");
+    let shear = read_pair(table, "GA");
+    let torsion = table.required_positive("GJ");
+    let bending = read_pair(table, "EI");
+    let mass = table.non_negative("rhoA");
+    let rotary = table.non_negative_vector::<3>("rhoJ");
+    let [ga2, ga3] = shear?;
+    let [ei2, ei3] = bending?;
+    Some(SectionBody::Resultants {
+        stiffness: [extension?.value, ga2, ga3, torsion?.value, ei2, ei3],
+        mass: mass.map(|mass| mass.value),
+        rotary: rotary.map(|rotary| rotary.value),
+    })
+}
+
+fn read_full(table: &Table) -> Option<SectionBody> {
+    let stiffness = table.required("stiffness").and_then(|item| read_matrix(table, "stiffness", item));
+    let mass = table.optional("mass", |_, item| read_matrix(table, "mass", item));
+    Some(SectionBody::Full { stiffness: stiffness?, mass: mass? })
+}
+
+/// A symmetric matrix of N by N; definiteness is checked where it is used.
+pub(super) fn read_matrix<const N: usize>(table: &Table, key: &str, item: &Item) -> Option<[[f64; N]; N]> {
+    let context = table.context;
+    let DeValue::Array(rows) = item.get_ref() else {
+        let message = format!("`{key}` is a list of {N} rows, found {}", kind_of(item.get_ref()));
+        return context.wrong(item.span(), message);
+    };
+    if rows.len() != N {
+        return context.wrong(item.span(), format!("`{key}` has {N} rows, found {}", rows.len()));
+    }
+    let rows: Vec<Option<[f64; N]>> = rows.iter().map(|row| context.vector(row).map(|v| v.value)).collect();
+    let rows: Vec<[f64; N]> = rows.into_iter().collect::<Option<_>>()?;
+    let out: [[f64; N]; N] = rows.try_into().ok()?;
+    let largest = out.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for i in 0..N {
+        for j in 0..i {
+            if (out[i][j] - out[j][i]).abs() > 1e-9 * largest {
+                let row = i + 1;
+                let column = j + 1;
+                let message = format!(
+                    "`{key}` must be symmetric; entry ({row}, {column}) is {}, its mirror {}",
+                    out[i][j], out[j][i]
+                );
+                return context.wrong(item.span(), message);
+            }
+        }
+    }
+    Some(out)
+}
+
+fn read_shaped(table: &Table) -> Option<SectionBody> {
+    let context = table.context;
+    let material = table.required("material");
+    let shape = table.required("shape");
+    let material = context.text(material?)?;
+    let kind: ShapeWord = context.word(shape?, "shape")?.value;
+    for key in DIMENSIONS.into_iter().filter(|key| !kind.keys().contains(key)) {
+        table.refuse(key, format!("a {} has no `{key}`", kind.word()));
+    }
+    for key in kind.keys() {
+        table.required(key);
+    }
+    let size = |key: &str| table.positive(key).map(|v| v.value);
+    let shape = match kind {
+        ShapeWord::Circle => Shape::Circle { radius: size("radius")? },
+        ShapeWord::Tube => {
+            let radius = size("radius")?;
+            let thickness = size("thickness")?;
+            if thickness > radius {
+                return table.wrong_key("thickness", "the wall is thicker than the radius");
+            }
+            Shape::Tube { radius, thickness }
+        }
+        ShapeWord::Rectangle => Shape::Rectangle { width: size("width")?, height: size("height")? },
+    };
+    let shear_factor = table.optional("shear_factor", |_, _| read_pair(table, "shear_factor"))?;
+    Some(SectionBody::Shaped { shape, material, shear_factor })
+}
