@@ -75,7 +75,8 @@ pub fn is_named(column: &str, name: &str) -> bool {
     column == name || without_stage(column) == name
 }
 
-/// The name of a mode or critical load without that of its stage: `mode1.omega` of `stage2.mode1.omega`.
+/// The name of a mode or critical load without that of its stage: `mode1.omega` of
+/// `stage2.mode1.omega`.
 pub fn without_stage(column: &str) -> &str {
     let bare = column
         .strip_prefix("stage")

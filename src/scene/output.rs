@@ -1,4 +1,5 @@
-//! The columns that a deck writes or watches, found by name and bound to nodes, beams and the scene.
+//! The columns that a deck writes or watches, found by name and bound to nodes, beams and the
+//! scene.
 
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
@@ -125,7 +126,8 @@ impl Columns<'_> {
     }
 }
 
-/// True if a column that a deck writes, expects or ends a stage by needs this part of the model or run.
+/// True if a column that a deck writes, expects or ends a stage by needs this part of the model or
+/// run.
 pub fn needs(deck: &Deck, need: Need) -> bool {
     let written = deck.output.columns.iter().flatten().filter_map(|key| group(&key.value));
     let expected = deck.expects.iter().filter_map(|expect| match &expect.body {
@@ -137,7 +139,8 @@ pub fn needs(deck: &Deck, need: Need) -> bool {
     written.chain(named.map(|(group, _)| group)).any(|group| group.needs.contains(&need))
 }
 
-/// Group and component of a column, by its name. Of groups with the same columns, the one that the deck writes.
+/// Group and component of a column, by its name. Of groups with the same columns, the one that the
+/// deck writes.
 fn column_of(deck: &Deck, name: &str) -> Option<(&'static ColumnGroup, usize)> {
     let (first, component) = find_column(name)?;
     let mut written = deck.output.columns.iter().flatten().filter_map(|key| group(&key.value));

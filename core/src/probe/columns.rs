@@ -1,7 +1,8 @@
-//! The table of output columns: names, quantities, and the functions that read them from a converged state.
+//! The table of output columns: names, quantities, and the functions that read them from a
+//! converged state.
 //!
-//! A new group of columns is a row of [`COLUMNS`] and the function that reads it. Histories, expectations, error scales,
-//! pictures and the report ask the row.
+//! A new group of columns is a row of [`COLUMNS`] and the function that reads it. Histories,
+//! expectations, error scales, pictures and the report ask the row.
 
 use super::place::{BeamPoint, Place};
 use crate::kernel::inertia::Spin;
@@ -21,7 +22,8 @@ pub struct ColumnGroup {
     pub source: Source,
     /// Parts of a model or run that must be there for the columns
     pub needs: &'static [Need],
-    /// For values that are not unique: replaces the first by its representative that is nearest to the second
+    /// For values that are not unique: replaces the first by its representative that is nearest to
+    /// the second
     pub nearest: Option<Nearest>,
 }
 
@@ -64,7 +66,8 @@ pub enum Need {
     ContinuedRotations,
 }
 
-/// Physical quantity of a column. Errors are measured against the largest value of the same quantity in a scene.
+/// Physical quantity of a column. Errors are measured against the largest value of the same
+/// quantity in a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Displacement
@@ -160,8 +163,8 @@ pub enum MeshError {
     Unspecified,
 }
 
-/// All groups: those of nodes, of the whole scene, and of the run. Where suffixes stand in two groups, the first is
-/// meant unless a deck writes the other.
+/// All groups: those of nodes, of the whole scene, and of the run. Where suffixes stand in two
+/// groups, the first is meant unless a deck writes the other.
 pub static COLUMNS: [ColumnGroup; 18] = [
     ColumnGroup {
         key: "u",
@@ -329,8 +332,8 @@ pub fn clocks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|group| group.is_of_run()).map(|group| group.key)
 }
 
-/// Group and component of a column, by its name (`tip.ux`, `energy.total`, `time`). Of groups with the same suffixes
-/// the first.
+/// Group and component of a column, by its name (`tip.ux`, `energy.total`, `time`). Of groups with
+/// the same suffixes the first.
 pub fn find_column(name: &str) -> Option<(&'static ColumnGroup, usize)> {
     let Some((owner, suffix)) = name.rsplit_once('.') else {
         return COLUMNS.iter().find(|group| group.is_of_run() && group.key == name).map(|group| (group, 0));
@@ -343,8 +346,8 @@ pub fn find_column(name: &str) -> Option<(&'static ColumnGroup, usize)> {
     }
 }
 
-/// Part of a table that a column belongs to, by its name: a column of a history, or of modes and critical loads, where
-/// the name may be the suffix alone (`mode1.omega`, `omega`).
+/// Part of a table that a column belongs to, by its name: a column of a history, or of modes and
+/// critical loads, where the name may be the suffix alone (`mode1.omega`, `omega`).
 pub fn find_part(name: &str) -> Option<&'static ColumnPart> {
     if let Some((group, component)) = find_column(name) {
         return Some(group.part(component));
@@ -465,8 +468,8 @@ impl Quantity {
         }
     }
 
-    /// Quantity about an axis that goes with this one along an axis: the round-off of one shows in the other, times or
-    /// over a length.
+    /// Quantity about an axis that goes with this one along an axis: the round-off of one shows in
+    /// the other, times or over a length.
     pub fn about_axis(self) -> Option<Self> {
         match self {
             Self::Displacement => Some(Self::Rotation),
@@ -532,8 +535,8 @@ fn section_axes(place: &Place, at: &Snapshot, out: &mut Vec<f64>) {
     (0..3).for_each(|k| out.extend(axes.column(k).0));
 }
 
-/// Unit quaternion of the total rotation: scalar part, which is not negative, then vector part, which points along the
-/// rotation vector of at most pi.
+/// Unit quaternion of the total rotation: scalar part, which is not negative, then vector part,
+/// which points along the rotation vector of at most pi.
 fn orientation(place: &Place, at: &Snapshot, out: &mut Vec<f64>) {
     let p = principal(place.motion(at.state).p);
     // Cosine of half the angle, and sine over it: no angle in a denominator.

@@ -1,4 +1,5 @@
-//! The whole shape of a scene, for pictures: every node of every beam with its section axes, strains and resultants.
+//! The whole shape of a scene, for pictures: every node of every beam with its section axes,
+//! strains and resultants.
 
 use super::place::{BeamPoint, Place};
 use crate::rotation::{Rotation, principal};

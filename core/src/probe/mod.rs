@@ -1,4 +1,5 @@
-//! Columns: named pure functions of a converged state. Histories, `until` and expectations all read these.
+//! Columns: named pure functions of a converged state. Histories, `until` and expectations all read
+//! these.
 
 mod columns;
 mod figure;

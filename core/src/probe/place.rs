@@ -12,7 +12,8 @@ use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
-/// A node, or a place that moves with the nodes of one element by the shape functions of that element.
+/// A node, or a place that moves with the nodes of one element by the shape functions of that
+/// element.
 #[derive(Clone, Debug)]
 pub struct Place {
     /// Nodes with their initial positions and their shape functions at the place
@@ -113,8 +114,8 @@ pub struct BeamPoint {
 }
 
 impl BeamPoint {
-    /// Gamma and K, then N and M, in section axes: values at Gauss points extrapolated within the element, mean of both
-    /// sides.
+    /// Gamma and K, then N and M, in section axes: values at Gauss points extrapolated within the
+    /// element, mean of both sides.
     pub fn strain_and_stress(&self, state: &State) -> [[f64; 6]; 2] {
         let mut mean = [[0.0; 6]; 2];
         for &(element, xi) in &self.sides {

@@ -32,7 +32,8 @@ pub struct Sampler {
     of_history: usize,
     /// Diagonal of the scene, to compare translations with rotations
     length: f64,
-    /// Columns whose values are not unique, such as rotation vectors that are not continued from turn to turn
+    /// Columns whose values are not unique, such as rotation vectors that are not continued from
+    /// turn to turn
     ambiguous: Vec<Ambiguous>,
     /// True if the line of a beam is curved, so that elements approximate it
     curved: bool,
@@ -281,9 +282,9 @@ impl Sampler {
         self.outputs.iter().all(motion).then_some(expected)
     }
 
-    /// Replaces values of a row that are not unique by the equivalent ones that are nearest to those
-    /// of another row: each rotation has two rotation vectors of up to 2 pi, and two unit quaternions.
-    /// `first` is the number of the first column of both rows.
+    /// Replaces values of a row that are not unique by the equivalent ones that are nearest to
+    /// those of another row: each rotation has two rotation vectors of up to 2 pi, and two unit
+    /// quaternions. `first` is the number of the first column of both rows.
     pub fn take_nearest(&self, first: usize, row: &mut [f64], to: &[f64]) {
         for group in &self.ambiguous {
             // The modes have no such columns: their rows begin after the columns of the history.
