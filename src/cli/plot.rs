@@ -8,14 +8,13 @@ use crate::deck::nearest;
 use crate::output::{
     Axis, Boundary, HistoryReader, Line, LinePlot, LineStyle, PartFile, Record, Scale, Units, quantity_of,
 };
+use beamsim_core::probe::{Quantity, clocks, quantity};
 use std::path::{Path, PathBuf};
 
 /// Largest number of columns that are drawn without `--column`.
 const MAX_DEFAULT_COLUMNS: usize = 6;
 /// Smallest change of a displacement relative to the largest one; smaller changes are round-off.
 const MIN_CHANGE: f64 = 1e-9;
-/// Columns that belong to every history.
-const CLOCKS: [&str; 3] = ["stage", "time", "load"];
 
 /// Arguments of `beamsim plot`.
 #[derive(clap::Args)]
@@ -277,9 +276,9 @@ fn columns(wanted: &PlotArguments, history: &HistoryReader) -> Result<Vec<String
         return wanted.columns.iter().map(|name| find(history, name).map(|_| name.clone())).collect();
     }
     let shown = |name: &&String| {
-        !CLOCKS.contains(&name.as_str()) && !name.ends_with(".err") && Some(*name) != wanted.x.as_ref()
+        clocks().all(|clock| clock != name.as_str()) && !name.ends_with(".err") && Some(*name) != wanted.x.as_ref()
     };
-    let moved = |name: &&String| [".ux", ".uy", ".uz"].iter().any(|suffix| name.ends_with(suffix));
+    let moved = |name: &&String| quantity(name) == Some(Quantity::Displacement);
     let all: Vec<String> = history.names.iter().filter(shown).cloned().collect();
     let displacements: Vec<String> = all.iter().filter(|name| moved(name)).cloned().collect();
     let changes: Vec<f64> = displacements.iter().map(|name| change(history, name)).collect();

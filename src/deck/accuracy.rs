@@ -72,6 +72,15 @@ impl Accuracy {
 
 /// True if a name of the deck stands for a column: `mode1.omega` is `stage2.mode1.omega` too.
 pub fn is_named(column: &str, name: &str) -> bool {
-    let bare = column.strip_prefix("stage").and_then(|rest| rest.split_once('.')).map(|(_, bare)| bare);
-    column == name || bare == Some(name)
+    column == name || without_stage(column) == name
+}
+
+/// The name of a mode or critical load without that of its stage: `mode1.omega` of
+/// `stage2.mode1.omega`.
+pub fn without_stage(column: &str) -> &str {
+    let bare = column
+        .strip_prefix("stage")
+        .and_then(|rest| rest.split_once('.'))
+        .filter(|(number, _)| number.parse::<usize>().is_ok());
+    bare.map_or(column, |(_, bare)| bare)
 }

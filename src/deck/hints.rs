@@ -179,7 +179,7 @@ const SYNONYMS: [Synonym; 50] = [
 ];
 
 #[rustfmt::skip]
-const WORDS: [Synonym; 43] = [
+const WORDS: [Synonym; 44] = [
     Synonym { written: &["hinge", "hinged", "pin", "pinned", "rotational", "rotary"], meant: &["revolute", "pin"] },
     Synonym { written: &["ball", "socket", "ball_joint", "ball_and_socket"], meant: &["spherical"] },
     Synonym { written: &["slider", "slide", "sliding", "translational"], meant: &["prismatic"] },
@@ -219,6 +219,7 @@ const WORDS: [Synonym; 43] = [
     Synonym { written: &["disp", "displacement", "displacements", "translation"], meant: &["u"] },
     Synonym { written: &["position", "positions", "coordinates"], meant: &["x"] },
     Synonym { written: &["rot", "rotation", "rotations"], meant: &["r"] },
+    Synonym { written: &["quaternion", "quaternions"], meant: &["q"] },
     Synonym { written: &["velocity", "velocities", "vel"], meant: &["v"] },
     Synonym { written: &["angular_velocity", "omega", "spin"], meant: &["w"] },
     Synonym { written: &["acceleration", "accelerations", "acc"], meant: &["a"] },

@@ -39,7 +39,7 @@ mod sweep;
 mod units;
 mod words;
 
-pub use accuracy::{Accuracy, is_named};
+pub use accuracy::{Accuracy, is_named, without_stage};
 pub use axes::Axes;
 pub use beam::{Beam, FreeStrain, InterpolationWord, MOST_ELEMENTS, Path};
 pub use body::Body;

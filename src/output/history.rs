@@ -2,6 +2,7 @@
 
 use super::OutputError;
 use super::files::{PartFile, remove_if_there};
+use beamsim_core::probe::clocks;
 use beamsim_core::run::Moment;
 use std::fmt::Write;
 use std::fs::File;
@@ -100,8 +101,9 @@ impl HistoryWriter {
         let (part, file) = PartFile::create(folder, "history.csv")?;
         let mut writer = csv::Writer::from_writer(file);
         let others = side_columns.as_ref().map_or(Vec::new(), |side| side.names(&names));
-        let all = names.iter().chain(&others).map(String::as_str);
-        writer.write_record(["stage", "time", "load"].into_iter().chain(all))?;
+        let mut header: Vec<&str> = clocks().collect();
+        header.extend(names.iter().chain(&others).map(String::as_str));
+        writer.write_record(header)?;
         Ok(Self {
             folder: folder.into(),
             part,

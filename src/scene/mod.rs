@@ -27,7 +27,7 @@ use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::integrate::Scheme;
 use beamsim_core::model::{ElementInfo, ModelParts, StageKind};
-use beamsim_core::probe::{Figure, Probe, Quantity};
+use beamsim_core::probe::{Figure, Need, Probe};
 use beamsim_core::run::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until, Warning};
 use beamsim_core::system::Node;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -240,10 +240,6 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     // Where a beam could not be meshed, points may seem to be no nodes: only errors about unknown
     // names are kept.
     diagnostics.extend(found.into_iter().filter(|d| complete || d.unknown.is_some()));
-    let energy = |probe: &Probe| matches!(probe.quantity, Quantity::Energy);
-    let expected =
-        expectations.iter().any(|e| matches!(&e.kind, ExpectationKind::Column { probe, .. } if energy(probe)));
-    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("energy."));
     check::warn_of_undamped_multipliers(deck, &composition, diagnostics);
     let loose = check::loose_rotations(deck, &mesh, &composition, &supports);
     check::refuse_moments(deck, &mesh, &loose, diagnostics);
@@ -265,8 +261,8 @@ fn build_on(deck: &Deck, mesh: Mesh, diagnostics: &mut Vec<Diagnostic>) -> Optio
     let (plane, planar) = planar::plane(deck, &model, &mesh, &initial, diagnostics);
     model.plane = plane;
     let plan = Plan {
-        energy: expected || watched || probes.iter().any(energy),
-        continued: probes.iter().any(|probe| matches!(probe.quantity, Quantity::Wound(_))),
+        energy: output::needs(deck, Need::EnergyAccount),
+        continued: output::needs(deck, Need::ContinuedRotations),
         model: Arc::new(model),
         initial,
         places: places(&mesh, &stages),

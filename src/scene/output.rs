@@ -1,53 +1,68 @@
-//! Written columns, and columns by their names.
+//! The columns that a deck writes or watches, found by name and bound to nodes, beams and the
+//! scene.
 
 use super::mesh::Mesh;
 use super::names::{Found, unknown};
-use crate::deck::{Deck, Diagnostic, Spanned, hint, nearest, one_of};
+use crate::deck::{Deck, Diagnostic, ExpectBody, Spanned, hint, nearest, one_of};
 use beamsim_core::effect::elasticity::StressField;
-use beamsim_core::probe::{BeamPoint, NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
+use beamsim_core::probe::{
+    BeamPoint, COLUMNS, ColumnGroup, Need, Place, Probe, Reading, Source, clocks, find_column, group,
+};
+use beamsim_core::system::Node;
 use std::sync::Arc;
 
-/// Finds probes by name.
+/// Groups that are written where a deck asks for none.
+const DEFAULT_GROUPS: [&str; 2] = ["u", "r"];
+
+/// Finder of columns by their names.
 pub struct Columns<'a> {
     /// The deck
     pub deck: &'a Deck,
     /// The mesh
     pub mesh: &'a Mesh,
-    /// The elasticity, for resultants
+    /// Elasticity of the scene, for strains and resultants
     pub elasticity: &'a [Arc<dyn StressField>],
 }
 
 impl Columns<'_> {
-    /// The probes of the history, in the order of its columns: node by node, then the whole scene.
+    /// Probes of the history, in the order of its columns: node by node, then the whole scene.
     pub fn written(&self, diagnostics: &mut Vec<Diagnostic>) -> Vec<Probe> {
-        let default = || ["u", "r"].map(|group| Spanned { value: group.to_string(), span: 0..0 }).to_vec();
-        let groups = self.deck.output.columns.clone().unwrap_or_else(default);
-        let mut known: Vec<&Spanned<String>> = Vec::new();
-        for group in &groups {
-            if suffixes(&group.value).is_none() {
-                diagnostics.push(unknown_group(group));
-            } else if known.iter().any(|k| k.value == group.value) {
-                diagnostics.push(Diagnostic::error(format!("`{}` is listed twice", group.value), group.span.clone()));
-            } else {
-                known.push(group);
-            }
-        }
-        if let (Some(_), Some(rc)) = (known.iter().find(|g| g.value == "r"), known.iter().find(|g| g.value == "rc")) {
-            let message = "`r` and `rc` have the same columns: ask for one of them";
-            diagnostics.push(Diagnostic::error(message, rc.span.clone()));
-        }
+        let groups = self.written_groups(diagnostics);
         let mut probes = Vec::new();
         for node in self.written_nodes(diagnostics) {
-            for group in known.iter().filter(|g| NODE_GROUPS.iter().any(|(name, _)| *name == g.value)) {
-                match self.node_probe(&node, &group.value) {
+            for group in groups.iter().filter(|group| group.is_of_node()) {
+                match self.node_probe(&node, group) {
                     Ok(probe) => probes.push(probe),
                     Err(diagnostic) => diagnostics.push(diagnostic),
                 }
             }
         }
-        let whole = known.iter().filter(|g| WHOLE_GROUPS.iter().any(|(name, _)| *name == g.value));
-        probes.extend(whole.map(|group| whole_probe(&group.value)));
+        probes.extend(groups.iter().filter_map(|group| whole_probe(group)));
         probes
+    }
+
+    /// Groups of columns that the deck asks for, each once.
+    fn written_groups(&self, diagnostics: &mut Vec<Diagnostic>) -> Vec<&'static ColumnGroup> {
+        let Some(keys) = &self.deck.output.columns else {
+            return DEFAULT_GROUPS.iter().filter_map(|key| group(key)).collect();
+        };
+        let mut known: Vec<&'static ColumnGroup> = Vec::new();
+        for key in keys {
+            let Some(group) = group(&key.value) else {
+                diagnostics.push(unknown_group(key));
+                continue;
+            };
+            if known.iter().any(|other| other.key == group.key) {
+                diagnostics.push(Diagnostic::error(format!("`{}` is listed twice", key.value), key.span.clone()));
+                continue;
+            }
+            if let Some(other) = known.iter().find(|other| other.has_columns_of(group)) {
+                let message = format!("`{}` and `{}` have the same columns: ask for one of them", other.key, group.key);
+                diagnostics.push(Diagnostic::error(message, key.span.clone()));
+            }
+            known.push(group);
+        }
+        known
     }
 
     fn written_nodes(&self, diagnostics: &mut Vec<Diagnostic>) -> Vec<Spanned<String>> {
@@ -64,33 +79,20 @@ impl Columns<'_> {
         nodes.clone()
     }
 
-    /// The probe of a group at a node.
-    pub fn node_probe(&self, node: &Spanned<String>, group: &str) -> Result<Probe, Diagnostic> {
-        let found = self.mesh.find(self.deck, node)?;
+    /// Probe of a group at a node.
+    fn node_probe(&self, name: &Spanned<String>, group: &'static ColumnGroup) -> Result<Probe, Diagnostic> {
+        let found = self.mesh.find(self.deck, name)?;
         let place = self.mesh.place(&found);
-        let quantity = match group {
-            "u" => Quantity::Displacement(place),
-            "x" => Quantity::Position(place),
-            "r" => Quantity::Rotation(place),
-            "rc" => Quantity::Wound(place),
-            "d" => Quantity::Axes(place),
-            "v" => Quantity::Velocity(place),
-            "w" => Quantity::Spin(place),
-            "a" => Quantity::Acceleration(place),
-            "alpha" => Quantity::AngularAcceleration(place),
-            "reaction" => Quantity::Reaction(place.node().ok_or_else(|| {
-                let message = format!("`{}` lies inside an element; reactions exist only at nodes", node.value);
-                Diagnostic::error(message, node.span.clone())
-            })?),
-            "resultant" => Quantity::Resultant(self.beam_point(node, &found)?),
-            "strain" => Quantity::Strain(self.beam_point(node, &found)?),
-            _ => return Err(unknown_group(&Spanned { value: group.to_string(), span: node.span.clone() })),
+        let reading = match group.source {
+            Source::Place(read) => Reading::Place(place, read),
+            Source::Node(read) => Reading::Node(node_of(&place, name)?, read),
+            Source::BeamPoint(read) => Reading::BeamPoint(self.beam_point(name, &found)?, read),
+            Source::Scene(read) | Source::Run(read) => Reading::Whole(read),
         };
-        let names = suffixes(group).unwrap_or_default().iter().map(|suffix| format!("{}.{suffix}", node.value));
-        Ok(Probe { names: names.collect(), quantity })
+        Ok(Probe { names: group.names_at(&name.value), group, reading })
     }
 
-    /// The point of a beam where resultants are asked for.
+    /// Point of a beam for strains and resultants.
     fn beam_point(&self, node: &Spanned<String>, found: &Found) -> Result<BeamPoint, Diagnostic> {
         let refuse = |message: String| Diagnostic::error(message, node.span.clone());
         let beams = self.mesh.beams_at(found);
@@ -113,55 +115,92 @@ impl Columns<'_> {
         Ok(BeamPoint { elasticity: self.elasticity.to_vec(), sides, frame: beam.frame(fraction) })
     }
 
-    /// Any column by its name: the probe and the component.
+    /// Probe and component of a column, by its name.
     pub fn find(&self, name: &Spanned<String>) -> Result<(Probe, usize), Diagnostic> {
-        let single = [("stage", Quantity::Stage), ("time", Quantity::Time), ("load", Quantity::Load)];
-        if let Some((_, quantity)) = single.into_iter().find(|(column, _)| *column == name.value) {
-            return Ok((Probe { names: vec![name.value.clone()], quantity }, 0));
+        let (group, component) = column_of(self.deck, &name.value).ok_or_else(|| no_column(name))?;
+        if let Some(probe) = whole_probe(group) {
+            return Ok((probe, component));
         }
-        let Some((node, suffix)) = name.value.rsplit_once('.') else {
-            return Err(self.no_column(name));
-        };
-        if let Some((group, suffixes)) = WHOLE_GROUPS.iter().find(|(group, _)| *group == node) {
-            let component = suffixes.iter().position(|s| *s == suffix).ok_or_else(|| self.no_column(name))?;
-            return Ok((whole_probe(group), component));
-        }
-        let group = NODE_GROUPS.iter().find_map(|(group, s)| s.iter().position(|s| *s == suffix).map(|k| (*group, k)));
+        let node = name.value.rsplit_once('.').map_or("", |(node, _)| node);
         let node = Spanned { value: node.to_string(), span: name.span.clone() };
-        match group {
-            Some(("r", component)) if self.continues_rotations() => Ok((self.node_probe(&node, "rc")?, component)),
-            Some((group, component)) => Ok((self.node_probe(&node, group)?, component)),
-            None => Err(self.no_column(name)),
+        Ok((self.node_probe(&node, group)?, component))
+    }
+}
+
+/// True if a column that a deck writes, expects or ends a stage by needs this part of the model or
+/// run.
+pub fn needs(deck: &Deck, need: Need) -> bool {
+    let written = deck.output.columns.iter().flatten().filter_map(|key| group(&key.value));
+    let expected = deck.expects.iter().filter_map(|expect| match &expect.body {
+        ExpectBody::Column { column, .. } => Some(column),
+        ExpectBody::Fails(_) | ExpectBody::Warns(_) | ExpectBody::Quiet => None,
+    });
+    let watched = deck.stages.iter().filter_map(|stage| stage.until.as_ref()).map(|until| &until.column);
+    let named = expected.chain(watched).filter_map(|column| column_of(deck, &column.value));
+    written.chain(named.map(|(group, _)| group)).any(|group| group.needs.contains(&need))
+}
+
+/// Group and component of a column, by its name. Of groups with the same columns, the one that the
+/// deck writes.
+fn column_of(deck: &Deck, name: &str) -> Option<(&'static ColumnGroup, usize)> {
+    let (first, component) = find_column(name)?;
+    let mut written = deck.output.columns.iter().flatten().filter_map(|key| group(&key.value));
+    let instead = written.find(|group| group.has_columns_of(first));
+    Some((instead.unwrap_or(first), component))
+}
+
+/// Probe of a group that belongs to no node.
+fn whole_probe(group: &'static ColumnGroup) -> Option<Probe> {
+    match group.source {
+        Source::Scene(read) | Source::Run(read) => {
+            Some(Probe { names: group.own_names(), group, reading: Reading::Whole(read) })
         }
+        Source::Place(_) | Source::Node(_) | Source::BeamPoint(_) => None,
     }
+}
 
-    /// True if the columns rx ry rz are continued from row to row.
-    fn continues_rotations(&self) -> bool {
-        self.deck.output.columns.as_ref().is_some_and(|columns| columns.iter().any(|c| c.value == "rc"))
-    }
+fn node_of(place: &Place, name: &Spanned<String>) -> Result<Node, Diagnostic> {
+    place.node().ok_or_else(|| {
+        let message = format!("`{}` lies inside an element; reactions exist only at nodes", name.value);
+        Diagnostic::error(message, name.span.clone())
+    })
+}
 
-    fn no_column(&self, name: &Spanned<String>) -> Diagnostic {
-        let diagnostic = Diagnostic::error(format!("there is no column `{}`", name.value), name.span.clone());
-        let suffix = name.value.rsplit_once('.').map_or(name.value.as_str(), |(_, suffix)| suffix);
-        let known = NODE_GROUPS.iter().chain(&WHOLE_GROUPS).flat_map(|(_, suffixes)| suffixes.iter().copied());
-        match nearest(suffix, known) {
-            Some(meant) if name.value.contains('.') => diagnostic.help(format!("did you mean `.{meant}`?")),
-            Some(_) | None => diagnostic
-                .help("a column is a node and a component, such as `tip.ux`, or `energy.total`, `momentum.px`"),
+fn no_column(name: &Spanned<String>) -> Diagnostic {
+    let diagnostic = Diagnostic::error(format!("there is no column `{}`", name.value), name.span.clone());
+    let suffix = name.value.rsplit_once('.').map_or(name.value.as_str(), |(_, suffix)| suffix);
+    match nearest(suffix, COLUMNS.iter().flat_map(ColumnGroup::suffixes)) {
+        Some(meant) if name.value.contains('.') => diagnostic.help(format!("did you mean `.{meant}`?")),
+        Some(_) | None => {
+            diagnostic.help("a column is a node and a component, such as `tip.ux`, or `energy.total`, `momentum.px`")
         }
     }
 }
 
-fn whole_probe(group: &str) -> Probe {
-    let names = suffixes(group).unwrap_or_default().iter().map(|suffix| format!("{group}.{suffix}")).collect();
-    Probe { names, quantity: if group == "energy" { Quantity::Energy } else { Quantity::Momentum } }
+/// Keys of the groups that a deck may ask for.
+fn group_keys() -> impl Iterator<Item = &'static str> {
+    COLUMNS.iter().map(|group| group.key).filter(|key| clocks().all(|clock| clock != *key))
 }
 
-fn unknown_group(group: &Spanned<String>) -> Diagnostic {
-    let known: Vec<&'static str> = NODE_GROUPS.iter().chain(&WHOLE_GROUPS).map(|(name, _)| *name).collect();
-    let diagnostic = unknown("group of columns", group, known.iter().copied());
-    match hint("columns", &group.value, &known) {
+fn unknown_group(key: &Spanned<String>) -> Diagnostic {
+    let known: Vec<&'static str> = group_keys().collect();
+    let diagnostic = unknown("group of columns", key, known.iter().copied());
+    match hint("columns", &key.value, &known) {
         Some(help) => diagnostic.help(help),
         None => diagnostic.help(format!("known groups: {}", one_of(known))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deck::SCHEMA;
+    use serde_json::Value;
+
+    #[test]
+    fn the_schema_lists_all_groups_of_columns() {
+        let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+        let listed = schema["properties"]["output"]["properties"]["columns"]["items"]["enum"].as_array().unwrap();
+        assert!(listed.iter().filter_map(Value::as_str).eq(group_keys()));
     }
 }

@@ -244,7 +244,7 @@ impl SideColumns for ErrorBars {
             };
             companion.next = there;
             let mut nearest = companion.outcome.rows[there].clone();
-            self.sampler.take_nearest_rotations(0, &mut nearest, row);
+            self.sampler.take_nearest(0, &mut nearest, row);
             for (((largest, a), b), divisor) in largest.iter_mut().zip(&nearest).zip(row).zip(&companion.divisors) {
                 let difference = (a - b).abs() / divisor;
                 *largest = if difference.is_nan() { f64::INFINITY } else { largest.max(difference) };

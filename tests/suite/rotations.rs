@@ -2,6 +2,7 @@
 
 use crate::dual::{Dual, along, jacobian, tensor_rate, values, variables, vector_rate};
 use crate::random::Random;
+use crate::scenes::simulate;
 use beamsim_core::model::charts;
 use beamsim_core::rotation::{Complement, Rotation, complement, log, nearest_turn, principal, relative_angle, unwound};
 use beamsim_core::system::State;
@@ -410,6 +411,82 @@ fn near_vectors_are_continued_by_themselves() {
             (state.q[0], state.unwrapped) = (p, vec![carried]);
             assert!(charts::wind(&mut state, &before, &[0]).is_empty());
             assert!((state.unwrapped[0] - p).norm() < 1e-12, "{old:?} to {p:?}");
+        }
+    }
+}
+
+/// Matrix of a unit quaternion, scalar part first.
+fn matrix_of_quaternion([w, x, y, z]: [f64; 4]) -> Mat3 {
+    Mat3([
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ])
+}
+
+/// Columns `q` against `d` and `r`, at a node and between nodes of bent beams that turn about random axes by up to
+/// three half turns.
+#[test]
+fn quaternions_in_columns_take_initial_section_axes_to_the_present_ones() {
+    let mut random = Random::new(83);
+    for (case, angle) in [0.7, PI, 4.0, 9.0].into_iter().enumerate() {
+        let axis = random.direction().0;
+        let force = random.cube(0.2).0;
+        let interpolation = ["relative", "total"][case % 2];
+        let text = format!(
+            r#"
+[point]
+root = [0, 0, 0]
+tip = [0.3, 0.5, 1]
+[section.s]
+EA = 100
+GA = 100
+GJ = 1
+EI = 1
+[[beam]]
+name = "b"
+section = "s"
+through = ["root", "tip"]
+elements = 4
+order = 2
+interpolation = "{interpolation}"
+[[support]]
+at = "root"
+fix = "pin"
+[[motion]]
+at = "root"
+rotate = {axis:?}
+angle = {angle:?}
+[[load]]
+at = "tip"
+force = {force:?}
+frame = "section"
+[[stage]]
+kind = "static"
+steps = 24
+[output]
+nodes = ["tip", "b@0.37"]
+columns = ["d", "q", "r"]
+"#
+        );
+        let simulation = simulate(&text);
+        for node in ["tip", "b@0.37"] {
+            let columns = |names: &[&str]| -> Vec<Vec<f64>> {
+                names.iter().map(|name| simulation.column(&format!("{node}.{name}"))).collect()
+            };
+            let d = columns(&["d1x", "d2x", "d3x", "d1y", "d2y", "d3y", "d1z", "d2z", "d3z"]);
+            let q = columns(&["qw", "qx", "qy", "qz"]);
+            let r = columns(&["rx", "ry", "rz"]);
+            let axes = |row: usize| Mat3(std::array::from_fn(|i| std::array::from_fn(|k| d[3 * i + k][row])));
+            for row in 0..simulation.rows.len() {
+                let quaternion: [f64; 4] = std::array::from_fn(|k| q[k][row]);
+                let vector = Vec3([quaternion[1], quaternion[2], quaternion[3]]);
+                let present = matrix_of_quaternion(quaternion) * axes(0);
+                let error = (present - axes(row)).max_abs();
+                assert!(error < 1e-14, "{node}, row {row} of case {case}: {error:e}");
+                let half_turn = vector.dot(Vec3([r[0][row], r[1][row], r[2][row]]));
+                assert!(quaternion[0] >= 0.0 && half_turn >= 0.0, "{node}, row {row} of case {case}: {quaternion:?}");
+            }
         }
     }
 }

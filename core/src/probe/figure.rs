@@ -1,4 +1,5 @@
-//! The whole shape of a scene, for pictures: every node of every beam with its section axes, strains and resultants.
+//! The whole shape of a scene, for pictures: every node of every beam with its section axes,
+//! strains and resultants.
 
 use super::place::{BeamPoint, Place};
 use crate::rotation::{Rotation, principal};
@@ -8,44 +9,44 @@ use crate::tensor::{Mat3, Vec3};
 /// The shape of a scene.
 #[derive(Clone, Default)]
 pub struct Figure {
-    /// Its beams
+    /// Beams
     pub lines: Vec<Line>,
-    /// Its rigid bodies
+    /// Rigid bodies
     pub bodies: Vec<Place>,
-    /// The ends of its springs and cables between nodes
+    /// Ends of springs and cables between nodes
     pub links: Vec<[Place; 2]>,
 }
 
 /// A beam.
 #[derive(Clone)]
 pub struct Line {
-    /// Its name
+    /// Name of the beam
     pub name: String,
-    /// Nodes of an element, less one
+    /// Order of its elements: nodes of an element, less one
     pub order: usize,
-    /// Its nodes from start to end
+    /// Nodes from start to end
     pub points: Vec<LinePoint>,
 }
 
-/// A node of a beam. Where beams meet each has its own.
+/// A node of a beam. Where beams meet, each has its own.
 #[derive(Clone)]
 pub struct LinePoint {
-    /// Where it is
+    /// The node, with the section axes of the beam there
     pub place: Place,
-    /// What acts there
+    /// Point of the beam for strains and resultants
     pub inside: BeamPoint,
-    /// Strains over resultants, section axes
+    /// Compliance: strains over resultants, section axes
     pub compliance: [[f64; 6]; 6],
 }
 
-/// What a node shows.
+/// Motion, strains and resultants of a node at a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// Where it is
+    /// Present position
     pub place: Vec3,
     /// Displacement
     pub u: Vec3,
-    /// Total rotation vector, |r| <= pi
+    /// Total rotation vector, at most pi long
     pub r: Vec3,
     /// Section axes as columns
     pub axes: Mat3,
@@ -67,7 +68,7 @@ impl Figure {
         points.map(|point| point.look(state)).chain(others.map(|place| bare(place, state))).collect()
     }
 
-    /// How many nodes of beams there are.
+    /// Number of nodes of beams.
     pub fn line_points(&self) -> usize {
         self.lines.iter().map(|line| line.points.len()).sum()
     }
@@ -77,13 +78,13 @@ impl LinePoint {
     fn look(&self, state: &State) -> Look {
         let [strain, resultant] = self.inside.strain_and_stress(state);
         let row = |row: &[f64; 6]| row.iter().zip(&resultant).map(|(c, s)| c * s).sum::<f64>();
-        // Of the strains that have stress: those of heat have none.
+        // Energy of the strains that have stress: free strains have none.
         let energy = 0.5 * self.compliance.iter().zip(&resultant).map(|(c, s)| s * row(c)).sum::<f64>();
         Look { strain, resultant, energy, ..bare(&self.place, state) }
     }
 }
 
-/// A place without anything inside.
+/// A node without strains and resultants.
 fn bare(place: &Place, state: &State) -> Look {
     let motion = place.motion(state);
     Look {

@@ -1,9 +1,15 @@
-//! Columns: named pure functions of a converged state. Histories, `until` and expectations all read these.
+//! Columns: named pure functions of a converged state. Histories, `until` and expectations all read
+//! these.
 
+mod columns;
 mod figure;
 mod place;
-mod quantity;
+mod reading;
 
+pub use columns::{
+    COLUMNS, ColumnGroup, ColumnPart, Dimension, MeshError, Nearest, Need, Quantity, Source, clocks, find_column,
+    find_part, group, quantity,
+};
 pub use figure::{Figure, Line, LinePoint, Look};
 pub use place::{BeamPoint, Place};
-pub use quantity::{NODE_GROUPS, Probe, Quantity, WHOLE_GROUPS, suffixes};
+pub use reading::{Probe, Reading};

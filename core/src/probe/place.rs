@@ -1,4 +1,4 @@
-//! Places that can be looked at: nodes, and points within elements.
+//! Places that columns are read at: nodes, and points within elements.
 
 use crate::effect::elasticity::StressField;
 use crate::kernel::NodeMotion;
@@ -12,19 +12,20 @@ use crate::system::{Node, State};
 use crate::tensor::{Mat3, Vec3};
 use std::sync::Arc;
 
-/// A place that moves with the nodes of one element, by the element's own shape functions; or just a node.
+/// A node, or a place that moves with the nodes of one element by the shape functions of that
+/// element.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// Nodes, their initial places, and their shape functions here
+    /// Nodes with their initial positions and their shape functions at the place
     pub nodes: Vec<(Node, Vec3, f64)>,
     /// The section axes E1, E2, E3 of the initial placement as columns
     pub frame: Mat3,
-    /// Whether rotations are interpolated relative to the element
+    /// True where rotations are interpolated relative to the element
     pub relative: bool,
 }
 
 impl Place {
-    /// The motion of the place.
+    /// Displacement and rotation vector of the place, with their rates.
     pub fn motion(&self, state: &State) -> NodeMotion {
         if let [(node, _, _)] = self.nodes[..] {
             return state.motion(node);
@@ -50,7 +51,7 @@ impl Place {
         }
     }
 
-    /// Displacements are interpolated as ever; the rotation relative to the element comes as a jet, with its rates.
+    /// Motion by interpolation relative to the element: the rotation and its rates come as a jet.
     fn relative_motion(&self, motions: &[NodeMotion]) -> NodeMotion {
         let sum = |field: fn(&NodeMotion) -> Vec3| {
             let parts = self.nodes.iter().zip(motions);
@@ -82,17 +83,17 @@ impl Place {
         Relative::new(&places, &[Vec3::zero(); N], &rotations).rotation(|i| self.nodes[i].2)
     }
 
-    /// Where it was at the start.
+    /// Initial position.
     pub fn initial(&self) -> Vec3 {
         self.nodes.iter().fold(Vec3::ZERO, |sum, &(_, place, weight)| sum + place * weight)
     }
 
-    /// The rotation vector continued since the start, interpolated like the rotation vectors themselves.
+    /// Rotation vector continued since the start, interpolated by the shape functions.
     pub fn unwrapped(&self, state: &State) -> Vec3 {
         self.nodes.iter().fold(Vec3::ZERO, |sum, &(node, _, weight)| sum + state.unwrapped_at(node.p) * weight)
     }
 
-    /// The node, where the place is one.
+    /// Node that the place is; none within an element.
     pub fn node(&self) -> Option<Node> {
         match self.nodes[..] {
             [(node, _, _)] => Some(node),
@@ -104,16 +105,17 @@ impl Place {
 /// A point within beam elements: between two elements of a beam it has two sides.
 #[derive(Clone)]
 pub struct BeamPoint {
-    /// The elasticity of the scene, one a way to interpolate
+    /// Elasticity of the scene, one for each way to interpolate rotations
     pub elasticity: Vec<Arc<dyn StressField>>,
-    /// Number of the element in the scene, and xi in it
+    /// For each side the number of the element in the scene, and xi in it
     pub sides: Vec<(u32, f64)>,
-    /// The section axes as columns
+    /// Initial section axes as columns
     pub frame: Mat3,
 }
 
 impl BeamPoint {
-    /// Gamma and K, N and M, in section axes: Gauss values extrapolated in the element, the mean of both sides.
+    /// Gamma and K, then N and M, in section axes: values at Gauss points extrapolated within the
+    /// element, mean of both sides.
     pub fn strain_and_stress(&self, state: &State) -> [[f64; 6]; 2] {
         let mut mean = [[0.0; 6]; 2];
         for &(element, xi) in &self.sides {
@@ -125,7 +127,7 @@ impl BeamPoint {
         mean
     }
 
-    /// The polynomial through the values at the Gauss points.
+    /// Strains and resultants of one side: the polynomial through the values at the Gauss points.
     fn one_side(&self, element: u32, xi: f64, state: &State) -> [[f64; 6]; 2] {
         let values = self.elasticity.iter().find_map(|field| field.at_points(element, state)).unwrap_or_default();
         let abscissas: Vec<f64> = gauss(values.len()).iter().map(|&(x, _)| x).collect();

@@ -4,7 +4,7 @@ use super::super::{Row, Units};
 use super::encode::{base64, quantised};
 use crate::scene::Scene;
 use beamsim_core::model::SlotKind;
-use beamsim_core::probe::{Figure, Look, Place, Quantity};
+use beamsim_core::probe::{Figure, Look, Place};
 use beamsim_core::run::Snapshot;
 use beamsim_core::system::{Node, State};
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -295,18 +295,7 @@ fn initial(figure: &Figure, shown: &[Vec<usize>]) -> Vec<(Node, Vec3)> {
 fn named(scene: &Scene) -> Vec<(String, Place)> {
     let mut names: Vec<(String, Place)> = Vec::new();
     for probe in &scene.probes {
-        let (Quantity::Displacement(place)
-        | Quantity::Position(place)
-        | Quantity::Rotation(place)
-        | Quantity::Wound(place)
-        | Quantity::Axes(place)
-        | Quantity::Velocity(place)
-        | Quantity::Spin(place)
-        | Quantity::Acceleration(place)
-        | Quantity::AngularAcceleration(place)) = &probe.quantity
-        else {
-            continue;
-        };
+        let Some(place) = probe.place() else { continue };
         let name = probe.names.first().and_then(|name| name.rsplit_once('.')).map_or("", |(node, _)| node);
         if !names.iter().any(|(known, _)| known == name) {
             names.push((name.into(), place.clone()));

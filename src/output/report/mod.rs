@@ -1,4 +1,5 @@
-//! report.html: one page that plays a run back, with its histories, energies, effects and deck. It needs no network and no server.
+//! report.html: one page that plays a run back, with its histories, energies, effects and deck. It
+//! needs no network and no server.
 
 mod encode;
 mod film;
@@ -6,6 +7,7 @@ mod film;
 pub use film::Film;
 
 use super::{HistoryReader, OutputError, PartFile, Record, Units};
+use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart};
 use encode::base64;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -33,7 +35,8 @@ impl Report<'_> {
     fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
         let history = HistoryReader::of_results(results).map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
-        // The last row of a run that was stopped is the one of that moment, which the film passes over.
+        // The last row of a run that was stopped is the one of that moment, which the film passes
+        // over.
         let filmed = history.rows.len() - usize::from(self.record.is_interrupted() && !history.rows.is_empty());
         let shown = rows(&history, &film.end(filmed));
         // The last row that is shown up to there.
@@ -46,7 +49,8 @@ impl Report<'_> {
             "version": env!("CARGO_PKG_VERSION"),
             "deck": self.record.text(),
             "run": self.record.bare(),
-            "length_unit": units.of_column("x"),
+            "length_unit": units.length(),
+            "parts": parts(),
             "history": table(&history, &shown, &columns, &units),
             "bars": if bars.is_empty() { Value::Null } else { table(&history, &shown, &bars, &units) },
             "scene": film.to_json(&row, &units),
@@ -60,8 +64,8 @@ impl Report<'_> {
     }
 }
 
-/// A small table of the results as columns, units and rows; null if there is no such file. Fields that
-/// are no numbers stay texts.
+/// A small table of the results as columns, units and rows; null if there is no such file. Fields
+/// that are no numbers stay texts.
 fn small_table(path: &Path, units: &Units) -> Result<Value, OutputError> {
     if !path.exists() {
         return Ok(Value::Null);
@@ -81,6 +85,22 @@ fn small_table(path: &Path, units: &Units) -> Result<Value, OutputError> {
 /// Whether a column is the error bar of another.
 fn is_bar(names: &[String], k: usize) -> bool {
     names[k].strip_suffix(".err").is_some_and(|of| names.iter().any(|name| name == of))
+}
+
+/// Rows of the table of columns: columns that share a picture, with the group of the whole scene
+/// that they belong to, if they do.
+fn parts() -> Vec<Value> {
+    let of_history = COLUMNS.iter().filter(|group| group.is_of_node() || group.is_of_scene());
+    let of_group = |group: &'static ColumnGroup| {
+        let scene = group.is_of_scene().then_some(group.key);
+        let of_section = group.is_of_section();
+        let row = move |part: &ColumnPart| {
+            let ColumnPart { title, suffixes, .. } = part;
+            json!({ "scene": scene, "of_section": of_section, "title": title, "suffixes": suffixes })
+        };
+        group.parts.iter().map(row)
+    };
+    of_history.flat_map(of_group).collect()
 }
 
 /// The rows that are shown: all, or each n-th and those with a frame.

@@ -9,6 +9,7 @@ mod spins;
 use super::constraints::find_history;
 use super::joints::FoundJoint;
 use super::mesh::{BeamElement, Mesh};
+use super::output::needs;
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
 use beamsim_core::effect::Effect;
 use beamsim_core::effect::elasticity::{
@@ -19,6 +20,7 @@ use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::kernel::law::Strain;
 use beamsim_core::model::beam_element::{SectionPoint, push_elastic};
 use beamsim_core::model::{Amplitude, History, SlotKind, StageSet, Support};
+use beamsim_core::probe::Need;
 use beamsim_core::run::Driven;
 use beamsim_core::system::Slot;
 use beamsim_core::tensor::{Mat3, Vec3};
@@ -315,13 +317,7 @@ impl Composer<'_> {
 /// and by static stages whose stability only small vibrations show.
 fn needs_mass(deck: &Deck) -> bool {
     let dynamic = deck.stages.iter().any(|stage| stage.body.needs_inertia() || stage.frame.is_some());
-    let written = deck.output.columns.iter().flatten().any(|group| group.value == "momentum");
-    let expected = deck.expects.iter().any(|expect| match &expect.body {
-        deck::ExpectBody::Column { column, .. } => column.value.starts_with("momentum."),
-        deck::ExpectBody::Fails(_) | deck::ExpectBody::Warns(_) | deck::ExpectBody::Quiet => false,
-    });
-    let watched = deck.stages.iter().filter_map(|s| s.until.as_ref()).any(|u| u.column.value.starts_with("momentum."));
-    dynamic || written || expected || watched || may_flutter(deck)
+    dynamic || needs(deck, Need::Mass) || may_flutter(deck)
 }
 
 /// True if a static stage may end under loads that turn, whose tangents are not symmetric.

@@ -2,7 +2,8 @@
 
 use crate::deck::{Accuracy, Deck};
 use crate::study::cost::{Sampler, Samples};
-use crate::study::scale::kind;
+use crate::study::scale::mesh_error;
+use beamsim_core::probe::MeshError;
 
 /// The orders of the error over the step.
 const TIME_ORDERS: Orders = Orders { assumed: 1.5, smooth: 2.0 };
@@ -29,7 +30,10 @@ impl Falls {
     const ALL: [Self; 2] = [Self::Places, Self::Slopes];
 
     fn of(column: &str) -> Self {
-        if ["N", "M"].contains(&kind(column)) { Self::Slopes } else { Self::Places }
+        match mesh_error(column) {
+            MeshError::Slopes => Self::Slopes,
+            MeshError::Nodes | MeshError::Unspecified => Self::Places,
+        }
     }
 
     /// The orders for elements of an order.

@@ -6,10 +6,10 @@ use super::variant::{Pace, dynamic_stages};
 use crate::deck::{Deck, Diagnostic, NormWord, Path, StageBody};
 use crate::scene::Scene;
 use crate::study::outcome::{Outcome, StageClock, columns, columns_of_history};
-use crate::study::scale::{ScaleRow, kind, scales};
+use crate::study::scale::{ScaleRow, mesh_error, scales};
 use crate::study::{Recorder, expected_values};
-use beamsim_core::probe::Quantity;
-use std::f64::consts::TAU;
+use beamsim_core::probe::{MeshError, Nearest, Probe};
+use std::ops::Range;
 
 /// The largest number of instants of a stage that are compared.
 const MOST_INSTANTS: usize = 200;
@@ -32,8 +32,9 @@ pub struct Sampler {
     of_history: usize,
     /// Diagonal of the scene, to compare translations with rotations
     length: f64,
-    /// First columns of rotation vectors that are not continued from turn to turn
-    rotations: Vec<usize>,
+    /// Columns whose values are not unique, such as rotation vectors that are not continued from
+    /// turn to turn
+    ambiguous: Vec<Ambiguous>,
     /// True if the line of a beam is curved, so that elements approximate it
     curved: bool,
     /// True if masses or loads are lumped to nodes of elements with relative rotations
@@ -48,6 +49,14 @@ pub struct Sampler {
 const LUMPED: [&str; 4] =
     ["rotary inertia", "eccentric section inertia", "section inertia at nodes", "following line loads"];
 
+/// Columns of a group whose values are not unique.
+struct Ambiguous {
+    /// Numbers of the columns
+    columns: Range<usize>,
+    /// Replaces the first values by the equivalent ones that are nearest to the second
+    nearest: Nearest,
+}
+
 /// The rows of a run that are compared.
 enum ComparedRows {
     /// Rows at these instants, the last row, and modes
@@ -55,9 +64,6 @@ enum ComparedRows {
     /// The values of [[expect]]
     Expected,
 }
-
-/// Kinds of columns that describe the motion of nodes.
-const MOTIONS: [&str; 7] = ["u", "", "r", "d", "v", "w", "energy"];
 
 /// The differences of a column over all compared rows.
 #[derive(Clone, Copy, Default)]
@@ -109,7 +115,7 @@ impl Sampler {
     pub fn of_expectations(deck: &Deck, scene: &Scene) -> (Self, Samples) {
         let (names, values): (Vec<_>, Vec<_>) = expected_values(&scene.expectations).into_iter().unzip();
         let count = names.len();
-        (Self { norm: NormWord::End, rotations: Vec::new(), ..Self::new(deck, scene, names, count) }, values)
+        (Self { norm: NormWord::End, ambiguous: Vec::new(), ..Self::new(deck, scene, names, count) }, values)
     }
 
     fn new(deck: &Deck, scene: &Scene, columns: Vec<String>, of_history: usize) -> Self {
@@ -120,7 +126,7 @@ impl Sampler {
             norm: deck.cost.norm.unwrap_or_default(),
             of_history,
             length: scene.plan.model.length,
-            rotations: rotations(scene),
+            ambiguous: ambiguous(scene),
             curved: deck.beams.iter().any(|beam| matches!(beam.path, Path::Arc(_))),
             lumped: scene.reasons.iter().any(|reason| reason.active && LUMPED.contains(&reason.name)),
             rows: ComparedRows::Expected,
@@ -212,7 +218,7 @@ impl Sampler {
         }
         for (a, b) in self.split(came).zip(self.split(reference)) {
             let mut nearest = a.values.to_vec();
-            self.take_nearest_rotations(a.first, &mut nearest, b.values);
+            self.take_nearest(a.first, &mut nearest, b.values);
             for (k, (one, other)) in nearest.iter().zip(b.values).enumerate() {
                 if !(one.is_nan() || other.is_nan()) {
                     sums[a.first + k].add((one - other).abs());
@@ -247,7 +253,7 @@ impl Sampler {
         let mut all = Vec::with_capacity(one.len());
         for (a, b) in self.split(one).zip(self.split(other)) {
             let mut nearest = b.values.to_vec();
-            self.take_nearest_rotations(a.first, &mut nearest, a.values);
+            self.take_nearest(a.first, &mut nearest, a.values);
             all.extend(a.values.iter().zip(&nearest).map(|(a, b)| a + weight * (a - b)));
         }
         all
@@ -258,7 +264,7 @@ impl Sampler {
     /// nodes one more than the order of the elements. `None` where outputs that are not motions
     /// count.
     pub fn order_in_space(&self, order: usize, relative: bool) -> Option<Expected> {
-        let motion = |&k: &usize| MOTIONS.contains(&kind(&self.columns[k]));
+        let motion = |&k: &usize| mesh_error(&self.columns[k]) == MeshError::Nodes;
         let between = |&k: &usize| {
             let node = self.columns[k].rsplit_once('.').map_or("", |(node, _)| node);
             let place = node.split_once('@').map_or("", |(_, place)| place);
@@ -277,37 +283,29 @@ impl Sampler {
         self.outputs.iter().all(motion).then_some(expected)
     }
 
-    /// Replaces rotation vectors by the equivalent ones that are nearer to those of another row:
-    /// each rotation has two of up to 2 pi.
-    pub fn take_nearest_rotations(&self, first: usize, row: &mut [f64], to: &[f64]) {
-        let own = first..first + row.len();
-        for k in self.rotations.iter().filter(|&k| own.contains(k)).map(|k| k - first) {
-            let r = [row[k], row[k + 1], row[k + 2]];
-            let goal = [to[k], to[k + 1], to[k + 2]];
-            let angle = r.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if angle == 0.0 {
-                continue;
-            }
-            let other = r.map(|x| x * (1.0 - TAU / angle));
-            let away = |v: [f64; 3]| v.iter().zip(goal).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-            if away(other) < away(r) {
-                row[k..k + 3].copy_from_slice(&other);
+    /// Replaces values of a row that are not unique by the equivalent ones that are nearest to
+    /// those of another row: each rotation has two rotation vectors of up to 2 pi, and two unit
+    /// quaternions. `first` is the number of the first column of both rows.
+    pub fn take_nearest(&self, first: usize, row: &mut [f64], to: &[f64]) {
+        for group in &self.ambiguous {
+            // The modes have no such columns: their rows begin after the columns of the history.
+            let own = group.columns.start.wrapping_sub(first)..group.columns.end.wrapping_sub(first);
+            if let (Some(values), Some(goal)) = (row.get_mut(own.clone()), to.get(own)) {
+                (group.nearest)(values, goal);
             }
         }
     }
 }
 
-/// The first columns of rotation vectors.
-fn rotations(scene: &Scene) -> Vec<usize> {
-    let mut first = 0;
-    let mut found = Vec::new();
-    for probe in &scene.probes {
-        if matches!(probe.quantity, Quantity::Rotation(_)) {
-            found.push(first);
-        }
-        first += probe.names.len();
-    }
-    found
+/// The columns of a history whose values are not unique.
+fn ambiguous(scene: &Scene) -> Vec<Ambiguous> {
+    let mut end = 0;
+    let columns = |probe: &Probe| {
+        let start = end;
+        end += probe.names.len();
+        Some(Ambiguous { columns: start..end, nearest: probe.group.nearest? })
+    };
+    scene.probes.iter().filter_map(columns).collect()
 }
 
 /// The instants that all runs of a deck have: levels of static stages, and multiples of the

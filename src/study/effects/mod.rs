@@ -10,6 +10,8 @@ use crate::scene::Scene;
 use crate::study::StudyError;
 use crate::study::built::BuiltDeck;
 use crate::study::outcome::{Outcome, columns};
+use crate::study::scale::quantity;
+use beamsim_core::probe::Quantity;
 use beamsim_core::run::Failure;
 use change::changes;
 use present::acts;
@@ -146,7 +148,8 @@ impl Baseline<'_> {
         };
         if words.contains(&EffectWord::LargeRotations) {
             // The energies are those of the full theory, which linear stages do not conserve.
-            let energies = self.columns.iter().zip(&mut changes).filter(|(column, _)| column.starts_with("energy."));
+            let is_energy = |column: &str| quantity(column) == Some(Quantity::Energy);
+            let energies = self.columns.iter().zip(&mut changes).filter(|(column, _)| is_energy(column));
             energies.for_each(|(_, change)| *change = f64::NAN);
         }
         Ok(ReducedScene { without: words.to_vec(), outcome, changes })

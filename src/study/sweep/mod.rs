@@ -14,7 +14,7 @@ pub use store::Store;
 use super::built::BuiltDeck;
 use super::parallel::in_parallel;
 use super::{StudyError, SweepError};
-use crate::deck::{self, Deck, Looked, looking_at, nearest};
+use crate::deck::{self, Deck, Looked, looking_at, nearest, without_stage};
 use crate::output::OutputError;
 use crate::scene::Scene;
 use beamsim_core::failure::FailureKind;
@@ -145,10 +145,7 @@ pub fn usual_outputs(scene: &Scene) -> Vec<Looked> {
     let mut names: Vec<String> = Vec::new();
     for column in super::outcome::columns(scene) {
         // Without the number of the stage, a name means the last stage with such modes.
-        let name = match column.strip_prefix("stage").and_then(|rest| rest.split_once('.')) {
-            Some((number, mode)) if number.parse::<usize>().is_ok() => mode.to_string(),
-            _ => column,
-        };
+        let name = without_stage(&column).to_string();
         if !names.contains(&name) {
             names.push(name);
         }

@@ -1,0 +1,50 @@
+//! Columns bound to the node, beam point or scene that they are read from.
+
+use super::columns::ColumnGroup;
+use super::place::{BeamPoint, Place};
+use crate::run::Snapshot;
+use crate::system::Node;
+
+/// A group of columns of one object, with their names.
+#[derive(Clone)]
+pub struct Probe {
+    /// One name a column
+    pub names: Vec<String>,
+    /// Row of the table of columns
+    pub group: &'static ColumnGroup,
+    /// Object and function that the values come from
+    pub reading: Reading,
+}
+
+/// The object that is read, with the function that reads it.
+#[derive(Clone)]
+pub enum Reading {
+    /// A node, or a place within a beam element
+    Place(Place, fn(&Place, &Snapshot, &mut Vec<f64>)),
+    /// A node
+    Node(Node, fn(Node, &Snapshot, &mut Vec<f64>)),
+    /// A point of one beam
+    BeamPoint(BeamPoint, fn(&BeamPoint, &Snapshot, &mut Vec<f64>)),
+    /// The whole scene, or the clocks of the run
+    Whole(fn(&Snapshot, &mut Vec<f64>)),
+}
+
+impl Probe {
+    /// Appends the values of the columns.
+    pub fn read(&self, at: &Snapshot, out: &mut Vec<f64>) {
+        match &self.reading {
+            Reading::Place(place, read) => read(place, at, out),
+            Reading::Node(node, read) => read(*node, at, out),
+            Reading::BeamPoint(point, read) => read(point, at, out),
+            Reading::Whole(read) => read(at, out),
+        }
+    }
+
+    /// The place whose motion the columns show.
+    pub fn place(&self) -> Option<&Place> {
+        match &self.reading {
+            Reading::Place(place, _) => Some(place),
+            Reading::Node(..) | Reading::BeamPoint(..) | Reading::Whole(_) => None,
+        }
+    }
+}
