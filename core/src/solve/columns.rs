@@ -1,9 +1,9 @@
-//! The tangent in compressed columns of numbers, as general libraries want it.
+//! The tangent in compressed columns of numbers, the format of general sparse solvers.
 
 use crate::system::{Pattern, System};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
-/// Where each entry between equations is found.
+/// Compressed columns of a tangent, with the position of each entry among its values.
 pub struct Columns {
     starts: Vec<u32>,
     rows: Vec<u32>,
@@ -12,14 +12,14 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// The columns of a pattern.
+    /// Compressed columns of a pattern.
     pub fn new(pattern: &Pattern) -> Self {
         let (mut rows, mut places) = (Vec::new(), Vec::new());
         let mut starts = vec![0];
         for column in 0..pattern.dof_map.count() as u32 {
             let mut entries: Vec<_> = pattern.entries(column).collect();
-            // The tile on the diagonal comes between the others, and nodes that share displacements
-            // are not in the order of equations.
+            // The diagonal tile comes between the others, and nodes that share displacements are
+            // not in the order of equations.
             entries.sort_unstable_by_key(|entry| entry.row);
             rows.extend(entries.iter().map(|entry| entry.row));
             places.extend(entries.iter().map(|entry| entry.place as u32));
@@ -28,13 +28,13 @@ impl Columns {
         Self { values: vec![0.0; rows.len()], starts, rows, places }
     }
 
-    /// The pattern alone.
+    /// The pattern without values.
     pub fn structure(&self) -> SymbolicSparseColMatRef<'_, u32> {
         let n = self.starts.len() - 1;
         SymbolicSparseColMatRef::new_checked(n, n, &self.starts, None, &self.rows)
     }
 
-    /// The tangent.
+    /// The pattern with the values of the tangent of a system.
     pub fn matrix(&mut self, system: &System) -> SparseColMatRef<'_, u32, f64> {
         for (value, &place) in self.values.iter_mut().zip(&self.places) {
             *value = system.values[place as usize];

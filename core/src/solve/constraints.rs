@@ -1,6 +1,6 @@
-//! Tangents with Lagrange multipliers, made ready for a factorisation without pivoting.
+//! Tangents with Lagrange multipliers, prepared for a factorisation without pivoting.
 //!
-//! With the rows B and columns C of the multipliers (C = B^T where the tangent is symmetric) and
+//! With the rows B and columns C of the multipliers (C = B^T if the tangent is symmetric) and
 //! weights W,
 //!
 //! ```text
@@ -8,36 +8,37 @@
 //! | B  0 | |l| = |g|   is the same as |     B      0 | |l| = |    g    |
 //! ```
 //!
-//! C W B stands in for the stiffness that a part has only through its joints: its pivots are then
-//! those of a part that is held, and each multiplier, which is eliminated behind what it ties, has
-//! a negative one. The inertia on the space that the constraints leave is that of the tangent for
-//! any W (congruence with [I, C W/2; 0, I]), and so is the solution.
+//! C W B replaces the stiffness that a part has only through its joints: the pivots of the part are
+//! then those of a clamped part, and each multiplier, which is eliminated after the unknowns it
+//! constrains, has a negative pivot. For any W, the inertia on the space that satisfies the
+//! constraints is that of the tangent (congruence with [I, C W/2; 0, I]), and so is the solution.
 
 use crate::system::{DofMap, Matrix, Pattern, Slot, System};
 use std::collections::BTreeMap;
 
-/// A multiplier gets so many times the stiffness beside it: what it ties is then held even where it
-/// has lost its own stiffness.
+/// Weight of a multiplier, relative to the stiffness of the unknowns it constrains: large enough
+/// that these remain stiff when they lose their own stiffness.
 const FACTOR: f64 = 8.0;
 
-/// The multipliers of a pattern, and the values of the last tangent that was made ready.
+/// The multipliers of a pattern, and the values of the last prepared tangent.
 pub struct Constraints {
     rows: Vec<Multiplier>,
     additions: Vec<Addition>,
-    /// NodeBlocks of multipliers
+    /// Node blocks of the multipliers, ascending
     node_blocks: Vec<u32>,
-    /// Of each row
+    /// Weight W of each multiplier
     weights: Vec<f64>,
     values: Vec<f64>,
 }
 
-/// The row of a multiplier.
+/// Equation of a multiplier and the unknowns it constrains.
 struct Multiplier {
     equation: u32,
     ties: Vec<Tie>,
 }
 
-/// An equation that a multiplier enters: where the entries of C, of B and of the diagonal stand.
+/// An unknown that a multiplier constrains, with the positions of its entries of C, of B and of the
+/// diagonal.
 struct Tie {
     equation: u32,
     of_column: usize,
@@ -45,8 +46,8 @@ struct Tie {
     diagonal: usize,
 }
 
-/// An entry of C W B: the place that it is added to, the number of the multiplier, and where its
-/// two factors stand.
+/// An entry of C W B: the position it is added to, the index of the multiplier, and the positions
+/// of its factors in C and B.
 struct Addition {
     place: usize,
     row: usize,
@@ -55,7 +56,7 @@ struct Addition {
 }
 
 impl Constraints {
-    /// Of these multipliers; `None` where there are none.
+    /// Constraints of the given multiplier slots; `None` if they have no equation.
     pub fn new(pattern: &Pattern, multipliers: &[Slot]) -> Option<Self> {
         let dof_map = multipliers.iter().flat_map(|&slot| pattern.dof_map.of(slot));
         let dof_map: Vec<u32> = dof_map.filter(|&equation| equation != DofMap::HELD).collect();
@@ -84,7 +85,7 @@ impl Constraints {
                     let [Some(above), Some(below)] = pair else { continue };
                     let add = |place, of_column, of_row| Addition { place, row: number, of_column, of_row };
                     additions.push(add(above, a.of_column, b.of_row));
-                    // Where one half is kept both entries stand at one place.
+                    // In symmetric storage both entries have one position.
                     if below != above {
                         additions.push(add(below, b.of_column, a.of_row));
                     }
@@ -99,22 +100,22 @@ impl Constraints {
         Some(Self { rows, additions, node_blocks, weights, values: Vec::new() })
     }
 
-    /// The groups of multipliers.
+    /// Node blocks of the multipliers.
     pub fn node_blocks(&self) -> &[u32] {
         &self.node_blocks
     }
 
-    /// The equations of multipliers.
+    /// Equations of the multipliers.
     pub fn dof_map(&self) -> impl Iterator<Item = usize> {
         self.rows.iter().map(|row| row.equation as usize)
     }
 
-    /// The number of multipliers.
+    /// Number of multipliers.
     pub fn count(&self) -> usize {
         self.rows.len()
     }
 
-    /// Makes a tangent ready.
+    /// Prepares the tangent of a system: K + C W B.
     pub fn take(&mut self, system: &System) {
         let Self { rows, additions, weights, values, .. } = self;
         values.clear();
@@ -127,12 +128,12 @@ impl Constraints {
         }
     }
 
-    /// What was made ready last, on the pattern of its tangent.
+    /// The prepared tangent, on its pattern.
     pub fn matrix<'a>(&'a self, pattern: &'a Pattern) -> Matrix<'a> {
         Matrix::new(pattern, &self.values)
     }
 
-    /// The right-hand side that belongs to it: f + C W g.
+    /// Prepares a right-hand side: f + C W g.
     pub fn change(&self, right_hand_side: &mut [f64]) {
         for (row, weight) in self.rows.iter().zip(&self.weights) {
             let gap = weight * right_hand_side[row.equation as usize];
@@ -146,9 +147,9 @@ impl Constraints {
 }
 
 impl Multiplier {
-    /// From the stiffness beside a multiplier in its own unit, so that it does not depend on any:
-    /// FACTOR/w = sum B_k C_k/|K_kk|. Where nothing has stiffness that of others, `largest`, must
-    /// do.
+    /// Weight from the stiffness of the constrained unknowns, independent of units:
+    /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` of the
+    /// scene is used.
     fn weight(&self, values: &[f64], largest: f64) -> f64 {
         let square = |tie: &Tie| (values[tie.of_column] * values[tie.of_row]).abs();
         let stiff = self.ties.iter().filter(|tie| values[tie.diagonal] != 0.0);

@@ -1,4 +1,4 @@
-//! The stop test of Newton's iteration, in terms that do not depend on units.
+//! Stop test of Newton's iteration, independent of units.
 
 use crate::effect::RoundOff;
 use crate::model::{Model, SlotKind};
@@ -6,61 +6,61 @@ use crate::system::{DofMap, Plane, Region, Slot, System};
 use crate::tensor::Vec3;
 use crate::threads;
 
-/// The bounds of the test.
+/// Tolerance of the stop test.
 ///
-/// A state has converged when every translational residual is below `tolerance` F and every
+/// A state has converged if every translational residual is below `tolerance` F and every
 /// rotational one below `tolerance` F l, or at its round-off floor; F is the largest nodal force,
 /// or moment over l, among internal, external, inertia and support forces, and l the length of the
-/// scene. A last correction below 1e-12 in |du|/l and |dpsi| ends it too.
+/// scene. A last correction below 1e-12 in |du|/l and |dpsi| ends the iteration, too.
 #[derive(Clone, Copy, Debug)]
 pub struct Convergence {
-    /// Relative to the largest force
+    /// Largest residual relative to the largest force, see [`Convergence`]
     pub tolerance: f64,
 }
 
-/// Correction below which nothing more can be gained, relative to the length of the scene, and in
-/// radians.
+/// Correction below which the iteration ends: displacements relative to the length of the scene,
+/// rotations in radians.
 const SMALLEST_CORRECTION: f64 = 1e-12;
 
-/// Gaps of joints are closed more tightly than forces are balanced, relative to the scene's length
-/// and in radians.
+/// Tolerance of constraint gaps relative to that of forces. Translational gaps are relative to the
+/// length of the scene, rotational ones in radians.
 const GAP: f64 = 1e-2;
 
-/// Sums of a few products carry a few times the round-off of one.
+/// A nodal force is a sum of a few products; its round-off is this many times that of one product.
 const NOISE_FACTOR: f64 = 4.0;
 
-/// The largest residual, as a multiple of what the test allows.
+/// Largest residual, relative to its tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
-    /// Its size over the allowed size
+    /// Size of the residual over its tolerance
     pub ratio: f64,
-    /// Its slot
+    /// Slot of the residual
     pub slot: Slot,
-    /// The free part of the residual there: a force, or a moment conjugate to the rotation vector
+    /// Free component of the residual at the slot (global components): a force, or a moment
+    /// conjugate to the rotation vector
     pub value: Vec3,
-    /// The force F to which it is compared
+    /// Force F that the tolerance refers to
     pub force: f64,
-    /// True if some residual is allowed for its round-off alone.
+    /// True if some residual is tolerated for its round-off only
     pub noisy: bool,
 }
 
-/// The verdict of the stop test.
+/// Verdict of the stop test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// In balance
+    /// The state is an equilibrium.
     Converged,
-    /// The residual is not larger than what round-off may have made of it, but the last correction
-    /// was.
+    /// The residual is within its round-off, while the last correction is not small.
     Noisy,
-    /// Not yet
+    /// The residual exceeds its tolerance.
     Continue,
     /// A force is not finite.
     NotFinite,
 }
 
 impl Convergence {
-    /// Judges the forces of `system`, and the [`size`] of the last correction: `None` before the
-    /// first, infinite where charts have changed since.
+    /// Judges the forces of `system` and the [`size`] of the last correction: `None` before the
+    /// first, infinite if charts have changed since.
     pub fn judge(&self, model: &Model, system: &System, round_off: RoundOff, last: Option<f64>) -> (Verdict, Residual) {
         let residual = self.residual(model, system, round_off);
         if !(residual.ratio.is_finite() && residual.force.is_finite()) {
@@ -79,7 +79,7 @@ impl Convergence {
     fn residual(&self, model: &Model, system: &System, round_off: RoundOff) -> Residual {
         let squares = Peaks::of(model, system, Vec3::squared);
         let peaks = match squares.largest() {
-            // Neither has a square overflowed, nor has anything that counts been lost.
+            // Squares have neither overflowed nor lost relevant digits to underflow.
             1e-280..=1e280 if squares.poison == 0.0 => squares.map(f64::sqrt),
             _ => Peaks::of(model, system, Vec3::size),
         };
@@ -111,28 +111,27 @@ impl Convergence {
     }
 }
 
-/// The largest of some vectors, and where it is.
+/// Largest of some vectors, and its slot.
 #[derive(Clone, Copy, Debug, Default)]
 struct Peak {
     size: f64,
     slot: Slot,
 }
 
-/// The largest forces and residuals.
+/// Largest forces and residuals.
 #[derive(Clone, Copy, Debug, Default)]
 struct Peaks {
-    /// The largest nodal force among all categories and what constraints hold, and the largest
-    /// moment
+    /// Largest nodal force, and largest moment, among all categories and constraint forces
     force: f64,
     moment: f64,
-    /// By kind of slot
+    /// Largest free residual for each [`SlotKind`]
     residuals: [Peak; 4],
-    /// Zero; NaN where a number is NaN or infinite, which the largest of numbers may leave out
+    /// Zero; NaN if some value is not finite, which maxima may ignore
     poison: f64,
 }
 
 impl Peaks {
-    /// In this measure of vectors.
+    /// Peaks of all slots, with vectors measured by `measure`.
     fn of(model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy + Send + Sync) -> Self {
         let mut all: Option<Self> = None;
         let of_region = |region| Self::among(region, model, system, measure);
@@ -142,11 +141,11 @@ impl Peaks {
         all.unwrap_or_default()
     }
 
-    /// The peaks in a region.
+    /// Peaks of the slots of a region.
     fn among(region: &Region, model: &Model, system: &System, measure: impl Fn(Vec3) -> f64 + Copy) -> Self {
         let slots = region.slots.clone();
         let dof_map = &system.pattern.dof_map;
-        // Vectors in a tilted plane are rounded aside.
+        // In a tilted plane, vectors have round-off out of the plane.
         let tilted = dof_map.plane().is_some_and(Plane::is_tilted);
         let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
         for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
@@ -170,7 +169,7 @@ impl Peaks {
         Self { force, moment, residuals, poison }
     }
 
-    /// The larger ones of two, of equal ones the first.
+    /// The larger peaks of two; the first of equal ones.
     fn or(self, other: Self) -> Self {
         let mut residuals = self.residuals;
         for (own, other) in residuals.iter_mut().zip(other.residuals) {
@@ -186,7 +185,7 @@ impl Peaks {
         }
     }
 
-    /// The largest of all.
+    /// Largest of all peaks.
     fn largest(&self) -> f64 {
         self.residuals.iter().fold(larger(self.force, self.moment), |largest, peak| larger(largest, peak.size))
     }
@@ -197,19 +196,19 @@ impl Peaks {
     }
 }
 
-/// The larger of two numbers, in one instruction, unlike `f64::max`: where one is NaN it is the
-/// second, and `poison` tells.
+/// The larger of two numbers in one instruction, unlike `f64::max`. If either is NaN the result is
+/// `b`; `poison` reports this.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// The part of a force in the free directions of its slot, global components.
+/// Component of a force in the free directions of its slot (global components).
 fn free_part(dof_map: &DofMap, slot: Slot, force: Vec3) -> Vec3 {
     force - dof_map.held_part(slot, force)
 }
 
-/// The size of a correction, or of any other motion: its largest vector, displacements over the
-/// length of the scene. What is no number does not count.
+/// Size of a correction or another motion: the largest of rotations in radians and displacements
+/// relative to the length of the scene. NaN entries are ignored.
 pub fn size(model: &Model, motion: &[Vec3]) -> f64 {
     threads::largest(motion.len(), |slots| {
         let mut squares = [0.0_f64; 4];

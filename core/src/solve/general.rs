@@ -1,4 +1,5 @@
-//! LU with partial pivoting and a fill-reducing column order, by faer: for what blocks cannot do.
+//! LU with partial pivoting and a fill-reducing column order, by faer, for tangents that the block
+//! solver cannot factorise.
 
 use super::columns::Columns;
 use crate::system::System;
@@ -7,7 +8,7 @@ use faer::mat::MatMut;
 use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::{Conj, Par};
 
-/// A factorisation by numbers.
+/// A sparse LU factorisation with its symbolic analysis.
 pub struct GeneralSolver {
     columns: Columns,
     symbolic: SymbolicLu<u32>,
@@ -16,7 +17,7 @@ pub struct GeneralSolver {
 }
 
 impl GeneralSolver {
-    /// Analyses the pattern of a system. `None` where memory for it cannot be had.
+    /// Analyses the pattern of a system. `None` if memory is not available.
     pub fn new(system: &System) -> Option<Self> {
         let columns = Columns::new(&system.pattern);
         let symbolic = factorize_symbolic_lu(columns.structure(), Default::default()).ok()?;
@@ -26,14 +27,14 @@ impl GeneralSolver {
         Some(Self { columns, symbolic, numeric: NumericLu::new(), memory })
     }
 
-    /// Factorises; `false` where a pivot cannot be found.
+    /// Factorises the tangent of a system; `false` if no pivot is found.
     pub fn factorise(&mut self, system: &System) -> bool {
         let matrix = self.columns.matrix(system);
         let stack = MemStack::new(&mut self.memory);
         self.symbolic.factorize_numeric_lu(&mut self.numeric, matrix, Par::Seq, stack, Default::default()).is_ok()
     }
 
-    /// Solves with the last factorisation, which has not failed.
+    /// Solves with the last factorisation, which must not have failed; `x` is by equation.
     pub fn solve(&mut self, x: &mut [f64]) {
         let n = x.len();
         let lu = LuRef::new_unchecked(&self.symbolic, &self.numeric);

@@ -1,59 +1,60 @@
 //! Eigenvalues of largest magnitude of a linear operator, by projection onto a block Krylov space.
 //!
-//! Blocks find eigenvalues that occur several times, such as the bending modes of a round section.
-//! The basis is orthonormal in an inner product x . W y that makes the operator symmetric where
-//! there is one.
+//! Blocks find multiple eigenvalues, such as the bending modes of a round section. The basis is
+//! orthonormal in an inner product x . W y in which the operator is symmetric, if there is one.
 
 use crate::scalar::{LANES, Lanes};
 use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
 use faer::{Mat, Side};
 use nalgebra::Complex;
 
-/// A linear operator on vectors.
+/// A linear operator with an inner product.
 pub trait Operator {
-    /// The length of its vectors
+    /// Length of its vectors
     fn size(&self) -> usize;
-    /// The image of a vector; `None` where it cannot be had.
+    /// Image of a vector; `None` if the computation fails.
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>>;
-    /// W x, of the inner product; W may be semidefinite.
+    /// W x, with the possibly semidefinite W of the inner product.
     fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
-    /// True if it is symmetric in that inner product
+    /// True if the operator is symmetric in the inner product
     fn is_symmetric(&self) -> bool;
 }
 
-/// Eigenvalues of an operator, largest magnitude first, with their vectors.
+/// Eigenvalues of an operator, of descending magnitude, with their eigenvectors.
 #[derive(Default)]
 pub struct Spectrum {
-    /// The eigenvalues
+    /// Eigenvalues
     pub values: Vec<Complex<f64>>,
-    /// Each vector in the basis
+    /// Coordinates of each eigenvector in the basis
     coordinates: Vec<Vec<Complex<f64>>>,
     space: Space,
 }
 
-/// Vectors that give a rough idea of the largest eigenvalue
+/// Size of the basis of a rough estimate of eigenvalues
 const ROUGH: usize = 12;
-/// Vectors a block
+/// Number of vectors in a block
 const BLOCK: usize = 6;
-/// Relative change at which eigenvalues count as found
+/// Relative change of eigenvalues between two projections at which they have converged
 const FOUND: f64 = 1e-11;
-/// Vectors that lose this part of themselves when the basis is taken out of them bring nothing new.
+/// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
+/// basis.
 const NOTHING_NEW: f64 = 1e-11;
 
-/// The `wanted` eigenvalues of largest magnitude, largest first; fewer where the space holds fewer.
-/// `None` where an image cannot be had.
+/// The `wanted` eigenvalues of largest magnitude, descending; fewer if the space has fewer
+/// dimensions. `None` if an image cannot be computed.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
     let most = operator.size().min(24 * wanted + 160);
     eigenvalues_within(operator, wanted, most)
 }
 
-/// A rough idea of the eigenvalues of largest magnitude, from few images.
+/// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
+/// cannot be computed.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
     let most = operator.size().min(ROUGH);
     eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
 }
 
-/// From a basis of at most so many vectors.
+/// Eigenvalues from a basis of at most `most` vectors. `None` if an image cannot be computed.
 fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
     let size = operator.size();
     if size == 0 {
@@ -65,7 +66,7 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
         block.push(operator.apply(&start(size, k))?);
     }
     let mut last: Vec<Complex<f64>> = Vec::new();
-    // The projection is looked at when it has grown by a quarter.
+    // Eigenvalues of the projection are computed whenever the basis has grown by a quarter.
     let mut look = 0;
     loop {
         let first = space.basis.len();
@@ -83,7 +84,7 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
             continue;
         }
         look = space.basis.len() + space.basis.len() / 4;
-        // A few more than wanted must stand still, lest the second of a pair is missed.
+        // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
         let guard = wanted + BLOCK;
         let now = space.eigenvalues(operator.is_symmetric(), guard);
         let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= FOUND * a.norm();
@@ -102,8 +103,8 @@ impl Spectrum {
         self.combine(number, &self.space.basis)
     }
 
-    /// The residual of an eigenvector, |A x - theta x| over |theta x|, in the norm of the inner
-    /// product.
+    /// Relative residual of an eigenvector, |A x - theta x| over |theta x|, in the norm of the
+    /// inner product.
     pub fn residual(&self, operator: &mut dyn Operator, number: usize) -> f64 {
         let (theta, [re, im]) = (self.values[number], self.vector(number));
         let [mut left_re, mut left_im] = self.combine(number, &self.space.images);
@@ -128,9 +129,9 @@ impl Spectrum {
     }
 }
 
-/// A vector without any pattern.
+/// A pseudo-random start vector with entries in [-0.5, 0.5).
 fn start(size: usize, number: usize) -> Vec<f64> {
-    // splitmix64
+    // The generator is splitmix64.
     let mut state = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(number as u64 + 1);
     let mut next = || {
         state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
@@ -146,13 +147,13 @@ struct Space {
     basis: Vec<Vec<f64>>,
     /// W times the basis
     weighed: Vec<Vec<f64>>,
-    /// The operator times the basis
+    /// The operator applied to the basis
     images: Vec<Vec<f64>>,
-    /// By rows: basis . W images
+    /// Projected operator by rows: basis . W images
     projected: Vec<Vec<f64>>,
 }
 
-/// In lanes, whose sums do not wait for each other.
+/// Inner product in vector lanes, whose sums are independent.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
     let sums = a.iter().zip(b).fold(Lanes([0.0; LANES]), |sums, (x, y)| sums + Lanes(*x) * Lanes(*y));
@@ -161,7 +162,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Space {
-    /// Adds the part of a vector that is new, normalised.
+    /// Orthogonalises a vector against the basis and adds it, normalised, unless it is linearly
+    /// dependent.
     fn add(&mut self, operator: &mut dyn Operator, mut vector: Vec<f64>, most: usize) {
         if self.basis.len() >= most {
             return;
@@ -169,7 +171,7 @@ impl Space {
         let size = |vector: &[f64], weighed: &[f64]| dot(vector, weighed).max(0.0).sqrt();
         let mut weighed = operator.weigh(&vector);
         let before = size(&vector, &weighed);
-        // Twice is enough (Kahan, Parlett).
+        // Two passes suffice (Kahan, Parlett).
         for _ in 0..2 {
             for (own, heavy) in self.basis.iter().zip(&self.weighed) {
                 let along = dot(heavy, &vector);
@@ -187,7 +189,7 @@ impl Space {
         self.weighed.push(weighed);
     }
 
-    /// Adds the rows and columns of the projection that belong to new vectors.
+    /// Extends the projected operator by the rows and columns of the basis vectors from `first` on.
     fn project(&mut self, first: usize) {
         for (i, heavy) in self.weighed.iter().enumerate() {
             if i >= first {

@@ -1,4 +1,5 @@
-//! The linear solver: by blocks where that is fast and safe, else in general.
+//! Linear solver: block factorisation where it is fast and safe, else sparse LU with partial
+//! pivoting.
 
 use super::block::BlockSolver;
 use super::constraints::Constraints;
@@ -8,60 +9,60 @@ use super::tangent::Tangent;
 use crate::system::{Leftover, Slot, System};
 use crate::tensor::Vec3;
 
-/// Solves with tangents of one pattern.
+/// Solves linear systems whose tangents share one pattern.
 ///
-/// Blocks serve scenes that are not too much of a net; multipliers of joints are made ready for
-/// them (`solve/constraints.rs`). Tangents whose pivots fail across blocks are left to LU with
-/// partial pivoting. Factors take the place of a tangent that may go as long as that is sure to
-/// lose no digits; else they stand beside it, and what they solve is looked at.
+/// The block solver serves scenes without dense nets; multipliers of joints are prepared for it
+/// (`solve/constraints.rs`). Tangents for which pivoting within blocks fails are left to LU with
+/// partial pivoting. Factors overwrite a tangent that may be destroyed as long as that certainly
+/// loses no digits; else they are stored separately, and residuals of solutions are checked.
 pub struct LinearSolver {
-    /// Where the pattern suits them
+    /// Block solver, if the pattern suits it
     blocks: Option<Box<BlockSolver>>,
-    /// Once blocks were left, or where there are none
+    /// Sparse LU, once the block solver has failed, or if there is none
     general: Option<Box<GeneralSolver>>,
     trust: Trust,
-    /// True if the last factorisation has come to its end
+    /// True if the last factorisation has succeeded
     pub(super) factored: bool,
-    /// That of the tangent that was factorised last; `None` where its values may have changed under
-    /// the same number
+    /// [`System::revision`] of the tangent factorised last; `None` if its values may have changed
+    /// since without a new revision
     revision: Option<u64>,
     pub(super) multipliers: Vec<Slot>,
-    /// The tangent that blocks factorise where there are multipliers
+    /// Multipliers with the tangent prepared for the block solver; `None` without multipliers
     constraints: Option<Constraints>,
-    /// Where it cannot count them itself
+    /// Separate factorisation that counts negative pivots if this solver's own does not
     pub(super) pivots: Option<Pivots>,
-    /// The last right-hand side where it had to be one list, solved, as it was, and what its
-    /// solution left of it
+    /// Buffers, by equation: the solution, its right-hand side, and the residual
     right_hand_side: Vec<f64>,
     wanted: Vec<f64>,
     leftover: Leftover,
 }
 
-/// The trust in blocks, where there are any.
+/// State of the choice between block solver and sparse LU.
 #[derive(Clone, Copy)]
 struct Trust {
     in_blocks: bool,
-    /// Solutions until they have another chance, and how many there will be when they fail again
+    /// Number of solutions until the block solver is tried again, and the number after its next
+    /// failure
     absence: u32,
     next: u32,
-    /// True if pivots have just not helped either
+    /// True if sparse LU has failed, too, so that the block solver stays for one attempt
     in_vain: bool,
-    /// True if the last factorisation was sure to lose no digits
+    /// True if the last block factorisation certainly lost no digits
     is_sure: bool,
 }
 
-/// A solution is one of a system whose entries differ by no more than this, relative to each
-/// (Oettli and Prager 1964).
+/// Backward error at which a solution is accepted: it solves a system whose entries differ by this
+/// relative amount (Oettli and Prager 1964).
 const BACKWARD_ERROR: f64 = 1e-11;
 
-/// The backward error above which refinement has found no solution.
+/// Backward error above which iterative refinement has failed.
 const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
 
-/// Corrections of one solution
+/// Largest number of refinements of a solution
 const REFINEMENTS: usize = 3;
 
 impl LinearSolver {
-    /// Analyses the pattern of a system. `None` where memory for it cannot be had.
+    /// Analyses the pattern of a system. `None` if memory is not available.
     pub fn new(system: &System, multipliers: &[Slot]) -> Option<Self> {
         let constraints = Constraints::new(&system.pattern, multipliers);
         let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
@@ -69,8 +70,8 @@ impl LinearSolver {
         Self::by(blocks, constraints, system, multipliers)
     }
 
-    /// A solver beside that of another system, whose analysis it takes over where the patterns are
-    /// alike.
+    /// Solver for `system` that takes over the analysis of `other`, the solver of the system
+    /// `others`, if their patterns are alike. `None` if memory is not available.
     pub fn beside(other: &Self, others: &System, system: &System, multipliers: &[Slot]) -> Option<Self> {
         match other.blocks().filter(|_| system.pattern.is_like(&others.pattern)) {
             Some(blocks) => {
@@ -103,63 +104,65 @@ impl LinearSolver {
         })
     }
 
-    /// The constraints of its multipliers, where there are some.
+    /// Multipliers prepared for the block solver, if there are any.
     pub(super) fn constraints(&self) -> Option<&Constraints> {
         self.constraints.as_ref()
     }
 
-    /// Its solver in blocks, where it has one, whether it is in use or not.
+    /// Block solver, if the pattern suits it, in use or not.
     pub(super) fn blocks(&self) -> Option<&BlockSolver> {
         self.blocks.as_deref()
     }
 
-    /// Its solver in blocks while it is in use.
+    /// Block solver, if it is in use.
     fn blocks_in_use(&mut self) -> Option<&mut BlockSolver> {
         self.blocks.as_deref_mut().filter(|_| self.trust.in_blocks)
     }
 
-    /// True if its factorisation is one of symmetric tangents, without pivoting.
+    /// True if the factorisation in use is one for symmetric tangents, without pivoting.
     pub(super) fn is_symmetric(&self) -> bool {
         self.trust.in_blocks && self.blocks().is_some_and(BlockSolver::is_symmetric)
     }
 
-    /// True if what was factorised last is known to have positive pivots only: then no digits are
-    /// lost.
+    /// True if the last factorised tangent is known to have positive pivots only, so that no digits
+    /// are lost.
     fn is_positive_definite(&self) -> bool {
         self.factored && self.constraints.is_none() && self.blocks().is_some_and(|blocks| blocks.negative() == Some(0))
     }
 
-    /// Factorises, as far as it can by blocks, and counts negative pivots.
+    /// Factorises with the block solver and counts negative pivots; `None` if either fails.
     pub(super) fn negative_of_own(&mut self, tangent: &mut Tangent) -> Option<usize> {
         if self.factorise_by_own(tangent) { self.negative_of_last() } else { None }
     }
 
-    /// Factorises by blocks what they have not factorised last; whether they could.
+    /// Factorises with the block solver, unless that was done last; `false` on failure.
     pub(super) fn factorise_by_own(&mut self, tangent: &mut Tangent) -> bool {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
         (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
         done
     }
 
-    /// The negative pivots of the last factorisation, where it tells them.
+    /// Number of negative pivots of the last factorisation on the space that satisfies the
+    /// constraints; `None` if it does not tell them.
     pub(super) fn negative_of_last(&self) -> Option<usize> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
         let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
         blocks.negative()?.checked_sub(of_multipliers)
     }
 
-    /// True if the determinant of the last factorisation is negative on the space that constraints
-    /// leave, where blocks tell: each multiplier turns the sign of that of the whole.
+    /// True if the determinant of the last factorised tangent is negative on the space that
+    /// satisfies the constraints: each multiplier changes the sign of the determinant. `None` if
+    /// the block solver is not in use.
     pub(super) fn has_negative_determinant(&self) -> Option<bool> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
         let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
         Some(blocks.has_negative_determinant()? != (of_multipliers % 2 == 1))
     }
 
-    /// Solves for the correction that a system asks for with the last factorisation, which is that
-    /// of its tangent, and writes it into a field of slots; held directions take their part of
-    /// `held`. It [looks](LinearSolver::solve) at what is left where it is asked to and there is
-    /// something to look at. `false` where there is no solution.
+    /// Solves J du = -g for the correction of a system, whose tangent was factorised last, and
+    /// writes du to a field of slots (global components). Held directions take the components of
+    /// `held`, or zero. With `looks` the residual is [checked](LinearSolver::solve) unless that is
+    /// superfluous. `false` if there is no solution.
     pub fn correct(&mut self, system: &System, looks: bool, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         let nothing_to_look_at = !looks || self.is_positive_definite() || system.holds_factors();
         let (is_factored, is_plain) = (self.factored, self.constraints.is_none());
@@ -177,18 +180,18 @@ impl LinearSolver {
         done
     }
 
-    /// How it solves, in a few words.
+    /// Name of the method in use.
     pub fn name(&self) -> &'static str {
         self.blocks().filter(|_| self.trust.in_blocks).map_or("sparse LU", BlockSolver::name)
     }
 
-    /// True if its last factorisation is that of this tangent.
+    /// True if the last factorisation is that of the tangent of this system.
     pub fn has_factorised(&self, system: &System) -> bool {
         self.factored && self.revision == Some(system.revision)
     }
 
-    /// Factorises the tangent where it is another one than the last; whether there is a
-    /// factorisation, and whether it is new.
+    /// Factorises a tangent, unless that was done last. First result: true if there is a
+    /// factorisation; second: true if it is new.
     pub fn factorise_new(&mut self, tangent: &mut Tangent) -> (bool, bool) {
         if self.has_factorised(tangent.system()) {
             return (true, false);
@@ -201,7 +204,8 @@ impl LinearSolver {
         (self.factored, true)
     }
 
-    /// By blocks: in the place of the tangent where it may go and that is sure to lose no digits.
+    /// Factorises with the block solver, overwriting the tangent if it may be destroyed and no
+    /// digits are lost. `false` on failure.
     fn factorise_in_blocks(&mut self, tangent: &mut Tangent) -> bool {
         if self.constraints.is_some() {
             return self.trust.in_blocks && self.factorise_staying(tangent.look());
@@ -215,7 +219,7 @@ impl LinearSolver {
         done
     }
 
-    /// By blocks, beside the tangent.
+    /// Factorises with the block solver and keeps the tangent. `false` on failure.
     fn factorise_staying(&mut self, system: &System) -> bool {
         match (&mut self.blocks, &mut self.constraints) {
             (Some(blocks), Some(constraints)) => {
@@ -227,9 +231,9 @@ impl LinearSolver {
         }
     }
 
-    /// Factorises a tangent that stays; `false` where a pivot cannot be found.
+    /// Factorises a tangent and keeps it; `false` if no pivot is found.
     pub fn factorise(&mut self, system: &System) -> bool {
-        // Its values may not stay.
+        // The values may change without a new revision.
         self.revision = None;
         self.factored = match self.trust.in_blocks {
             true => self.factorise_staying(system) || self.leave_blocks(system),
@@ -238,8 +242,8 @@ impl LinearSolver {
         self.factored
     }
 
-    /// Factorises a system whose values do not stay: a solution is looked at here and now, where
-    /// pivots do not vouch for it.
+    /// Factorises a system whose values will change. Unless all pivots are positive, a solution is
+    /// checked now, since its residual cannot be checked later. `false` on failure.
     pub fn factorise_surely(&mut self, system: &System) -> bool {
         if !self.factorise(system) || self.is_positive_definite() {
             return self.factored;
@@ -249,10 +253,10 @@ impl LinearSolver {
         self.solve(system, &mut x)
     }
 
-    /// Solves with the last factorisation, which is that of `system`; `false` where there is no
-    /// solution. What blocks leave of the residual is refined, unless all pivots are positive, or
-    /// the tangent is gone: then they are [sure](BlockSolver::is_sure), and what they leave shows
-    /// in Newton's next residual.
+    /// Solves with the last factorisation, which is that of `system`; `false` if there is no
+    /// solution. Solutions of the block solver are refined, unless all pivots are positive, or the
+    /// tangent is overwritten: such factorisations are [sure](BlockSolver::is_sure), and their
+    /// residual shows in Newton's next one.
     pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
         if !self.trust.in_blocks || self.is_positive_definite() || system.holds_factors() {
             return self.solve_once(system, right_hand_side);
@@ -270,7 +274,8 @@ impl LinearSolver {
         done
     }
 
-    /// Solves with the last factorisation; `false` where the solution is not finite.
+    /// Solves with the last factorisation, without refinement; `false` if the solution is not
+    /// finite.
     pub fn solve_once(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
         if right_hand_side.is_empty() {
             return true;
@@ -292,13 +297,13 @@ impl LinearSolver {
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
-    /// Corrects a solution until its residual is round-off; `false` where it stays larger than it
-    /// may.
+    /// Refines a solution until its backward error is at most [`BACKWARD_ERROR`]; `false` if it
+    /// remains above [`LARGEST_BACKWARD_ERROR`].
     fn refine(&mut self, system: &System, wanted: &[f64], x: &mut [f64]) -> bool {
         let mut error = f64::INFINITY;
         for _ in 0..=REFINEMENTS {
             let now = system.residual(wanted, x, &mut self.leftover);
-            // A last correction that made it worse is round-off.
+            // A refinement that increases the error shows that only round-off is left.
             if now <= BACKWARD_ERROR || now >= error {
                 error = error.min(now);
                 break;
@@ -314,13 +319,14 @@ impl LinearSolver {
         error <= LARGEST_BACKWARD_ERROR
     }
 
-    /// True if blocks do the work at present.
+    /// True if the block solver is in use.
     pub(super) fn is_in_blocks(&self) -> bool {
         self.trust.in_blocks
     }
 
-    /// After corrections that led nowhere pivoting gives way to blocks, which then stay for the
-    /// next attempt whatever they lose; `false` where blocks did the work, and may be left.
+    /// Called after Newton's iteration has failed. If sparse LU is in use, returns to the block
+    /// solver, which then stays for the next attempt whatever its accuracy (`true`). `false` if the
+    /// block solver is in use and may be replaced.
     pub(super) fn gives_way_to_blocks(&mut self) -> bool {
         if !self.trust.in_blocks {
             self.return_to_blocks();
@@ -330,7 +336,8 @@ impl LinearSolver {
         std::mem::take(&mut self.trust.in_vain)
     }
 
-    /// From here on in general, until blocks have another chance.
+    /// Changes to sparse LU, until the block solver is tried again, and factorises the tangent;
+    /// `false` on failure.
     pub(super) fn leave_blocks(&mut self, system: &System) -> bool {
         if self.general.is_none() {
             self.general = GeneralSolver::new(system).map(Box::new);
@@ -342,9 +349,9 @@ impl LinearSolver {
         general.factorise(system)
     }
 
-    /// After a solution in balance. An iterate that flies far away loses digits that the structure
-    /// has: blocks come back, after twice as many solutions each time that they fail, and one less
-    /// for each that they find.
+    /// Called after a solution has converged. A diverging iterate may lose digits that the
+    /// structure does not: the block solver is tried again, after twice as many solutions with each
+    /// failure, and one fewer with each success.
     pub fn succeeded(&mut self) {
         self.trust.in_vain = false;
         if self.trust.in_blocks {
@@ -357,7 +364,7 @@ impl LinearSolver {
         }
     }
 
-    /// Where there are some.
+    /// Changes to the block solver, if there is one.
     fn return_to_blocks(&mut self) {
         if self.blocks.is_some() {
             self.trust = Trust { in_blocks: true, absence: 0, ..self.trust };

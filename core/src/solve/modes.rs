@@ -1,5 +1,4 @@
-//! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each checked before it
-//! is given.
+//! Small motions x exp(s t) with (s^2 M + s C + K) x = 0 nearest to a shift, each verified.
 
 use super::krylov::{Operator, Spectrum, largest_eigenvalues, roughly_largest_eigenvalues};
 use super::linear::LinearSolver;
@@ -8,81 +7,81 @@ use super::softest::lost_part;
 use crate::system::{Symmetry, System};
 use nalgebra::Complex;
 
-/// What is left of a rigid motion beside the others, as part of itself, that is none of its own.
+/// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
+/// its norm.
 const MADE_OF_OTHERS: f64 = 1e-6;
 
-/// An eigenvector leaves no more than this of itself.
+/// Largest relative residual of an eigenvector.
 const RESIDUAL: f64 = 1e-5;
 
-/// The same of conservative scenes, whose frequencies are wrong by its square only: solutions with
-/// slender beams leave more.
+/// Largest relative residual of an eigenvector of a conservative scene, whose frequencies err by
+/// its square only; solutions for slender beams leave more than in general.
 const RESIDUAL_OF_SYMMETRIC: f64 = 1e-3;
 
-/// The energies of a mode balance to this.
+/// Largest relative imbalance of the energies of a mode.
 const BALANCE: f64 = 1e-6;
 
-/// Damping forces below this part of inertia and stiffness forces are none.
+/// Damping forces below this part of inertia and stiffness forces are taken for zero.
 const NO_DAMPING: f64 = 1e-14;
 
-/// Of a rough look so many exponents tell.
+/// Number of exponents of a rough estimate that are nearly right.
 const NEARLY_RIGHT: usize = 6;
 
-/// Frequencies that round-off may change by more than this part of themselves are found once more
-/// from strains.
+/// Relative uncertainty of a frequency by round-off above which it is computed again from strains.
 const UNCERTAIN: f64 = 1e-9;
 
-/// Motions slower than this part of the shift are free ones: their stiffness is round-off, and
-/// balances nothing.
+/// Motions slower than this part of the shift are free motions: their stiffness is round-off, and
+/// energies need not balance.
 const FREE: f64 = 1e-3;
 
-/// Without dampers, a motion that grows faster than this part of |s| has a twin that decays.
+/// Without damping, a motion with growth above this part of |s| has a decaying counterpart.
 const TWIN: f64 = 1e-6;
 
 /// K, C and M on the pattern of the tangent.
 pub struct Matrices {
-    /// K
+    /// Stiffness K
     pub stiffness: Vec<f64>,
-    /// C, of dampers and of Coriolis and gyroscopic forces
+    /// Damping C, of dampers and of Coriolis and gyroscopic forces
     pub damping: Vec<f64>,
-    /// M
+    /// Mass M
     pub mass: Vec<f64>,
 }
 
-/// A small motion: its exponent, and how large round-off may be in it, relative to itself.
+/// A small motion x exp(s t) with its exponent and uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmallMotion {
-    /// s = growth + i omega, omega >= 0
+    /// s = growth + i omega [1/s], omega >= 0
     pub exponent: Complex<f64>,
-    /// The part of |s| that round-off in the stiffness may have taken
+    /// Relative error of |s| that round-off in the stiffness may cause
     pub uncertainty: f64,
-    /// The shape of motions without damping that are uncertain
+    /// Shape of an uncertain motion of an undamped symmetric problem
     pub shape: Option<ModeShape>,
 }
 
-/// The shape of a small motion.
+/// Shape of a small motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeShape {
-    /// One number an equation
+    /// Unknowns x by equation
     pub unknowns: Vec<f64>,
-    /// x.M x
+    /// Modal mass x . M x
     pub mass: f64,
 }
 
-/// Properties of the matrices.
+/// Structure of the eigenvalue problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Form {
     /// K symmetric, C = 0: s^2 is real.
     Symmetric,
-    /// C = 0: with s, -s is a motion.
+    /// C = 0: if s is an exponent, so is -s.
     Undamped,
-    /// K symmetric, C skew: with s, -s is a motion.
+    /// K symmetric, C skew: if s is an exponent, so is -s.
     Gyroscopic,
-    /// Anything
+    /// No known structure
     General,
 }
 
 impl Form {
-    /// The exponent that belongs to an eigenvalue, see [`Motions`].
+    /// Exponent s of an eigenvalue theta of the operator, see [`Motions`].
     fn exponent(self, shift: f64, theta: Complex<f64>) -> Complex<f64> {
         match self {
             Self::Symmetric | Self::Undamped => root(shift * shift - theta.inv()),
@@ -93,24 +92,25 @@ impl Form {
 
 /// The eigenvalue problem of a state.
 pub struct ModeSearch<'a> {
-    /// Where K + shift C + shift^2 M is formed
+    /// System whose values become K + shift C + shift^2 M
     system: &'a mut System,
     solver: &'a mut LinearSolver,
     matrices: &'a Matrices,
     form: Form,
-    /// Rigid motions of free parts, and M times each: orthonormal, and taken out of everything
+    /// Orthonormal rigid motions of free parts, and M times each; all vectors are orthogonal to
+    /// them
     rigid: Vec<[Vec<f64>; 2]>,
     shift: f64,
     /// True if the system and its factors are those of the shift
     is_ready: bool,
-    /// Negative pivots of K + shift^2 M, where K is symmetric
+    /// Number of negative pivots of K + shift^2 M, for symmetric K
     negative: Option<usize>,
-    /// Factorisations so far
+    /// Number of factorisations so far
     pub factorisations: u64,
 }
 
 impl Matrices {
-    /// K + shift C + shift^2 M
+    /// Writes K + shift C + shift^2 M.
     pub fn combine(&self, shift: f64, out: &mut [f64]) {
         let parts = self.stiffness.iter().zip(&self.damping).zip(&self.mass);
         for (out, ((k, c), m)) in out.iter_mut().zip(parts) {
@@ -118,13 +118,13 @@ impl Matrices {
         }
     }
 
-    /// True if nothing has any mass.
+    /// True if all masses are zero.
     pub fn is_massless(&self) -> bool {
         self.mass.iter().all(|&m| m == 0.0)
     }
 
-    /// The root of the smallest K_ii / M_ii, or of the stiffest over the heaviest: no lowest
-    /// frequency lies above it.
+    /// Upper bound of the lowest frequency [rad/s]: the root of the smallest K_ii / M_ii, or if
+    /// there is none, of the largest stiffness over the largest mass.
     pub fn softest_frequency(&self, system: &System) -> f64 {
         let Self { stiffness, mass, .. } = self;
         let (mut softest, mut largest) = (f64::INFINITY, [0.0_f64; 2]);
@@ -139,7 +139,7 @@ impl Matrices {
         ratio.sqrt()
     }
 
-    /// K + square M
+    /// Writes K + square M.
     fn combine_squared(&self, square: f64, out: &mut [f64]) {
         for (out, (k, m)) in out.iter_mut().zip(self.stiffness.iter().zip(&self.mass)) {
             *out = k + square * m;
@@ -148,7 +148,7 @@ impl Matrices {
 }
 
 impl<'a> ModeSearch<'a> {
-    /// A search in these matrices; `rigid` motions are left out.
+    /// Search with these matrices, in the space orthogonal to the `rigid` motions.
     pub fn new(
         system: &'a mut System,
         solver: &'a mut LinearSolver,
@@ -181,12 +181,12 @@ impl<'a> ModeSearch<'a> {
         search
     }
 
-    /// The number of rigid motions.
+    /// Number of linearly independent rigid motions.
     pub fn rigid(&self) -> usize {
         self.rigid.len()
     }
 
-    /// Orthonormal to the others; none that is made of these.
+    /// Orthonormalises a rigid motion and adds it, unless it is linearly dependent on the others.
     fn take_out(&mut self, mut motion: Vec<f64>) {
         let before = dot(&motion, &self.system.multiply(&self.matrices.mass, &motion)).max(0.0).sqrt();
         for _ in 0..2 {
@@ -200,7 +200,7 @@ impl<'a> ModeSearch<'a> {
         }
     }
 
-    /// Takes rigid motions out of a vector.
+    /// Projects a vector onto the space orthogonal to the rigid motions.
     fn project(&self, x: &mut [f64]) {
         for [motion, weighed] in &self.rigid {
             let along = dot(weighed, x);
@@ -208,7 +208,7 @@ impl<'a> ModeSearch<'a> {
         }
     }
 
-    /// Factorises at a shift, unless that was done last; `false` where it cannot be done.
+    /// Factorises at a shift, unless that was done last; `false` on failure.
     pub fn factorise(&mut self, shift: f64) -> bool {
         if self.is_ready && self.shift == shift {
             return true;
@@ -229,24 +229,26 @@ impl<'a> ModeSearch<'a> {
         done
     }
 
-    /// Negative pivots of the system, which was factorised, or was tried to be.
+    /// Number of negative pivots of the system; `done` if its factorisation has succeeded.
     fn count(&mut self, done: bool) -> Option<usize> {
         let own = self.solver.negative_of_last().filter(|_| done);
         own.or_else(|| self.solver.negative_beside(self.system))
     }
 
-    /// How many motions grow faster than the shift, where pivots tell.
+    /// Number of motions that grow faster than the shift, of symmetric problems; `None` if it is
+    /// unknown.
     pub fn growing(&self) -> Option<usize> {
         self.negative.filter(|_| self.form == Form::Symmetric)
     }
 
-    /// True if stiffness holds everything, so that nothing can grow but by dampers that drive.
+    /// True if K + shift^2 M is positive definite, so that a motion can only grow by damping forces
+    /// that supply energy.
     pub fn is_held(&self) -> bool {
         self.negative == Some(0)
     }
 
-    /// True if `motions`, nearest to the shift that was factorised last, reach around another
-    /// shift: those near to it are among them.
+    /// True if `motions`, which are nearest to the shift factorised last, include those near
+    /// another shift.
     pub fn reaches(&self, motions: &[SmallMotion], other: f64) -> bool {
         let shift = Complex::from(self.shift);
         let distance = |exponent: Complex<f64>| match self.form {
@@ -257,8 +259,9 @@ impl<'a> ModeSearch<'a> {
         reach >= 2.0 * distance(other.into())
     }
 
-    /// How many motions swing slower than `omega` or grow, rigid ones among them, where pivots
-    /// tell. Another shift has to be factorised afterwards.
+    /// Number of motions with a frequency below `omega` [rad/s] or with growth, rigid motions
+    /// included, of symmetric problems; `None` if it is unknown. Another shift must be factorised
+    /// afterwards.
     pub fn slower(&mut self, omega: f64) -> Option<usize> {
         self.matrices.combine_squared(-omega * omega, &mut self.system.values);
         self.system.revision += 1;
@@ -271,11 +274,11 @@ impl<'a> ModeSearch<'a> {
         self.count(done)
     }
 
-    /// Rough exponents nearest to the shift; `None` where a solution fails.
+    /// Rough magnitudes |s| of the exponents nearest to the shift; `None` if a solution fails.
     pub fn roughly_nearest(&mut self) -> Option<Vec<f64>> {
         let (shift, form, diagonal) = (self.shift, self.form, self.inner_product());
         let values = roughly_largest_eigenvalues(&mut Motions { search: self, diagonal })?;
-        // The first ones are nearly right.
+        // Only the first few are nearly right.
         let there = values.into_iter().filter(|theta| theta.norm() > 0.0).take(NEARLY_RIGHT);
         Some(there.map(|theta| form.exponent(shift, theta).norm()).collect())
     }
@@ -286,8 +289,8 @@ impl<'a> ModeSearch<'a> {
         if takes_energies { Vec::new() } else { self.diagonal() }
     }
 
-    /// The motions nearest to the shift that was factorised last, nearest first; those that do not
-    /// pass the checks are left out. `None` where a solution fails.
+    /// The motions nearest to the shift factorised last, nearest first, without those that fail
+    /// verification. `None` if a solution fails.
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
         let room = match self.form {
             Form::Symmetric | Form::Undamped => wanted,
@@ -303,21 +306,21 @@ impl<'a> ModeSearch<'a> {
         let mut found = Vec::new();
         for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| theta.norm() > 0.0) {
             let exponent = form.exponent(shift, theta);
-            // Of a conjugate pair one
+            // One exponent of each conjugate pair is kept.
             let upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
             let is_twin = form == Form::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
             if upper && !is_twin && spectrum.residual(&mut operator, number) <= allowed {
                 found.push((number, exponent));
             }
         }
-        // What follows asks for K alone.
+        // Verification needs the values of K alone.
         self.is_ready = false;
         self.system.values.copy_from_slice(&self.matrices.stiffness);
         self.system.revision += 1;
         let mut motions = Vec::new();
         for motion in found.into_iter().filter_map(|(number, exponent)| self.check(&spectrum, number, exponent)) {
             let s = motion.exponent;
-            // Flutter: with s, -s* is a motion of the same frequency.
+            // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
             let twin = form == Form::Undamped && s.re > TWIN * s.norm() && s.im > 0.0;
             let twin = twin.then(|| SmallMotion { exponent: -s.conj(), ..motion.clone() });
             motions.push(motion);
@@ -326,7 +329,8 @@ impl<'a> ModeSearch<'a> {
         Some(motions)
     }
 
-    /// A motion that balances: multiplied from the left with its own x*, m s^2 + c s + k = 0.
+    /// A verified motion: multiplied by x* from the left, m s^2 + c s + k = 0. `None` if the terms
+    /// do not balance.
     fn check(&self, spectrum: &Spectrum, number: usize, exponent: Complex<f64>) -> Option<SmallMotion> {
         let n = self.system.pattern.dof_map.count();
         let [mut re, mut im] = spectrum.vector(number);
@@ -339,20 +343,20 @@ impl<'a> ModeSearch<'a> {
         let mass = form(&self.matrices.mass);
         let terms =
             [mass * exponent * exponent, form(&self.matrices.damping) * exponent, form(&self.matrices.stiffness)];
-        // The larger part of the vector tells.
+        // The larger part of the vector determines the round-off.
         let of_part = if dot(&re, &re) >= dot(&im, &im) { &re } else { &im };
         let uncertainty = lost_part(self.system, of_part);
         let all: f64 = terms.iter().map(|term| term.norm()).sum();
         let balances = (terms[0] + terms[1] + terms[2]).norm() <= (BALANCE + 10.0 * uncertainty) * all;
         let is_free = exponent.norm() <= FREE * self.shift;
-        // s goes with the root of K.
+        // s is proportional to the root of K.
         let uncertainty = if is_free { 0.0 } else { 0.5 * uncertainty };
         let is_asked_for = self.form == Form::Symmetric && uncertainty > UNCERTAIN;
         let shape = is_asked_for.then_some(ModeShape { unknowns: re, mass: mass.re });
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
 
-    /// |K_ii| + shift^2 M_ii, an inner product that every scene has.
+    /// Diagonal of an inner product that every scene has: |K_ii| + shift^2 M_ii, by equation.
     fn diagonal(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.system.pattern.dof_map.count()];
         let Matrices { stiffness, mass, .. } = self.matrices;
@@ -362,18 +366,19 @@ impl<'a> ModeSearch<'a> {
     }
 }
 
-/// The motions with the smallest s - shift as eigenvectors with the largest eigenvalues.
+/// Operator whose largest eigenvalues belong to the motions with the smallest |s - shift|, with the
+/// shift e.
 ///
 /// ```text
 /// C = 0:     (K + e^2 M)^-1 M x = x/(e^2 - s^2)
 /// general:   with z = (x, s x/e):   A z = z/(s - e),   from   Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
 /// ```
 ///
-/// Inner products are kinetic energies, and in general the sum of strain and kinetic energies: it
-/// makes a conservative A normal, so that round-off invents no motions.
+/// Inner products are kinetic energies, in the general case the sum of strain and kinetic energies:
+/// a conservative A is then normal, so that round-off creates no spurious motions.
 struct Motions<'s, 'a> {
     search: &'s mut ModeSearch<'a>,
-    /// In the place of strain energies, where these are no inner product
+    /// Diagonal that replaces K in the inner product if strain energies are indefinite; else empty
     diagonal: Vec<f64>,
 }
 
@@ -439,8 +444,8 @@ impl Operator for Motions<'_, '_> {
     }
 }
 
-/// The root with a real part that is not negative, and a positive imaginary part if that is zero;
-/// of real squares exactly.
+/// Square root with non-negative real part, and positive imaginary part if the real part is zero;
+/// exact for real squares.
 fn root(square: Complex<f64>) -> Complex<f64> {
     match square {
         Complex { re, im: 0.0 } if re < 0.0 => Complex::new(0.0, (-re).sqrt()),
@@ -457,7 +462,7 @@ fn is_skew(system: &System, values: &[f64]) -> bool {
     let x: Vec<f64> =
         (0..system.pattern.dof_map.count()).map(|k| 0.5 + (k as f64 * 0.618_033_988_749_895).fract()).collect();
     let y: Vec<f64> = (0..x.len()).map(|k| 0.5 + (k as f64 * 0.414_213_562_373_095).fract()).collect();
-    // Random vectors tell: y.C x = -x.C y, and x.C x = 0.
+    // Tested with pseudo-random vectors: y.C x = -x.C y, and x.C x = 0.
     let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let size = dot(&y, &system.multiply(&sizes, &x));
     let (of_x, of_y) = (system.multiply(values, &x), system.multiply(values, &y));

@@ -1,4 +1,4 @@
-//! Newton's iteration on one step or load level.
+//! Newton's iteration for one time step or load level.
 
 use super::convergence::{Convergence, Residual, Verdict, size};
 use super::linear::LinearSolver;
@@ -19,41 +19,43 @@ use crate::scalar::CompressedField;
 use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
 
-/// The iteration with its linear solver and its scratch.
+/// Newton's iteration with its linear solver and buffers, kept between solutions.
 pub struct Newton {
-    /// When to stop
+    /// Stop test
     pub convergence: Convergence,
-    /// Linear solves allowed
+    /// Largest number of linear solves in a solution
     pub max_iterations: usize,
-    /// Solves with the tangent
+    /// Linear solver
     pub solver: LinearSolver,
     dq: Vec<Vec3>,
-    /// The size of the last correction of a solution: `None` before the first, infinite after a
-    /// change of chart
+    /// Size of the last correction of the current solution: `None` before the first, infinite after
+    /// a change of chart
     last: Option<f64>,
-    /// The first correction of the last solution in statics, along the tangent of the path; empty
-    /// where nothing was to correct
+    /// First correction of the last solution in statics, tangential to the equilibrium path; empty
+    /// if there was none
     pub first: CompressedField<3>,
-    /// The largest ratio of a correction of the last solution to the one before it, of those that
-    /// are no round-off: an iteration that follows the path contracts
+    /// Largest ratio of successive corrections of the last solution, above round-off; small if the
+    /// iteration follows the path
     pub contraction: f64,
     reuse: Reuse,
     stress_predictor: StressPredictor,
-    /// The estimate of the error of time steps, where it is made
+    /// Error estimator of time steps, in adaptive dynamics
     pub time_error: Option<TimeError>,
-    /// The tangent that is known to be that of the state a solution begins with, see
+    /// Revision of the tangent if it is that of the start of the next solution, see
     /// [`Newton::begin_with`]
     given: Option<u64>,
 }
 
-/// Corrections below this (lengths of the scene, radians) need not become any smaller.
+/// Corrections below this size (relative to the length of the scene, or in radians) do not count
+/// for the contraction.
 const NO_CORRECTION: f64 = 1e-6;
 
-/// A correction of more than this (lengths of the scene, radians) is a flight, not a step.
+/// Corrections above this size (relative to the length of the scene, or in radians) show
+/// divergence.
 const RUNAWAY: f64 = 1e6;
 
 impl Newton {
-    /// For a stage with these unknowns.
+    /// Newton's iteration for a stage with this system.
     pub fn new(convergence: Convergence, max_iterations: usize, solver: LinearSolver, system: &System) -> Self {
         Self {
             convergence,
@@ -70,7 +72,7 @@ impl Newton {
         }
     }
 
-    /// The signs of the eigenvalues of a tangent, see [`LinearSolver::signature`].
+    /// Signs of the eigenvalues of a tangent, see [`LinearSolver::signature`].
     pub fn signature(&mut self, tangent: &mut Tangent, work: &mut Work) -> Option<Signature> {
         let known = self.solver.has_factorised(tangent.system());
         let signature = self.solver.signature(tangent);
@@ -78,34 +80,34 @@ impl Newton {
         signature
     }
 
-    /// Forms the stiffness of a state, and tells what its pivots do.
+    /// Forms the stiffness of a state and determines the signs of its eigenvalues.
     pub fn signature_at(&mut self, assembly: &mut Assembly, state: &State, work: &mut Work) -> Option<Signature> {
         assembly.forget();
         assembly.evaluate(state, Weights::STIFFNESS, None);
         self.signature(&mut Tangent::that_may_go(assembly, state, Weights::STIFFNESS), work)
     }
 
-    /// The tangent that is there is that of another state than the one the next solution begins
-    /// with.
+    /// Declares that the current tangent is not that of the state at which the next solution
+    /// starts.
     pub fn begin_anew(&mut self) {
         self.given = None;
     }
 
-    /// Memory for a field of slots that nobody needs between solutions.
+    /// Buffer for a field of slots, free between solutions.
     pub fn scratch(&mut self) -> &mut [Vec3] {
         &mut self.dq
     }
 
-    /// The tangent of the system is that of the state that the next solution begins with, but for
-    /// the loads.
+    /// Declares that the tangent of the system is, except for loads, that of the state at which the
+    /// next solution starts.
     pub fn begin_with(&mut self, system: &System) {
         self.given = Some(system.revision);
     }
 
-    /// Brings the state into balance. `prescribed_increment` holds increments of held directions
-    /// that are not in the state yet: they go in with the first correction, so that the rest of the
-    /// structure follows them linearly. The forces of the system are then those of the state; its
-    /// tangent need not be.
+    /// Solves for the equilibrium of `state`. `prescribed_increment` holds increments of held
+    /// directions (by slot, global components) that `state` does not yet contain: the first
+    /// correction includes them, so that the rest of the structure follows linearly. Afterwards the
+    /// forces of the system are those of the state; its tangent need not be.
     pub fn solve(
         &mut self,
         model: &Model,
@@ -135,7 +137,7 @@ impl Newton {
         solution.find()
     }
 
-    /// The step that was solved last is taken from one state to another.
+    /// Passes the last time step, from the first of `states` to the second, to the error estimator.
     pub fn end_step(
         &mut self,
         system: &System,
@@ -149,32 +151,32 @@ impl Newton {
     }
 }
 
-/// A solution under way.
+/// A solution in progress.
 struct Solution<'s> {
     newton: &'s mut Newton,
     model: &'s Model,
-    /// The rotations and elements that have charts in the stage
+    /// Rotations and elements that have charts in the stage
     charted: &'s Charted,
     assembly: &'s mut Assembly,
     state: &'s mut State,
     method: &'s dyn Method,
     work: &'s mut Work,
-    /// Increments of held directions that go in with the first correction
+    /// Increments of held directions for the first correction (by slot, global components)
     prescribed_increment: Option<&'s [Vec3]>,
     round_off: RoundOff,
-    /// Corrections so far
+    /// Number of corrections so far
     iterations: usize,
     refinement: Refinement,
-    /// A tangent was formed since corrections with an older one have stalled.
+    /// True if a tangent was formed after corrections with an older one had stalled
     has_formed_anew: bool,
 }
 
-/// The fate of an iterate.
+/// Decision about an iterate.
 #[derive(PartialEq)]
 enum Next {
-    /// It is the solution.
+    /// The iterate is the solution.
     Done,
-    /// It is corrected.
+    /// The iterate is to be corrected.
     Correct,
 }
 
@@ -200,13 +202,14 @@ impl Solution<'_> {
         }
     }
 
-    /// True if the tangent is formed with the forces of the present iterate.
+    /// True if the tangent is formed together with the forces of the current iterate.
     fn forms_tangent(&self) -> bool {
         let is_last = self.iterations >= self.newton.max_iterations;
         self.prescribed_increment.is_some() || is_last || self.newton.reuse.expects_tangent()
     }
 
-    /// The forces of the present iterate, and its tangent where it is formed; judged.
+    /// Evaluates the forces of the current iterate, and its tangent if `forms`, and applies the
+    /// stop test.
     fn evaluate(&mut self, forms: bool) -> (Verdict, Residual) {
         let weights = if forms { self.method.weights() } else { Weights::NONE };
         let Newton { stress_predictor, convergence, reuse, dq, last, .. } = &mut *self.newton;
@@ -220,7 +223,7 @@ impl Solution<'_> {
         (verdict, residual)
     }
 
-    /// The fate of the iterate: it is the solution, is corrected, or leads nowhere.
+    /// Decides about the iterate. `Err` if no further correction is possible.
     fn decide(&mut self, verdict: Verdict, residual: Residual, forms: bool) -> Result<Next, NewtonFailure> {
         let is_last = self.iterations >= self.newton.max_iterations;
         match verdict {
@@ -231,8 +234,8 @@ impl Solution<'_> {
                 self.end();
                 return Ok(Next::Done);
             }
-            // Each correction with a new residual refines the solution, until round-off makes it no
-            // smaller.
+            // Each correction from a new residual refines the solution, until round-off prevents
+            // further progress.
             Verdict::Noisy if self.prescribed_increment.is_none() && self.iterations > 0 => {
                 return Ok(self.refine(is_last));
             }
@@ -243,12 +246,12 @@ impl Solution<'_> {
         if is_last { Err(self.not_converged(residual)) } else { Ok(Next::Correct) }
     }
 
-    /// Looks at the last correction of an iterate whose residual is round-off.
+    /// Decides about an iterate whose residual is round-off, by its last correction.
     fn refine(&mut self, is_last: bool) -> Next {
         let Newton { reuse, dq, last, .. } = &mut *self.newton;
         let refined = self.refinement.look(self.model, dq, last.unwrap_or_default(), size(self.model, &self.state.q));
         if refined.stalls() && !reuse.is_own() && !self.has_formed_anew {
-            // Not round-off may make it stall, but an older tangent.
+            // Not round-off but an older tangent may be the reason for the stall.
             self.has_formed_anew = true;
             reuse.forget();
         } else if refined.is_done() || is_last {
@@ -259,7 +262,7 @@ impl Solution<'_> {
         Next::Correct
     }
 
-    /// Goes on with the tangent that is there, or with that of the iterate.
+    /// Keeps the current tangent, or forms that of the iterate.
     fn choose_tangent(&mut self, forms: bool) {
         if !forms && self.newton.reuse.keeps_tangent() {
             self.newton.reuse.keep();
@@ -269,15 +272,15 @@ impl Solution<'_> {
             self.form();
         }
         self.newton.reuse.form(self.prescribed_increment.is_some());
-        // What one tangent leaves tells nothing of the corrections with another one.
+        // Corrections with different tangents are not comparable.
         self.refinement = Refinement::default();
     }
 
-    /// The next correction; its size.
+    /// Solves for the next correction and returns its size.
     fn find_correction(&mut self, residual: Residual) -> Result<f64, NewtonFailure> {
         self.show_rates();
         self.work.iterations += 1;
-        // What an older tangent leaves is more than what the solver does.
+        // The residual of the linear solve is negligible beside the error of an older tangent.
         let looks = self.newton.reuse.is_own();
         let prescribed_increment = self.prescribed_increment.take();
         if !self.substitute(prescribed_increment, looks) {
@@ -286,7 +289,7 @@ impl Solution<'_> {
         self.iterations += 1;
         let length = size(self.model, &self.newton.dq);
         if length > RUNAWAY {
-            // Round-off may have left a stiffness where there is none.
+            // Round-off may look like stiffness where there is none.
             return Err(match self.mechanism() {
                 Some(vector) => NewtonFailure::Singular(Some(vector)),
                 None => self.not_converged(residual),
@@ -295,8 +298,8 @@ impl Solution<'_> {
         Ok(length)
     }
 
-    /// Foresees the stress that the next tangent is formed with. Where balance is expected that is
-    /// the stress of the state itself.
+    /// Prepares the prediction of stress for the next tangent. If equilibrium is expected, the
+    /// stress of the state itself is used.
     fn foresee_stress(&mut self, noisy: bool) {
         let Newton { stress_predictor, reuse, .. } = &mut *self.newton;
         if !noisy && reuse.expects_balance() {
@@ -306,7 +309,7 @@ impl Solution<'_> {
         }
     }
 
-    /// Takes a correction of this size into the state.
+    /// Adds a correction of size `length` to the state.
     fn correct(&mut self, length: f64) {
         let newton = &mut *self.newton;
         if let Some(last) = newton.last.filter(|&last| last > NO_CORRECTION) {
@@ -317,12 +320,12 @@ impl Solution<'_> {
             newton.first.take(newton.dq.len(), |slot| newton.dq[slot].0);
         }
         self.add();
-        // What was a correction before is none in a new chart: it may not end the iteration.
+        // In a new chart the last correction has no meaning: it must not end the iteration.
         let switched = changes_charts && self.change_charts();
         self.newton.last = Some(if switched { f64::INFINITY } else { length });
     }
 
-    /// A solution is found.
+    /// Called when a solution is found.
     fn end(&mut self) {
         let Newton { time_error, solver, dq, reuse, .. } = &mut *self.newton;
         if let Some(time_error) = time_error {
@@ -335,8 +338,8 @@ impl Solution<'_> {
         solver.succeeded();
     }
 
-    /// Shows the state of a new tangent to the estimate of the error of time steps. The tangent of
-    /// a linear stage, which is formed once, fits the states of all steps.
+    /// Passes the state of a new tangent to the error estimator of time steps. In a linear stage
+    /// the only tangent serves all steps.
     fn show_rates(&mut self) {
         let Newton { time_error, solver, .. } = &mut *self.newton;
         let is_new = !solver.has_factorised(&self.assembly.system);
@@ -346,7 +349,7 @@ impl Solution<'_> {
         }
     }
 
-    /// Forces and the tangent.
+    /// Evaluates forces and tangent of the current iterate.
     fn form(&mut self) {
         let Newton { stress_predictor, dq, .. } = &mut *self.newton;
         stress_predictor.foresee(self.assembly, self.state, dq);
@@ -354,15 +357,14 @@ impl Solution<'_> {
         timed(seconds, || self.assembly.evaluate(self.state, self.method.weights(), None));
     }
 
-    /// Another correction with a tangent of this solution takes most of a residual away for the
-    /// price of a substitution: what is left of it may grow from time step to time step. Forces
-    /// stay those of the iterate before, from which they differ by less than the stop test allows.
-    /// A time step that is in balance at once has no tangent but its own; `formed` where it is
-    /// there.
+    /// Adds one more correction to a converged iterate with a tangent of this solution. For the
+    /// price of a substitution this removes most of the residual, which could grow from time step
+    /// to time step. Forces remain those of the iterate before, within the tolerance of the stop
+    /// test. `formed` if the tangent is that of the iterate.
     fn polish(&mut self, formed: bool) {
         let last = self.newton.last;
-        // A correction that grows is none; without one before, one that is large for its residual
-        // is of something loose.
+        // A correction larger than the last is no improvement; without a last one, a large
+        // correction for a small residual belongs to a loose part.
         let most = last.unwrap_or_else(|| self.newton.convergence.tolerance.sqrt());
         if last.is_none() && self.method.changes_charts() {
             return;
@@ -385,22 +387,22 @@ impl Solution<'_> {
         self.method.correct(self.state, dq);
     }
 
-    /// The next attempt is better off with pivots where round-off has taken most of the softest
-    /// stiffness.
+    /// Failure of the iteration; if round-off has taken most of the softest stiffness, the linear
+    /// solver changes its method for the next attempt.
     fn not_converged(&mut self, residual: Residual) -> NewtonFailure {
         let mut tangent = Tangent::that_may_go(self.assembly, self.state, self.method.weights());
         self.newton.solver.doubt(&mut tangent);
         NewtonFailure::NotConverged { residual, history: self.newton.reuse.history.clone() }
     }
 
-    /// A motion that nothing holds.
+    /// A motion without stiffness or strain, if there is one.
     fn mechanism(&mut self) -> Option<NullVector> {
         let mut tangent = Tangent::that_may_go(self.assembly, self.state, self.method.weights());
         mechanism(&mut self.newton.solver, &mut tangent, self.model)
     }
 
-    /// Solves J dq = -g; held directions take their part of `prescribed_increment`. `looks`: at
-    /// what the solver leaves. `false` where there is no solution.
+    /// Solves J dq = -g. Held directions take the components of `prescribed_increment`, or zero.
+    /// With `looks` the residual of the linear solve is checked. `false` if there is no solution.
     fn substitute(&mut self, prescribed_increment: Option<&[Vec3]>, looks: bool) -> bool {
         let Newton { solver, dq, .. } = &mut *self.newton;
         let mut tangent = Tangent::that_may_go(self.assembly, self.state, self.method.weights());
@@ -412,8 +414,8 @@ impl Solution<'_> {
         })
     }
 
-    /// In statics a node changes its chart as soon as an iterate passes pi, so that the tangent
-    /// stays regular at any turn; whether one did.
+    /// Changes charts in statics as soon as an iterate exceeds a rotation angle of pi, so that the
+    /// tangent stays regular at any rotation. `true` if a chart has changed.
     fn change_charts(&mut self) -> bool {
         let rotations = &self.charted.rotations;
         if charts::first_beyond(self.state, rotations, charts::STATIC_BAND).is_none() {

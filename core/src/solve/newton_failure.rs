@@ -1,57 +1,57 @@
-//! The failures of Newton's iteration.
+//! Failures of Newton's iteration and of the step around it.
 
 use super::convergence::Residual;
 use super::softest::NullVector;
 use crate::model::Assembly;
 use crate::system::State;
 
-/// Why an iteration did not end in balance.
+/// Reason why a step or level has no solution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NewtonFailure {
-    /// Too many iterations, or corrections that run away
+    /// The iteration has reached its limit, or corrections diverge.
     NotConverged {
-        /// The worst residual of the last iterate
+        /// Largest residual of the last iterate
         residual: Residual,
-        /// The largest residual of each iterate, over what is allowed
+        /// Largest residual of each iterate, relative to its tolerance
         history: Vec<f64>,
     },
-    /// A prescribed rotation goes too far at once.
+    /// A prescribed rotation is too large for one increment.
     TurnsTooFar {
-        /// The slot
+        /// Slot of the rotation
         slot: usize,
-        /// Radians
+        /// Angle of the increment [rad]
         angle: f64,
     },
-    /// Neighbouring nodes turn past pi against each other at once.
+    /// Neighbouring nodes rotate by more than pi relative to each other in one increment.
     LeapsTooFar {
-        /// The element
+        /// Index of the element
         element: usize,
-        /// Their relative rotation, in radians
+        /// Relative rotation of its nodes [rad]
         angle: f64,
     },
-    /// The error of the smallest step is above what it may be.
+    /// The error of the smallest time step exceeds its tolerance.
     StepTooSmall {
-        /// The slot
+        /// Slot of the largest error
         slot: usize,
-        /// Relative to the scene's length, or in radians
+        /// Error relative to the length of the scene, or in radians
         error: f64,
-        /// The error that is allowed
+        /// Tolerance of the error, in the same unit
         share: f64,
     },
-    /// The tangent cannot be solved with.
+    /// The tangent is singular, with the null vector if it was found.
     Singular(Option<NullVector>),
     /// A force is not finite.
     NotFinite {
-        /// The effect that gave it, if one did
+        /// Effect that computed the force; `None` if only a sum overflows
         effect: Option<&'static str>,
-        /// Where
+        /// Slot of the force
         slot: usize,
     },
 }
 
 impl NewtonFailure {
-    /// Names the effect whose forces are not finite; of a sum that overflows nobody alone is to
-    /// blame.
+    /// Failure by a force that is not finite, with the effect that computed it. A sum that
+    /// overflows belongs to no single effect.
     pub fn not_finite(assembly: &mut Assembly, state: &State) -> Self {
         match assembly.culprit(state) {
             Some((effect, slot)) => Self::NotFinite { effect: Some(effect), slot },

@@ -5,21 +5,20 @@ use super::block::BlockSolver;
 use super::constraints::Constraints;
 use crate::system::{Pattern, Slot, Symmetry, System};
 
-/// A factorisation L D L^T whose D tells the inertia, for a solver whose own factorisation does
-/// not.
+/// A factorisation L D L^T for counting negative pivots, beside a solver whose own factorisation
+/// does not tell them.
 pub(super) struct Pivots {
     blocks: BlockSolver,
     constraints: Option<Constraints>,
 }
 
-/// A tangent whose entries differ from their mirror images by more than this is not symmetric:
-/// relative to the roots of the diagonal entries that they stand between, so that stiff directions
-/// do not hide soft ones.
+/// Largest difference of mirrored entries of a symmetric tangent, relative to the roots of the two
+/// diagonal entries in their row and column, so that stiff directions do not hide soft ones.
 const SYMMETRY: f64 = 1e-9;
 
 impl Pivots {
-    /// For tangents of the pattern of a system. Its order of elimination is that of the `solver` in
-    /// blocks, where there is one. `None` where memory cannot be had.
+    /// Factorisation for tangents of the pattern of a system, in the order of elimination of the
+    /// block `solver`, if there is one. `None` if memory is not available.
     pub fn beside(solver: Option<&BlockSolver>, multipliers: &[Slot], system: &System) -> Option<Self> {
         let constraints = Constraints::new(&system.pattern, multipliers);
         let late = constraints.as_ref().map_or(&[][..], Constraints::node_blocks);
@@ -30,8 +29,8 @@ impl Pivots {
         Some(Self { blocks, constraints })
     }
 
-    /// The number of negative eigenvalues on the space that constraints leave; `None` where a pivot
-    /// is lost.
+    /// Number of negative eigenvalues on the space that satisfies the constraints; `None` if the
+    /// factorisation fails.
     pub fn negative(&mut self, system: &System) -> Option<usize> {
         let done = match &mut self.constraints {
             Some(constraints) => {
@@ -45,8 +44,7 @@ impl Pivots {
     }
 }
 
-/// True if each entry equals its mirror image. Where one of two mirrored tiles is kept they count
-/// as equal.
+/// True if each entry equals its mirror image. Tiles stored only once count as symmetric.
 pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
     if pattern.symmetry == Symmetry::Whole {
         return true;
@@ -72,7 +70,7 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
                 let difference = entry(tile, r, c) - entry(mirror, c, r);
                 difference.abs() <= SYMMETRY * roots[column][c] * roots[row][r]
             }),
-            // Whom a node meets meets it.
+            // Every off-diagonal tile has a mirrored one.
             _ => false,
         })
     })

@@ -4,26 +4,27 @@ use crate::model::Model;
 use crate::scalar::CompressedField;
 use crate::tensor::Vec3;
 
-/// Where only round-off is left, a correction smaller than this part of the unknowns ends the
-/// iteration.
+/// Size of a correction, relative to that of the unknowns, that ends an iteration with a residual
+/// at round-off.
 const FINE: f64 = 1e-8;
 
-/// Follows corrections that refine a solution whose residual is round-off.
+/// Observes successive corrections that refine a solution whose residual is round-off.
 #[derive(Default)]
 pub(super) struct Refinement {
     before: CompressedField<3>,
-    /// Its size
+    /// Size of the last correction, see [`super::convergence::size`]
     size: f64,
-    /// The last correction over the unknowns; after a change of chart there is none.
+    /// Size of the last correction relative to that of the unknowns; not finite after a change of
+    /// chart
     last: f64,
-    /// The last correction over the one before
+    /// Ratio of the sizes of the last two corrections
     ratio: f64,
-    /// True if both go the same way
+    /// True if the last two corrections have nearly the same direction
     aligned: bool,
 }
 
 impl Refinement {
-    /// Looks at a correction of this size; the unknowns have a size, too.
+    /// Observes a correction `dq` of this size, for unknowns of size `unknowns`.
     pub fn look(&mut self, model: &Model, dq: &[Vec3], size: f64, unknowns: f64) -> &Self {
         let (now, before) = (|slot: usize| dq[slot], |slot: usize| Vec3(self.before.get(slot)));
         let count = self.before.len();
@@ -40,19 +41,19 @@ impl Refinement {
         self
     }
 
-    /// Small enough, or not becoming smaller any more.
+    /// True if corrections are small enough, or do not decrease any more.
     pub fn is_done(&self) -> bool {
         self.last <= FINE || self.stalls()
     }
 
-    /// Still too large, and not becoming smaller any more.
+    /// True if corrections are not small enough and do not decrease any more.
     pub fn stalls(&self) -> bool {
         let most = if self.aligned { 0.9 } else { 0.5 };
         self.last > FINE && self.last.is_finite() && self.ratio > most
     }
 
-    /// The sum of the corrections that are still to come: of those that go one way, each `ratio`
-    /// times the one before.
+    /// Sum of the remaining corrections relative to the unknowns: a geometric series with factor
+    /// `ratio` if they are aligned.
     pub fn uncertainty(&self) -> f64 {
         let series = if self.aligned { 1.0 / (1.0 - self.ratio.min(0.99)) } else { 1.0 };
         if self.last.is_finite() { (self.last * series).min(1.0) } else { 0.0 }

@@ -1,40 +1,40 @@
-//! When Newton's iteration goes on with the tangent it has (modified Newton), and when it forms
-//! another.
+//! Modified Newton: decides when an iteration keeps its tangent and when it forms another.
 //!
 //! A correction with an old tangent costs an evaluation of forces and a substitution; one with a
-//! new tangent costs an evaluation of both and a factorisation, about three times that. Where a new
-//! tangent has made a residual smaller by theta, the same tangent makes the next one smaller by
-//! about 2 theta (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is kept where so
-//! much brings balance soon enough. Where a residual is round-off ratios tell nothing: a tangent of
-//! such an iterate is formed once, and serves for all that follow as long as their corrections
-//! become smaller. Only residuals and counts decide, never a clock.
+//! new tangent costs an evaluation of both and a factorisation, about three times as much. If a new
+//! tangent has reduced the residual by the factor theta, it reduces the next one by about 2 theta
+//! (Deuflhard 2011, doi:10.1007/978-3-642-23899-4, section 2.1): it is kept if this leads to
+//! equilibrium soon enough. If a residual is round-off, its ratios mean nothing: the tangent of
+//! such an iterate is formed once and kept as long as corrections decrease. Only residuals and
+//! counts decide, never a clock.
 
-/// The ratio of a residual to what is allowed that is expected to become one in balance.
+/// Expected residual, relative to its tolerance, below which the next iterate is expected to
+/// converge.
 const EXPECTED: f64 = 0.1;
 
-/// The factor of the next residual with the same tangent, over that of the first one: twice what
-/// theory has.
+/// Ratio of the reductions of the residual by the second and by the first correction with one
+/// tangent: twice the value of theory.
 const SAME: f64 = 4.0;
 
-/// Corrections with an old tangent that cost less than one with a new one
+/// Number of corrections with an old tangent that cost less than one with a new tangent
 const CHEAP: i32 = 2;
 
-/// Follows one solution after the other.
+/// Observes successive solutions and decides about their tangents.
 #[derive(Debug)]
 pub(super) struct Reuse {
-    /// The largest residual of each iterate of the present solution, over what is allowed
+    /// Largest residual of each iterate of the current solution, relative to its tolerance
     pub history: Vec<f64>,
-    /// True if there is a tangent near the present iterate
+    /// True if the current tangent is that of an iterate nearby
     kept: bool,
-    /// True if the residual of the present iterate is round-off
+    /// True if the residual of the current iterate is round-off
     noisy: bool,
-    /// True if nothing but round-off lies between the tangent's iterate and the present one
+    /// True if the iterate of the tangent differs from the current one by round-off only
     fine: bool,
-    /// True if the last correction was found with the tangent of its iterate
+    /// True if the last correction was computed with the tangent of its iterate
     own: bool,
-    /// The tangents that this solution could not do without so far
+    /// Number of tangents that the current solution has required so far
     needed: usize,
-    /// The tangents that the last solution could not do without, once there is one
+    /// Number of tangents that the last solution has required; `usize::MAX` before the first
     before: usize,
 }
 
@@ -43,28 +43,27 @@ impl Reuse {
         Self { history: Vec::new(), kept: false, noisy: false, fine: false, own: false, needed: 0, before: usize::MAX }
     }
 
-    /// A solution begins; `kept` where the tangent is already that of its first iterate, but for
-    /// the loads.
+    /// Begins a solution; `kept` if the tangent is, except for loads, that of its first iterate.
     pub fn begin(&mut self, kept: bool) {
         self.history.clear();
         (self.kept, self.own, self.needed) = (kept, false, 0);
         (self.noisy, self.fine) = (false, false);
     }
 
-    /// The present iterate has this residual, over what is allowed; `noisy` where that is
+    /// Records the residual of the current iterate, relative to its tolerance; `noisy` if it is
     /// round-off.
     pub fn look(&mut self, residual: f64, noisy: bool) {
         self.history.push(residual);
         self.noisy = noisy;
     }
 
-    /// A solution has come to balance.
+    /// Ends a solution that has converged.
     pub fn end(&mut self) {
         self.before = self.needed;
     }
 
-    /// True if the next evaluation had better form the tangent, too: neither is balance expected,
-    /// nor did the last solution need another one from here on.
+    /// True if the next evaluation should form the tangent, too: equilibrium is not expected, and
+    /// the last solution required another tangent at this point.
     pub fn expects_tangent(&self) -> bool {
         match self.history.is_empty() {
             true => !self.kept,
@@ -73,62 +72,62 @@ impl Reuse {
         }
     }
 
-    /// True if residuals have fallen so fast that the next one will do.
+    /// True if residuals have decreased so fast that the next iterate is expected to converge.
     pub fn expects_balance(&self) -> bool {
         self.will_do(1)
     }
 
-    /// True if there is a tangent near the present iterate.
+    /// True if the current tangent is that of an iterate nearby.
     pub fn has_tangent(&self) -> bool {
         self.kept
     }
 
-    /// True if the tangent that is there shall serve for the present iterate.
+    /// True if the current iterate is to be corrected with the current tangent.
     pub fn keeps_tangent(&self) -> bool {
         if self.noisy { self.serves_on() } else { self.brings_balance() }
     }
 
-    /// True if the tangent that is there is that of the present iterate but for round-off.
+    /// True if the current tangent is that of the current iterate except for round-off.
     fn serves_on(&self) -> bool {
         self.kept && self.fine
     }
 
-    /// True if the tangent that is there is expected to bring balance soon enough.
+    /// True if the current tangent is expected to lead to equilibrium soon enough.
     fn brings_balance(&self) -> bool {
         self.kept && (self.begins() || self.will_do(CHEAP))
     }
 
-    /// True if this is the first iterate, whose tangent may have been given.
+    /// True at the first iterate, whose tangent may have been given.
     fn begins(&self) -> bool {
         self.history.len() == 1
     }
 
-    /// The iterate has its own tangent, which is used unless it is in balance; `leaps` where
-    /// prescribed increments lie between it and the next.
+    /// Records that the tangent of the iterate is formed, to be used unless the iterate has
+    /// converged; `leaps` if the next correction includes prescribed increments.
     pub fn form(&mut self, leaps: bool) {
         self.needed += usize::from(!self.brings_balance());
         (self.kept, self.own) = (true, true);
         self.fine = self.noisy && !leaps;
     }
 
-    /// The iterate is corrected with the tangent that is there.
+    /// Records that the iterate is corrected with the current tangent.
     pub fn keep(&mut self) {
         self.own = self.begins();
     }
 
-    /// True if the present correction is found with the tangent of its iterate.
+    /// True if the current correction is computed with the tangent of its iterate.
     pub fn is_own(&self) -> bool {
         self.own
     }
 
-    /// The tangent that is there serves no more: unknowns have changed their meaning, or
-    /// corrections with it do not become smaller.
+    /// Discards the current tangent, since charts have changed, or corrections with it do not
+    /// decrease.
     pub fn forget(&mut self) {
         self.kept = false;
     }
 
-    /// True if residuals have fallen so fast that after so many corrections more the next one will
-    /// do.
+    /// True if residuals have decreased so fast that the iterate after this many corrections is
+    /// expected to converge.
     fn will_do(&self, corrections: i32) -> bool {
         let [.., before, last] = self.history[..] else { return false };
         let factor = if self.own && corrections > 1 { SAME * last / before } else { last / before };
@@ -140,8 +139,8 @@ impl Reuse {
 mod tests {
     use super::*;
 
-    /// How many tangents a solution with these residuals forms, and how many evaluations it makes
-    /// for nothing.
+    /// Number of tangents formed in a solution with these residuals, and number of superfluous
+    /// evaluations.
     fn solve(reuse: &mut Reuse, residuals: &[f64]) -> (usize, usize) {
         let (mut formed, mut twice) = (0, 0);
         reuse.begin(false);
@@ -167,7 +166,8 @@ mod tests {
     fn a_tangent_is_kept_where_it_will_do() {
         let mut reuse = Reuse::new();
         let fast = [1e9, 1e2, 1e-3];
-        // Nothing is known at first; from then on the second evaluation forms no tangent.
+        // The first solution has no precedent; in the second the second evaluation forms no
+        // tangent.
         assert_eq!(solve(&mut reuse, &fast), (2, 0));
         assert_eq!(solve(&mut reuse, &fast), (1, 0));
     }
@@ -177,7 +177,8 @@ mod tests {
         let mut reuse = Reuse::new();
         let slow = [1e9, 5e8, 1e8, 1e7, 1e-1];
         assert_eq!(solve(&mut reuse, &slow), (4, 0));
-        // What was enough in the last solution is tried again, and given up where it is not.
+        // The number of tangents of the last solution is tried again, and given up if it does not
+        // suffice.
         solve(&mut reuse, &[1e9, 1e2, 1e-3]);
         assert_eq!(solve(&mut reuse, &slow), (4, 1));
         assert_eq!(solve(&mut reuse, &slow), (4, 0));
@@ -190,7 +191,8 @@ mod tests {
         assert!(!reuse.expects_tangent());
         reuse.look(10.0, false);
         assert!(reuse.keeps_tangent());
-        // It is that of the iterate, and what it gives is looked at like that of a new one.
+        // The given tangent is that of the iterate, so the linear solve is checked as with a new
+        // one.
         reuse.keep();
         assert!(reuse.is_own());
         reuse.look(1.5, false);
@@ -205,7 +207,7 @@ mod tests {
         reuse.begin(false);
         reuse.look(1e9, false);
         reuse.form(false);
-        // One from further away does not.
+        // A tangent from further away is not kept.
         reuse.look(0.5, true);
         assert!(reuse.expects_tangent() && !reuse.keeps_tangent());
         reuse.form(false);
@@ -214,8 +216,7 @@ mod tests {
             assert!(!reuse.expects_tangent() && reuse.keeps_tangent());
             reuse.keep();
         }
-        // Nor where the residual is more than round-off again, or unknowns have changed their
-        // meaning.
+        // Nor is it kept if the residual exceeds round-off again, or charts have changed.
         reuse.look(30.0, false);
         assert!(!reuse.keeps_tangent());
         reuse.look(0.5, true);

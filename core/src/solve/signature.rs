@@ -1,26 +1,26 @@
-//! The signs of the eigenvalues of a tangent: of a symmetric one, how many directions have lost
-//! their stiffness; of any, the sign of its determinant.
+//! Signs of the eigenvalues of a tangent: for a symmetric one the number of negative eigenvalues,
+//! for any the sign of its determinant.
 
 use super::linear::LinearSolver;
 use super::pivots::{Pivots, is_symmetric};
 use super::tangent::Tangent;
 use crate::system::System;
 
-/// The signs of the eigenvalues of a tangent, on the space that constraints leave.
+/// Signs of the eigenvalues of a tangent on the space that satisfies the constraints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signature {
-    /// It is symmetric, and so many are negative.
+    /// Number of negative eigenvalues of a symmetric tangent
     Negative(usize),
-    /// It is not symmetric, and the number of those that are real and negative is odd, or even: the
-    /// sign of the determinant.
+    /// Parity of the number of negative real eigenvalues of an unsymmetric tangent, the sign of its
+    /// determinant
     Parity {
-        /// The number is odd.
+        /// True if the number is odd
         is_odd: bool,
     },
 }
 
 impl Signature {
-    /// The number of negative eigenvalues, where it is known.
+    /// Number of negative eigenvalues, if it is known.
     pub fn negative(self) -> Option<usize> {
         match self {
             Self::Negative(count) => Some(count),
@@ -28,7 +28,7 @@ impl Signature {
         }
     }
 
-    /// True if an odd number of eigenvalues is real and negative: then one of them is.
+    /// True if the number of negative real eigenvalues is odd, so that there is at least one.
     pub fn is_odd(self) -> bool {
         match self {
             Self::Negative(count) => count % 2 == 1,
@@ -36,7 +36,7 @@ impl Signature {
         }
     }
 
-    /// True if at least one eigenvalue is real and negative for sure.
+    /// True if at least one eigenvalue is certainly real and negative.
     pub fn tells_unstable(self) -> bool {
         match self {
             Self::Negative(count) => count > 0,
@@ -44,7 +44,7 @@ impl Signature {
         }
     }
 
-    /// The number of eigenvalues whose sign has changed, at least, from this tangent to another.
+    /// Least number of eigenvalues that change their sign from this tangent to another.
     pub fn changes_to(self, other: Self) -> usize {
         match (self, other) {
             (Self::Negative(before), Self::Negative(after)) => before.abs_diff(after),
@@ -55,8 +55,8 @@ impl Signature {
 }
 
 impl LinearSolver {
-    /// The number of negative eigenvalues of a tangent or the sign of its determinant, see
-    /// [`LinearSolver::negative_pivots`].
+    /// Number of negative eigenvalues of a tangent, or the sign of its determinant, see
+    /// [`LinearSolver::negative_pivots`]. `None` if the factorisation fails.
     pub fn signature(&mut self, tangent: &mut Tangent) -> Option<Signature> {
         if let Some(negative) = self.negative_pivots(tangent) {
             return Some(Signature::Negative(negative));
@@ -66,9 +66,9 @@ impl LinearSolver {
         Some(Signature::Parity { is_odd })
     }
 
-    /// How many eigenvalues of the tangent are negative on the space that constraints leave; `None`
-    /// where it is not symmetric, or a pivot is lost. Where this solver's own factorisation tells,
-    /// the tangent is what it has factorised last, and may be used up by that.
+    /// Number of negative eigenvalues of the tangent on the space that satisfies the constraints;
+    /// `None` if it is unsymmetric, or the factorisation fails. If this solver's own factorisation
+    /// tells it, the tangent is factorised by it and may be overwritten.
     pub fn negative_pivots(&mut self, tangent: &mut Tangent) -> Option<usize> {
         if self.is_symmetric() {
             return self.negative_of_own(tangent);
@@ -76,8 +76,9 @@ impl LinearSolver {
         self.negative_beside(tangent.look())
     }
 
-    /// The number of negative eigenvalues of a system that this solver need not have factorised;
-    /// its own last factorisation stays.
+    /// Number of negative eigenvalues of the tangent of a system, by a separate factorisation that
+    /// leaves this solver's last one unchanged. `None` if the tangent is unsymmetric, or the
+    /// factorisation fails.
     pub(super) fn negative_beside(&mut self, system: &System) -> Option<usize> {
         if !is_symmetric(&system.pattern, &system.values) {
             return None;

@@ -1,4 +1,4 @@
-//! Motions that nothing holds: mechanisms and loose parts.
+//! Softest motions of a tangent: mechanisms and loose parts.
 
 use super::convergence::size;
 use super::linear::LinearSolver;
@@ -6,24 +6,26 @@ use super::softest::NullVector;
 use super::tangent::Tangent;
 use crate::model::Model;
 
-/// The softest motion of a tangent.
+/// The softest motion of a tangent, with its strain.
 pub struct SoftMode {
     /// The motion
     pub vector: NullVector,
-    /// It strains what it moves.
+    /// True if the motion causes strain
     strains: bool,
-    /// True if it is a motion, not the multiplier of a joint
+    /// True if the motion moves nodes most, not the multiplier of a joint
     moves: bool,
 }
 
-/// A motion that something holds strains it by about its own size; what round-off makes of one that
-/// nothing holds is smaller than this, up to condition numbers of 1e13.
+/// Strain relative to the size of a motion, below which it is a rigid motion. Motions with
+/// stiffness strain by about their own size; round-off in motions without any causes less than
+/// this, up to condition numbers of 1e13.
 const NO_STRAIN: f64 = 1e-3;
 
 impl SoftMode {
-    /// The softest motion of a tangent; one that stays is the one that `solver` has tried to
-    /// factorise. Whether it strains is asked where the tangent has no stiffness against it, or
-    /// else where `stress` may be all that holds it.
+    /// Finds the softest motion of a tangent. A tangent that stays must be the one that `solver`
+    /// has tried to factorise last. Strain is computed if the tangent has no stiffness against the
+    /// motion, or if `stress` may be the only cause of that stiffness; otherwise it is assumed.
+    /// `None` if there are no equations or the iteration fails.
     pub fn find(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model, stress: bool) -> Option<Self> {
         let vector = solver.softest(tangent)?;
         let (assembly, state) = (tangent.assembly(), tangent.state());
@@ -31,33 +33,33 @@ impl SoftMode {
             return Some(Self { vector, strains: true, moves: true });
         }
         let (largest, motion) = vector.by_slot(&assembly.system.pattern.dof_map, state.q.len());
-        // What moves may be the multiplier of a condition that is said twice: no strain stands in
-        // its way.
+        // The largest component may be the multiplier of a redundant constraint, which causes no
+        // strain.
         let moves = !model.kinds[largest].is_multiplier();
         let size = if moves { size(model, &motion) } else { 0.0 };
         let strains = size > 0.0 && assembly.strain_of(state, &motion, model.length) > NO_STRAIN * size;
         Some(Self { vector, strains, moves })
     }
 
-    /// True if nothing holds it. Very slender beams on fine meshes bend so softly that their
-    /// stiffness is lost in the tangent, but they bend.
+    /// True if the motion has neither stiffness nor strain. Very slender beams on fine meshes bend
+    /// so softly that their stiffness is lost in round-off, but they strain.
     pub fn is_loose(&self) -> bool {
         !self.vector.held && !self.strains
     }
 
-    /// True if its stiffness is lost in the tangent, although something holds it.
+    /// True if the stiffness against the motion is lost in round-off, although it causes strain.
     pub fn is_soft(&self) -> bool {
         !self.vector.held && self.strains
     }
 
-    /// True if it strains nothing, and only stress that is there already holds it, as a hanging
-    /// pendulum. Known only where that was asked for.
+    /// True if only stress gives the motion stiffness, as gravity does to a pendulum. Meaningful
+    /// only if strain was asked for with `stress`.
     pub fn is_held_by_stress(&self) -> bool {
         self.vector.held && self.moves && !self.strains
     }
 }
 
-/// A motion that nothing holds, of a tangent; see [`SoftMode::find`].
+/// A motion of a tangent without stiffness or strain, if there is one; see [`SoftMode::find`].
 pub fn mechanism(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model) -> Option<NullVector> {
     SoftMode::find(solver, tangent, model, false).filter(SoftMode::is_loose).map(|soft_mode| soft_mode.vector)
 }

@@ -1,4 +1,4 @@
-//! The softest motion of a tangent, by inverse iteration.
+//! Softest motion of a tangent, by inverse iteration.
 
 use super::linear::LinearSolver;
 use super::tangent::Tangent;
@@ -9,26 +9,27 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::ops::Range;
 
-/// Unknowns that move without any force, as far as the tangent tells.
+/// Motion of least stiffness, with no stiffness at all unless it is `held`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NullVector {
-    /// One entry an equation, of sizes that compare; the largest tells what moves.
+    /// Motion by equation, scaled by the roots of the diagonal so that entries of all units compare
     pub entries: Vec<f64>,
-    /// The unknowns themselves
+    /// Motion by equation, in units of the unknowns
     pub motion: Vec<f64>,
-    /// True if the tangent has some stiffness against it after all
+    /// True if the tangent has stiffness against the motion
     pub held: bool,
-    /// True if no factorisation of the tangent came to its end
+    /// True if no factorisation of the tangent has succeeded
     pub broke_down: bool,
 }
 
 impl NullVector {
-    /// The decimal digits that round-off leaves of its stiffness in the tangent.
+    /// Number of decimal digits of the stiffness against the motion that round-off in the tangent
+    /// leaves.
     pub fn digits(&self, system: &System) -> f64 {
         stiffness_of(system, &self.motion).max(1.0).log10()
     }
 
-    /// The slot that moves most, told by entries that compare, and the motion of every slot.
+    /// The slot with the largest scaled motion, and the motion by slot (global components).
     pub fn by_slot(&self, dof_map: &DofMap, slots: usize) -> (usize, Vec<Vec3>) {
         let field = |entries: &[f64]| {
             let mut field = vec![Vec3::ZERO; slots];
@@ -41,25 +42,25 @@ impl NullVector {
     }
 }
 
-/// x.Jx over the round-off of this sum, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has
-/// no stiffness.
+/// Ratio of x.Jx to its round-off, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no
+/// stiffness.
 const NO_STIFFNESS: f64 = 8.0;
 
-/// Decimal digits of the softest stiffness that factorisation in blocks must leave.
+/// Number of decimal digits of the softest stiffness that a block factorisation must leave.
 const FEW_DIGITS: f64 = 4.0;
 
-/// Forces of multipliers that cancel to this part of themselves cancel.
+/// Sum of multiplier forces, relative to the sum of their magnitudes, below which they cancel.
 const SAID_TWICE: f64 = 1e-10;
 
 impl LinearSolver {
-    /// A direction in which the tangent has no stiffness.
+    /// Direction in which the tangent has no stiffness, if there is one.
     pub fn null_vector(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
         self.softest(tangent).filter(|vector| !vector.held)
     }
 
-    /// The direction in which the tangent has the least stiffness, by inverse iteration; of a
-    /// tangent that stays with the last factorisation. Unknowns are scaled by their diagonal, so
-    /// that forces and moments compare.
+    /// Direction in which the tangent has the least stiffness, by inverse iteration; for a tangent
+    /// that stays, with the last factorisation. Unknowns are scaled by their diagonal, so that
+    /// forces and moments compare. `None` if there are no equations or the iteration fails.
     pub fn softest(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
         let system = tangent.look();
         if system.pattern.dof_map.count() == 0 {
@@ -95,13 +96,15 @@ impl LinearSolver {
         Some(NullVector { entries: x, motion, held, broke_down: false })
     }
 
-    /// After corrections that led nowhere: in general where few digits of the softest stiffness are
-    /// left, of which pivots save more; and in turns with blocks where that did not help either.
+    /// Chooses the method for the next attempt after Newton's iteration has failed: partial
+    /// pivoting if the block factorisation leaves few digits of the softest stiffness, and the
+    /// block solver again if partial pivoting has not helped.
     pub fn doubt(&mut self, tangent: &mut Tangent) {
         if self.gives_way_to_blocks() {
             return;
         }
-        // The factorisation may be that of the iterate before; either may leave blocks itself.
+        // The factorisation may be that of the iterate before; either solution may change the
+        // method itself.
         let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
         let is_doubtful = softest.is_some_and(|vector| vector.digits(tangent.look()) < FEW_DIGITS);
         if is_doubtful && self.is_in_blocks() {
@@ -109,9 +112,8 @@ impl LinearSolver {
         }
     }
 
-    /// True if what moves most, by entries that compare, are multipliers whose forces cancel:
-    /// conditions that hold what is held already. Their unknowns are round-off, of which the
-    /// stiffness tells nothing.
+    /// True if the largest scaled components are multipliers whose forces cancel, which belong to
+    /// redundant constraints. Their values are round-off and have no stiffness.
     fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
         let Some(constraints) = self.constraints() else { return false };
         let mut multipliers = vec![0.0; motion.len()];
@@ -129,11 +131,11 @@ impl LinearSolver {
         left.iter().zip(&all).all(|(left, all)| left.abs() <= SAID_TWICE * all)
     }
 
-    /// The direction of least stiffness where the factorisation broke down: the diagonal is raised
-    /// by a little first.
+    /// Direction of least stiffness after a failed factorisation, of a tangent with a slightly
+    /// raised diagonal.
     fn null_vector_of_shifted(&mut self, system: &System, broke_down: bool) -> Option<NullVector> {
         let mut shifted = system.clone();
-        // Multipliers have no diagonal: they get a little compliance.
+        // Multipliers have a zero diagonal and get a small compliance.
         let shift = |value: f64| if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };
         system.pattern.each_diagonal(|_, place| shifted.values[place] = shift(shifted.values[place]));
         if !self.factorise(&shifted) {
@@ -160,8 +162,8 @@ fn diagonal(system: &System) -> Vec<f64> {
     diagonal
 }
 
-/// The root of the diagonal; of unknowns without one, such as multipliers, what makes their column
-/// comparable.
+/// Scales of the unknowns: the root of the diagonal; for unknowns without one, such as multipliers,
+/// a scale that makes their column comparable.
 fn scales(system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
     threads::each_part(&mut diagonal, |_, part| part.iter_mut().for_each(|entry| *entry = entry.abs().sqrt()));
     let roots = &diagonal;
@@ -172,7 +174,7 @@ fn scales(system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
     let entry = |c: usize| entries(system, c).fold(0.0_f64, |m, (_, value)| m.max(value.abs()));
     let scale = |c: usize| match column(c) {
         compared if compared > 0.0 => compared,
-        // Unknowns and multipliers that only meet each other.
+        // Unknowns and multipliers that are coupled with each other only.
         _ => entry(c).sqrt().max(f64::MIN_POSITIVE),
     };
     let without: Vec<usize> = (0..roots.len()).filter(|&c| roots[c].is_nan() || roots[c] <= 0.0).collect();
@@ -181,25 +183,25 @@ fn scales(system: &System, mut diagonal: Vec<f64>) -> Vec<f64> {
     diagonal
 }
 
-/// Row and value of the entries of a column.
+/// Rows and values of the entries of a column.
 fn entries(system: &System, column: usize) -> impl Iterator<Item = (usize, f64)> {
     system.pattern.entries(column as u32).map(|entry| (entry.row as usize, system.values[entry.place]))
 }
 
-/// A column without any entry that is not zero.
+/// The first column whose entries are all zero.
 fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
     let is_empty = |column: usize| entries(system, column).all(|(_, value)| value == 0.0);
     threads::first(diagonal.len(), |mut part| part.find(|&column| diagonal[column] == 0.0 && is_empty(column)))
 }
 
-/// |x.Jx| over the round-off that so many rounded terms leave in it. The sum itself is
+/// Ratio of |x.Jx| to the round-off of its terms, eps sqrt(sum (x_i J_ij x_j)^2). The sum itself is
 /// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are not
 /// taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
 }
 
-/// The part of x.Jx that round-off in the entries of J may have taken.
+/// Relative error of x.Jx that round-off in the entries of J may cause.
 pub(super) fn lost_part(system: &System, x: &[f64]) -> f64 {
     1.0 / stiffness_of(system, x).max(1.0)
 }
@@ -215,8 +217,8 @@ fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
     if squares == 0.0 { 0.0 } else { (whole.sum + whole.lost).abs() / (f64::EPSILON * squares.sqrt()) }
 }
 
-/// The sums over some columns of tiles, of the terms and of their squares. A sum for each row of a
-/// tile: they do not wait for each other.
+/// Sums over some columns of tiles of the terms of x.Jx and of their squares, separately for each
+/// row of a tile: independent sums are faster.
 fn stiffness_of_columns<const W: usize>(
     system: &System,
     x: &[f64],
@@ -228,7 +230,7 @@ fn stiffness_of_columns<const W: usize>(
         #[inline(always)]
         || {
             system.each_tile::<W>(columns, |row, column, tile| {
-                // What is not kept counts as much.
+                // Tiles that are not stored count as well.
                 let times = if pattern.symmetry.halves() && row != column { 2.0 } else { 1.0 };
                 let (of_row, of_column) = (pattern.part::<W>(row, x), pattern.part::<W>(column, x));
                 for (line, x) in tile.iter().zip(of_column) {
@@ -244,7 +246,7 @@ fn stiffness_of_columns<const W: usize>(
     (sums, squares)
 }
 
-/// A sum with what its roundings have lost (Knuth's two-sum, which needs no branch).
+/// A compensated sum (Knuth's two-sum, which needs no branch).
 #[derive(Clone, Copy, Default)]
 struct Compensated {
     sum: f64,

@@ -1,50 +1,49 @@
-//! A tangent that solvers may use up: factors take its place, and who looks at it again has it
-//! formed again.
+//! A tangent that solvers may overwrite with factors, and that is formed again when its values are
+//! needed.
 
 use crate::kernel::Weights;
 use crate::model::Assembly;
 use crate::system::{Slot, State, System};
 use crate::tensor::Mat3;
 
-/// The tangent of a state, as it stands in an assembly.
+/// The tangent of a state in an assembly.
 pub struct Tangent<'a> {
     assembly: &'a mut Assembly,
     state: &'a State,
-    /// The weights that it is formed again with; `None` where it stays
+    /// Weights with which the tangent is formed again; `None` if it must not be overwritten
     weights: Option<Weights>,
-    /// Blocks that are added to it then, see [`System::add_to_own_block`]
+    /// Blocks that are added after it is formed again, see [`System::add_to_own_block`]
     additions: &'a [(Slot, Mat3)],
 }
 
 impl<'a> Tangent<'a> {
-    /// One that stays: factors stand elsewhere.
+    /// A tangent that must not be overwritten.
     pub fn that_stays(assembly: &'a mut Assembly, state: &'a State) -> Self {
         Self { assembly, state, weights: None, additions: &[] }
     }
 
-    /// One that may be used up. It was formed of this state with these weights.
+    /// A tangent that may be overwritten, formed at this state with these weights.
     pub fn that_may_go(assembly: &'a mut Assembly, state: &'a State, weights: Weights) -> Self {
         Self { assembly, state, weights: Some(weights), additions: &[] }
     }
 
-    /// The tangent to which something was added.
+    /// The tangent plus diagonal blocks that have been added to it.
     pub fn with(self, additions: &'a [(Slot, Mat3)]) -> Self {
         Self { additions, ..self }
     }
 
-    /// Where it stands, or what has taken its place.
+    /// The system of the tangent, whose values may be factors.
     pub fn system(&self) -> &System {
         &self.assembly.system
     }
 
-    /// The system whose values factors may take the place of; `None` where the tangent stays, or is
-    /// gone already.
+    /// The system whose tangent factors may overwrite; `None` if they must not, or already have.
     pub(super) fn give_away(&mut self) -> Option<&mut System> {
         let may_go = self.weights.is_some() && !self.assembly.system.holds_factors();
         may_go.then_some(&mut self.assembly.system)
     }
 
-    /// The tangent itself, formed again where it is gone.
+    /// The system with the tangent itself, formed again if it was overwritten.
     pub fn look(&mut self) -> &System {
         if let Some(weights) = self.weights.filter(|_| self.assembly.system.holds_factors()) {
             self.assembly.form_again(self.state, weights);
@@ -55,7 +54,7 @@ impl<'a> Tangent<'a> {
         &self.assembly.system
     }
 
-    /// True if it stays.
+    /// True if the tangent must not be overwritten.
     pub(super) fn stays(&self) -> bool {
         self.weights.is_none()
     }

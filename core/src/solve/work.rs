@@ -1,26 +1,26 @@
-//! Work that a run counts.
+//! Counters of work.
 
 use std::time::Instant;
 
-/// Work done, added up over a run.
+/// Work of a run, summed up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
-    /// Corrections of Newton's method whose forces were looked at
+    /// Number of corrections of Newton's iteration whose forces were evaluated
     pub iterations: u64,
-    /// Factorisations
+    /// Number of factorisations
     pub factorisations: u64,
-    /// Changes of chart
+    /// Number of chart changes
     pub chart_switches: u64,
-    /// Seconds spent on forces and tangents, scattered into the system
+    /// Time for evaluating and assembling forces and tangents [s]
     pub evaluation_seconds: f64,
-    /// Seconds spent on factorising and solving
+    /// Time for factorising and solving [s]
     pub solve_seconds: f64,
-    /// The correction that round-off still leaves where an iteration ended, relative to the
+    /// Largest correction that round-off leaves at the end of an iteration, relative to the
     /// unknowns
     pub uncertainty: f64,
 }
 
-/// Runs `part` and adds its seconds to `seconds`.
+/// Runs `part` and adds its duration [s] to `seconds`.
 pub fn timed<R>(seconds: &mut f64, part: impl FnOnce() -> R) -> R {
     let start = Instant::now();
     let result = part();

@@ -1,4 +1,5 @@
-//! Where effects add their forces and tangents: to the whole system, or to the part of it that belongs to a region.
+//! Assembly of element forces and tangents into the system: into all of it, or into the slice of
+//! one region.
 
 use super::category::Category;
 use super::dof_map::DofMap;
@@ -12,26 +13,30 @@ use crate::scalar::{LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
 use std::ops::Range;
 
-/// A stretch of the system: that of a region, to which others add nothing meanwhile, or all of it.
+/// A slice of the system that one thread writes to: the slots, equations and tiles of one region,
+/// or all of them.
 pub struct Part<'a> {
     pub(super) pattern: &'a Pattern,
-    /// The categories that something may add to there
+    /// Indices ([`Category`] as a number) of the force categories that some effect adds to in this
+    /// slice
     pub(super) acting: &'a [usize],
-    /// `None` for all of it
+    /// Index of the region; `None` if the slice is the whole system
     pub(super) region: Option<usize>,
-    /// Of its slots, by category
+    /// Nodal forces of the slots of this slice, one list per category (global components)
     pub(super) force: [&'a mut [Vec3]; 4],
-    /// Of its tiles
+    /// Tangent values of the tiles of this slice
     pub(super) values: Values<'a>,
-    /// Of all slots, where increments are prescribed
+    /// Prescribed increments of all slots of the scene (global components); `None` if nothing is
+    /// prescribed
     pub(super) prescribed_increment: Option<&'a [Vec3]>,
-    /// Of its equations
+    /// Tangent times prescribed increments, one number per equation of this slice
     pub(super) lifted: &'a mut [f64],
     pub(super) room: &'a mut Vec<ElementSystem<Lanes>>,
 }
 
 impl<'a> Part<'a> {
-    /// Sets forces to zero, and the tangent where it is to be formed.
+    /// Sets the forces of the acting categories to zero, and the tangent if it is going to be
+    /// formed.
     pub fn clear(&mut self, with_tangent: bool) {
         self.acting.iter().for_each(|&category| self.force[category].fill(Vec3::ZERO));
         if with_tangent {
@@ -39,12 +44,13 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// The instances of an effect that lie in the region; of the whole those that lie in none.
+    /// Ranges of the instances of effect number `effect` that lie in this region; for the whole
+    /// system, of the instances that lie in no single region.
     pub fn instances(&self, effect: usize) -> &'a [Range<usize>] {
         self.pattern.places[effect].shares.of(self.region)
     }
 
-    /// The sink of these instances of effect number `effect`.
+    /// Assembler of the given instances of effect number `effect`, which borrows this slice.
     pub fn sink(
         &mut self,
         effect: usize,
@@ -68,7 +74,8 @@ impl<'a> Part<'a> {
         part.into_sink(effect, category, with_tangent, instances)
     }
 
-    /// The same, with what it borrows.
+    /// Assembler of the given instances of effect number `effect`, which takes over the borrows of
+    /// this slice.
     pub(super) fn into_sink(
         self,
         effect: usize,
@@ -104,7 +111,8 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Adds one lane of a tile to its place: four numbers at once where they are next to each other.
+/// Adds one lane of an element tile to the tangent, in vectors of [`LANES`] numbers if the tile is
+/// stored contiguously.
 #[inline(always)]
 fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
     match &mut place {
@@ -117,40 +125,43 @@ fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
     }
 }
 
-/// Row and column that the block of two slots of an instance begins with in its tile.
+/// Row and column in the tile of the first entry of the block that couples two slots of an
+/// instance.
 #[inline(always)]
 fn corner(node_blocks: &NodeBlocks, slots: &[Slot], pair: [usize; 2]) -> [usize; 2] {
     pair.map(|number| node_blocks.row(slots[number]).1)
 }
 
-/// Through this an effect adds the force and tangent of its instances.
+/// Access for an effect to add the forces and tangents of its instances.
 pub struct Assembler<'a> {
     places: &'a ScatterMap,
     pattern: &'a Pattern,
     instances: Range<usize>,
-    /// What stretches begin with
+    /// First slot of the slice, by which slot indices are shifted
     first_slot: usize,
     first_equation: usize,
-    /// Forces of its own category
+    /// Nodal forces of the category of the effect
     force: &'a mut [Vec3],
-    /// And those that damp, where these are not the same
+    /// Nodal damping forces; `None` if the category of the effect is damping itself
     damping: Option<&'a mut [Vec3]>,
     values: Values<'a>,
     prescribed_increment: Option<&'a [Vec3]>,
     lifted: &'a mut [f64],
     room: &'a mut Vec<ElementSystem<Lanes>>,
     with_tangent: bool,
-    /// Whether damping forces are cleared
+    /// True if damping is among the acting categories, so that its forces have been cleared.
     may_damp: bool,
 }
 
 impl Assembler<'_> {
-    /// The instances that it takes: all of them, unless the effect is [divisible](super::Connectivity::divisible).
+    /// Range of instances to add: all of them, unless the effect is
+    /// [divisible](super::Connectivity::divisible).
     pub fn instances(&self) -> Range<usize> {
         self.instances.clone()
     }
 
-    /// A system to compute with, of so many blocks, whose forces are those of who had it last; its tangent, where there is one, is zero, unless it is going to be formed anew.
+    /// Lends a buffer of `blocks` blocks for element forces and tangents. Its forces are those of
+    /// the last user. A tangent is zero unless the effect forms it (`forms_tangent`) by assignment.
     pub fn lend(&mut self, blocks: usize, forms_tangent: bool) -> ElementSystem<Lanes> {
         let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
             return ElementSystem::new(blocks);
@@ -162,12 +173,13 @@ impl Assembler<'_> {
         system
     }
 
-    /// Takes it back for the next evaluation.
+    /// Takes a lent buffer back for the next evaluation.
     pub fn take_back(&mut self, system: ElementSystem<Lanes>) {
         self.room.push(system);
     }
 
-    /// Adds instance `k`; the blocks of `element` are in the order of the slots of its clique.
+    /// Adds forces and tangent of instance `k`; the blocks of `element` are in the order of the
+    /// slots of the instance.
     #[inline]
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
         let (forces, first_slot) = (&mut *self.force, self.first_slot);
@@ -181,8 +193,9 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds the first `count` of the instances from `first` on that stand in lanes, in their order: sums do not depend on who stands
-    /// beside whom. An instance that `is_apart` is left to `alone`.
+    /// Adds the first `count` lanes of `elements`, which are the instances from `first` on, in
+    /// their order, so that sums do not depend on which instances share a vector. Instances for
+    /// which `is_apart` holds are passed to `alone` instead.
     #[inline(always)]
     pub fn add_lanes(
         &mut self,
@@ -207,7 +220,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// Whether the tangent of an instance has entries to leave out, or to turn. In a plane all have.
+    /// True if the tangent of instance `k` cannot be added tile by tile, since some of its slots
+    /// have held directions or rotated axes. In planar scenes this holds for every instance.
     #[inline(always)]
     fn is_constrained(&self, k: usize) -> bool {
         self.with_tangent && (self.places.special[k] || self.pattern.dof_map.plane().is_some())
@@ -221,7 +235,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// The same where none is constrained.
+    /// Adds some lanes of `elements` whose instances have neither held directions nor rotated axes;
+    /// lane 0 is instance `first`.
     #[inline(always)]
     fn add_free(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
         for lane in lanes.clone() {
@@ -238,7 +253,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds the tangents of elements of whole nodes, one element after the other.
+    /// Adds the tangents of some lanes whose instances couple whole nodes, one instance after the
+    /// other.
     #[inline(always)]
     fn add_whole(&mut self, first: usize, lanes: Range<usize>, elements: &ElementSystem<Lanes>) {
         for lane in lanes {
@@ -248,7 +264,9 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds instances that lie in the plane, as [`Assembler::add_lanes`] does those in space; each couples whole nodes.
+    /// Adds the first `count` lanes of planar elements, which are the instances from `first` on and
+    /// couple whole nodes. Instances for which `is_apart` holds, or whose slots have other axes
+    /// than the plane, are passed to `alone`.
     #[inline(always)]
     pub fn add_planar<const N: usize>(
         &mut self,
@@ -283,8 +301,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds an instance that couples displacements alone, by a mass matrix that is the same in all directions: its forces (global
-    /// components), and `weight` times the matrix.
+    /// Adds instance `k` of an effect that couples displacements by an isotropic mass matrix `mass`
+    /// (N x N): `forces` in global components, and `weight` times the matrix to the tangent.
     #[inline(always)]
     pub fn add_mass<const N: usize>(&mut self, k: usize, forces: &[Vec3; N], mass: &[[f64; N]; N], weight: f64) {
         let (all, first_slot) = (&mut *self.force, self.first_slot);
@@ -299,7 +317,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// The same where all directions are free, of tiles W wide.
+    /// Adds `weight` times the mass matrix of instance `k` whose directions are all free, to tiles
+    /// of width W.
     #[inline(always)]
     fn add_free_mass<const N: usize, const W: usize, const DIRECTIONS: usize>(
         &mut self,
@@ -314,7 +333,9 @@ impl Assembler<'_> {
         }
     }
 
-    /// The same where directions are held or moved: between slots with other axes it is their cosine that counts.
+    /// Adds `weight` times the mass matrix of instance `k` that has held directions or rotated
+    /// axes: entries are scaled by the cosine between the axes of the two slots, and columns of
+    /// held directions multiply the prescribed increments.
     #[cold]
     fn add_constrained_mass(&mut self, k: usize, nodes: usize, mass: &[f64], weight: f64) {
         let slots = self.places.connectivity.get(k);
@@ -342,14 +363,15 @@ impl Assembler<'_> {
         }
     }
 
-    /// Whether some slot of an instance has other axes than the plane.
+    /// True if some slot of instance `k` has local axes other than those of the plane.
     fn has_turned_axes(&self, plane: &Plane, k: usize) -> bool {
         let is_turned = |&slot: &Slot| self.pattern.dof_map.frame(slot).is_some_and(|frame| frame != *plane.axes());
         self.places.connectivity.get(k).iter().any(is_turned)
     }
 
-    /// Adds the tangent of one lane entry by entry, where directions are held or nodes may share displacements: each goes to where those
-    /// of its slots meet, or pushes with the increment that is prescribed.
+    /// Adds the tangent of one lane of a planar element entry by entry, for instances with held
+    /// directions or shared displacements. Columns of held directions multiply the prescribed
+    /// increments.
     fn add_planar_entries<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
         let (slots, places) = (self.places.connectivity.get(k), self.places.of(k));
         let unknown = |node: usize, direction: usize| {
@@ -388,8 +410,9 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds the tangent of an instance in the axes of its slots, block by block; columns of held directions push with the increments
-    /// that are prescribed instead. `pick` takes the instance's number from each entry.
+    /// Adds the tangent of instance `k` in the local axes of its slots, 3 x 3 block by block.
+    /// Columns of held directions multiply the prescribed increments. `pick` reads the number of
+    /// the instance from a tile entry.
     #[inline(always)]
     fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
         let (slots, width) = (self.places.connectivity.get(k), self.pattern.node_blocks.width());
@@ -430,7 +453,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// What is kept of the block of two slots of an instance.
+    /// Stored part of the tangent block that couples slots number `row` and `column` of instance
+    /// `k`.
     #[inline(always)]
     fn block(&mut self, k: usize, row: usize, column: usize) -> BlockMut<'_> {
         let (places, slots, node_blocks) =
@@ -445,7 +469,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds the tangent in blocks of 3 x 3; `pick` takes the instance's number from each entry.
+    /// Adds the tangent of instance `k`, without held directions, in 3 x 3 blocks; `pick` reads the
+    /// number of the instance from a tile entry.
     #[inline(always)]
     fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
         let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
@@ -458,7 +483,8 @@ impl Assembler<'_> {
         }
     }
 
-    /// Adds forces of instance `k` that damp, block by block; their tangent goes with the others.
+    /// Adds damping forces of instance `k`, one per slot (global components). Their derivatives
+    /// belong to the element tangent.
     pub fn add_damping(&mut self, k: usize, force: &[Vec3]) {
         debug_assert!(self.may_damp, "an effect that damps says so");
         for (&slot, &force) in self.places.connectivity.get(k).iter().zip(force) {

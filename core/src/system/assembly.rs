@@ -14,14 +14,15 @@ use crate::tensor::{Mat3, Vec3, zeros};
 use crate::threads;
 use std::ops::Range;
 
-/// Room to look at what solutions leave of right-hand sides: what is as long as a scene is not asked for again and again.
+/// Buffer for residuals of linear solves, kept between solves to save its allocation.
 #[derive(Default)]
 pub struct Leftover {
     residuals: Vec<f64>,
 }
 
 impl Leftover {
-    /// Of each row of a group's tile what is left, and the size that it is compared with.
+    /// Slices of the buffer by node block: the residual of each tile row, and the size it is
+    /// compared with.
     fn take<const W: usize>(&mut self, pattern: &Pattern) -> &mut [[[f64; W]; 2]] {
         let length = 2 * W * pattern.node_blocks.count();
         self.residuals.resize(self.residuals.len().max(length), 0.0);
@@ -29,68 +30,74 @@ impl Leftover {
     }
 }
 
-/// The values of a tangent on its pattern; factors may have taken the place of its tiles on the diagonal.
+/// Values of a tangent with its pattern. Factors may have overwritten the diagonal tiles.
 #[derive(Clone, Copy)]
 pub struct Matrix<'a> {
-    /// The pattern
+    /// Sparsity pattern of the values
     pub pattern: &'a Pattern,
     values: &'a [f64],
     holds_factors: bool,
 }
 
 impl<'a> Matrix<'a> {
-    /// A matrix with these values, tile by tile.
+    /// Matrix with the given values, stored by `pattern.storage`.
     pub fn new(pattern: &'a Pattern, values: &'a [f64]) -> Self {
         Self { pattern, values, holds_factors: false }
     }
 
-    /// The matrix tile by tile, each by its columns. `W` is the width of the pattern.
+    /// Tiles of the matrix, each stored by columns. `W` is the tile width of the pattern.
     pub fn tiles<const W: usize>(self) -> Tiles<'a, W> {
         debug_assert!(!self.holds_factors, "there is no tangent");
         self.pattern.storage.tiles(self.values)
     }
 
-    /// The numbers on the diagonal, of the tangent or of factors in its place, and the tiles beside it.
+    /// Values of the diagonal tiles, or of the factors that have overwritten them, and the
+    /// off-diagonal tiles.
     pub fn numbers<const W: usize>(self) -> (&'a [f64], &'a [Tile<W>]) {
         let (own, beside) = self.values.split_at(self.pattern.storage.boundary());
         (own, as_tiles(beside))
     }
 
-    /// Whether factors stand in the place of the tiles on the diagonal.
+    /// True if factors have overwritten the diagonal tiles.
     pub fn holds_factors(self) -> bool {
         self.holds_factors
     }
 }
 
-/// The forces g = f_int + f_acc - f_ext, by category and slot, and the values of the tangent J = s K + d C + m M.
+/// Nodal forces g = f_int + f_acc - f_ext by category and slot, and the values of the tangent J = s
+/// K + d C + m M.
 ///
-/// Forces are conjugate to the unknowns of the slot (global components, the chart of the state).
+/// Forces are conjugate to the unknowns of their slot (global components, in the chart of the
+/// state).
 #[derive(Clone, Debug)]
 pub struct System {
-    /// The pattern of the tangent
+    /// Sparsity pattern of the tangent
     pub pattern: Pattern,
-    /// By category and slot; nothing where nothing may add to a category
+    /// Nodal forces by category and slot; lists of categories without any effect are empty.
     pub force: [Vec<Vec3>; 4],
-    /// The numbers of those that something may add to, in all and region by region
+    /// Indices of the categories that some effect adds to, in the scene and in each region
     acting: Vec<usize>,
     acting_in: Vec<Vec<usize>>,
-    /// The values of the tangent, tile by tile: that of the last evaluation with weights, unless [factors](System::holds_factors) have taken
-    /// its place
+    /// Values of the tangent, stored by `pattern.storage`. They are those of the last evaluation
+    /// with weights, unless [factors](System::holds_factors) have overwritten them.
     pub values: Vec<f64>,
-    /// Counts how often the tangent has become another one
+    /// Number of changes of the tangent so far, by which factorisations recognise it
     pub revision: u64,
-    /// Whether factors have taken the place of its tiles on the diagonal
+    /// True if factors have overwritten the diagonal tiles.
     holds_factors: bool,
-    /// Prescribed increments of held directions, whose effect on the free equations is collected in `lifted`.
+    /// Prescribed increments of held directions, by slot (global components). The tangent times
+    /// these is summed in `lifted`, by equation.
     prescribed_increment: Vec<Vec3>,
     lifts: bool,
     lifted: Vec<f64>,
-    /// Systems of elements that stand side by side, kept between evaluations; the first of all regions, the others of each
+    /// Buffers for element forces and tangents, kept between evaluations: of the whole scene, then
+    /// of each region
     rooms: Vec<Vec<ElementSystem<Lanes>>>,
 }
 
 impl System {
-    /// A system of zeros, for internal forces and those of some categories everywhere, and for those of each effect where it acts.
+    /// A system of zeros. Internal forces and those of the categories `everywhere` act at all
+    /// slots, those of `of_effects` (one list per effect) where the effect has instances.
     pub fn new(pattern: Pattern, slots: usize, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Self {
         let acting_in = acting_in(&pattern, everywhere, of_effects);
         let acts = |category: &usize| acting_in.iter().any(|acting| acting.contains(category));
@@ -115,14 +122,15 @@ impl System {
         }
     }
 
-    /// Sets forces and tangent to zero. `prescribed_increment` holds increments of the held directions that the next correction
-    /// shall take with it.
+    /// Sets forces and tangent to zero. `prescribed_increment` holds the increments of held
+    /// directions (by slot, global components) that the next correction includes.
     pub fn clear(&mut self, prescribed_increment: Option<&[Vec3]>) {
         self.begin(true, prescribed_increment);
         self.each_part(|part| part.clear(true));
     }
 
-    /// Does something with what each region adds to, at once, or with all of the system where it is not cut.
+    /// Calls `work` on the slice of each region, in parallel, or on the whole system if it has one
+    /// region only.
     pub fn each_part(&mut self, work: impl Fn(&mut Part) + Send + Sync) {
         match self.is_cut() {
             true => threads::each(self.parts().into_iter(), |mut part| work(&mut part)),
@@ -130,7 +138,8 @@ impl System {
         }
     }
 
-    /// Begins an evaluation for which each part is still to be [cleared](Part::clear).
+    /// Begins an evaluation. The forces and the tangent of each slice are still to be
+    /// [cleared](SystemSlice::clear).
     pub fn begin(&mut self, with_tangent: bool, prescribed_increment: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
         self.holds_factors &= !with_tangent;
@@ -144,60 +153,61 @@ impl System {
         }
     }
 
-    /// The force of a category at a slot.
+    /// Force of a category at a slot (global components); zero if the category does not act.
     #[inline]
     pub fn part_of(&self, category: Category, slot: usize) -> Vec3 {
         self.force[category as usize].get(slot).copied().unwrap_or(Vec3::ZERO)
     }
 
-    /// The sum of the forces at a slot.
+    /// Sum of the forces of all categories at a slot (global components).
     #[inline]
     pub fn total(&self, slot: usize) -> Vec3 {
         self.acting.iter().fold(Vec3::ZERO, |sum, &category| sum + self.force[category][slot])
     }
 
-    /// Forces of the categories that something may add to in a region.
+    /// Forces, indexed by slot of the scene, of the categories that act in a region.
     #[inline]
     pub fn acting_in(&self, region: &Region) -> impl Iterator<Item = &[Vec3]> {
         self.acting_in[region.number].iter().map(|&category| &self.force[category][..])
     }
 
-    /// Sets forces to zero for a new evaluation, without prescribed increments; the tangent is left as it is.
+    /// Sets forces to zero for a new evaluation without prescribed increments. The tangent is kept.
     pub fn clear_forces(&mut self) {
         self.begin(false, None);
         self.each_part(|part| part.clear(false));
     }
 
-    /// Drops all forces and keeps the tangent.
+    /// Sets all forces to zero without beginning an evaluation. The tangent is kept.
     pub fn forget_forces(&mut self) {
         self.force.iter_mut().for_each(|f| f.fill(Vec3::ZERO));
     }
 
-    /// Puts a force in the place of all that stand at a slot.
+    /// Replaces the forces of all categories at a slot by one internal force (global components).
     pub fn replace_force(&mut self, slot: Slot, force: Vec3) {
         self.acting.iter().for_each(|&category| self.force[category][slot as usize] = Vec3::ZERO);
         self.force[Category::Internal as usize][slot as usize] = force;
     }
 
-    /// The tangent, or what has taken its place.
+    /// The tangent, or the factors that have overwritten its diagonal tiles.
     pub fn matrix(&self) -> Matrix<'_> {
         Matrix { pattern: &self.pattern, values: &self.values, holds_factors: self.holds_factors }
     }
 
-    /// Whether factors stand in the place of the tiles on the diagonal. Until the next evaluation with weights there is no tangent then.
+    /// True if factors have overwritten the diagonal tiles. The tangent is then undefined until the
+    /// next evaluation with weights.
     pub fn holds_factors(&self) -> bool {
         self.holds_factors
     }
 
-    /// Gives the numbers of the tiles on the diagonal away: their place is that of factors from here on. Beside them, the tiles beside the
-    /// diagonal.
+    /// Gives the storage of the diagonal tiles to a factorisation, together with the off-diagonal
+    /// tiles to read. The tangent is undefined from here on.
     pub fn give_to_factors<const W: usize>(&mut self) -> (&mut [f64], &[Tile<W>]) {
         self.holds_factors = true;
         let (own, beside) = self.values.split_at_mut(self.pattern.storage.boundary());
         (own, as_tiles(beside))
     }
 
-    /// What a slot has of the tangent on its diagonal, in its own directions; zero where one is held.
+    /// The 3 x 3 diagonal block of a slot in its local axes, with zeros for held directions.
     pub fn own_block(&self, slot: Slot) -> Mat3 {
         debug_assert!(!self.holds_factors, "there is no tangent");
         let mut block = Mat3::ZERO;
@@ -205,10 +215,11 @@ impl System {
         block
     }
 
-    /// Adds a symmetric block to that, in the directions that are not held.
+    /// Adds a symmetric 3 x 3 block (local axes of the slot) to the diagonal block of a slot, in
+    /// its free directions.
     pub fn add_to_own_block(&mut self, slot: Slot, block: &Mat3) {
         debug_assert!(!self.holds_factors, "there is no tangent");
-        // Where one half is kept, entries share their place with their mirror images.
+        // In symmetric storage an entry shares its position with its mirror image.
         let once = self.pattern.symmetry == Symmetry::Whole;
         for ([r, c], place) in self.pattern.own_entries(slot).filter(|([r, c], _)| r <= c || !once) {
             self.values[place] += block.0[r][c];
@@ -216,7 +227,7 @@ impl System {
         self.revision += 1;
     }
 
-    /// A x, for a matrix with these values on the pattern of the tangent.
+    /// Product A x of a matrix with the given values on this pattern and a vector by equation.
     pub fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
         let mut out = x.to_vec();
         match self.pattern.width() {
@@ -242,8 +253,9 @@ impl System {
         self.pattern.join(|group| &sums[group], x);
     }
 
-    /// Shows each tile with what belongs to the group of its rows, and the part of x that its columns take: regions at once. Tiles that
-    /// are not kept are shown, too.
+    /// Calls `show` with each tile, the item of the node block of its rows, and the entries of x of
+    /// its columns. Regions are processed in parallel. Tiles known only as transposes of stored
+    /// ones are shown, too.
     fn each_product<const W: usize, K: Send>(
         &self,
         values: &[f64],
@@ -293,7 +305,8 @@ impl System {
         }
     }
 
-    /// Shows each tile that is kept in some columns with the groups of its rows and of its columns.
+    /// Calls `show` with row, column (node blocks) and value of each stored tile in the given
+    /// columns.
     #[inline(always)]
     pub fn each_tile<const W: usize>(&self, columns: Range<usize>, mut show: impl FnMut(usize, usize, &Tile<W>)) {
         let tiles = self.matrix().tiles();
@@ -310,7 +323,8 @@ impl System {
         }
     }
 
-    /// The largest component of b - A x over what round-off in A, x and b may leave there: |A| |x| + |b|, row by row.
+    /// Largest backward error of a solution x of A x = b: max over the rows of |b - A x|_i / (|A|
+    /// |x| + |b|)_i. The residual stays in `room`.
     pub fn residual(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
         if self.pattern.width() == WIDTH {
             self.residual_of::<WIDTH>(b, x, room)
@@ -344,13 +358,13 @@ impl System {
                 }
             },
         );
-        // Numbers that small have lost digits of their own.
+        // Sizes below 1e-280 may consist of subnormal numbers, which have fewer digits.
         let ratio = |(r, size): (&f64, &f64)| r.abs() / size.max(1e-280);
         let of_part = |[part, sizes]: &[[f64; W]; 2]| part.iter().zip(sizes).map(ratio).fold(0.0, f64::max);
         threads::largest(residuals.len(), |own| residuals[own].iter().map(of_part).fold(0.0, f64::max))
     }
 
-    /// The b - A x that was looked at last.
+    /// Writes the residual b - A x of the last call of [`System::residual`] to `out`, by equation.
     pub fn last_residual(&self, room: &Leftover, out: &mut [f64]) {
         if self.pattern.width() == WIDTH { self.join::<WIDTH>(room, out) } else { self.join::<3>(room, out) }
     }
@@ -360,14 +374,15 @@ impl System {
         self.pattern.join(|group| &residuals[2 * group], out);
     }
 
-    /// The right-hand side of the correction: -g - J du on the free equations.
+    /// Right-hand side of the linear system of a correction: -g - J du_prescribed, by free
+    /// equation.
     pub fn right_hand_side(&self, out: &mut [f64]) {
         let total =
             |region: &Region, slot: usize| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot]);
         self.fill_right_hand_side(total, out);
     }
 
-    /// The part of a group of that, row by row.
+    /// Right-hand side -g - J du_prescribed of one node block, by tile row.
     #[inline(always)]
     pub fn right_hand_side_at<const W: usize>(&self, group: usize) -> [f64; W] {
         let Pattern { dof_map, node_blocks, .. } = &self.pattern;
@@ -396,17 +411,19 @@ impl System {
         self.pattern.spread(group, own)
     }
 
-    /// The increments of held directions that the next correction takes with it.
+    /// Increments of held directions (by slot, global components) that the next correction
+    /// includes.
     pub fn prescribed_increment(&self) -> Option<&[Vec3]> {
         self.lifts.then_some(&self.prescribed_increment)
     }
 
-    /// The same for other forces than those that were assembled.
+    /// Right-hand side -f - J du_prescribed for given forces f by slot (global components).
     pub fn right_hand_side_of(&self, force: &[Vec3], out: &mut [f64]) {
         self.fill_right_hand_side(|_, slot| force[slot], out);
     }
 
-    /// The same again, without what prescribed increments bring.
+    /// Right-hand side -f for given forces f by slot (global components), without prescribed
+    /// increments.
     pub fn right_hand_side_without_lift(&self, force: &[Vec3], out: &mut [f64]) {
         self.right_hand_side_of(force, out);
         out.iter_mut().zip(&self.lifted).for_each(|(out, lifted)| *out += lifted);
@@ -426,12 +443,12 @@ impl System {
         });
     }
 
-    /// Whether it has regions that can be evaluated at once.
+    /// True if the scene has several regions, which are evaluated in parallel.
     pub fn is_cut(&self) -> bool {
         self.pattern.regions.len() > 1
     }
 
-    /// What each region adds to.
+    /// The slices of all regions, which are disjoint.
     fn parts(&mut self) -> Vec<Part<'_>> {
         let Self { pattern, acting_in, force, values, prescribed_increment, lifts, lifted, rooms, .. } = self;
         let regions = &pattern.regions;
@@ -442,7 +459,7 @@ impl System {
         let (own, beside) = values.split_at_mut(storage.boundary());
         let own = threads::split(own, regions.iter().map(|region| places(region)[0].end));
         let beside = threads::split(beside, regions.iter().map(|region| places(region)[1].end - storage.boundary()));
-        // Where nothing connects nodes nothing stands beside the diagonal.
+        // Without coupled nodes the list of off-diagonal tiles is empty.
         let (mut own, mut beside) = (own.into_iter(), beside.into_iter());
         let values = regions.iter().map(|region| {
             let lists = [&mut own, &mut beside].map(|list| list.next().unwrap_or_default());
@@ -463,7 +480,7 @@ impl System {
         stretches.map(part).collect()
     }
 
-    /// What everything between regions adds to.
+    /// The slice that consists of the whole system, for instances that lie in no single region.
     pub fn whole(&mut self) -> Part<'_> {
         Part {
             pattern: &self.pattern,
@@ -477,14 +494,14 @@ impl System {
         }
     }
 
-    /// The sink of all instances of effect number `effect`.
+    /// Assembler of all instances of effect number `effect`.
     pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool) -> Assembler<'_> {
         let all = 0..self.pattern.places[effect].connectivity.len();
         self.whole().into_sink(effect, category, with_tangent, all)
     }
 }
 
-/// The categories of force in each region.
+/// Indices of the acting force categories, by region.
 fn acting_in(pattern: &Pattern, everywhere: &[Category], of_effects: &[Vec<Category>]) -> Vec<Vec<usize>> {
     let first = Category::ALL.map(|category| category == Category::Internal || everywhere.contains(&category));
     let mut acts = vec![first; pattern.regions.len()];

@@ -1,19 +1,20 @@
-//! The categories that forces are summed in.
+//! Categories of nodal forces.
 
-/// Categories of forces, which the stop test of Newton and the energy account look at apart.
+/// Categories of forces, which the stop test of Newton's iteration and the energy account treat
+/// separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Category {
-    /// Stress resultants and springs
+    /// Forces of stress resultants and springs
     Internal,
-    /// Mass times acceleration, in all its forms
+    /// Inertia forces, mass times acceleration in all forms
     Inertia,
-    /// Loads, entered with the opposite sign
+    /// Loads, added with the opposite sign
     External,
-    /// What takes energy away with velocities
+    /// Dissipative forces, functions of velocities
     Damping,
 }
 
 impl Category {
-    /// All of them, in the order of their numbers.
+    /// All categories, in the order of their indices.
     pub const ALL: [Self; 4] = [Self::Internal, Self::Inertia, Self::External, Self::Damping];
 }

@@ -1,9 +1,9 @@
-//! Which slots meet in the instances of an effect.
+//! Connectivity: the slots that each instance of an effect couples.
 
 use super::runs::Runs;
 use super::state::Slot;
 
-/// The slots that meet in each instance of an effect: one clique an element.
+/// The slots that each instance of an effect couples, one list per element, spring or joint.
 #[derive(Clone, Debug, Default)]
 pub struct Connectivity {
     slots: Vec<Slot>,
@@ -12,13 +12,14 @@ pub struct Connectivity {
 }
 
 impl Connectivity {
-    /// Of an effect that adds no others than the [instances that a sink takes](super::Assembler::instances), so that regions of a large scene
-    /// can be evaluated at once.
+    /// Connectivity of an effect that adds only the [instances its assembler asks
+    /// for](super::Assembler::instances), so that the regions of a large scene can be evaluated in
+    /// parallel.
     pub fn divisible() -> Self {
         Self { divisible: true, ..Self::default() }
     }
 
-    /// Adds an instance that couples these slots, in the order of its blocks.
+    /// Adds an instance that couples `slots`, in the order of its element blocks.
     pub fn push(&mut self, slots: impl IntoIterator<Item = Slot>) {
         let before = self.slots.len();
         self.slots.extend(slots);
@@ -30,23 +31,23 @@ impl Connectivity {
         self.instances.shrink_to_fit();
     }
 
-    /// The number of instances.
+    /// Number of instances.
     pub fn len(&self) -> usize {
         self.instances.len()
     }
 
-    /// Whether there is no instance.
+    /// True without instances.
     pub fn is_empty(&self) -> bool {
         self.instances.is_empty()
     }
 
-    /// The slots of an instance.
+    /// Slots of instance `k`.
     #[inline]
     pub fn get(&self, k: usize) -> &[Slot] {
         &self.slots[self.instances.get(k)]
     }
 
-    /// All instances.
+    /// The slots of each instance, in order.
     pub fn iter(&self) -> impl Iterator<Item = &[Slot]> {
         (0..self.len()).map(|k| self.get(k))
     }

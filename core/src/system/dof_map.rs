@@ -1,4 +1,4 @@
-//! Which unknowns are free: the numbering of the equations, and turned axes at constrained slots.
+//! Degrees of freedom: the numbers of the free equations, and the local axes of constrained slots.
 
 use super::node_blocks::Layout;
 use super::plane::Plane;
@@ -6,46 +6,50 @@ use super::state::Slot;
 use crate::tensor::{Mat3, Vec3};
 use crate::threads;
 
-/// Unit vectors whose inner product is nearer to 1 are one axis, nearer to 0 orthogonal: the fewest digits that a deck may give axes with.
+/// Unit vectors are parallel if their inner product differs from ±1 by less than this, and
+/// orthogonal if it is smaller than this. Decks must give axes to nine digits.
 const SAME_AXIS: f64 = 1e-9;
 
-/// An axis that is nearer to a global one, by its cosine, is it but for round-off.
+/// An axis is a global one if the magnitude of their inner product differs from 1 by less than
+/// this, the round-off of normalisation.
 const GLOBAL_AXIS: f64 = 1e-15;
 
-/// A direction of a slot that is not free: its value is held or prescribed.
+/// A constrained direction of a slot, whose value is zero or prescribed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
-    /// The slot
+    /// Constrained slot
     pub slot: Slot,
-    /// A unit vector, global components
+    /// Unit vector (global components)
     pub axis: Vec3,
 }
 
-/// Two constraints on one slot whose directions are neither the same nor orthogonal.
+/// Error: two constraints on one slot whose directions are neither parallel nor orthogonal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameConflict {
-    /// The slot
+    /// Slot of the two constraints
     pub slot: Slot,
 }
 
-/// The number of no frame.
+/// Frame number of slots whose local axes are the global ones.
 const GLOBAL: u32 = u32::MAX;
 
-/// The numbers of the free equations, slot by slot.
+/// The numbers of the free equations, slot by slot, and the local axes in which directions are free
+/// or held.
 #[derive(Clone, Debug)]
 pub struct DofMap {
-    /// The number of the first equation of each slot, and behind the last slot that of all
+    /// First equation of each slot; the last item is the number of all equations
     first: Vec<u32>,
-    /// What is free at each slot
+    /// Free directions of each slot
     freedom: Vec<Freedom>,
-    /// For each slot the number of its frame, or `GLOBAL` where its local directions are the global ones; nothing where no slot has one
+    /// Index into `frames` for each slot, or [`GLOBAL_FRAME`]; empty if all slots have global axes
     frame: Vec<u32>,
-    /// Local directions as columns
+    /// Local axes as columns (global components)
     frames: Vec<Mat3>,
     plane: Option<Plane>,
 }
 
-/// The local directions of a slot that are free, a bit each, and a fourth where one is held that does not leave the plane anyway.
+/// Free local directions of a slot, one bit each. A fourth bit tells that a constraint other than
+/// the plane of the scene holds a direction.
 #[derive(Clone, Copy, Debug)]
 struct Freedom(u8);
 
@@ -55,13 +59,13 @@ impl Freedom {
         Self(a | b << 1 | c << 2 | u8::from(constrained) << 3)
     }
 
-    /// Whether a direction is free, as a number.
+    /// 1 if local direction k is free, else 0.
     #[inline(always)]
     fn of(self, k: u32) -> u32 {
         u32::from(self.0 >> k) & 1
     }
 
-    /// Whether all directions are free.
+    /// True if all three directions are free and no constraint holds the slot.
     #[inline(always)]
     fn is_whole(self) -> bool {
         self.0 == 0b111
@@ -77,10 +81,11 @@ impl Freedom {
 }
 
 impl DofMap {
-    /// The number of a direction that is no equation.
+    /// Equation number of held directions.
     pub const HELD: u32 = u32::MAX;
 
-    /// Numbers the free directions of `slots` slots, slot by slot.
+    /// Degrees of freedom of a spatial scene. `Err` if two held directions of a slot are neither
+    /// parallel nor orthogonal.
     pub fn new(slots: usize, held: &[Direction]) -> Result<Self, FrameConflict> {
         let mut out = Self::empty(slots, None);
         for (slot, known) in by_slot(slots, held)?.iter().enumerate() {
@@ -90,8 +95,9 @@ impl DofMap {
         Ok(out)
     }
 
-    /// The same in a plane: displacements stay in it, and rotation vectors, where a slot `turns`, along its normal, the third local
-    /// direction of every slot.
+    /// Degrees of freedom of a planar scene. Displacements stay in the plane; rotation vectors (of
+    /// slots for which `turns` holds) stay parallel to its normal, which is the third local axis of
+    /// every slot. `Err` if two held directions of a slot are neither parallel nor orthogonal.
     pub fn planar(
         slots: usize,
         held: &[Direction],
@@ -101,7 +107,8 @@ impl DofMap {
         let (normal, own) = (plane.normal(), (!plane.is_global()).then_some(*plane.axes()));
         let mut out = Self::empty(slots, Some(plane));
         for (slot, known) in by_slot(slots, held)?.iter().enumerate() {
-            // What leaves the plane is held by the plane.
+            // Only the component in the free space of the slot counts: the plane itself holds the
+            // rest.
             let along = |axis: &Vec3| normal * normal.dot(*axis);
             let inside = |axis: &Vec3| if turns(slot as Slot) { along(axis) } else { *axis - along(axis) };
             let known = spanned(known.iter().map(inside));
@@ -130,7 +137,7 @@ impl DofMap {
         let freedom = Freedom::new(is_held, constrained);
         self.first.push(self.first[slot] + freedom.count());
         self.freedom.push(freedom);
-        // Slots of one plane all have the same.
+        // Consecutive slots with equal axes share one frame.
         if let Some(frame) = frame.filter(|frame| self.frames.last() != Some(frame)) {
             self.frames.push(frame);
         }
@@ -140,29 +147,29 @@ impl DofMap {
         }
     }
 
-    /// Which rows of a tile they are.
+    /// Layout of tile rows: planar or spatial.
     pub fn layout(&self) -> Layout {
         if self.plane.is_some() { Layout::Planar } else { Layout::Spatial }
     }
 
-    /// The plane that everything stays in, if there is one.
+    /// Plane of a planar scene.
     #[inline]
     pub fn plane(&self) -> Option<&Plane> {
         self.plane.as_ref()
     }
 
-    /// The number of equations.
+    /// Number of equations.
     pub fn count(&self) -> usize {
         self.before(self.freedom.len())
     }
 
-    /// The number of equations of the slots before this one.
+    /// Number of equations of all slots before `slot`.
     #[inline(always)]
     pub fn before(&self, slot: usize) -> usize {
         self.first[slot] as usize
     }
 
-    /// The equations of a slot, by local direction.
+    /// Equation numbers of a slot by local direction, [`DofMap::HELD`] for held directions.
     #[inline]
     pub fn of(&self, slot: Slot) -> [u32; 3] {
         let (first, freedom) = (self.first[slot as usize], self.freedom[slot as usize]);
@@ -173,34 +180,36 @@ impl DofMap {
         [number(0, 0), number(1, freedom.of(0)), number(2, freedom.of(0) + freedom.of(1))]
     }
 
-    /// The slot of an equation.
+    /// Slot of an equation.
     fn slot_of(&self, equation: usize) -> usize {
         self.first.partition_point(|&first| first as usize <= equation) - 1
     }
 
-    /// The slot and the local direction of an equation.
+    /// Slot and local direction (0 to 2) of an equation.
     pub fn origin(&self, equation: usize) -> (Slot, u8) {
         let slot = self.slot_of(equation);
         let directions = self.of(slot as Slot).into_iter().take_while(|&number| number as usize != equation);
         (slot as Slot, directions.count() as u8)
     }
 
-    /// Whether the equations of some slots that follow each other are their components.
+    /// True if the equations of consecutive slots are exactly their three global components each.
     #[inline(always)]
     pub fn are_components(&self, slots: std::ops::Range<Slot>) -> bool {
         let count = self.before(slots.end as usize) - self.before(slots.start as usize);
         self.frame.is_empty() && count == 3 * slots.len()
     }
 
-    /// Whether the equations of some slots are those of a node in a plane that nothing else holds, which would stand as a fourth bit: two local
-    /// components of the first, and the third of the second.
+    /// True if two consecutive slots are displacement and rotation of a planar node without other
+    /// constraints: the equations are the first two local components of the first slot and the
+    /// third of the second.
     #[inline(always)]
     pub fn are_planar(&self, slots: std::ops::Range<Slot>) -> bool {
         let freedom = self.freedom.get(slots.start as usize..slots.end as usize);
         matches!(freedom, Some([Freedom(0b011), Freedom(0b100)]))
     }
 
-    /// The turned axes of a slot as columns.
+    /// Rotated local axes of a slot as columns (global components); `None` if they are the global
+    /// ones.
     #[inline]
     pub fn frame(&self, slot: Slot) -> Option<Mat3> {
         self.axes(slot).copied()
@@ -211,29 +220,31 @@ impl DofMap {
         self.frames.get(*self.frame.get(slot as usize)? as usize)
     }
 
-    /// The slot and the direction (global components) of an equation.
+    /// Slot and axis (global components) of an equation.
     pub fn direction(&self, equation: usize) -> Direction {
         let (slot, k) = self.origin(equation);
         let axis = self.frame(slot).map_or(Vec3::UNIT[k as usize], |frame| frame.column(k as usize));
         Direction { slot, axis }
     }
 
-    /// Picks the free entries of what stands at each slot.
+    /// Writes the free components of a field of slots (global components) to `out`, by equation.
     pub fn gather(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
         self.each_entry(|slot| self.to_local(slot as Slot, field(slot)), out, |_, out, entry| *out = entry);
     }
 
-    /// The same less what the entries were before.
+    /// Replaces each entry of `out` by the free component of a field of slots (global components)
+    /// minus the entry.
     pub fn gather_change(&self, field: impl Fn(usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
         self.each_entry(|slot| self.to_local(slot as Slot, field(slot)), out, |_, out, entry| *out = entry - *out);
     }
 
-    /// Gives each entry what its slot has.
+    /// Writes the value of its slot to each equation.
     pub fn fill(&self, own: impl Fn(usize) -> f64 + Send + Sync, out: &mut [f64]) {
         self.each_entry(|_| Vec3::ZERO, out, |slot, out, _| *out = own(slot));
     }
 
-    /// Shows for each equation its slot, what is kept for it, and its entry of what stands at the slot in local directions.
+    /// Calls `show` for each equation with its slot, its item in `list`, and its component of the
+    /// local vector of the slot. Parts of the list are processed in parallel.
     #[inline(always)]
     fn each_entry<T: Send>(
         &self,
@@ -252,7 +263,8 @@ impl DofMap {
         });
     }
 
-    /// The same for one slot, with what is kept for the equations from `start` on.
+    /// Calls `show` for each free component of the local vector of one slot, with its item in
+    /// `list`, which begins with equation `start`.
     #[inline(always)]
     pub fn each_of<T>(
         &self,
@@ -267,14 +279,15 @@ impl DofMap {
             return [x, y, z].into_iter().zip(local.0).for_each(|(kept, entry)| show(kept, entry));
         }
         for (number, entry) in self.of(slot as Slot).into_iter().zip(local.0) {
-            // What is held has the number of no equation.
+            // Held directions have the number of no equation.
             if let Some(kept) = list.get_mut((number as usize).wrapping_sub(start)) {
                 show(kept, entry);
             }
         }
     }
 
-    /// Writes the solution into a field of slots; held directions take their part of `held`.
+    /// Writes a solution by equation to a field of slots (global components). Held directions take
+    /// the components of `held` (global components), or zero.
     pub fn scatter(&self, solution: &[f64], held: Option<&[Vec3]>, out: &mut [Vec3]) {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
@@ -284,7 +297,8 @@ impl DofMap {
         });
     }
 
-    /// The same where the solution is found by equation, and nothing is held that moves.
+    /// Writes a solution, read by equation from a function, to a field of slots (global
+    /// components). Held directions become zero.
     pub fn scatter_found(&self, solution: impl Fn(usize) -> f64 + Send + Sync, out: &mut [Vec3]) {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
@@ -295,7 +309,8 @@ impl DofMap {
         });
     }
 
-    /// What stands at a slot, of a solution from the equation `start` on.
+    /// Vector at a slot (global components), from solution entries of which the first is that of
+    /// equation `start`. Held directions take the components of `held`, or zero.
     #[inline(always)]
     pub fn at(&self, slot: usize, solution: &[f64], start: usize, held: Option<&[Vec3]>) -> Vec3 {
         let mut local = held.map_or(Vec3::ZERO, |held| self.to_local(slot as Slot, held[slot]));
@@ -303,7 +318,7 @@ impl DofMap {
             Some(&[x, y, z]) => local = Vec3([x, y, z]),
             _ => {
                 for (local, number) in local.0.iter_mut().zip(self.of(slot as Slot)) {
-                    // What is held has the number of no equation.
+                    // Held directions have the number of no equation.
                     *local = solution.get((number as usize).wrapping_sub(start)).copied().unwrap_or(*local);
                 }
             }
@@ -311,13 +326,13 @@ impl DofMap {
         self.to_global(slot as Slot, local)
     }
 
-    /// Whether no direction of a slot is held but those that leave the plane.
+    /// True if no constraint other than the plane of the scene holds the slot.
     #[inline]
     pub fn is_plain(&self, slot: Slot) -> bool {
         !self.freedom[slot as usize].is_constrained()
     }
 
-    /// The held part of a value at a slot.
+    /// Projection of a vector at a slot onto its held directions (global components).
     pub fn held_part(&self, slot: Slot, value: Vec3) -> Vec3 {
         let mut local = self.to_local(slot, value);
         for (local, number) in local.0.iter_mut().zip(self.of(slot)) {
@@ -328,20 +343,21 @@ impl DofMap {
         self.frame(slot).map_or(local, |frame| frame * local)
     }
 
-    /// What has these components in the local directions of a slot.
+    /// Global components of a vector given in the local axes of a slot.
     #[inline(always)]
     pub fn to_global(&self, slot: Slot, local: Vec3) -> Vec3 {
         self.axes(slot).map_or(local, |frame| *frame * local)
     }
 
-    /// Components in the local directions of a slot.
+    /// Components in the local axes of a slot of a vector given in global components.
     #[inline(always)]
     pub fn to_local(&self, slot: Slot, value: Vec3) -> Vec3 {
         self.axes(slot).map_or(value, |frame| frame.transpose_mul(value))
     }
 }
 
-/// The held axes of each slot, of each direction once.
+/// Held axes of each slot without duplicates. `Err` if two of them are neither parallel nor
+/// orthogonal.
 fn by_slot(slots: usize, held: &[Direction]) -> Result<Vec<Vec<Vec3>>, FrameConflict> {
     let mut axes: Vec<Vec<Vec3>> = vec![Vec::new(); slots];
     for direction in held {
@@ -359,7 +375,7 @@ fn by_slot(slots: usize, held: &[Direction]) -> Result<Vec<Vec<Vec3>>, FrameConf
     Ok(axes)
 }
 
-/// Orthogonal unit vectors that span the same.
+/// Orthonormal basis of the span of some vectors (Gram-Schmidt).
 fn spanned(vectors: impl Iterator<Item = Vec3>) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = Vec::new();
     for vector in vectors {
@@ -369,12 +385,13 @@ fn spanned(vectors: impl Iterator<Item = Vec3>) -> Vec<Vec3> {
     out
 }
 
-/// Whether an axis is the k-th of a plane.
+/// True if `axis` is parallel to local axis k of the plane.
 fn is_axis(plane: &Plane, k: usize, axis: Vec3) -> bool {
     plane.axes().column(k).dot(axis).abs() > 1.0 - GLOBAL_AXIS
 }
 
-/// Completes held directions to three; no frame where all of them are global axes.
+/// Local axes whose first columns are the held directions, and which of them are held; no frame is
+/// needed if all held directions are global axes.
 fn local_axes(held: &[Vec3]) -> (Option<Mat3>, [bool; 3]) {
     let global =
         held.iter().map(|axis| (0..3).find(|&k| axis.0[k].abs() > 1.0 - GLOBAL_AXIS)).collect::<Option<Vec<_>>>();

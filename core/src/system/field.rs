@@ -1,26 +1,27 @@
-//! One 3-vector a slot, kept once by all states that have the same.
+//! A 3-vector per slot, shared by all states that have equal values.
 
 use crate::tensor::{Vec3, zeros};
 use crate::threads;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-/// A vector a slot. Clones are one until one of them is changed: where nothing moves, all rates of all states are one list of zeros.
+/// A 3-vector per slot with copy-on-write storage: in statics the rates of all states share one
+/// list of zeros.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field(Arc<Vec<Vec3>>);
 
 impl Field {
-    /// Zero at so many slots.
+    /// Field of zeros at `slots` slots.
     pub fn zero(slots: usize) -> Self {
         Self(Arc::new(zeros(slots)))
     }
 
-    /// At no slot: nothing is kept.
+    /// Empty field, of no slot.
     pub fn none() -> Self {
         Self::zero(0)
     }
 
-    /// Puts a value at a slot, where another one stands there.
+    /// Sets the value of a slot. Storage is copied only if the value differs.
     #[inline]
     pub fn put(&mut self, slot: usize, value: Vec3) {
         if self[slot] != value {
@@ -28,7 +29,8 @@ impl Field {
         }
     }
 
-    /// Takes over another one, into memory of its own where it has some.
+    /// Takes over the values of another field, into the memory of this one if no other field shares
+    /// it.
     pub fn copy_from(&mut self, other: &Self) {
         if Arc::ptr_eq(&self.0, &other.0) {
             return;
@@ -50,7 +52,7 @@ impl Deref for Field {
 }
 
 impl DerefMut for Field {
-    /// Looks whether others have it, too: who changes many slots asks once.
+    /// Copies the storage if another field shares it. Callers that change many slots borrow once.
     #[inline]
     fn deref_mut(&mut self) -> &mut [Vec3] {
         Arc::make_mut(&mut self.0).as_mut_slice()
@@ -68,7 +70,7 @@ mod tests {
         assert!(Arc::ptr_eq(&field.0, &other.0));
         other[1] = Vec3::UNIT[0];
         assert_eq!((field[1], other[1]), (Vec3::ZERO, Vec3::UNIT[0]));
-        // What is a field's own stays its own.
+        // Unshared storage is overwritten in place.
         let place = field.0.as_ptr();
         field.copy_from(&other);
         assert_eq!((field.0.as_ptr(), &field), (place, &other));

@@ -1,4 +1,5 @@
-//! What effects read and write: the state, the equations, the sparsity pattern, forces and tangent.
+//! Data that effects read and write: the state, the degrees of freedom, the sparsity pattern, nodal
+//! forces and the tangent.
 
 mod assembler;
 mod assembly;

@@ -1,25 +1,26 @@
-//! Which slots share a tile of the tangent, the displacement and the rotation of a node, and which rows of it are theirs.
+//! Node blocks: the displacement and the rotation of a node share a block row of the tangent, and a
+//! tile per coupled node.
 
 use super::state::Slot;
 use std::ops::Range;
 
-/// Slots in a tile.
+/// Largest number of slots in a node block.
 pub const SLOTS: usize = 2;
 
-/// The slots of a scene in groups of one or two.
+/// The slots of a scene in node blocks of one or two.
 #[derive(Clone, Debug)]
 pub struct NodeBlocks {
     slots: usize,
-    /// Where not all groups are pairs
+    /// Lists by slot; `None` if every node block has two slots
     uneven: Option<Uneven>,
     layout: Layout,
 }
 
 #[derive(Clone, Debug)]
 struct Uneven {
-    /// For each slot its group, twice, and its place in it
+    /// For each slot `SLOTS` times its node block plus its position in it
     places: Vec<u32>,
-    /// The first slot of each group, and behind the last group the number of all
+    /// First slot of each node block; the last item is the number of all slots
     starts: Vec<Slot>,
 }
 
@@ -40,17 +41,19 @@ impl Uneven {
     }
 }
 
-/// Which rows of a tile belong to the directions of its slots.
+/// Rows of a tile by slot and direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// Three for each slot
+    /// Three rows for each slot
     Spatial,
-    /// Three in all: displacements keep to the first two directions of their slot, rotation vectors to the third.
+    /// Three rows for a node: displacements use the first two local directions of their slot,
+    /// rotation vectors the third.
     Planar,
 }
 
 impl NodeBlocks {
-    /// Of so many slots; `joins` tells which of them share the group of the one before.
+    /// Node blocks of `slots` slots; `joins` is true for slots that share the node block of the
+    /// slot before.
     pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
         let second = |slot: Slot| !slot.is_multiple_of(SLOTS as Slot);
         let are_pairs =
@@ -58,23 +61,24 @@ impl NodeBlocks {
         Self { slots, uneven: (!are_pairs).then(|| Uneven::new(slots, joins)), layout }
     }
 
-    /// The number of groups.
+    /// Number of node blocks.
     pub fn count(&self) -> usize {
         self.uneven.as_ref().map_or(self.slots / SLOTS, |uneven| uneven.starts.len() - 1)
     }
 
-    /// The number of slots.
+    /// Number of slots.
     pub fn slots(&self) -> usize {
         self.slots
     }
 
-    /// The first slot of a group; those of its others and of later groups follow. Behind the last group the number of all.
+    /// First slot of a node block; for `count()` the number of all slots. The slots of a node block
+    /// are consecutive.
     #[inline]
     pub fn first_slot(&self, group: usize) -> usize {
         self.uneven.as_ref().map_or(SLOTS * group, |uneven| uneven.starts[group] as usize)
     }
 
-    /// The rows of a tile.
+    /// Rows of a tile.
     pub fn width(&self) -> usize {
         match self.layout {
             Layout::Spatial => 3 * SLOTS,
@@ -82,7 +86,7 @@ impl NodeBlocks {
         }
     }
 
-    /// The group of a slot, and the row of its first direction in the group's tiles.
+    /// Node block of a slot, and the tile row of its first direction.
     #[inline]
     pub fn row(&self, slot: Slot) -> (usize, usize) {
         let (group, place) = self.of(slot);
@@ -92,14 +96,14 @@ impl NodeBlocks {
         }
     }
 
-    /// The group of a slot, and its place in it.
+    /// Node block of a slot, and its position in it (0 or 1).
     #[inline]
     pub fn of(&self, slot: Slot) -> (usize, usize) {
         let place = self.uneven.as_ref().map_or(slot, |uneven| uneven.places[slot as usize]) as usize;
         (place / SLOTS, place % SLOTS)
     }
 
-    /// The slots of a group.
+    /// Slots of a node block.
     #[inline]
     pub fn members(&self, group: usize) -> Range<Slot> {
         self.first_slot(group) as Slot..self.first_slot(group + 1) as Slot

@@ -1,4 +1,5 @@
-//! The sparsity pattern of the tangent in tiles, and for each element the places its blocks go to, worked out once.
+//! Sparsity pattern of the tangent in tiles, and for each element the positions its blocks are
+//! added to, computed once.
 
 use super::connectivity::Connectivity;
 use super::dof_map::DofMap;
@@ -13,20 +14,20 @@ use crate::threads;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// A tile of the tangent is one of an element's tangent, but in a plane.
+/// Tiles of spatial tangents have the size of element tiles.
 const _: () = assert!(WIDTH == 3 * SLOTS);
 
-/// Where the blocks of one effect's instances go.
+/// Positions in the tangent of the element blocks of one effect.
 #[derive(Clone, Debug)]
 pub(super) struct ScatterMap {
     pub connectivity: Connectivity,
-    /// Whether each instance couples whole nodes, whose tiles it adds to in one go
+    /// True if every instance couples whole nodes, so that it adds whole tiles.
     pub whole: bool,
-    /// By instance and then by rows of blocks: where a block is added to, or [`NOT_KEPT`]. Blocks are those of whole nodes, or else
-    /// those of slots.
+    /// Position of each block by instance, then by block row, or [`NOT_KEPT`]. Blocks are tiles if
+    /// `whole`, else 3 x 3 blocks of two slots.
     pub values: Vec<u32>,
     of_instances: Runs,
-    /// Instances that touch a held direction or turned axes.
+    /// True for instances with a held direction or rotated axes
     pub special: Vec<bool>,
     pub shares: Shares,
 }
@@ -38,19 +39,21 @@ impl ScatterMap {
     }
 }
 
-/// How much of each tangent is the transpose of itself.
+/// Symmetry that the tangents of a stage have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Symmetry {
-    /// Perhaps nothing
+    /// No tile is known from its transpose.
     None,
-    /// Tiles of two groups, not those of a group and itself: what sits at single nodes turns as it likes, bodies and moments.
+    /// Off-diagonal tiles are transposes of each other. Diagonal tiles are unsymmetric, for
+    /// instance by gyroscopic terms of bodies or by moments at single nodes.
     BetweenGroups,
-    /// All of it
+    /// The tangent is symmetric.
     Whole,
 }
 
 impl Symmetry {
-    /// Of what effects add with this connectivity, each with whether it is symmetric.
+    /// Symmetry of the sum of effects, given by connectivity and symmetry of their tangents.
+    /// Unsymmetric effects that act on single nodes spoil the diagonal tiles only.
     pub fn of<'a>(effects: impl IntoIterator<Item = (&'a Connectivity, bool)>, node_blocks: &NodeBlocks) -> Self {
         let one = |slots: &[Slot]| slots.windows(2).all(|pair| node_blocks.of(pair[0]).0 == node_blocks.of(pair[1]).0);
         let of_effect = |(connectivity, symmetric): (&Connectivity, bool)| match symmetric {
@@ -61,62 +64,64 @@ impl Symmetry {
         effects.into_iter().map(of_effect).min().unwrap_or(Self::Whole)
     }
 
-    /// Whether of two tiles one tells the other.
+    /// True if only one of two mirrored off-diagonal tiles is stored.
     #[inline]
     pub fn halves(self) -> bool {
         self != Self::None
     }
 }
 
-/// The tangent without its values: a tile for each group and itself, and those beside the diagonal in compressed columns.
+/// Sparsity pattern of the tangent: a diagonal tile per node block, and off-diagonal tiles in
+/// compressed columns.
 ///
-/// The rows of a tile are those of its group's slots, three each; rows of held directions are there and stay zero. Where tiles of two groups
-/// are each other's transposes, those above the diagonal are not kept.
+/// A tile has three rows per slot of its node block (three in all in a plane). Rows of held
+/// directions are stored and stay zero. If off-diagonal tiles are transposes of each other, those
+/// above the diagonal are not stored.
 #[derive(Clone, Debug)]
 pub struct Pattern {
-    /// The equations that the rows and columns stand for.
+    /// Equation numbers of rows and columns
     pub dof_map: DofMap,
-    /// The slots of tiles
+    /// Node blocks, one per block row
     pub node_blocks: NodeBlocks,
-    /// How symmetric each tangent is
+    /// Symmetry that the tangents have in common
     pub symmetry: Symmetry,
-    /// Where the values stand
+    /// Positions of tiles in the list of values
     pub storage: Storage,
-    /// Where the tiles of each column start that stand beside the diagonal.
+    /// First off-diagonal tile of each column; the last item is the number of all
     pub column_starts: Vec<u32>,
-    /// The group of the rows of each of these.
+    /// Row (node block) of each off-diagonal tile
     pub rows: Vec<u32>,
-    /// The tiles that are not kept, once somebody has asked for entries of theirs
+    /// Tiles that are not stored, computed when entries are asked for
     mirrors: OnceLock<Mirrors>,
-    /// Rows without an equation: group, and row of its tile
+    /// Rows without an equation: node block, and row in its tile
     pub idle: Vec<(u32, u8)>,
-    /// What is evaluated at once
+    /// Regions of nodes that are evaluated in parallel
     pub regions: Vec<Region>,
-    /// Tiles whose rows lie in another region than their columns: column and number
+    /// Off-diagonal tiles that couple two regions: column, and number of the tile
     pub between: Vec<(usize, usize)>,
     pub(super) places: Vec<ScatterMap>,
 }
 
-/// A tile above the diagonal that is not kept.
+/// An off-diagonal tile above the diagonal that is not stored.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mirror {
-    /// The group of its rows
+    /// Node block of its rows
     row: u32,
-    /// The number of its transpose
+    /// Number of the stored tile, its transpose
     tile: u32,
 }
 
 /// An entry of the tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Its equation
+    /// Equation of the row
     pub row: u32,
-    /// The index of its value
+    /// Index of the value
     pub place: usize,
 }
 
 impl Pattern {
-    /// The pattern of several effects, given by the connectivity of each.
+    /// Pattern of several effects, given by the connectivity of each.
     pub fn new(dof_map: DofMap, node_blocks: NodeBlocks, effects: Vec<Connectivity>, symmetry: Symmetry) -> Self {
         let (column_starts, rows) = compressed_columns(&node_blocks, &effects, symmetry.halves());
         let regions = regions::cut(&node_blocks, &dof_map, &column_starts);
@@ -142,35 +147,35 @@ impl Pattern {
         pattern
     }
 
-    /// The number of pairs of groups that meet.
+    /// Number of pairs of coupled node blocks.
     pub fn pairs(&self) -> usize {
         if self.symmetry.halves() { self.rows.len() } else { self.rows.len() / 2 }
     }
 
-    /// The rows of a tile.
+    /// Rows of a tile.
     #[inline]
     pub fn width(&self) -> usize {
         self.node_blocks.width()
     }
 
-    /// The number of values: those of all tiles that are kept.
+    /// Number of stored values.
     pub fn values(&self) -> usize {
         self.storage.other(self.rows.len())
     }
 
-    /// The tiles in a column that are kept beside the diagonal.
+    /// Numbers of the off-diagonal tiles stored in a column.
     #[inline]
     pub fn tiles_of(&self, column: usize) -> Range<usize> {
         self.column_starts[column] as usize..self.column_starts[column + 1] as usize
     }
 
-    /// The groups of the rows of these tiles.
+    /// Rows (node blocks) of the off-diagonal tiles stored in a column.
     #[inline]
     pub fn rows_of(&self, column: usize) -> &[u32] {
         &self.rows[self.tiles_of(column)]
     }
 
-    /// Who meets whom.
+    /// Adjacency of node blocks.
     pub fn meetings(&self) -> Meetings<'_> {
         Meetings { pattern: self, mirrors: self.find_mirrors() }
     }
@@ -179,13 +184,13 @@ impl Pattern {
         if self.symmetry.halves() { Mirrors::new(&self.column_starts, &self.rows) } else { Mirrors::default() }
     }
 
-    /// The equations of a group's rows, [`DofMap::HELD`] for those without.
+    /// Equation of each tile row of a node block, [`DofMap::HELD`] for rows without.
     #[inline]
     pub fn numbers(&self, group: usize) -> impl Iterator<Item = u32> {
         let mut numbers = [DofMap::HELD; WIDTH];
         for slot in self.node_blocks.members(group) {
             let (_, first) = self.node_blocks.row(slot);
-            // In a plane slots share rows, each of which is free in one of them at most.
+            // In a plane the slots of a node share rows, each of which is free in one slot at most.
             for (row, number) in numbers[first..].iter_mut().zip(self.dof_map.of(slot)) {
                 *row = number.min(*row);
             }
@@ -193,7 +198,8 @@ impl Pattern {
         numbers.into_iter().take(self.width())
     }
 
-    /// The part of a group of what has one number an equation; zero where a row has none.
+    /// Entries of a vector by equation at the tile rows of a node block; zero for rows without an
+    /// equation.
     #[inline(always)]
     pub fn part<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
         let own = x.get(self.equations_of(group)).and_then(|own| own.first_chunk::<W>());
@@ -203,7 +209,8 @@ impl Pattern {
         }
     }
 
-    /// The same of numbers of the group's own equations.
+    /// Distributes the entries of the equations of a node block, in `own`, to its tile rows; zero
+    /// for rows without an equation.
     #[inline(always)]
     pub fn spread<const W: usize>(&self, group: usize, own: [f64; W]) -> [f64; W] {
         let dof_map = self.equations_of(group);
@@ -215,7 +222,8 @@ impl Pattern {
         std::array::from_fn(|_| numbers.next().and_then(of_row).unwrap_or(0.0))
     }
 
-    /// The reverse of that.
+    /// Collects the entries of the tile rows of a node block that have an equation, in the order of
+    /// equations; the inverse of [`Pattern::spread`].
     #[inline(always)]
     fn gathered<const W: usize>(&self, group: usize, part: &[f64; W]) -> [f64; W] {
         let mut own = *part;
@@ -226,26 +234,28 @@ impl Pattern {
         own
     }
 
-    /// The same row by row.
+    /// Entries of a vector by equation at the tile rows of a node block, looked up row by row.
     #[cold]
     fn part_by_rows<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
         let mut numbers = self.numbers(group);
         std::array::from_fn(|_| numbers.next().and_then(|k| x.get(k as usize)).copied().unwrap_or(0.0))
     }
 
-    /// Whether the equations of a group are in the order of its rows.
+    /// True if the equations of a node block ascend with its tile rows.
     fn is_ascending(&self, group: usize) -> bool {
         self.numbers(group).filter(|&number| number != DofMap::HELD).is_sorted()
     }
 
-    /// The equations of a group; where they are as many as a tile is wide, those of its rows in their order.
+    /// Equations of a node block. If they are as many as a tile has rows, they are in the order of
+    /// rows.
     #[inline(always)]
     pub fn equations_of(&self, group: usize) -> Range<usize> {
         self.dof_map.before(self.node_blocks.first_slot(group))
             ..self.dof_map.before(self.node_blocks.first_slot(group + 1))
     }
 
-    /// The reverse of [`Pattern::part`], for parts that are found by their groups.
+    /// Collects a vector by equation from its parts by node block; the inverse of
+    /// [`Pattern::part`].
     pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
         self.each_region(out, |region, out| {
             for group in region.node_blocks.clone() {
@@ -262,7 +272,8 @@ impl Pattern {
         });
     }
 
-    /// Writes parts, found by their groups, into a field of slots; held directions take their part of `held`.
+    /// Writes a solution, given by node block, to a field of slots (global components). Held
+    /// directions take the components of `held` (global components), or zero.
     pub fn scatter<'a, const W: usize>(
         &self,
         part: impl Fn(usize) -> &'a [f64; W] + Send + Sync,
@@ -298,22 +309,22 @@ impl Pattern {
         );
     }
 
-    /// The region of a group.
+    /// Region of a node block.
     #[inline(always)]
     pub fn region_of(&self, group: usize) -> &Region {
         match &self.regions[..] {
             [all] => all,
-            // All but the last are as long as the first.
+            // All regions but the last have the length of the first.
             regions => &regions[group / regions[0].node_blocks.len()],
         }
     }
 
-    /// Does something for each region with what belongs to its equations, one number each.
+    /// Calls `work` for each region, in parallel, with the entries of its equations in `out`.
     pub fn each_region(&self, out: &mut [f64], work: impl Fn(&Region, &mut [f64]) + Send + Sync) {
         regions::each(&self.regions, out, |region| region.dof_map.end, work);
     }
 
-    /// The entries of an equation's column, tile by tile.
+    /// Entries of the column of an equation, tile by tile.
     pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
         let ((group, c), storage) = (self.row_of(column), &self.storage);
         let free = |group: usize| {
@@ -332,7 +343,7 @@ impl Pattern {
         mirrors.of(group).iter().flat_map(mirrored).chain(in_tile(group, storage.own(group))).chain(kept)
     }
 
-    /// The number of entries between equations.
+    /// Number of entries whose row and column are equations.
     pub fn nonzeros(&self) -> usize {
         let meetings = self.meetings();
         let free = |group: usize| self.numbers(group).filter(|&n| n != DofMap::HELD).count();
@@ -340,7 +351,8 @@ impl Pattern {
         (0..self.node_blocks.count()).map(column).sum()
     }
 
-    /// The entries of a slot and itself in the directions that are not held: row and column in its own directions, and where they are.
+    /// Entries of the diagonal block of a slot in its free directions: row and column in its local
+    /// axes, and index of the value.
     pub fn own_entries(&self, slot: Slot) -> impl Iterator<Item = ([usize; 2], usize)> {
         let ((group, first), storage) = (self.node_blocks.row(slot), &self.storage);
         let numbers = self.dof_map.of(slot);
@@ -350,8 +362,8 @@ impl Pattern {
         free().flat_map(column)
     }
 
-    /// Where an entry is stored, perhaps with its mirror image: `None` for held directions, and for pairs
-    /// that no effect couples.
+    /// Index of the value of an entry, which it may share with its mirror image; `None` for held
+    /// directions, and for pairs of equations that no effect couples.
     pub fn find(&self, row: u32, column: u32) -> Option<usize> {
         if row == DofMap::HELD || column == DofMap::HELD {
             return None;
@@ -362,9 +374,10 @@ impl Pattern {
         Some(self.storage.entry(self.tile(i, j)?, r, c))
     }
 
-    /// Whether the same groups meet as in another pattern, as they do in space and in a plane of it, whatever halves are kept.
+    /// True if the same node blocks are coupled as in another pattern, as in spatial and planar
+    /// patterns of one scene, for any symmetry.
     pub fn is_like(&self, other: &Self) -> bool {
-        // Who meets a group that does not come after it.
+        // Tiles in a column at or below the diagonal.
         let lower = |pattern: &Self, column: usize| {
             let rows = pattern.rows_of(column);
             pattern.tiles_of(column).start + rows.partition_point(|&row| (row as usize) < column)
@@ -375,12 +388,12 @@ impl Pattern {
         count == other.node_blocks.count() && (0..count).all(meet)
     }
 
-    /// Shows each equation and where its entry of the diagonal is stored.
+    /// Calls `show` with each equation and the index of its diagonal entry.
     pub fn each_diagonal(&self, show: impl FnMut(usize, usize)) {
         self.each_diagonal_of(0..self.node_blocks.count(), show);
     }
 
-    /// The same of some groups.
+    /// Calls `show` with each equation of some node blocks and the index of its diagonal entry.
     pub fn each_diagonal_of(&self, node_blocks: Range<usize>, mut show: impl FnMut(usize, usize)) {
         for group in node_blocks {
             for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != DofMap::HELD) {
@@ -389,20 +402,21 @@ impl Pattern {
         }
     }
 
-    /// The group and the row of the tile of an equation.
+    /// Node block and tile row of an equation.
     fn row_of(&self, equation: u32) -> (usize, usize) {
         let (slot, k) = self.dof_map.origin(equation as usize);
         let (group, first) = self.node_blocks.row(slot);
         (group, first + k as usize)
     }
 
-    /// Whether the tile of two groups is kept where they meet.
+    /// True if the tile of two coupled node blocks is stored.
     #[inline]
     fn keeps(&self, row: usize, column: usize) -> bool {
         row >= column || !self.symmetry.halves()
     }
 
-    /// The index of the first value of a tile; `None` where the groups do not meet, or it is not kept.
+    /// Index of the first value of a tile; `None` if the node blocks are not coupled, or the tile
+    /// is not stored.
     pub fn tile(&self, row: usize, column: usize) -> Option<usize> {
         if row == column {
             return Some(self.storage.own(row));
@@ -444,7 +458,8 @@ impl Pattern {
             let corners = || slots.iter().step_by(step).map(|&slot| self.node_blocks.row(slot));
             for (i, r) in corners() {
                 let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
-                    // Connectivity are what the pattern was made of.
+                    // Every pair of an instance has a tile: the pattern was made of the same
+                    // connectivity.
                     true => self.tile(i, j).map(|tile| self.storage.target(tile, r, c) as u32),
                     false => Some(NOT_KEPT),
                 };
@@ -459,7 +474,7 @@ impl Pattern {
         places
     }
 
-    /// Whether these slots are those of nodes, each after the other.
+    /// True if the slots are the complete node blocks of several nodes, one after the other.
     fn is_whole(&self, slots: &[Slot]) -> bool {
         let pair = |pair: &[Slot]| match *pair {
             [u, p] => self.node_blocks.members(self.node_blocks.of(u).0).eq([u, p]),
@@ -469,11 +484,13 @@ impl Pattern {
     }
 }
 
-/// Column by column the other groups that a group meets; where `halves` do those that come after it.
+/// Off-diagonal tiles in compressed columns: starts of columns, and rows. With `halves` only rows
+/// below the diagonal are included.
 fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves: bool) -> (Vec<u32>, Vec<u32>) {
     let is_kept = |column: u32, row: u32| row > column || (row != column && !halves);
     let kept = |met: &[u32], column: u32| met.iter().filter(|&&row| is_kept(column, row)).count() as u32;
-    // Room for every meeting, then each column for itself: sorting all of them at once takes longer than a solution.
+    // Every coupling is entered, then each column is sorted by itself: sorting all of them at once
+    // takes longer than a linear solve.
     let mut column_starts = vec![0_u32; node_blocks.count() + 1];
     let ends = &mut column_starts[1..];
     each_meeting(node_blocks, effects, &mut |met| {
@@ -491,7 +508,7 @@ fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves
             }
         }
     });
-    // In place: a column has no more rows than meetings.
+    // Duplicates are removed in place: a column has at most as many rows as couplings.
     let (mut start, mut count) = (0, 0);
     for end in ends {
         let first = count;
@@ -509,7 +526,7 @@ fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves
     (column_starts, rows)
 }
 
-/// The transposes of all tiles below the diagonal, column by column.
+/// Transposes of all tiles below the diagonal, column by column.
 #[derive(Clone, Debug, Default)]
 struct Mirrors {
     starts: Vec<u32>,
@@ -522,7 +539,7 @@ impl Mirrors {
         Self { starts, all }
     }
 
-    /// Those in a column.
+    /// Transposed tiles in a column.
     #[inline]
     fn of(&self, column: usize) -> &[Mirror] {
         match self.starts.get(column..column + 2) {
@@ -532,19 +549,19 @@ impl Mirrors {
     }
 }
 
-/// Who meets whom.
+/// Adjacency of node blocks, with both directions of each pair.
 pub struct Meetings<'a> {
     pattern: &'a Pattern,
     mirrors: Mirrors,
 }
 
 impl Meetings<'_> {
-    /// The number of pairs that meet.
+    /// Number of pairs of coupled node blocks.
     pub fn pairs(&self) -> usize {
         self.pattern.pairs()
     }
 
-    /// The other groups that a group meets, in their order.
+    /// The other node blocks that a node block is coupled with, ascending.
     pub fn of(&self, group: usize) -> impl Iterator<Item = u32> {
         let kept = self.pattern.rows_of(group).iter().copied();
         self.mirrors.of(group).iter().map(|mirror| mirror.row).chain(kept)
@@ -570,7 +587,7 @@ fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
     (starts, mirrors)
 }
 
-/// Shows the groups that meet in each instance.
+/// Calls `show` with the node blocks that each instance couples.
 fn each_meeting(node_blocks: &NodeBlocks, effects: &[Connectivity], show: &mut dyn FnMut(&[u32])) {
     let mut met = Vec::new();
     for clique in effects.iter().flat_map(Connectivity::iter) {

@@ -1,39 +1,42 @@
-//! Scenes that stay in one plane: their own mirror images in it.
+//! Planar scenes: scenes that are their own mirror images in a plane.
 //!
-//! What lies in the plane and is loaded in it moves in it, since a motion out of it would have to choose a side. Then displacements keep
-//! to two directions, and rotation vectors to the normal of the plane.
+//! A structure that lies in a plane and is loaded in it moves in it, since a motion out of the
+//! plane would have to choose a side. Displacements then have two components, and rotation vectors
+//! are parallel to the normal of the plane.
 
 use crate::tensor::{Mat3, Vec3};
 use std::fmt;
 
-/// What lies less far out of a plane, relative to its size, lies in it but for round-off: some hundreds of units in the last place, what
-/// sines, cosines and a few sums in a deck leave.
+/// Largest distance from a plane, relative to the size of the scene or to the length of the vector,
+/// of what counts as lying in it: some hundreds of units in the last place, the round-off of sines,
+/// cosines and a few sums in a deck.
 const ROUND_OFF: f64 = 1e-13;
 
-/// A normal that is so near to an axis is this axis: in coordinate planes nothing is rounded aside. Whether the scene lies in the plane
-/// is asked afterwards, so that nothing is let in by this.
+/// A normal is replaced by a global axis if the norm of their difference is smaller than this, so
+/// that vectors in coordinate planes have exact zeros. The scene is checked against the resulting
+/// plane afterwards.
 const SNAP: f64 = 1e-12;
 
-/// Directions that differ by less do not tell a plane: the normal of their cross product would be known to fewer than ten digits, and
-/// what lies in the plane would not be found to.
+/// Two directions determine a plane only if their cross product exceeds this part of the squared
+/// length of the longer one: below, the normal would have fewer than ten correct digits.
 const NO_PLANE: f64 = 1e-6;
 
-/// Something that a scene is made of, as a mirror sees it.
+/// A datum of a scene, with its behaviour under reflection in a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MirrorData {
-    /// A place
+    /// Position
     Place(Vec3),
-    /// A displacement, velocity or force
+    /// Displacement, velocity or force
     Vector(Vec3),
-    /// A rotation, spin or moment
+    /// Axial vector: rotation, spin or moment
     Axial(Vec3),
-    /// An axis whose sense does not matter
+    /// Axis without sense
     Line(Vec3),
-    /// What maps vectors to vectors, or axial ones to axial ones
+    /// Tensor that maps vectors to vectors, or axial vectors to axial vectors
     Tensor(Mat3),
-    /// What maps axial vectors to vectors
+    /// Tensor that maps axial vectors to vectors
     Coupling(Mat3),
-    /// What is never treated in a plane
+    /// Datum of an effect that has no planar kernel
     Spatial,
 }
 
@@ -60,23 +63,24 @@ impl fmt::Display for MirrorData {
     }
 }
 
-/// A vector in six digits, for messages; nought has no sign.
+/// A vector in six significant digits, for messages, without negative zeros.
 pub fn rounded(v: Vec3) -> String {
     let rounded = |component: f64| format!("{component:.5e}").parse().unwrap_or(component) + 0.0;
     format!("{:?}", v.0.map(rounded))
 }
 
-/// Shows the parts of a scene, each with whose it is.
+/// Visits the data of a scene: calls its argument with the name of the owner and each datum.
 pub type Shown<'a> = dyn Fn(&mut dyn FnMut(&'static str, MirrorData)) + 'a;
 
-/// A plane.
+/// A plane through an unspecified point, by its normal and two axes in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     axes: Mat3,
 }
 
 impl Plane {
-    /// The plane with this normal; `None` for zero.
+    /// Plane with the given normal, of any length; `None` for the zero vector. The normal of the
+    /// plane has a positive largest component.
     pub fn normal_to(normal: Vec3) -> Option<Self> {
         let mut e = normal.normalized()?;
         let nearest = (0..3).fold(0, |best, k| if e.0[k].abs() > e.0[best].abs() { k } else { best });
@@ -93,42 +97,45 @@ impl Plane {
         Some(Self { axes: Mat3::from_columns(a, e.cross(a), e) })
     }
 
-    /// Two axes in the plane and its normal, as columns.
+    /// Two orthonormal axes in the plane and its normal, as columns (global components).
     #[inline]
     pub fn axes(&self) -> &Mat3 {
         &self.axes
     }
 
-    /// The normal, a unit vector.
+    /// Unit normal (global components).
     pub fn normal(&self) -> Vec3 {
         self.axes.column(2)
     }
 
-    /// Whether these axes are the global ones.
+    /// True if the three axes are the global ones.
     pub fn is_global(&self) -> bool {
         self.axes == Mat3::IDENTITY
     }
 
-    /// Whether it is no coordinate plane, so that vectors in it are rounded aside.
+    /// True if the normal is not a global axis, so that vectors in the plane have round-off out of
+    /// it.
     pub fn is_tilted(&self) -> bool {
         !Vec3::UNIT.contains(&self.normal())
     }
 
-    /// Whether a vector is normal to the plane.
+    /// True if a vector is normal to the plane, up to `ROUND_OFF` times its length.
     pub fn is_normal(&self, v: Vec3) -> bool {
         let e = self.normal();
         (v - e * v.dot(e)).norm() <= ROUND_OFF * v.norm()
     }
 
-    /// Whether a vector lies in the plane.
+    /// True if a vector lies in the plane, up to `ROUND_OFF` times its length.
     pub fn is_along(&self, v: Vec3) -> bool {
         v.dot(self.normal()).abs() <= ROUND_OFF * v.norm()
     }
 
-    /// Whether something is its own mirror image; places are compared with `origin`, a point of the plane, in a scene so long.
+    /// True if a datum is its own mirror image. Positions are compared with `origin`, a point of
+    /// the plane, in a scene of the given length.
     fn mirrors(&self, aspect: &MirrorData, origin: Vec3, length: f64) -> bool {
         let e = self.normal();
-        // Its own image where it maps the normal to the normal, and the plane to itself.
+        // A tensor is symmetric under reflection if it maps the normal to a multiple of itself, and
+        // so does its transpose.
         let across = |m: Mat3| {
             let (left, right) = (m.transpose_mul(e), m * e);
             let along = e * e.dot(right);
@@ -140,7 +147,8 @@ impl Plane {
             MirrorData::Axial(v) => self.is_normal(v),
             MirrorData::Line(v) => self.is_along(v) || self.is_normal(v),
             MirrorData::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
-            // What turns in the plane strains aside, and the other way about.
+            // A coupling is symmetric under reflection if it maps the normal (axial) into the
+            // plane, and axial vectors in the plane to the normal.
             MirrorData::Coupling(m) => {
                 let (right, left) = (m * e, m.transpose_mul(e));
                 let along = right.dot(e);
@@ -151,7 +159,8 @@ impl Plane {
         }
     }
 
-    /// The plane of a scene with this length, whose parts are `shown`, each with whose it is. `Err`: why there is none.
+    /// Plane of a scene of the given length whose data are visited by `shown`. `Err`: the reason
+    /// why the scene is spatial.
     pub fn of(length: f64, shown: &Shown) -> Result<Self, String> {
         let search = Search::through(length, shown);
         if let Some(name) = search.spatial {
@@ -161,7 +170,7 @@ impl Plane {
         for plane in search.normals().filter_map(Self::normal_to) {
             match search.first_apart(&plane, shown) {
                 None => return Ok(plane),
-                // Told of the last.
+                // The error names the datum that contradicts the last candidate.
                 found => apart = found,
             }
         }
@@ -172,24 +181,24 @@ impl Plane {
     }
 }
 
-/// What is known of a plane while it is looked for.
+/// Quantities collected from the data of a scene to find candidate normals.
 #[derive(Default)]
 struct Search {
     origin: Option<Vec3>,
-    /// Of places, measured from the origin
+    /// Span of positions relative to the origin
     places: Span,
-    /// Of these and of vectors, each as long as the scene
+    /// Span of relative positions and of vectors scaled to the length of the scene
     vectors: Span,
     axial: Option<Vec3>,
     spatial: Option<&'static str>,
     length: f64,
 }
 
-/// What some vectors span.
+/// Plane spanned by some vectors.
 #[derive(Default)]
 struct Span {
     longest: Vec3,
-    /// The largest product of it and another
+    /// Cross product of largest norm of the longest vector with another
     product: Vec3,
 }
 
@@ -207,7 +216,7 @@ impl Span {
         }
     }
 
-    /// A normal of it, where it is a plane.
+    /// Normal, of any length; `None` if the vectors are nearly parallel.
     fn normal(&self) -> Option<Vec3> {
         let tells = self.product.norm() > NO_PLANE * self.longest.squared().max(f64::MIN_POSITIVE);
         tells.then_some(self.product)
@@ -248,13 +257,14 @@ impl Search {
         }
     }
 
-    /// Normals of planes that the scene may lie in: that of an axial vector, which has no round-off, that of all vectors, where shallow
-    /// arches have as few digits as their loads leave them, and that of places, which tell what is the structure's and what a load's.
+    /// Candidate normals: the first axial vector, which is free of round-off; the normal of
+    /// positions and vectors, as shallow arches determine theirs to a few digits only; and that of
+    /// positions, which tells whether structure or load is out of plane.
     fn normals(&self) -> impl Iterator<Item = Vec3> {
         [self.axial, self.vectors.normal(), self.places.normal()].into_iter().flatten()
     }
 
-    /// The first that is not its own image in a plane, with whose it is.
+    /// The first datum that is not its own mirror image in a plane, with the name of its owner.
     fn first_apart(&self, plane: &Plane, shown: &Shown) -> Option<(&'static str, MirrorData)> {
         let mut apart = None;
         shown(&mut |name, aspect| {
@@ -306,7 +316,7 @@ mod tests {
         );
     }
 
-    /// ScatterMap alone would tell the normal of a shallow arch to a few digits only.
+    /// Positions alone would determine the normal of a shallow arch to a few digits only.
     #[test]
     fn shallow_scenes_lie_in_the_plane_of_their_loads() {
         let plane = Plane::normal_to(TILTED).unwrap();
@@ -322,7 +332,7 @@ mod tests {
         }
     }
 
-    /// A load out of the plane of the structure is what does not fit, not the structure.
+    /// The error names a load out of the plane of the structure, not the structure.
     #[test]
     fn what_leaves_the_plane_of_places_is_named() {
         let places = [Vec3::ZERO, Vec3::UNIT[0], Vec3([1.0, 1.0, 0.0])];

@@ -1,7 +1,9 @@
-//! A large scene in regions of nodes that follow each other: what lies in one of them is evaluated at once with what lies in others.
+//! Regions: a large scene is cut into runs of consecutive node blocks, which are evaluated in
+//! parallel.
 //!
-//! Regions are cut by the scene alone. Elements between regions, and effects that are not cut, come after all regions, in their order:
-//! a sum has the same terms in the same order on any number of threads.
+//! The cuts depend on the scene alone. Instances between regions, and effects that are not
+//! divisible, are added after all regions in their order, so that sums have the same terms in the
+//! same order on any number of threads.
 
 use super::connectivity::Connectivity;
 use super::dof_map::DofMap;
@@ -10,25 +12,26 @@ use crate::scalar::LANES;
 use crate::threads;
 use std::ops::Range;
 
-/// Tile columns in a region: enough that a thread has something to do, few enough that what it writes stays near it
+/// Least number of node blocks in a region of a large scene: enough work for a thread, few enough
+/// that the values it writes stay in its cache
 const GROUPS: usize = 1024;
 
-/// What belongs to nodes that follow each other.
+/// A run of consecutive node blocks.
 #[derive(Clone, Debug)]
 pub struct Region {
-    /// Its place among all
+    /// Index of the region
     pub number: usize,
-    /// Columns of tiles
+    /// Node blocks, which are columns of tiles
     pub node_blocks: Range<usize>,
-    /// Their slots
+    /// Slots of these node blocks
     pub slots: Range<usize>,
-    /// Their equations
+    /// Equations of these slots
     pub dof_map: Range<usize>,
-    /// The tiles in these columns beside the diagonal
+    /// Off-diagonal tiles stored in these columns
     pub tiles: Range<usize>,
 }
 
-/// The instances of an effect that lie in each region, and all others.
+/// Instances of an effect by region, as ranges.
 #[derive(Clone, Debug, Default)]
 pub struct Shares {
     inside: Vec<Vec<Range<usize>>>,
@@ -36,7 +39,8 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// Of instances that couple these slots.
+    /// Divides the instances of an effect into those within one region and all others. Effects that
+    /// are not [divisible](Connectivity::divisible) have others only.
     pub fn new(connectivity: &Connectivity, node_blocks: &NodeBlocks, regions: &[Region]) -> Self {
         if regions.len() < 2 || !connectivity.divisible {
             let all = std::iter::once(0..connectivity.len());
@@ -57,18 +61,18 @@ impl Shares {
         out
     }
 
-    /// Those in a region, or with `None` those in none.
+    /// Instances within one region; with `None` those within no single region.
     pub fn of(&self, region: Option<usize>) -> &[Range<usize>] {
         region.map_or(&self.others, |region| &self.inside[region])
     }
 }
 
-/// All regions but the last are of the same length.
+/// Region of a slot. All regions but the last have the length of the first.
 fn region_of(slot: u32, node_blocks: &NodeBlocks, regions: &[Region]) -> usize {
     node_blocks.of(slot).0 / regions[0].node_blocks.len()
 }
 
-/// Whether something of an effect lies in each region, or between it and others.
+/// By region: true if some instance of an effect has a slot in it.
 pub fn touched(connectivity: &Connectivity, node_blocks: &NodeBlocks, regions: &[Region]) -> Vec<bool> {
     let mut touched = vec![false; regions.len()];
     for &slot in connectivity.iter().flatten() {
@@ -77,7 +81,8 @@ pub fn touched(connectivity: &Connectivity, node_blocks: &NodeBlocks, regions: &
     touched
 }
 
-/// Instances that stand side by side: of one shape, as many as there are lanes.
+/// Ranges of instances that are evaluated together in vector lanes: at most [`LANES`] consecutive
+/// ones with equal numbers of slots.
 fn rows(connectivity: &Connectivity) -> impl Iterator<Item = Range<usize>> {
     let mut start = 0;
     std::iter::from_fn(move || {
@@ -90,7 +95,8 @@ fn rows(connectivity: &Connectivity) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Does something for each region with what belongs to it in a list, where it ends there.
+/// Calls `work` for each region, in parallel, with its items in `list`; `end` gives the end of its
+/// items.
 pub fn each<T: Send>(
     regions: &[Region],
     list: &mut [T],
@@ -104,12 +110,12 @@ pub fn each<T: Send>(
     threads::each(regions.iter().zip(parts), |(region, part)| work(region, part));
 }
 
-/// The regions of a scene with so many nodes: one where it is not large.
+/// Number of regions of a scene of `nodes` nodes.
 pub fn most(nodes: usize) -> usize {
     (nodes / GROUPS).max(1)
 }
 
-/// Cuts a scene; all of it is one region where it is not large.
+/// Cuts a scene into regions of equal length.
 pub fn cut(all_groups: &NodeBlocks, dof_map: &DofMap, column_starts: &[u32]) -> Vec<Region> {
     let all = all_groups.count();
     let count = most(all);

@@ -1,19 +1,19 @@
-//! Parts of a list, one after the other: where all have one length that is all that is kept.
+//! Consecutive ranges of a list, stored as one length if all are equally long.
 
 use std::ops::Range;
 
-/// Where each part of a list stands.
+/// Consecutive ranges that cover a list.
 #[derive(Clone, Debug, Default)]
 pub struct Runs {
     count: usize,
-    /// The length of all, where they have one
+    /// Length of each range if all are equally long
     length: usize,
-    /// Where each ends, where they do not
+    /// End of each range; empty if all are equally long
     ends: Vec<u32>,
 }
 
 impl Runs {
-    /// One more, of this length.
+    /// Appends a range of the given length.
     pub fn push(&mut self, length: usize) {
         if self.count == 0 {
             self.length = length;
@@ -26,17 +26,17 @@ impl Runs {
         self.count += 1;
     }
 
-    /// Their number.
+    /// Number of ranges.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there is none.
+    /// True without ranges.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Where one of them stands.
+    /// Range number k.
     #[inline(always)]
     pub fn get(&self, k: usize) -> Range<usize> {
         debug_assert!(k < self.count, "part {k} of {}", self.count);
@@ -46,7 +46,7 @@ impl Runs {
         }
     }
 
-    /// Gives back what has grown beyond the end.
+    /// Releases unused capacity.
     pub fn shrink_to_fit(&mut self) {
         self.ends.shrink_to_fit();
     }

@@ -1,20 +1,20 @@
-//! What a stage does, as far as effects and amplitudes need to know.
+//! Properties of a stage that effects and amplitudes depend on.
 
-/// What a stage does with the clock and the load factor.
+/// Kind of a stage, by its time and load factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StageKind {
-    /// The load factor goes from 0 to 1, the clock stands.
+    /// The load factor rises from 0 to 1 at constant time.
     Static,
-    /// The clock runs, the load factor is 1.
+    /// Time advances at load factor 1.
     Dynamic,
-    /// Small motions about the state that was reached: nothing goes on.
+    /// Small vibrations about the state reached, at constant time and load factor.
     Modal,
-    /// The load factor goes on to where the state loses its stiffness.
+    /// Critical load factors beyond the state reached, at constant time.
     Buckling,
 }
 
 impl StageKind {
-    /// The clock runs: inertia and damping act, and histories are read over the time.
+    /// True if time advances: inertia and damping act, and histories are functions of time.
     pub fn advances_time(self) -> bool {
         match self {
             Self::Dynamic => true,
@@ -22,7 +22,7 @@ impl StageKind {
         }
     }
 
-    /// The load factor goes from 0 to 1: histories are read over it.
+    /// True if the load factor rises from 0 to 1: histories are functions of it.
     pub fn ramps_load(self) -> bool {
         match self {
             Self::Static => true,
@@ -30,7 +30,7 @@ impl StageKind {
         }
     }
 
-    /// It leads to another state, in which the next stage begins.
+    /// True if the stage changes the state, in which the next stage begins.
     pub fn advances_state(self) -> bool {
         match self {
             Self::Static | Self::Dynamic => true,
@@ -38,7 +38,7 @@ impl StageKind {
         }
     }
 
-    /// The mass matrix is formed.
+    /// True if the mass matrix is formed.
     pub fn needs_inertia(self) -> bool {
         match self {
             Self::Dynamic | Self::Modal => true,
@@ -46,7 +46,7 @@ impl StageKind {
         }
     }
 
-    /// It cannot begin where nothing that is free to move has mass.
+    /// True if the stage requires mass at some free unknown.
     pub fn needs_mass(self) -> bool {
         match self {
             Self::Modal => true,
@@ -54,8 +54,8 @@ impl StageKind {
         }
     }
 
-    /// The load factor that it begins with, where the stages before have come to `reached`;
-    /// `fresh`: whether loads act for the first time.
+    /// Load factor at the start, if the stages before have ended at load factor `reached`; `fresh`
+    /// if some loads act for the first time.
     pub fn first_load(self, reached: f64, fresh: bool) -> f64 {
         match self {
             Self::Static => 0.0,
@@ -65,7 +65,7 @@ impl StageKind {
         }
     }
 
-    /// The load factor that it ends with, where it began with `begun`.
+    /// Load factor at the end, if the stage began at load factor `begun`.
     pub fn last_load(self, begun: f64) -> f64 {
         match self {
             Self::Static | Self::Dynamic => 1.0,
@@ -74,24 +74,24 @@ impl StageKind {
     }
 }
 
-/// The stages in which something acts.
+/// Numbers of the stages in which an effect or a load acts, from 0; `None` means all.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct StageSet(pub Option<Vec<usize>>);
 
 impl StageSet {
-    /// Whether stage number `stage` (from 0) is one of them; no list means all.
+    /// True if the set contains the stage of this number (from 0).
     pub fn contains(&self, stage: usize) -> bool {
         self.0.as_ref().is_none_or(|stages| stages.contains(&stage))
     }
 }
 
-/// A stage as effects see it.
+/// Properties of the current stage that effects depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StageContext {
-    /// From 0
+    /// Number of the stage, from 0
     pub number: usize,
-    /// What it does
+    /// Kind of the stage
     pub kind: StageKind,
-    /// Whether it is seen from a frame that rotates, whose own effect then holds all inertia
+    /// True for modal stages in a rotating frame, in which one effect represents all inertia.
     pub rotating: bool,
 }

@@ -1,4 +1,4 @@
-//! The state of a scene: one 3-vector of unknowns a slot, with its rates.
+//! State of a scene: a 3-vector of unknowns per slot, with its rates.
 
 use super::field::Field;
 use crate::kernel::NodeMotion;
@@ -11,76 +11,82 @@ use crate::threads;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// The index of a 3-vector of unknowns: a displacement or a rotation vector.
+/// Index of a 3-vector of unknowns: a displacement or a rotation vector.
 pub type Slot = u32;
 
-/// Where a node keeps its displacement and its rotation vector. Nodes that a spherical joint connects share `u`.
+/// The two slots of a node. Nodes connected by a spherical joint share `u`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
-    /// The slot of the displacement
+    /// Slot of the displacement
     pub u: Slot,
-    /// The slot of the rotation vector
+    /// Slot of the rotation vector
     pub p: Slot,
 }
 
-/// A force at a slot that fades with the load factor of a static stage.
+/// Force at a slot that fades to zero as the load factor of a static stage rises.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fading {
-    /// In full, on the side of the internal forces
+    /// Full force, at load factor 0, on the side of the internal forces (global components)
     pub force: Vec3,
-    /// The unknowns that it is conjugate to, as they were when it was found: they tell the chart.
+    /// Unknowns of the slot when the force was computed, which identify the chart that it is
+    /// conjugate in
     pub at: Vec3,
 }
 
-/// What an artificial resistance pulls a state back to, see [`crate::effect::resistance`].
+/// Unknowns towards which the artificial resistance of a static stage pulls, see
+/// [`crate::effect::resistance`].
 #[derive(Clone, Debug)]
 pub struct Anchor {
-    /// Force per displacement at every node
+    /// Stiffness, force per displacement, at every node
     pub resistance: f64,
-    /// The unknowns to which it pulls
+    /// Unknowns by slot
     pub q: Vec<Vec3>,
 }
 
-/// Everything that changes in a run. Effects are functions of it.
+/// The variables of a run. Effects are functions of it.
 #[derive(Clone, Debug)]
 pub struct State {
-    /// The run's clock. Static stages do not advance it.
+    /// Time of the run, constant in static stages
     pub time: f64,
-    /// The load factor of a static stage; 1 in a dynamic one.
+    /// Load factor of a static stage; 1 in dynamic stages
     pub load: f64,
-    /// Displacements, and rotation vectors each in its present chart (global components).
+    /// Displacements, and rotation vectors each in its current chart (global components)
     pub q: Vec<Vec3>,
-    /// dq/dt; zero in static stages.
+    /// Rates dq/dt; zero in static stages
     pub v: Field,
-    /// d2q/dt2; zero in static stages.
+    /// Second rates d2q/dt2; zero in static stages
     pub a: Field,
-    /// The algorithmic acceleration of generalised-alpha methods; empty where a method has none of its own, for which it is `a`. Where
-    /// the unknowns of steps are increments, that of a rotation is the rate of the momentum that it carries, see [`Turn`];
-    /// while a step is iterated, that of its start.
+    /// Algorithmic accelerations of generalised-alpha methods; empty for methods without, which use
+    /// `a`. If the unknowns of a step are increments, that of a rotation is the rate of its angular
+    /// momentum, see [`Turn`]; during the iterations of a step it has the value at the start of the
+    /// step.
     pub algorithmic: Field,
-    /// The factor of each load, valid at `time` and `load`.
+    /// Factor of each load, valid at `time` and `load`
     pub amplitude: Vec<f64>,
-    /// For each beam element the nodes that are converted into the chart of the first; frozen while Newton iterates.
+    /// For each beam element the nodes whose rotation is converted into the chart of the first;
+    /// constant during a Newton iteration
     pub mixed: Vec<Conversion>,
-    /// For each rotation slot the rotation vector continued without jumps since the start; valid at the last converged
-    /// state. It tells a unwrapped spring, and the columns `rc`, which of the turns they are in. Empty as long as no chart has changed:
-    /// then `q` itself goes on without jumps.
+    /// For each rotation slot the rotation vector continued without jumps since the start, valid at
+    /// the last converged state. Springs that count turns and the output columns `rc` read it.
+    /// Empty as long as no chart has changed: `q` itself is then without jumps.
     pub unwrapped: Vec<Vec3>,
-    /// First and second derivative over time of each factor of a load.
+    /// First and second time derivative of each load factor
     pub amplitude_rates: Vec<[f64; 2]>,
-    /// For each slot what inertia and damping did when a motion ended in a static stage; empty where none did.
+    /// For each slot the inertia and damping force at the end of the motion before a static stage;
+    /// empty without such a motion
     pub fading: Arc<Vec<Fading>>,
-    /// What an artificial resistance pulls to, while a static stage looks for a state of rest.
+    /// Anchor of the artificial resistance while a static stage searches for an equilibrium
     pub anchor: Option<Arc<Anchor>>,
-    /// The angle of each sprung joint, continued without jumps; valid at the last converged state.
+    /// Angle of each joint spring [rad], continued without jumps, valid at the last converged state
     pub angles: Vec<f64>,
-    /// For each rotation slot the step it is in, while a step is iterated whose unknowns are increments. Then `q` holds the
-    /// increment, `v` and `a` the material spin and its rate. Else empty: rotation vectors are total ones.
+    /// For each rotation slot the base of the current time step, during the iterations of a step
+    /// whose unknowns are increments: `q` is then the increment, `v` and `a` the material spin and
+    /// its rate. Otherwise empty: rotation vectors are total.
     pub turns: Vec<Option<Turn>>,
 }
 
 impl State {
-    /// At rest in the initial placement.
+    /// The undeformed state at rest.
     pub fn rest(slots: usize, elements: usize, amplitudes: usize, angles: usize) -> Self {
         let rates = Field::zero(slots);
         Self {
@@ -101,7 +107,7 @@ impl State {
         }
     }
 
-    /// A copy to come back to. Of unknowns that are zero, as at the start of a run, it takes no memory.
+    /// A copy to restore later. Lists of zeros, as at the start of a run, take no memory.
     pub fn kept(&self) -> Self {
         Self {
             time: self.time,
@@ -121,7 +127,7 @@ impl State {
         }
     }
 
-    /// Takes all velocities and accelerations away.
+    /// Sets all velocities and accelerations to zero.
     pub fn stand_still(&mut self) {
         if self.moves() {
             let rest = Field::zero(self.v.len());
@@ -129,7 +135,7 @@ impl State {
         }
     }
 
-    /// Whether it has velocities or accelerations.
+    /// True if some velocity or acceleration is not zero.
     pub fn moves(&self) -> bool {
         let moves = |&slot: &usize| {
             [&self.v, &self.a, &self.algorithmic]
@@ -139,7 +145,7 @@ impl State {
         threads::first(self.v.len(), |mut part| part.find(moves)).is_some()
     }
 
-    /// The state itself where it stands still, or else another one without velocities and accelerations.
+    /// The state itself if it is at rest, else a copy without velocities and accelerations.
     pub fn at_rest(&self) -> Cow<'_, Self> {
         if !self.moves() {
             return Cow::Borrowed(self);
@@ -149,20 +155,20 @@ impl State {
         Cow::Owned(still)
     }
 
-    /// Takes over another state of the same scene, into the memory that it has.
+    /// Takes over another state of the same scene, into the memory of this one.
     pub fn copy_from(&mut self, other: &Self) {
         self.copy_rates(other);
         self.copy_all_but_rates(other);
     }
 
-    /// Takes over its velocities and accelerations.
+    /// Takes over velocities and accelerations of another state.
     pub fn copy_rates(&mut self, other: &Self) {
         self.v.copy_from(&other.v);
         self.a.copy_from(&other.a);
         self.algorithmic.copy_from(&other.algorithmic);
     }
 
-    /// The same where both have the same rates, as in statics.
+    /// Takes over another state that has equal velocities and accelerations, as in statics.
     pub fn copy_all_but_rates(&mut self, other: &Self) {
         debug_assert!(self.v == other.v && self.a == other.a && self.algorithmic == other.algorithmic, "rates differ");
         self.time = other.time;
@@ -178,13 +184,13 @@ impl State {
         self.turns.clone_from(&other.turns);
     }
 
-    /// The unwrapped rotation vector at a slot.
+    /// Rotation vector at a slot continued without jumps since the start (global components).
     #[inline]
     pub fn unwrapped_at(&self, slot: Slot) -> Vec3 {
         *self.unwrapped.get(slot as usize).unwrap_or(&self.q[slot as usize])
     }
 
-    /// All of them, kept apart from `q` from here on.
+    /// Rotation vectors continued without jumps, by slot, stored separately from `q` from here on.
     pub fn wound_apart(&mut self) -> &mut [Vec3] {
         if self.unwrapped.is_empty() {
             threads::copy(&mut self.unwrapped, &self.q);
@@ -192,13 +198,14 @@ impl State {
         &mut self.unwrapped
     }
 
-    /// The step that a rotation is in, where its unknown is an increment.
+    /// Base of the current time step of a rotation whose unknown is an increment; `None` for total
+    /// rotation vectors.
     #[inline]
     pub fn turn(&self, slot: Slot) -> Option<&Turn> {
         self.turns.get(slot as usize)?.as_ref()
     }
 
-    /// The rotation at a slot, in the chart of the state.
+    /// Rotation at a slot, in the chart of the state.
     #[inline]
     pub fn rotation(&self, slot: Slot) -> Rotation {
         let rotation = Rotation::new(self.q[slot as usize]);
@@ -208,7 +215,7 @@ impl State {
         }
     }
 
-    /// The rate of the unknown at a rotation slot.
+    /// Rate of the rotation unknown at a slot: of the total rotation vector, or of the increment.
     pub fn rotation_rate(&self, slot: Slot) -> RotationRate {
         let given = self.v[slot as usize];
         let Some(turn) = self.turn(slot) else { return RotationRate::of_vector(given) };
@@ -219,7 +226,7 @@ impl State {
         RotationRate { rate, over_unknown: over }
     }
 
-    /// The spin at a slot.
+    /// Spin and its rate at a rotation slot.
     #[inline]
     pub fn spin(&self, slot: Slot) -> Spin {
         let k = slot as usize;
@@ -229,7 +236,7 @@ impl State {
         }
     }
 
-    /// The motion of a node, for effects that know total rotation vectors only.
+    /// Motion of a node, for effects that support total rotation vectors only.
     #[inline]
     pub fn motion(&self, node: Node) -> NodeMotion {
         let (u, p) = (node.u as usize, node.p as usize);
@@ -244,23 +251,23 @@ impl State {
     }
 }
 
-/// The rate of a rotation's unknown. Where that is an increment X, its rate Xd = T^-1 Omega is a function of X.
+/// Rate of a rotation unknown. For an increment X, the rate Xd = T^-1 Omega is a function of X.
 #[derive(Clone, Copy, Debug)]
 pub struct RotationRate {
-    /// Pd or Xd
+    /// Rate Pd of a total rotation vector, or Xd of an increment
     pub rate: Vec3,
-    /// dXd/dX = T^-1 (dOmega - C1(Xd))
+    /// dXd/dX = T^-1 (dOmega - C1(Xd)); `None` for a total rotation vector
     over_unknown: Option<Mat3>,
 }
 
 impl RotationRate {
-    /// Of a total rotation vector.
+    /// Rate of a total rotation vector, an independent variable.
     pub fn of_vector(rate: Vec3) -> Self {
         Self { rate, over_unknown: None }
     }
 
-    /// What the derivative of something over the rate of the unknown means for the unknown rate of the state, and for the
-    /// unknown itself.
+    /// Converts a derivative with respect to the rate of a rotation unknown into derivatives with
+    /// respect to the independent rate of the state (first) and to the unknown itself (second).
     pub fn pull_back(&self, over_rate: Vec3) -> (Vec3, Vec3) {
         match &self.over_unknown {
             None => (over_rate, Vec3::ZERO),
@@ -269,11 +276,12 @@ impl RotationRate {
     }
 }
 
-/// What one effect must remember while Newton iterates: six numbers a point. It can be dropped at any time.
+/// Stresses that one effect remembers during a Newton iteration, six numbers per integration point.
+/// They can be dropped at any time.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
-    /// The remembered numbers; valid only while `valid`.
+    /// Remembered stresses, meaningful only while `valid`
     pub points: Vec<[f64; 6]>,
-    /// Whether `points` belongs to the present iteration.
+    /// True if `points` belongs to the current iteration.
     pub valid: bool,
 }

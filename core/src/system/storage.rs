@@ -1,74 +1,78 @@
-//! How the values of a tangent stand in one list: first the tiles on the diagonal, one a group, then those beside it.
+//! Storage of tangent values in one list: first the diagonal tiles, one per node block, then the
+//! off-diagonal tiles.
 
 use super::tile::Tile;
 use std::ops::Range;
 
-/// The place of a tile that is not kept: that of its transpose is.
+/// Position of tiles that are not stored, since their transposes are.
 pub(super) const NOT_KEPT: u32 = u32::MAX;
 
-/// Where tiles and their entries stand in the list.
+/// Positions of tiles and of their entries in the list of values.
 ///
-/// Tiles stand by their columns. Where a tangent is symmetric, tiles on the diagonal keep one half of themselves: what is above the
-/// diagonal and on it, row by row.
+/// Tiles are stored by columns. Diagonal tiles of symmetric tangents store only their upper
+/// triangle, diagonal included, row by row.
 #[derive(Clone, Copy, Debug)]
 pub struct Storage {
     width: usize,
-    /// Whether tiles on the diagonal keep one half
+    /// True if diagonal tiles store only their upper triangle.
     keeps_upper: bool,
-    /// The numbers of a tile on the diagonal, and of one beside it
+    /// Numbers of values of a diagonal and of an off-diagonal tile
     lengths: [usize; 2],
-    /// Where the tiles beside the diagonal begin
+    /// Position of the first off-diagonal tile
     boundary: usize,
 }
 
 impl Storage {
-    /// Of tiles so wide; `keeps_upper` where those on the diagonal are symmetric, and only that half is kept.
+    /// Storage of tiles with `width` rows for `node_blocks` node blocks; with `keeps_upper`
+    /// diagonal tiles store only their upper triangle.
     pub(super) fn new(width: usize, node_blocks: usize, keeps_upper: bool) -> Self {
         let whole = width * width;
         let own = if keeps_upper { upper_length(width) } else { whole };
         Self { width, keeps_upper, lengths: [own, whole], boundary: own * node_blocks }
     }
 
-    /// The numbers of these tiles on the diagonal.
+    /// Positions of the values of some diagonal tiles.
     pub(super) fn on_diagonal(&self, node_blocks: &Range<usize>) -> Range<usize> {
         self.own(node_blocks.start)..self.own(node_blocks.end)
     }
 
-    /// The numbers of these tiles beside it.
+    /// Positions of the values of some off-diagonal tiles.
     pub(super) fn beside(&self, tiles: &Range<usize>) -> Range<usize> {
         self.other(tiles.start)..self.other(tiles.end)
     }
 
-    /// Whether tiles on the diagonal keep one half.
+    /// True if diagonal tiles store only their upper triangle.
     #[inline(always)]
     pub(super) fn keeps_upper(&self) -> bool {
         self.keeps_upper
     }
 
-    /// Where the tiles beside the diagonal begin.
+    /// Position of the first off-diagonal tile.
     #[inline(always)]
     pub(super) fn boundary(&self) -> usize {
         self.boundary
     }
 
-    /// Where the tile of a group and itself begins.
+    /// Position of the diagonal tile of a node block.
     #[inline(always)]
     pub(super) fn own(&self, group: usize) -> usize {
         self.lengths[0] * group
     }
 
-    /// Where a tile beside the diagonal begins.
+    /// Position of an off-diagonal tile.
     #[inline(always)]
     pub(super) fn other(&self, tile: usize) -> usize {
         self.boundary + self.lengths[1] * tile
     }
 
-    /// Where the block is added to that begins at an entry of a tile: see [`Values::block`](super::values::Values::block).
+    /// Position to which a block is added that begins at an entry of the tile at `place`: see
+    /// [`TileValues::block`](super::values::TileValues::block).
     pub(super) fn target(&self, place: usize, row: usize, column: usize) -> usize {
         if self.is_half(place) { place } else { self.entry(place, row, column) }
     }
 
-    /// Where an entry of the tile stands that begins at a place; in one half, perhaps with its mirror image.
+    /// Position of an entry of the tile at `place`; in an upper triangle it may be that of the
+    /// mirrored entry.
     #[inline]
     pub fn entry(&self, place: usize, row: usize, column: usize) -> usize {
         match self.is_half(place) {
@@ -77,13 +81,13 @@ impl Storage {
         }
     }
 
-    /// Whether one half is kept of the tile at a place.
+    /// True if the tile at `place` stores only its upper triangle.
     #[inline(always)]
     fn is_half(&self, place: usize) -> bool {
         self.keeps_upper && place < self.boundary
     }
 
-    /// The tiles of a list of values.
+    /// A list of values as tiles.
     pub(super) fn tiles<'a, const W: usize>(&self, values: &'a [f64]) -> Tiles<'a, W> {
         let (own, beside) = values.split_at(self.boundary);
         let own = if self.keeps_upper { Own::Halves(own) } else { Own::Whole(as_tiles(own)) };
@@ -91,43 +95,43 @@ impl Storage {
     }
 }
 
-/// The numbers of the upper half of a symmetric tile.
+/// Number of values in the upper triangle of a symmetric tile.
 pub const fn upper_length(width: usize) -> usize {
     width * (width + 1) / 2
 }
 
-/// Where an entry on or above the diagonal stands in it.
+/// Position in an upper triangle of an entry on or above the diagonal.
 #[inline(always)]
 pub const fn upper_entry(width: usize, row: usize, column: usize) -> usize {
     upper_start(width, row) + column
 }
 
-/// Where its rows would begin if they were complete: they overlap.
+/// Position in an upper triangle of column 0 of a row, if the row were complete; such rows overlap.
 #[inline(always)]
 pub const fn upper_start(width: usize, row: usize) -> usize {
     row * (width - 1) - row * row.saturating_sub(1) / 2
 }
 
-/// The values of a tangent as tiles.
+/// Values of a tangent as tiles.
 #[derive(Clone, Copy)]
 pub struct Tiles<'a, const W: usize> {
-    /// Those on the diagonal, one a group
+    /// Diagonal tiles, one per node block
     pub own: Own<'a, W>,
-    /// Those beside it, in the order of the pattern
+    /// Off-diagonal tiles, in the order of the pattern
     pub beside: &'a [Tile<W>],
 }
 
-/// The tiles on the diagonal of a tangent.
+/// Diagonal tiles of a tangent.
 #[derive(Clone, Copy)]
 pub enum Own<'a, const W: usize> {
-    /// As they are
+    /// Complete tiles
     Whole(&'a [Tile<W>]),
-    /// The upper half of each, row by row
+    /// Upper triangles, each row by row
     Halves(&'a [f64]),
 }
 
 impl<'a, const W: usize> Own<'a, W> {
-    /// Does something with the tile of a group.
+    /// Calls `work` with the tile of a node block.
     #[inline(always)]
     pub fn with<T>(&self, group: usize, work: impl FnOnce(&Tile<W>) -> T) -> T {
         match self {
@@ -145,7 +149,7 @@ impl<'a, const W: usize> Own<'a, W> {
         }
     }
 
-    /// Copies the upper half of the tile of a group, which is symmetric.
+    /// Copies the upper triangle of the symmetric tile of a node block.
     #[inline(always)]
     pub fn copy_upper(&self, group: usize, upper: &mut [f64]) {
         match self {
@@ -160,13 +164,13 @@ impl<'a, const W: usize> Own<'a, W> {
     }
 }
 
-/// The numbers of one half among many.
+/// Upper triangle of one node block in the list of all.
 #[inline(always)]
 fn half<const W: usize>(numbers: &[f64], group: usize) -> &[f64] {
     &numbers[upper_length(W) * group..][..upper_length(W)]
 }
 
-/// Values as tiles.
+/// A list of values as complete tiles.
 pub(super) fn as_tiles<const W: usize>(values: &[f64]) -> &[Tile<W>] {
     values.as_chunks::<W>().0.as_chunks::<W>().0
 }

@@ -1,52 +1,54 @@
-//! The values of a tangent, or of a stretch of it, to add to: block by block, whatever is kept of its tile.
+//! Mutable values of a tangent or of a slice of it, to which blocks are added in any storage.
 
 use super::storage::{NOT_KEPT, Storage, upper_entry};
 
-/// The values of a stretch of the tangent, to add to.
+/// Mutable values of a slice of the tangent.
 pub struct Values<'a> {
     storage: &'a Storage,
     own: &'a mut [f64],
     beside: &'a mut [f64],
-    /// What both begin with
+    /// Positions in the complete list of the first value of `own` and of `beside`
     first: [usize; 2],
 }
 
-/// A tile, or a block of two slots in it, to add to.
+/// Mutable tile, or block of two slots in a tile.
 pub enum BlockMut<'a> {
-    /// As it is, from its first entry on
+    /// Values of a complete tile, from the first entry of the block on
     Whole(&'a mut [f64]),
-    /// The upper half of the tile, row by row, and row and column of the tile that the block begins with
+    /// Upper triangle of a tile, row by row, and the tile row and column of the first entry of the
+    /// block
     Upper(&'a mut [f64], [usize; 2]),
-    /// It is not kept.
+    /// The tile is not stored, since its transpose is.
     Nowhere,
 }
 
 impl<'a> Values<'a> {
-    /// Those of all tiles.
+    /// Values of all tiles.
     pub(super) fn all(storage: &'a Storage, values: &'a mut [f64]) -> Self {
         let (own, beside) = values.split_at_mut(storage.boundary());
         Self { storage, own, beside, first: [0, storage.boundary()] }
     }
 
-    /// Those of some tiles on the diagonal, and beside it, that stand at these places.
+    /// Values of some diagonal and off-diagonal tiles, which begin at the positions `first` of the
+    /// complete list.
     pub(super) fn part(storage: &'a Storage, [own, beside]: [&'a mut [f64]; 2], first: [usize; 2]) -> Self {
         Self { storage, own, beside, first }
     }
 
-    /// Lends them.
+    /// Borrows the values again for a shorter time.
     #[inline]
     pub(super) fn reborrow(&mut self) -> Values<'_> {
         Values { storage: self.storage, own: self.own, beside: self.beside, first: self.first }
     }
 
-    /// Sets them to zero.
+    /// Sets all values to zero.
     pub(super) fn clear(&mut self) {
         self.own.fill(0.0);
         self.beside.fill(0.0);
     }
 
-    /// The block at a place, which is that of its first entry; in a tile of which one half is kept that of the tile, and `corner` tells
-    /// row and column of the first entry.
+    /// Block at a position: that of its first entry, or in an upper triangle that of the tile, for
+    /// which `corner` gives tile row and column of the first entry.
     #[inline(always)]
     pub(super) fn block(&mut self, place: u32, corner: impl FnOnce() -> [usize; 2]) -> BlockMut<'_> {
         let at = place as usize;
@@ -58,7 +60,7 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// The tile at a place.
+    /// Tile at a position.
     #[inline(always)]
     pub(super) fn tile(&mut self, place: u32) -> BlockMut<'_> {
         self.block(place, || [0, 0])
@@ -66,7 +68,7 @@ impl<'a> Values<'a> {
 }
 
 impl<'a> BlockMut<'a> {
-    /// The block of a tile so wide that begins at this row and column.
+    /// Block of a tile of the given width that begins at this row and column.
     #[inline(always)]
     pub fn within(self, width: usize, [row, column]: [usize; 2]) -> Self {
         match self {
@@ -76,7 +78,8 @@ impl<'a> BlockMut<'a> {
         }
     }
 
-    /// Adds to an entry, in a tile so wide; what is below the diagonal of one half goes without saying.
+    /// Adds to an entry of the block, in a tile of the given width. In an upper triangle entries
+    /// below the diagonal are skipped.
     #[inline(always)]
     pub fn add(&mut self, width: usize, row: usize, column: usize, value: f64) {
         match self {
@@ -94,7 +97,7 @@ impl<'a> BlockMut<'a> {
         }
     }
 
-    /// Adds the same to the first D entries of its diagonal, in a tile W wide.
+    /// Adds a value to the first D diagonal entries of the block, in a tile of width W.
     #[inline(always)]
     pub fn add_along_diagonal<const W: usize, const D: usize>(&mut self, value: f64) {
         match self {
@@ -106,7 +109,7 @@ impl<'a> BlockMut<'a> {
         }
     }
 
-    /// Adds 3 x 3 entries, by row and column, in a tile W wide.
+    /// Adds 3 x 3 entries by row and column, in a tile of width W.
     #[inline(always)]
     pub fn add_block<const W: usize>(&mut self, value: impl Fn(usize, usize) -> f64) {
         match self {
@@ -123,7 +126,7 @@ impl<'a> BlockMut<'a> {
         }
     }
 
-    /// Adds all of a tile W wide, which stands by its columns.
+    /// Adds all entries of a tile of width W, numbered by columns.
     #[inline(always)]
     pub fn add_tile<const W: usize>(&mut self, value: impl Fn(usize) -> f64) {
         match self {

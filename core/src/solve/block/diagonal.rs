@@ -1,29 +1,30 @@
-//! The tiles on the diagonal of some rows, wherever they stand.
+//! Diagonal tiles of some rows, stored by row or by node block.
 
 use std::ops::{Index, IndexMut};
 
-/// The tiles on the diagonal of a piece, called by its rows: they stand in a list of their own, row
-/// by row, or in the tangent, group by group. `S` is a slice of them.
+/// Diagonal tiles of a piece, indexed by row: stored in a list of their own, by row, or in the
+/// tangent, by node block. `S` is a slice of tiles.
 pub struct Diagonal<'a, S> {
     tiles: S,
-    /// The row or the group of the first
+    /// Row or node block of the first tile
     first: usize,
-    /// The group of each row, where they stand by groups
+    /// Node block of each row, for tiles stored by node block
     node_blocks: Option<&'a [u32]>,
 }
 
 impl<'a, S> Diagonal<'a, S> {
-    /// Row by row from the first on.
+    /// Tiles stored by row from row `first` on.
     pub fn by_rows(tiles: S, first: usize) -> Self {
         Self { tiles, first, node_blocks: None }
     }
 
-    /// Group by group from the first on; `order` tells the group of each row.
+    /// Tiles stored by node block from node block `first` on; `order` is the node block of each
+    /// row.
     pub fn by_groups(tiles: S, first: usize, order: &'a [u32]) -> Self {
         Self { tiles, first, node_blocks: Some(order) }
     }
 
-    /// Where the tile of a row is; rows of other pieces lie beyond.
+    /// Index in `tiles` of the tile of a row; out of bounds for rows of other pieces.
     #[inline(always)]
     fn place(&self, row: usize) -> usize {
         self.node_blocks.map_or(row, |order| order[row] as usize).wrapping_sub(self.first)
@@ -31,7 +32,7 @@ impl<'a, S> Diagonal<'a, S> {
 }
 
 impl<T> Diagonal<'_, &mut [T]> {
-    /// The tile of a row, of this piece or of one beyond.
+    /// Tile of a row, of this piece or else of `beyond`.
     #[inline(always)]
     pub fn or<'s>(&'s mut self, beyond: &'s mut Diagonal<'_, &mut [T]>, row: usize) -> &'s mut T {
         let place = self.place(row);

@@ -1,36 +1,37 @@
-//! The order of elimination and where its updates go, worked out once for a pattern.
+//! Symbolic factorisation: the order of elimination and the positions of its updates, computed once
+//! for a pattern.
 
 use super::order::{self, Order};
 use crate::system::Pattern;
 use std::ops::Range;
 
-/// Elimination makes so many blocks out of one at most; beyond, a supernodal factorisation is
-/// faster.
+/// Limit of fill: with more blocks in the factor than this many times those of the tangent, a
+/// supernodal factorisation is faster.
 const MOST_FILL: usize = 8;
 
-/// How much fill a factorisation may have.
+/// Limit of fill of a factorisation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fill {
-    /// As much as is faster than another solver
+    /// At most [`MAX_FILL_RATIO`] times the blocks of the tangent
     Little,
-    /// As much as it takes
+    /// Any amount
     Any,
 }
 
-/// Where a block stands, in one number.
+/// Position of the first value of a block, packed into one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Source(u32);
 
-/// What a [`Source`] says.
+/// Position of the first value of a block, unpacked from a [`Source`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stands {
-    /// A tile of the tangent beside its diagonal
+    /// Off-diagonal tile of the tangent, by number
     Tile(usize),
-    /// The transpose of one
+    /// Transpose of an off-diagonal tile of the tangent
     Transpose(usize),
-    /// Elimination changes it, and keeps it by itself.
+    /// Block of the factorisation that elimination changes, by number
     Own(usize),
-    /// Elimination fills it.
+    /// Fill: a block that the tangent does not have.
     Nowhere,
 }
 
@@ -45,12 +46,12 @@ impl Source {
         Self(4 * number as u32 + 2)
     }
 
-    /// Where the transpose of a block that stands in the tangent stands.
+    /// Source of the transpose of a block of the tangent.
     fn transposed(self) -> Self {
         if self.0 & 2 == 0 { Self(self.0 ^ 1) } else { self }
     }
 
-    /// Where it is.
+    /// The position, unpacked.
     #[inline(always)]
     pub fn stands(self) -> Stands {
         let number = (self.0 / 4) as usize;
@@ -63,49 +64,50 @@ impl Source {
     }
 }
 
-/// The elimination of block rows one after the other.
+/// Elimination of block rows one after the other.
 ///
-/// Rows are called by their place in the order. The rows that the elimination of row k changes are
-/// its later neighbours; the blocks right of the diagonal in row k stand in their order. Blocks
-/// that no elimination changes are those of the tangent.
+/// Rows are numbered in the order of elimination. Eliminating row k changes its later neighbours;
+/// the blocks right of the diagonal in row k are in their order. Blocks that no elimination changes
+/// are read from the tangent.
 #[derive(Clone, Debug)]
 pub struct Elimination {
-    /// The group of each row
+    /// Node block of each row
     pub order: Vec<u32>,
-    /// The row of each group
+    /// Row of each node block
     pub row_of: Vec<u32>,
-    /// Rows that do not meet but in the trunk, and can be eliminated at once
+    /// Ranges of rows (subtrees of the elimination tree) that are coupled only through the trunk
+    /// and are eliminated in parallel
     pub branches: Vec<Range<usize>>,
-    /// The rows after all branches
+    /// Rows after all branches
     pub trunk: Range<usize>,
-    /// The groups of each branch and of the trunk, where those of each follow each other; else
-    /// nothing
+    /// Node blocks of each branch and of the trunk as ranges; empty unless those of each one are
+    /// consecutive
     pub runs: Vec<Range<usize>>,
-    /// Where the later neighbours of each row begin
+    /// Position in `later` of the first later neighbour of each row
     pub starts: Vec<u32>,
-    /// Later neighbours
+    /// Later neighbours, row by row
     pub later: Vec<u32>,
-    /// Where the targets of each row begin, where there are some
+    /// Position in `targets` of the first target of each row; empty without targets
     target_starts: Vec<u32>,
-    /// Row by row, for each pair of later neighbours (a before b), in the order of b and then of a:
-    /// the number, among those that elimination changes, of the block that they share right of the
-    /// diagonal
+    /// Row by row, for each pair of later neighbours a < b, in the order of b and then of a: the
+    /// changed block in which they are coupled, by its number among changed blocks
     pub targets: Vec<u32>,
-    /// The blocks that elimination changes
+    /// Blocks right of the diagonal that elimination changes, ascending
     changed: Vec<u32>,
-    /// What these begin with, as `above` and `below`
+    /// Sources of the initial values of each changed block and of its mirror image
     begin: Vec<[Source; 2]>,
-    /// Each block right of the diagonal by rows; empty where they are `below`
+    /// Source of each block right of the diagonal; empty for symmetric off-diagonal tiles, for
+    /// which `below` is used
     above: Vec<Source>,
-    /// Their mirror images by columns
+    /// Source of the transpose of the mirror image of each block
     below: Vec<Source>,
-    /// Rows of tiles that are no equations: row, and row of its tile
+    /// Rows of diagonal tiles without an equation: row of elimination, and row of the tile
     idle: Vec<(u32, u8)>,
 }
 
 impl Elimination {
-    /// In the order of [`order::find`]: without any fill on chains and trees. `None` where there is
-    /// more fill than there may be, or memory for the analysis cannot be had.
+    /// Elimination in the order of [`order::find`], without fill on chains and trees. `None` if
+    /// fill exceeds its limit, or memory for the analysis is not available.
     pub fn new(pattern: &Pattern, multipliers: &[u32], fill: Fill) -> Option<Self> {
         let most = match fill {
             Fill::Little => MOST_FILL * pattern.pairs(),
@@ -141,67 +143,69 @@ impl Elimination {
         Some(out)
     }
 
-    /// The same for a pattern that is [like](Pattern::is_like) its own.
+    /// Elimination in the same order for another pattern that is [like](Pattern::is_like) this one.
     pub fn of_like(&self, pattern: &Pattern) -> Self {
         let mut out = self.clone();
         out.find_sources(pattern);
         out
     }
 
-    /// The later neighbours of a row.
+    /// Positions of the later neighbours of a row.
     #[inline]
     pub fn neighbours(&self, row: usize) -> Range<usize> {
         self.starts[row] as usize..self.starts[row + 1] as usize
     }
 
-    /// Where the targets of a row begin.
+    /// Position in `targets` of the first target of a row.
     #[inline(always)]
     pub fn first_target(&self, row: usize) -> usize {
         self.target_starts.get(row).map_or(0, |&first| first as usize)
     }
 
-    /// A block right of the diagonal, by rows.
+    /// Source of a block right of the diagonal.
     #[inline(always)]
     pub fn above(&self, block: usize) -> Source {
         *self.above.get(block).unwrap_or(&self.below[block])
     }
 
-    /// Its mirror image, by columns.
+    /// Source of the transpose of the mirror image, left of the diagonal, of a block.
     #[inline(always)]
     pub fn below(&self, block: usize) -> Source {
         self.below[block]
     }
 
-    /// True if a block by rows and its mirror image by columns stand at one place and are the same.
+    /// True if a block and the transpose of its mirror image are equal and read from one tile of
+    /// the tangent.
     #[inline(always)]
     pub fn is_one(&self, block: usize) -> bool {
         self.above.is_empty() && !matches!(self.below[block].stands(), Stands::Own(_))
     }
 
-    /// The blocks in these rows that elimination changes, by their numbers among all such.
+    /// Numbers, among changed blocks, of those in the given rows.
     pub fn changed(&self, rows: &Range<usize>) -> Range<usize> {
         let place = |row: usize| self.changed.partition_point(|&block| block < self.starts[row]);
         if self.changed.is_empty() { 0..0 } else { place(rows.start)..place(rows.end) }
     }
 
-    /// What one of these begins with, by rows, and its mirror image, by columns.
+    /// Sources of the initial values of changed block `number` and of the transpose of its mirror
+    /// image.
     pub fn begin(&self, number: usize) -> [Source; 2] {
         self.begin[number]
     }
 
-    /// The end of these rows and of those before `end` that their elimination changes.
+    /// The end of the rows up to `end` that the elimination of `rows` reads or changes.
     pub fn reach(&self, rows: &Range<usize>, end: usize) -> usize {
         let later = &self.later[self.starts[rows.start] as usize..self.starts[rows.end] as usize];
         let ends = later.iter().map(|&row| row as usize + 1).filter(|&after| after <= end);
         ends.fold(rows.end, usize::max)
     }
 
-    /// Branches and trunk.
+    /// Row ranges of all branches and of the trunk.
     pub fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
         self.branches.iter().chain([&self.trunk]).cloned()
     }
 
-    /// Where the later row of a block stands, seen from the rows of its piece.
+    /// Position of the later row of a block relative to the piece of `rows`.
     #[inline(always)]
     pub fn place(&self, rows: &Range<usize>, block: usize) -> Later {
         match self.later[block] as usize {
@@ -210,7 +214,7 @@ impl Elimination {
         }
     }
 
-    /// The rows of some tiles that are no equations.
+    /// Rows of diagonal tiles without an equation, among `rows`.
     pub fn idle(&self, rows: &Range<usize>) -> &[(u32, u8)] {
         let place = |row: usize| self.idle.partition_point(|(other, _)| (*other as usize) < row);
         &self.idle[place(rows.start)..place(rows.end)]
@@ -223,7 +227,7 @@ impl Elimination {
         for column in 0..pattern.node_blocks.count() {
             for tile in pattern.tiles_of(column) {
                 let (i, j) = (row_of[pattern.rows[tile] as usize], row_of[column]);
-                // Tiles stand by their columns.
+                // Tiles are stored by columns; factors are by rows.
                 let (block, source) = (find(&self.starts, &self.later, i.min(j), i.max(j)), Source::tile(tile));
                 match (i < j, self.above.get_mut(block)) {
                     (true, Some(above)) => *above = source.transposed(),
@@ -244,17 +248,17 @@ impl Elimination {
     }
 }
 
-/// Where a later row stands.
+/// Position of a later row relative to a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Later {
-    /// In the same piece
+    /// Row of the same piece, from its first on
     Own(usize),
-    /// In the trunk
+    /// Row of the trunk, from its first on
     Beyond(usize),
 }
 
 impl Later {
-    /// What belongs to it.
+    /// Item of the row, in the list of the piece or in that of the trunk.
     #[inline(always)]
     pub fn of<'a, T>(self, own: &'a [T], beyond: &'a [T]) -> &'a T {
         match self {
@@ -263,7 +267,7 @@ impl Later {
         }
     }
 
-    /// The same, to change it.
+    /// Mutable item of the row, in the list of the piece or in that of the trunk.
     #[inline(always)]
     pub fn of_mut<'a, T>(self, own: &'a mut [T], beyond: &'a mut [T]) -> &'a mut T {
         match self {
@@ -273,14 +277,14 @@ impl Later {
     }
 }
 
-/// NodeBlocks as a range, where they follow each other in some order.
+/// Node blocks as a range, if they are consecutive in some order.
 fn run(node_blocks: &[u32]) -> Option<Range<usize>> {
     let Some((least, most)) = node_blocks.iter().min().zip(node_blocks.iter().max()) else { return Some(0..0) };
     let range = *least as usize..*most as usize + 1;
     (range.len() == node_blocks.len()).then_some(range)
 }
 
-/// Where row `i` keeps its block with the later row `j`.
+/// Position of the block of row `i` and later row `j`.
 fn find(starts: &[u32], later: &[u32], i: u32, j: u32) -> usize {
     let start = starts[i as usize] as usize;
     let neighbours = &later[start..starts[i as usize + 1] as usize];

@@ -1,14 +1,14 @@
-//! Factorisations in blocks, of whatever kind.
+//! Interface of block factorisations.
 
 use super::elimination::Elimination;
 use crate::system::{Matrix, System};
 
-/// The numbers of a factorisation.
+/// Values of a block factorisation.
 pub trait Factor: Send {
-    /// Its name, in a word.
+    /// Name of the method.
     fn name(&self) -> &'static str;
 
-    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
+    /// Factorises a matrix; `false` if a pivot is zero or not finite, or memory is not available.
     fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool;
 
     /// See [`super::BlockSolver::can_stay_within`].
@@ -29,6 +29,7 @@ pub trait Factor: Send {
     /// See [`super::BlockSolver::is_symmetric`].
     fn is_symmetric(&self) -> bool;
 
-    /// Solves with the last factorisation, which is that of `matrix`, row by row.
+    /// Solves with the last factorisation, which is that of `matrix`; `x` is in the order of
+    /// elimination, a tile width of numbers per row.
     fn solve(&self, elimination: &Elimination, matrix: Matrix, x: &mut [f64]);
 }

@@ -1,4 +1,4 @@
-//! L D L^T in blocks, of symmetric tangents.
+//! Block L D L^T factorisation of symmetric tangents.
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
@@ -8,16 +8,17 @@ use super::tile::{self, Block, Own, Part, Rows, Tile, Upper, Width};
 use crate::system::upper_entry;
 use std::ops::Range;
 
-/// With A_kk = L D L^T as row k is eliminated. Blocks beside the diagonal stay what they are then:
-/// with Y = L^-1 A_kj a row takes Y^T D^-1 Y from what comes later.
+/// Rows of a block L D L^T factorisation, with A_kk = L D L^T the diagonal tile at the elimination
+/// of row k. Off-diagonal blocks keep the values they have then: with Y = L^-1 A_kj, row k
+/// subtracts Y^T D^-1 Y from later blocks.
 pub struct Ldl<const W: usize>
 where
     Width<W>: Rows<W>,
 {
     rows: Range<usize>,
-    /// The blocks above the diagonal that are not those of the tangent
+    /// Blocks above the diagonal that elimination changes
     changed: Stretch<Tile<W>>,
-    /// D^-1 Y of the row that is being eliminated
+    /// D^-1 Y of the row being eliminated
     row: Vec<Tile<W>>,
 }
 
@@ -62,7 +63,7 @@ where
             }
         }
         for number in elimination.changed(&rows) {
-            // By columns it is what its mirror image is by rows.
+            // A block stored by columns is its mirror image stored by rows.
             let ([_, below], none, block) = (elimination.begin(number), Stretch::nothing(), &mut self.changed[number]);
             Block::find(below, beside, &none).with(|begin| tile::copy(block, begin));
         }
@@ -73,7 +74,7 @@ where
 
     fn add_own(sum: &mut Self::Own, other: &Self::Own) -> bool {
         sum.as_mut().iter_mut().zip(other.as_ref()).for_each(|(sum, other)| *sum += other);
-        // Signs of pivots tell.
+        // The signs of pivots tell whether digits may be lost.
         true
     }
 
@@ -118,7 +119,7 @@ where
             }
             tile::invert_symmetric(&factor, &mut diagonal[row]);
         }
-        // Where all pivots are positive nothing is lost, as with Cholesky's factorisation.
+        // With positive pivots only no digits are lost, as in Cholesky's factorisation.
         Some(Signs { negative, doubtful: negative })
     }
 
@@ -144,7 +145,7 @@ impl<const W: usize> Ldl<W>
 where
     Width<W>: Rows<W>,
 {
-    /// x_j -= A_jk part for all later rows j
+    /// x_j -= A_jk x_k for all later rows j, with x_k in `part`
     #[inline(always)]
     fn subtract_from_later(
         &self,

@@ -1,5 +1,5 @@
-//! LU in blocks, of unsymmetric tangents, with pivots looked for inside the blocks of the diagonal
-//! where those in place are small.
+//! Block LU factorisation of unsymmetric tangents, with row pivoting inside diagonal tiles that
+//! have small pivots.
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
@@ -8,15 +8,16 @@ use super::stretch::Stretch;
 use super::tile::{self, Block, Own, Part, RowOrder, Rows, Tile, Width};
 use std::ops::Range;
 
-/// With P A_kk = L U as row k is eliminated. Blocks beside the diagonal stay what they are then:
-/// with Y = L^-1 P A_kj and W = U^-T A_jk^T a row takes W^T Y from what comes later.
+/// Rows of a block LU factorisation, with P A_kk = L U the diagonal tile at the elimination of row
+/// k. Off-diagonal blocks keep the values they have then: with Y = L^-1 P A_kj and W = U^-T A_jk^T,
+/// row k subtracts W^T Y from later blocks.
 pub struct Lu<const W: usize> {
     orders: Stretch<RowOrder<W>>,
-    /// The blocks above the diagonal that are not those of the tangent
+    /// Blocks above the diagonal that elimination changes
     above: Stretch<Tile<W>>,
-    /// Transposed, each beside its mirror image in `above`
+    /// Transposes of the mirror images of the blocks in `above`, in the same order
     below: Stretch<Tile<W>>,
-    /// Y and W of the row that is being eliminated
+    /// Y and W of the row being eliminated
     row: Vec<[Tile<W>; 2]>,
 }
 
@@ -61,7 +62,7 @@ where
         diagonal: &mut Diagonal<&mut [Self::Own]>,
     ) {
         for row in rows.clone() {
-            // Tiles of the tangent stand by columns.
+            // Tiles of the tangent are stored by columns; factors are by rows.
             match own {
                 Some(own) => own.with(
                     elimination.order[row] as usize,
@@ -178,13 +179,13 @@ impl<const W: usize> Lu<W>
 where
     Width<W>: Rows<W>,
 {
-    /// A_kk^-1 x, with A_kk as row k was eliminated
+    /// A_kk^-1 x, with A_kk the diagonal tile at the elimination of row k
     #[inline(always)]
     fn solved(&self, look: &Look<Self, W>, row: usize, x: &Part<W>) -> Part<W> {
         tile::solve(&look.diagonal[row], &tile::reordered(&self.orders[row], x))
     }
 
-    /// x_j -= A_jk part for all later rows j
+    /// x_j -= A_jk x_k for all later rows j, with x_k in `part`
     #[inline(always)]
     fn subtract_from_later(
         &self,

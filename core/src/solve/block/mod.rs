@@ -1,11 +1,10 @@
-//! Factorisations of the tangent in blocks, the unknowns of one node each, 6 x 6 or in a plane 3 x
-//! 3: L D L^T where it is symmetric, LU where not.
+//! Block factorisations of the tangent, with one block per node, 6 x 6 or in a plane 3 x 3: L D L^T
+//! if it is symmetric, else LU.
 //!
-//! The order of elimination is that of least degree, in large scenes turned towards a middle, so
-//! that chains and trees get no fill at all. Pivots are not looked for across blocks: who uses this
-//! looks at the residual of what it solved, or whether the factorisation is
-//! [sure](BlockSolver::is_sure). Where blocks are not filled up the tangent's own serve beside the
-//! diagonal; those on it may give their place to the factors, too.
+//! The order is minimum degree, in large scenes rearranged towards a middle, so that chains and
+//! trees have no fill. There is no pivoting across blocks: callers check the residual of their
+//! solution, or whether the factorisation is [sure](BlockSolver::is_sure). Off-diagonal blocks
+//! without fill are read from the tangent; factors may overwrite its diagonal tiles.
 
 mod diagonal;
 mod elimination;
@@ -27,35 +26,35 @@ use lu::Lu;
 use pieces::Pieces;
 use std::sync::Arc;
 
-/// A factorisation in blocks.
+/// A block factorisation with its symbolic analysis.
 pub struct BlockSolver {
     elimination: Arc<Elimination>,
     factor: Box<dyn Factor>,
-    /// The unknowns that are solved for, by row
+    /// Right-hand side and solution in the order of elimination
     parts: Vec<f64>,
 }
 
 impl BlockSolver {
-    /// For tangents of this pattern; groups of `multipliers` are eliminated behind those that they
-    /// meet. `None` where blocks would fill up, or memory cannot be had.
+    /// Solver for tangents of this pattern. Node blocks of `multipliers` are eliminated after those
+    /// they are coupled with. `None` if there is too much fill, or memory is not available.
     pub fn new(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
         let elimination = Elimination::new(pattern, multipliers, Fill::Little)?;
         Self::by(Arc::new(elimination), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
-    /// For tangents of this pattern that are symmetric, even where the pattern does not say so, and
-    /// with as much fill as it takes. `None` where memory cannot be had.
+    /// Solver with any amount of fill for symmetric tangents, even if the symmetry of the pattern
+    /// is not declared. `None` if memory is not available.
     pub fn symmetric(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
         Self::by(Arc::new(Elimination::new(pattern, multipliers, Fill::Any)?), pattern, true)
     }
 
-    /// Another one for tangents of a pattern that is [like](Pattern::is_like) its own: in the same
-    /// order.
+    /// Solver in the same order for tangents of a pattern that is [like](Pattern::is_like) this
+    /// one.
     pub fn of_like(&self, pattern: &Pattern) -> Option<Self> {
         Self::by(Arc::new(self.elimination.of_like(pattern)), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
-    /// Another one for tangents of the same pattern, which are symmetric.
+    /// Solver in the same order for symmetric tangents of this pattern.
     pub fn symmetric_beside(&self, pattern: &Pattern) -> Option<Self> {
         Self::by(self.elimination.clone(), pattern, true)
     }
@@ -71,65 +70,65 @@ impl BlockSolver {
         Some(Self { elimination, factor, parts })
     }
 
-    /// The name of its factorisation, in a word.
+    /// Name of the method.
     pub fn name(&self) -> &'static str {
         self.factor.name()
     }
 
-    /// The rows in each part that is eliminated at once with others; what is left comes last.
+    /// Numbers of rows of the branches that are eliminated in parallel, before the trunk.
     pub fn branches(&self) -> Vec<usize> {
         self.elimination.branches.iter().map(|rows| rows.len()).collect()
     }
 
-    /// The blocks right of the diagonal.
+    /// Number of blocks right of the diagonal.
     pub fn blocks(&self) -> usize {
         self.elimination.later.len()
     }
 
-    /// True if it takes the tangent for symmetric.
+    /// True if the tangent is taken for symmetric.
     pub fn is_symmetric(&self) -> bool {
         self.factor.is_symmetric()
     }
 
-    /// Factorises; `false` where a pivot is zero or no number, or memory cannot be had.
+    /// Factorises a matrix; `false` if a pivot is zero or not finite, or memory is not available.
     pub fn factorise(&mut self, matrix: Matrix) -> bool {
         self.factor.factorise(&self.elimination, matrix)
     }
 
-    /// True if the factors may take the place of this tangent: each branch has nodes that follow
-    /// each other, and the tangent keeps as much of the tiles on its diagonal as the factors.
+    /// True if factors may overwrite the diagonal tiles of this tangent: each branch has
+    /// consecutive nodes, and the tangent stores as many values per diagonal tile as the factor.
     pub fn can_stay_within(&self, system: &System) -> bool {
         self.factor.can_stay_within(&self.elimination, system)
     }
 
-    /// Factorises a tangent whose place the factors [can](Self::can_stay_within) take: it needs no
-    /// memory. `false` where a pivot is zero or no number; the tangent is gone in any case.
+    /// Factorises a tangent in place, if that is [possible](Self::can_stay_within), without further
+    /// memory. `false` if a pivot is zero or not finite; the tangent is destroyed in any case.
     pub fn factorise_within(&mut self, system: &mut System) -> bool {
         self.factor.factorise_within(&self.elimination, system)
     }
 
-    /// How many pivots of the last factorisation are negative: as many as the matrix has negative
-    /// eigenvalues (Sylvester). `None` where it is not symmetric, or did not come to its end.
+    /// Number of negative pivots of the last factorisation, equal to the number of negative
+    /// eigenvalues (Sylvester's law of inertia). `None` if it is unsymmetric or has failed.
     pub fn negative(&self) -> Option<usize> {
         self.factor.negative()
     }
 
-    /// True if the determinant of what was factorised last is negative: an odd number of its real
-    /// eigenvalues is. `None` where the factorisation did not come to its end.
+    /// True if the determinant of the last factorised matrix is negative: it has an odd number of
+    /// negative real eigenvalues. `None` if the factorisation has failed.
     pub fn has_negative_determinant(&self) -> Option<bool> {
         self.factor.has_negative_determinant()
     }
 
-    /// True if the last factorisation shows no sign of lost digits. Where the tangent is symmetric,
-    /// all pivots are positive: it is that of a matrix which differs from A_ij by a few eps
+    /// True if the last factorisation shows no sign of lost digits. For a symmetric tangent, all
+    /// pivots are positive: the factors are those of a matrix that differs from A_ij by a few eps
     /// sqrt(A_ii A_jj) (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorems
-    /// 10.4, 10.5). Where not, no row took from an entry on the diagonal much more than what it had
-    /// then: no proof, since several rows may take some each.
+    /// 10.4, 10.5). For an unsymmetric one, no row has subtracted from a diagonal entry much more
+    /// than its value. The latter is no proof, since several rows may each subtract some.
     pub fn is_sure(&self) -> bool {
         self.factor.is_sure()
     }
 
-    /// Solves with the last factorisation, which is that of `matrix`; one entry an equation.
+    /// Solves with the last factorisation, which is that of `matrix`; `x` is by equation.
     pub fn solve(&mut self, matrix: Matrix, x: &mut [f64]) {
         match matrix.pattern.width() {
             WIDTH => self.solve_by::<WIDTH>(matrix, x),
@@ -137,9 +136,9 @@ impl BlockSolver {
         }
     }
 
-    /// Solves for the correction that a system asks for, whose tangent was factorised last, and
-    /// writes it into a field of slots; held directions take their part of `held`. Whether it is
-    /// finite.
+    /// Solves J du = -g for the correction of a system whose tangent was factorised last, and
+    /// writes du to a field of slots (global components). Held directions take the components of
+    /// `held`, or zero. `false`, with `out` unchanged, if du is not finite.
     pub fn correct(&mut self, system: &System, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         match system.pattern.width() {
             WIDTH => self.correct_by::<WIDTH>(system, held, out),

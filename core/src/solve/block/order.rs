@@ -1,10 +1,10 @@
-//! In which order blocks are eliminated: that of least degree, and in large scenes from several
-//! ends to a middle, so that branches of the elimination tree can be eliminated at once.
+//! Order of elimination: minimum degree, in large scenes rearranged from several ends to a middle,
+//! so that branches of the elimination tree can be eliminated in parallel.
 //!
-//! Least degree runs along a chain from one end to the other: its tree is a single branch. But
-//! whatever fills up under one order is a chordal graph, which can be eliminated without any more
-//! fill towards any of its cliques (Rose, Tarjan and Lueker 1976, doi:10.1137/0205021): here
-//! towards one in its middle.
+//! Minimum degree eliminates a chain from one end to the other: its elimination tree is a single
+//! branch. The filled graph of an order is chordal, and can be eliminated without further fill
+//! towards any of its cliques (Rose, Tarjan and Lueker 1976, doi:10.1137/0205021), here towards a
+//! clique in its middle.
 
 use crate::system::{Meetings, Pattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -14,43 +14,43 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-/// Smaller scenes are eliminated as they come.
+/// Least number of rows for which branches are looked for.
 const LEAST: usize = 1024;
 
-/// The rows of a trunk are looked for so long.
+/// Largest number of rows in the trunk that is tried.
 const MOST_TRUNK: usize = 64;
 
-/// As many parts as branches are cut into where the tree has that many
+/// Number of parts of equal size into which branches are divided if the tree permits
 const PARTS: usize = 16;
 
-/// No row: the parent of a root
+/// Row number that means no row, as the parent of a root
 const NONE: u32 = u32::MAX;
 
-/// An order of elimination.
+/// An order of elimination with its branches and fill.
 pub struct Order {
-    /// The group of each row
+    /// Node block of each row
     pub order: Vec<u32>,
-    /// Consecutive rows from the first on that meet others only after the last of them; empty where
-    /// it does not pay
+    /// Consecutive row ranges, from the first row on, that are coupled only with later rows after
+    /// all of them; empty if parallel elimination does not pay
     pub branches: Vec<Range<usize>>,
-    /// What each row leaves behind
+    /// Later neighbours of each row
     pub neighbours: Neighbours,
 }
 
-/// The rows that the elimination of each row changes.
+/// For each row, the rows that its elimination changes.
 pub struct Neighbours {
-    /// Where those of each row begin
+    /// Position in `later` of the first neighbour of each row
     pub starts: Vec<u32>,
-    /// In their order
+    /// Neighbours of each row, ascending
     pub later: Vec<u32>,
 }
 
 impl Neighbours {
-    /// Neighbours in the pattern, and what the rows that were eliminated before leave behind.
-    /// `None` where these are more than `most`.
+    /// Later neighbours: those in the pattern, and those that result from fill. `None` if there are
+    /// more than `most`.
     fn new(meetings: &Meetings, order: &[u32], most: usize) -> Option<Self> {
         let (n, row_of) = (order.len(), inverse(order));
-        // Rows whose first later neighbour is this one
+        // Rows whose first later neighbour is the index
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut seen = vec![u32::MAX; n];
         let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(meetings.pairs()));
@@ -84,8 +84,8 @@ impl Neighbours {
         Some(Self { starts, later })
     }
 
-    /// The same where rows come in another order, in which each still comes before those that it
-    /// changes, and these as they did.
+    /// Later neighbours after a permutation of rows in which each row still comes before those it
+    /// changes, and these keep their relative order.
     fn permuted(&self, places: &[u32]) -> Self {
         let row_of = inverse(places);
         let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
@@ -107,12 +107,12 @@ impl Neighbours {
         self.starts.len() - 1
     }
 
-    /// The elimination tree: the first row that each one changes.
+    /// Elimination tree: parent of each row, the first row that it changes.
     fn parents(&self) -> Vec<u32> {
         (0..self.count()).map(|row| self.of(row).first().copied().unwrap_or(NONE)).collect()
     }
 
-    /// The rows that each row is changed by.
+    /// For each row, the rows whose elimination changes it.
     fn earlier(&self) -> Self {
         let mut starts = vec![0; self.count() + 1];
         self.later.iter().for_each(|&row| starts[row as usize + 1] += 1);
@@ -129,8 +129,9 @@ impl Neighbours {
     }
 }
 
-/// The order for a pattern, in which each group of `multipliers` stands behind the groups that it
-/// meets. `None` where it fills up to more blocks than `most`, or memory cannot be had.
+/// Order for a pattern, in which the node blocks of `multipliers` come after those they are coupled
+/// with. `None` if the factor has more than `most` blocks right of the diagonal, or memory is not
+/// available.
 pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order> {
     let meetings = &pattern.meetings();
     let order = match multipliers {
@@ -151,21 +152,21 @@ pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order
     Some(Order { neighbours: neighbours.permuted(&sorted), order, branches })
 }
 
-/// Where each entry stands.
+/// Inverse permutation: position of each entry.
 pub fn inverse(order: &[u32]) -> Vec<u32> {
     let mut out = vec![0; order.len()];
     (0..).zip(order).for_each(|(place, &entry)| out[entry as usize] = place);
     out
 }
 
-/// The entries at these places.
+/// The entries at the given positions.
 fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
     places.iter().map(|&place| order[place as usize]).collect()
 }
 
-/// That of least degree among all other groups, and each multiplier right behind the last group
-/// that it meets: with everything after it clamped, what it ties is there, so that its pivot has
-/// the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
+/// Minimum degree among all other node blocks, then each multiplier right after the last node block
+/// it is coupled with. With everything after it clamped, the parts it connects are complete, so
+/// that its pivot has the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
 fn constrained(node_blocks: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
     let mut is_multiplier = vec![false; node_blocks];
     multipliers.iter().for_each(|&group| is_multiplier[group as usize] = true);
@@ -186,7 +187,7 @@ fn constrained(node_blocks: usize, meetings: &Meetings, multipliers: &[u32]) -> 
     };
     let mut places: Vec<(u32, u32)> = (0..).zip(&order).map(|(place, &group)| (place, group)).collect();
     places.extend(multipliers.iter().map(|&multiplier| (last_met(multiplier), multiplier)));
-    // Stable: at the same place a multiplier stays behind the group.
+    // The sort is stable: at equal positions a multiplier stays after the node block.
     places.sort_by_key(|&(place, _)| place);
     order.clear();
     order.extend(places.iter().map(|&(_, group)| group));
@@ -201,14 +202,14 @@ fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u
     Some(order)
 }
 
-/// An order without more fill that ends in a clique in the middle: that of maximum cardinality
-/// search from it, backwards.
+/// Order without further fill that ends in a clique in the middle: the reverse of a maximum
+/// cardinality search from there.
 fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
     let (n, earlier) = (neighbours.count(), neighbours.earlier());
     let start = middle(&neighbours.parents());
     let mut known = vec![0_u32; n];
     let mut is_done = vec![false; n];
-    // By the number of neighbours that are done, those found last on top
+    // Rows by their number of visited neighbours, the last found on top
     let mut waiting: Vec<Vec<u32>> = vec![(0..n as u32).rev().collect()];
     waiting[0].extend(neighbours.of(start).iter().rev().copied().chain([start as u32]));
     let mut order = Vec::with_capacity(n);
@@ -235,15 +236,15 @@ fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
     order
 }
 
-/// The row below which, and beside whose later neighbours, no part of the tree has more than half
-/// of the rows.
+/// Row with the property that removing it and its later neighbours leaves no part of the tree with
+/// more than half of the rows.
 fn middle(parents: &[u32]) -> usize {
     let sizes = sizes(parents);
-    // Children come before their parents.
+    // Children precede their parents.
     (0..parents.len()).find(|&row| 2 * sizes[row] as usize > parents.len()).unwrap_or(parents.len() - 1)
 }
 
-/// The rows of the tree below each row, and itself.
+/// Number of rows in the subtree of each row, itself included.
 fn sizes(parents: &[u32]) -> Vec<u32> {
     let mut sizes = vec![1; parents.len()];
     for (row, &parent) in parents.iter().enumerate() {
@@ -254,8 +255,8 @@ fn sizes(parents: &[u32]) -> Vec<u32> {
     sizes
 }
 
-/// Rows branch by branch, those of the trunk last, and the branches; none where most rows are in
-/// one of them.
+/// Rows sorted by branch, those of the trunk last, and the row ranges of the branches; no branches
+/// if more than three quarters of the rows are in one of them.
 fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
     let n = parents.len();
     let roots = branch_roots(parents);
@@ -268,7 +269,7 @@ fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
             owner[row] = owner[parents[row] as usize];
         }
     }
-    // The trunk, which nobody owns, sorts last.
+    // Rows of the trunk have no owner and sort last.
     let mut rows: Vec<u32> = (0..n as u32).collect();
     rows.sort_by_key(|&row| owner[row as usize]);
     let mut start = 0;
@@ -281,8 +282,8 @@ fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
     if 4 * largest > 3 * n { ((0..n as u32).collect(), Vec::new()) } else { (rows, branches) }
 }
 
-/// The roots of the trees in each branch, where rows are taken for the trunk from the largest tree
-/// on, as long as that pays.
+/// Roots of the subtrees in each branch. The trunk takes the root of the largest subtree again and
+/// again, as long as that reduces the cost.
 fn branch_roots(parents: &[u32]) -> Vec<Vec<u32>> {
     let sizes = sizes(parents);
     let mut children: Vec<Vec<u32>> = vec![Vec::new(); parents.len()];
@@ -293,7 +294,7 @@ fn branch_roots(parents: &[u32]) -> Vec<Vec<u32>> {
             None => trees.push((sizes[row as usize], Reverse(row))),
         }
     }
-    // A row of the trunk has to wait for all branches.
+    // Each row of the trunk waits for all branches, which counts double.
     let cost = |trees: &BinaryHeap<(u32, Reverse<u32>)>, trunk: usize| {
         trees.peek().map_or(0, |(size, _)| (*size as usize).max(parents.len() / PARTS)) + 2 * trunk
     };
@@ -308,7 +309,7 @@ fn branch_roots(parents: &[u32]) -> Vec<Vec<u32>> {
     in_branches(best.1.into_vec(), parents.len() / PARTS)
 }
 
-/// Trees together until they have so many rows.
+/// Collects consecutive subtrees into branches of at least `enough` rows.
 fn in_branches(mut trees: Vec<(u32, Reverse<u32>)>, enough: usize) -> Vec<Vec<u32>> {
     trees.sort_unstable_by_key(|&(_, Reverse(row))| row);
     let (mut branches, mut rows) = (Vec::<Vec<u32>>::new(), enough);
@@ -328,7 +329,7 @@ mod tests {
     use super::*;
     use crate::system::{Connectivity, DofMap, Layout, NodeBlocks, Symmetry};
 
-    /// Three chains of nodes that meet in node 0, one of them in a ladder, which fills up.
+    /// Three chains of nodes that join at node 0. One of them is a ladder, which has fill.
     fn star(length: u32) -> Pattern {
         let node = |chain: u32, k: u32| if k == 0 { 0 } else { chain * length + k };
         let rungs = (2..length).map(|k| [node(0, k - 2), node(0, k)]);
@@ -340,7 +341,7 @@ mod tests {
         Pattern::new(DofMap::new(slots, &[]).unwrap(), node_blocks, vec![connectivity], Symmetry::Whole)
     }
 
-    /// What is permuted is what would be found.
+    /// Permuted neighbours equal those computed from the permuted order.
     #[test]
     fn neighbours_of_branches_are_those_of_their_order() {
         let pattern = star(700);

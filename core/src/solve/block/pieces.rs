@@ -1,5 +1,5 @@
-//! A factorisation in pieces: branches of the elimination tree, which are eliminated at once, and
-//! the trunk, where they meet.
+//! Factorisation in pieces: the branches of the elimination tree, which are eliminated in parallel,
+//! and the trunk that couples them.
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
@@ -10,10 +10,10 @@ use crate::system::{Matrix, Symmetry, System};
 use crate::threads;
 use std::ops::{AddAssign, Range};
 
-/// Rows that are eliminated without a look at what has to be loaded for them
+/// Rows eliminated between two calls of [`Piece::load`]
 const AT_ONCE: usize = 8;
 
-/// Runs a piece of work as it is compiled for the instructions of this machine.
+/// Runs an expression compiled for the vector instructions of this machine.
 macro_rules! run {
     ($work:expr) => {
         Instructions::here().run(
@@ -23,13 +23,13 @@ macro_rules! run {
     };
 }
 
-/// The signs of the pivots of rows.
+/// Signs of the pivots of some rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Signs {
-    /// How many are negative; of unsymmetric tangents, how many tiles on the diagonal have a
-    /// negative determinant
+    /// Number of negative pivots; for unsymmetric tangents, of diagonal tiles with negative
+    /// determinant
     pub negative: usize,
-    /// How many rows may have lost digits, or cost later ones some
+    /// Number of rows that may have lost digits, or that may cost later rows digits
     pub doubtful: usize,
 }
 
@@ -40,36 +40,38 @@ impl AddAssign for Signs {
     }
 }
 
-/// The numbers of rows that follow each other, but for the tiles on their diagonal.
+/// Values of the factors of consecutive rows, without the diagonal tiles.
 pub trait Piece<const W: usize>: Send + Sync + Sized {
-    /// The name of the factorisation, in a word
+    /// Name of the method
     const NAME: &'static str;
 
-    /// It factorises symmetric tangents, whose pivots have the signs of eigenvalues
+    /// True if the method factorises symmetric tangents, whose pivots have the signs of the
+    /// eigenvalues
     const SYMMETRIC: bool;
 
-    /// A tile on the diagonal as it is factorised
+    /// A diagonal tile of the factor
     type Own: Copy + Send + Sync;
 
-    /// Nothing
+    /// A diagonal tile of zeros
     const NOTHING: Self::Own;
 
-    /// Of these rows, and blocks right of the diagonal that elimination changes. `None` where
-    /// memory cannot be had.
+    /// Values of `rows`, with the given changed blocks right of the diagonal. `None` if memory is
+    /// not available.
     fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self>;
 
-    /// Its rows.
+    /// Rows of the piece.
     fn rows(&self) -> Range<usize>;
 
-    /// The numbers of a tangent on its diagonal as they are factorised in their place.
+    /// Views the values of the diagonal tiles of a tangent, factorised in place, as tiles of the
+    /// factor.
     fn within(numbers: &[f64]) -> &[Self::Own];
 
-    /// The numbers of a tangent on its diagonal, to be factorised in their place.
+    /// Mutable view of the values of the diagonal tiles of a tangent as tiles of the factor, to be
+    /// factorised in place.
     fn within_mut(numbers: &mut [f64]) -> &mut [Self::Own];
 
-    /// Makes some of its rows ready, once, before the first elimination that changes them: `own`
-    /// are the tiles that those on the diagonal are copies of; without, they stand there
-    /// themselves.
+    /// Loads the tangent into some rows, once, before the first elimination that changes them.
+    /// Diagonal tiles are copied from `own`; without it they are in `diagonal` already.
     fn load(
         &mut self,
         rows: Range<usize>,
@@ -79,18 +81,18 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
         diagonal: &mut Diagonal<&mut [Self::Own]>,
     );
 
-    /// Adds what another piece takes from the tile of a row; whether that is no more than it may
-    /// be.
+    /// Adds the contribution of another piece to the diagonal tile of a row; `false` if that may
+    /// lose digits.
     fn add_own(sum: &mut Self::Own, other: &Self::Own) -> bool;
 
-    /// Adds what belongs to the same rows.
+    /// Adds the off-diagonal contributions of another piece to the same rows.
     fn add(&mut self, other: &Self);
 
-    /// Sets all numbers to zero.
+    /// Sets all values to zero.
     fn clear(&mut self);
 
-    /// Eliminates the next of its rows; what that changes in rows later than its own goes to
-    /// `beyond`. `None` where a pivot is zero or no number.
+    /// Eliminates the next rows; contributions to rows after those of the piece go to `beyond`.
+    /// `None` if a pivot is zero or not finite.
     fn eliminate(
         &mut self,
         rows: Range<usize>,
@@ -100,44 +102,45 @@ pub trait Piece<const W: usize>: Send + Sync + Sized {
         beyond: (&mut Self, &mut Diagonal<&mut [Self::Own]>),
     ) -> Option<Signs>;
 
-    /// Solves with the lower factor for its own part `x`; what that changes in later rows goes to
-    /// `beyond`.
+    /// Solves with the lower factor for `x`, the right-hand side of the rows of the piece;
+    /// contributions to later rows are added to `beyond`.
     fn forward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]);
 
-    /// Solves with the upper factor for its own part `x`, where all later rows are solved.
+    /// Solves with the upper factor for `x`, the rows of the piece, with the solution of later rows
+    /// in `beyond`.
     fn backward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]);
 }
 
-/// The view of a piece on the factors, to solve.
+/// Factors as a piece sees them in a solution.
 pub struct Look<'a, P: Piece<W>, const W: usize> {
     pub elimination: &'a Elimination,
-    /// The tiles of the tangent beside its diagonal
+    /// Off-diagonal tiles of the tangent
     pub beside: &'a [Tile<W>],
-    /// The factors on the diagonal
+    /// Diagonal tiles of the factor
     pub diagonal: Diagonal<'a, &'a [P::Own]>,
 }
 
-/// What a branch changes in the trunk: blocks beside the diagonal, and tiles on it, row by row.
+/// Contributions of a branch to the trunk: off-diagonal blocks, and diagonal tiles by row.
 type Change<P, const W: usize> = (P, Vec<<P as Piece<W>>::Own>);
 
-/// Branches and trunk.
+/// Factors of all branches and of the trunk.
 pub struct Pieces<P: Piece<W>, const W: usize> {
     branches: Vec<P>,
-    /// What each branch changes
+    /// Contributions of each branch to the trunk
     changes: Vec<Change<P, W>>,
     trunk: P,
-    /// Later than the trunk there is nothing.
+    /// An empty piece, for the rows after the trunk
     nothing: P,
-    /// True if the last factorisation stands within the tangent
+    /// True if the last factorisation is stored in the tangent
     is_within: bool,
-    /// What it has on the diagonal where it does not, row by row
+    /// Diagonal tiles of the factor by row, if they are not stored in the tangent
     diagonal: Vec<P::Own>,
-    /// The pivots of the last factorisation, where that came to its end
+    /// Signs of the pivots of the last factorisation; `None` if it has failed
     signs: Option<Signs>,
 }
 
 impl<P: Piece<W>, const W: usize> Pieces<P, W> {
-    /// For an elimination. `None` where memory cannot be had.
+    /// Memory for the factors of an elimination. `None` if it is not available.
     pub fn new(elimination: &Elimination) -> Option<Self> {
         let piece = |rows: &Range<usize>| P::new(rows.clone(), elimination.changed(rows));
         let (trunk, end) = (&elimination.trunk, elimination.trunk.end);
@@ -153,7 +156,7 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
         Some(Self { branches, changes, trunk, nothing, is_within: false, diagonal: Vec::new(), signs: None })
     }
 
-    /// Memory for factors on the diagonal; whether there is some.
+    /// Allocates the diagonal tiles of the factor; `false` if memory is not available.
     fn make_room(&mut self, rows: usize) -> bool {
         let has_room = self.diagonal.try_reserve_exact(rows - self.diagonal.len()).is_ok();
         if has_room {
@@ -162,8 +165,8 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
         has_room
     }
 
-    /// Eliminates all rows: branches at once, then the trunk. The tiles on the diagonal stand piece
-    /// by piece; see [`Piece::load`] for `own`.
+    /// Eliminates all rows: branches in parallel, then the trunk. `diagonals` are the diagonal
+    /// tiles of each piece; see [`Piece::load`] for `own`.
     fn eliminate(
         &mut self,
         elimination: &Elimination,
@@ -204,7 +207,7 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
         )
     }
 
-    /// What pieces look at, one after the other; see [`Look`].
+    /// Factors as the pieces see them, one after the other.
     fn looks<'a>(&'a self, elimination: &'a Elimination, matrix: Matrix<'a>) -> Vec<Look<'a, P, W>> {
         debug_assert_eq!(self.is_within, matrix.holds_factors(), "another tangent");
         let (own, beside) = matrix.numbers::<W>();
@@ -218,7 +221,7 @@ impl<P: Piece<W>, const W: usize> Pieces<P, W> {
     }
 }
 
-/// A tangent's tiles on the diagonal, piece by piece.
+/// Diagonal tiles of a tangent by piece.
 fn within<'a, T>(elimination: &'a Elimination, tiles: &'a [T]) -> Vec<Diagonal<'a, &'a [T]>> {
     let of_piece = |node_blocks: &Range<usize>| {
         Diagonal::by_groups(&tiles[node_blocks.clone()], node_blocks.start, &elimination.order)
@@ -226,7 +229,7 @@ fn within<'a, T>(elimination: &'a Elimination, tiles: &'a [T]) -> Vec<Diagonal<'
     elimination.runs.iter().map(of_piece).collect()
 }
 
-/// The tiles on the diagonal by pieces, to be factorised.
+/// Mutable diagonal tiles of a tangent by piece.
 fn within_mut<'a, T>(elimination: &'a Elimination, tiles: &'a mut [T]) -> Vec<Diagonal<'a, &'a mut [T]>> {
     let mut runs: Vec<(usize, &Range<usize>)> = elimination.runs.iter().enumerate().collect();
     runs.sort_by_key(|(_, node_blocks)| (node_blocks.start, node_blocks.end));
@@ -305,12 +308,13 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     }
 }
 
-/// Adds parts of the same rows.
+/// Adds vectors of the same rows.
 fn add<const W: usize>(sums: &mut [Part<W>], others: &[Part<W>]) {
     sums.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
 }
 
-/// Makes rows ready not long before they are needed, so that the tangent passes the caches once.
+/// Eliminates all rows of a piece. Rows are loaded shortly before they are needed, so that the
+/// tangent passes through the caches once.
 fn eliminate<const W: usize, P: Piece<W>>(
     piece: &mut P,
     elimination: &Elimination,

@@ -1,21 +1,21 @@
-//! A part of a long list that is called by the places in the list.
+//! A range of a longer list, indexed by positions in the whole list.
 
 use super::tile::Tile;
 use std::ops::{Index, IndexMut, Range};
 
-/// Entries that follow each other.
+/// Consecutive items of a longer list, indexed by positions in the whole list.
 pub struct Stretch<T> {
     start: usize,
     entries: Vec<T>,
 }
 
 impl<T: Clone> Stretch<T> {
-    /// No entries.
+    /// An empty range.
     pub fn nothing() -> Self {
         Self { start: 0, entries: Vec::new() }
     }
 
-    /// At these places. `None` where memory cannot be had.
+    /// Copies of `entry` at the given positions. `None` if memory is not available.
     pub fn new(places: Range<usize>, entry: T) -> Option<Self> {
         let mut entries = Vec::new();
         entries.try_reserve_exact(places.len()).ok()?;
@@ -23,19 +23,19 @@ impl<T: Clone> Stretch<T> {
         Some(Self { start: places.start, entries })
     }
 
-    /// Its places.
+    /// Positions of the items.
     #[inline(always)]
     pub fn range(&self) -> Range<usize> {
         self.start..self.start + self.entries.len()
     }
 
-    /// Sets all entries.
+    /// Sets each item to a function of its position.
     #[inline(always)]
     pub fn fill(&mut self, entry: impl Fn(usize) -> T) {
         (self.start..).zip(&mut self.entries).for_each(|(place, own)| *own = entry(place));
     }
 
-    /// The entry at a place, of this stretch or of one beyond.
+    /// Item at a position of this range, or else of `beyond`.
     #[inline(always)]
     pub fn or<'a>(&'a mut self, beyond: &'a mut Self, place: usize) -> &'a mut T {
         match self.entries.get_mut(place - self.start) {
@@ -46,7 +46,7 @@ impl<T: Clone> Stretch<T> {
 }
 
 impl<const W: usize> Stretch<Tile<W>> {
-    /// Adds tiles at the same places.
+    /// Adds the tiles of another range with equal positions.
     pub fn add_tiles(&mut self, other: &Self) {
         add(self.entries.as_flattened_mut().as_flattened_mut(), other.entries.as_flattened().as_flattened());
     }

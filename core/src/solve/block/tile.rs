@@ -1,5 +1,5 @@
-//! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 where a scene is planar.
-//! Every loop runs along rows, which lie next to each other.
+//! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 in planar scenes. All
+//! loops run along rows, which are contiguous.
 
 use super::elimination::{Source, Stands};
 use super::stretch::Stretch;
@@ -7,68 +7,69 @@ use crate::scalar::{LANES, Lanes, each_lane};
 pub use crate::system::{Own, Tile, transposed};
 use crate::system::{upper_entry, upper_start};
 
-/// A part of a vector that belongs to one tile row.
+/// Entries of a vector at the rows of one node block.
 pub type Part<const W: usize> = [f64; W];
 
-/// Rows of a tile keep their order as long as no pivot takes so many times its size from the
-/// diagonal entry of a row below it: a measure without units, as entries of L have some. What it is
-/// does not matter much: tiles that take their rows in another order are doubtful.
+/// Limit for rows of a tile to keep their order: no pivot may subtract from the diagonal entry of a
+/// later row more than this many times its value. The measure is dimensionless, while entries of L
+/// may have units. Its value matters little: tiles with reordered rows are checked for lost digits.
 const GROWTH: f64 = 16.0;
 
-/// The terms that elimination takes from an entry on the diagonal may be so many times that entry:
-/// they cost as many times its round-off (Higham, Accuracy and Stability of Numerical Algorithms,
+/// Limit for lost digits: terms subtracted from a diagonal entry may be this many times the entry,
+/// which multiplies its relative round-off (Higham, Accuracy and Stability of Numerical Algorithms,
 /// 2nd ed., theorem 13.6).
 const MODERATE: f64 = 1e3;
 
-/// The order in which a tile takes its rows as pivots.
+/// Order in which the rows of a tile are pivots.
 pub type RowOrder<const W: usize> = [u8; W];
 
-/// Tiles so wide.
+/// Marker for tiles of width W.
 pub struct Width<const W: usize>;
 
-/// How a row of a tile stands in registers; behind its numbers stand zeros.
+/// Representation of a row of a tile in vector registers, padded with zeros.
 pub trait Rows<const W: usize> {
-    /// The registers
+    /// Registers of a row
     type Row: Copy;
 
-    /// The numbers of the upper half of a symmetric tile, row by row
+    /// Upper triangle of a symmetric tile, row by row
     type Upper: Copy + Send + Sync + AsRef<[f64]> + AsMut<[f64]>;
 
-    /// Nothing
+    /// Upper triangle of zeros
     const NOTHING: Self::Upper;
 
-    /// Numbers as upper halves
+    /// Views a list of values as upper triangles.
     fn uppers(numbers: &[f64]) -> &[Self::Upper];
 
-    /// The same to change them
+    /// Mutable view of a list of values as upper triangles.
     fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper];
 
-    /// Into registers
+    /// Loads a row into registers.
     fn row(part: &Part<W>) -> Self::Row;
 
-    /// And out of them
+    /// Stores a row from registers.
     fn part(row: Self::Row) -> Part<W>;
 
-    /// row -= factor other
+    /// row -= factor * other
     fn subtract(row: &mut Self::Row, factor: f64, other: &Self::Row);
 
-    /// row factor
+    /// row * factor
     fn scaled(row: Self::Row, factor: f64) -> Self::Row;
 
-    /// sums += |a b|, number by number
+    /// sums += |a * b|, entry by entry
     fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row);
 
-    /// a.b
+    /// Inner product a . b
     fn dot(a: &Part<W>, b: &Part<W>) -> f64;
 
-    /// Row r of an upper half, with anything left of the diagonal
+    /// Row r of an upper triangle, with undefined entries left of the diagonal
     fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row;
 
-    /// Puts it there, and anything where the rows before it end: later rows come first.
+    /// Stores row r of an upper triangle. This overwrites the ends of earlier rows: later rows must
+    /// be stored first.
     fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row);
 }
 
-/// The upper half of a symmetric tile.
+/// Upper triangle of a symmetric tile of width W.
 pub type Upper<const W: usize> = <Width<W> as Rows<W>>::Upper;
 
 impl Rows<6> for Width<6> {
@@ -118,7 +119,7 @@ impl Rows<6> for Width<6> {
         }
     }
 
-    /// Two sums of three: shorter chains than one of six.
+    /// Two sums of three terms have shorter dependency chains than one of six.
     #[inline(always)]
     fn dot(a: &Part<6>, b: &Part<6>) -> f64 {
         (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
@@ -198,7 +199,7 @@ impl Rows<3> for Width<3> {
     }
 }
 
-/// Nothing.
+/// A tile of zeros.
 pub const fn zero<const W: usize>() -> Tile<W> {
     [[0.0; W]; W]
 }
@@ -241,8 +242,8 @@ where
     }
 }
 
-/// `$work` for each row of a tile, written out: loops over a triangle that the compiler leaves
-/// loops keep numbers out of registers.
+/// Repeats `$work` for each row of a tile, unrolled: in loops over a triangle that are not
+/// unrolled, the compiler keeps values in memory instead of registers.
 macro_rules! each_row {
     ($width:ident, |$row:ident| $work:expr) => {{
         const { assert!($width <= 6) };
@@ -258,26 +259,27 @@ macro_rules! each_row {
     };
 }
 
-/// The same from the last row on.
+/// Repeats `$work` for each row of a tile from the last to the first, unrolled.
 macro_rules! each_row_backwards {
     ($width:ident, |$row:ident| $work:expr) => {{
         each_row!(@ $width, $row, $work, 5, 4, 3, 2, 1, 0);
     }};
 }
 
-/// A block, wherever it stands.
+/// A block of a factorisation, as stored in the tangent or by the factorisation.
 #[derive(Clone, Copy)]
 pub enum Block<'a, const W: usize> {
-    /// As it is
+    /// The tile itself
     Tile(&'a Tile<W>),
-    /// Its transpose
+    /// Transpose of the tile
     Transpose(&'a Tile<W>),
     /// Zero
     Nothing,
 }
 
 impl<'a, const W: usize> Block<'a, W> {
-    /// In the tangent, or with its own.
+    /// Block at a position, in the off-diagonal tiles of the tangent or in the changed blocks `own`
+    /// of the factorisation.
     #[inline(always)]
     pub fn find(source: Source, beside: &'a [Tile<W>], own: &'a Stretch<Tile<W>>) -> Self {
         match source.stands() {
@@ -288,7 +290,7 @@ impl<'a, const W: usize> Block<'a, W> {
         }
     }
 
-    /// Its transpose.
+    /// Transpose of the block.
     #[inline(always)]
     pub fn transposed(self) -> Self {
         match self {
@@ -298,7 +300,7 @@ impl<'a, const W: usize> Block<'a, W> {
         }
     }
 
-    /// Does something with it: it is not copied, which would cost as much as a solution with it.
+    /// Calls `work` with the block by reference: copying it would take as long as solving with it.
     #[inline(always)]
     pub fn with(self, mut work: impl FnMut(&Tile<W>)) {
         match self {
@@ -308,7 +310,7 @@ impl<'a, const W: usize> Block<'a, W> {
         }
     }
 
-    /// part -= b x
+    /// part -= b x, with b the block
     #[inline(always)]
     pub fn subtract_times(self, part: &mut Part<W>, x: &Part<W>)
     where
@@ -322,7 +324,7 @@ impl<'a, const W: usize> Block<'a, W> {
     }
 }
 
-/// Copies a tile row by row: a call for so few numbers costs more.
+/// Copies a tile row by row, which is faster than a call for so few values.
 #[inline(always)]
 pub fn copy<const W: usize>(to: &mut Tile<W>, from: &Tile<W>)
 where
@@ -345,7 +347,8 @@ where
     });
 }
 
-/// True if w^T y is [`MODERATE`] beside the tile on the diagonal that it is taken from.
+/// True if |w|^T |y| is at most [`MAX_CANCELLATION`] times the diagonal entries of `target`, from
+/// which w^T y is subtracted.
 #[inline(always)]
 pub fn is_moderate<const W: usize>(w: &Tile<W>, y: &Tile<W>, target: &Tile<W>) -> bool
 where
@@ -358,14 +361,15 @@ where
     is_moderate
 }
 
-/// Adds to a tile on the diagonal; whether that is [`MODERATE`].
+/// sum += other for diagonal tiles; `false` if a diagonal entry of `other` exceeds
+/// [`MAX_CANCELLATION`] times that of `sum`.
 pub fn add_moderate<const W: usize>(sum: &mut Tile<W>, other: &Tile<W>) -> bool {
     let is_moderate = (0..W).all(|r| other[r][r].abs() <= MODERATE * sum[r][r].abs());
     sum.as_flattened_mut().iter_mut().zip(other.as_flattened()).for_each(|(sum, other)| *sum += other);
     is_moderate
 }
 
-/// The same as [`subtract_product`] for a product that is symmetric, of which one half is kept.
+/// target -= w^T y for a symmetric product, of which the upper triangle is stored.
 #[inline(always)]
 pub fn subtract_symmetric_product<const W: usize>(target: &mut Upper<W>, w: &Tile<W>, y: &Tile<W>)
 where
@@ -377,7 +381,7 @@ where
     each_row_backwards!(W, |r| Width::<W>::set_upper_row(target, r, sums[r]));
 }
 
-/// The rows of an upper half, with anything left of the diagonal.
+/// Rows of an upper triangle, with undefined entries left of the diagonal.
 #[inline(always)]
 fn upper_rows<const W: usize>(upper: &Upper<W>) -> [<Width<W> as Rows<W>>::Row; W]
 where
@@ -388,7 +392,7 @@ where
     out
 }
 
-/// A tile with these rows; left of the diagonal there is anything.
+/// Copies an upper triangle into a tile; entries below its diagonal are undefined.
 #[inline(always)]
 pub fn spread<const W: usize>(upper: &Upper<W>, out: &mut Tile<W>)
 where
@@ -417,9 +421,9 @@ where
     each_row!(W, |r| part[r] -= Width::<W>::dot(&y[r], x));
 }
 
-/// L D L^T of a symmetric tile, whose upper triangle is read: L^T takes the place above the
-/// diagonal, 1/D that of the diagonal. The number of negative pivots; `None` where one is zero or
-/// no number.
+/// Factorises a symmetric tile, whose upper triangle is read, as L D L^T: L^T replaces the entries
+/// above the diagonal, 1/D those on it. Returns the number of negative pivots; `None` if one is
+/// zero or not finite.
 #[inline(always)]
 pub fn factorise_symmetric<const W: usize>(tile: &mut Tile<W>) -> Option<usize>
 where
@@ -442,14 +446,14 @@ where
     (poison == 0.0).then_some(negative)
 }
 
-/// Zero; NaN where a pivot or its inverse is infinite or no number. One look at a sum of these
-/// costs less than one at each.
+/// Zero; NaN if a pivot or its inverse is not finite. Testing a sum of these once costs less than
+/// testing each pivot.
 #[inline(always)]
 fn poison_of(pivot: f64, inverse: f64) -> f64 {
     (pivot + inverse) * 0.0
 }
 
-/// y = L^-1 b, for all columns at once.
+/// y = L^-1 b for all columns, with the factors of [`factorise_symmetric`].
 #[inline(always)]
 pub fn forward_symmetric<const W: usize>(factor: &Tile<W>, b: &Tile<W>, y: &mut Tile<W>)
 where
@@ -465,7 +469,7 @@ where
     store::<W>(&lanes, y);
 }
 
-/// w = D^-1 y
+/// w = D^-1 y, with the factors of [`factorise_symmetric`].
 #[inline(always)]
 pub fn over_pivots<const W: usize>(factor: &Tile<W>, y: &Tile<W>, w: &mut Tile<W>)
 where
@@ -474,10 +478,9 @@ where
     each_row!(W, |r| w[r] = part::<W>(Width::<W>::scaled(row::<W>(&y[r]), factor[r][r])));
 }
 
-/// P A = L U of a tile: L (its diagonal is one) below, U from the diagonal on, whose diagonal holds
-/// inverses. Rows stay where they are if their pivots are large enough for what is below them; else
-/// those with the largest pivots come first. Tells, too, whether no digits are lost. `None` where a
-/// pivot is zero or no number.
+/// Factorises a tile as P A = L U: L (unit diagonal) below the diagonal, U on and above it, with
+/// inverted diagonal. Rows keep their order if each pivot is large enough for the rows below; else
+/// the rows with the largest pivots come first. `None` if a pivot is zero or not finite.
 #[inline(always)]
 pub fn factorise<const W: usize>(tile: &mut Tile<W>) -> Option<(RowOrder<W>, bool)>
 where
@@ -493,8 +496,8 @@ where
     Some((order, has_grown_moderately(tile, &order, &before)))
 }
 
-/// The same with rows where they are; `false` where a pivot takes too much ([`GROWTH`]), is zero or
-/// no number.
+/// Factorises a tile as A = L U with rows in their order; `false` if a pivot exceeds
+/// [`MAX_GROWTH_IN_ORDER`], is zero or not finite.
 #[inline(always)]
 fn factorise_in_order<const W: usize>(tile: &mut Tile<W>) -> bool
 where
@@ -512,7 +515,8 @@ where
     fits && poison == 0.0
 }
 
-/// The same with the row that has the largest entry of its column as the next one.
+/// Factorises a tile as P A = L U with partial pivoting: the row with the largest entry of the
+/// column is next.
 #[inline(never)]
 fn factorise_by_largest<const W: usize>(tile: &mut Tile<W>) -> Option<RowOrder<W>>
 where
@@ -537,7 +541,8 @@ where
     Some(order)
 }
 
-/// True if |L| |U| is moderate beside the tile that was factorised with its rows in this order.
+/// True if (|L| |U|)_ij^2 is at most [`MAX_CANCELLATION`]^2 |A_ii A_jj| for the tile `before`,
+/// which was factorised with its rows in this order.
 #[inline(never)]
 fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, before: &Tile<W>) -> bool {
     let lower = |i: usize, k: usize| if k < i { factor[i][k].abs() } else { 1.0 };
@@ -551,7 +556,7 @@ fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b
 }
 
 /// True if the determinant of a tile that was factorised with its rows in this order is negative:
-/// negative pivots and exchanges of rows are odd in sum.
+/// negative pivots and row exchanges add up to an odd number.
 #[inline(always)]
 pub fn has_negative_determinant<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>) -> bool {
     let mut is_negative = false;
@@ -564,13 +569,13 @@ pub fn has_negative_determinant<const W: usize>(factor: &Tile<W>, order: &RowOrd
     is_negative
 }
 
-/// Takes row r, whose pivot has this inverse, from those below.
+/// Subtracts multiples of row r, whose pivot has this inverse, from the rows below.
 #[inline(always)]
 fn take_pivot<const W: usize>(tile: &mut Tile<W>, r: usize, inverse: f64)
 where
     Width<W>: Rows<W>,
 {
-    // What stands left of the diagonal belongs to L.
+    // Entries left of the diagonal belong to L.
     let mut right = tile[r];
     each_row!(W, |k| if k <= r {
         right[k] = 0.0;
@@ -586,7 +591,7 @@ where
     tile[r][r] = inverse;
 }
 
-/// y = L^-1 P b, for all columns at once.
+/// y = L^-1 P b for all columns, with the factors of [`factorise`].
 #[inline(always)]
 pub fn forward<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b: &Tile<W>, y: &mut Tile<W>)
 where
@@ -603,7 +608,7 @@ where
     store::<W>(&lanes, y);
 }
 
-/// w = U^-T b, for all columns at once.
+/// w = U^-T b for all columns, with the factors of [`factorise`].
 #[inline(always)]
 pub fn forward_upper<const W: usize>(factor: &Tile<W>, b: &Tile<W>, w: &mut Tile<W>)
 where
@@ -620,7 +625,7 @@ where
     store::<W>(&lanes, w);
 }
 
-/// Of a [`factorise_symmetric`]d tile what [`solve_symmetric`] takes: L^-T (its diagonal is one)
+/// Inverts the factors of [`factorise_symmetric`] for [`solve_symmetric`]: L^-T (unit diagonal)
 /// above the diagonal, D^-1 on it.
 #[inline(always)]
 pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Upper<W>)
@@ -643,8 +648,8 @@ where
     });
 }
 
-/// Of a [`factorise`]d tile what [`solve`] takes: L^-1 (its diagonal is one) below the diagonal,
-/// U^-1 from there on.
+/// Inverts the factors of [`factorise`] for [`solve`]: L^-1 (unit diagonal) below the diagonal,
+/// U^-1 on and above it.
 #[inline(always)]
 pub fn invert<const W: usize>(factor: &Tile<W>, out: &mut Tile<W>)
 where
@@ -673,7 +678,7 @@ where
     });
 }
 
-/// A row of the unit matrix.
+/// Row r of the identity.
 #[inline(always)]
 fn unit<const W: usize>(r: usize) -> <Width<W> as Rows<W>>::Row
 where
@@ -684,8 +689,8 @@ where
     row::<W>(&out)
 }
 
-/// Solves with what a factorisation has left of a tile, its triangles inverted: two products take a
-/// half of the time of two substitutions, each of whose numbers waits for the one before.
+/// U^-1 L^-1 x with the inverted triangles of [`invert`]. Two products take half the time of two
+/// substitutions, in which each entry waits for the one before.
 #[inline(always)]
 pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
     let (mut y, mut z) = ([0.0; W], [0.0; W]);
@@ -706,7 +711,7 @@ pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
     z
 }
 
-/// The same for a symmetric tile.
+/// L^-T D^-1 L^-1 x with the inverted triangles of [`invert_symmetric`].
 #[inline(always)]
 pub fn solve_symmetric<const W: usize>(inverses: &Upper<W>, x: &Part<W>) -> Part<W>
 where
@@ -732,7 +737,7 @@ where
     z
 }
 
-/// A part in another order.
+/// Entries of x in the order of the pivots, P x.
 #[inline(always)]
 pub fn reordered<const W: usize>(order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
     let mut out = [0.0; W];
