@@ -139,7 +139,8 @@ impl<T: Real> Vec3<T> {
     /// a x b
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
-        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        let [a, b, c] = self.0;
+        let [x, y, z] = other.0;
         Self([b * z - c * y, c * x - a * z, a * y - b * x])
     }
 
@@ -247,7 +248,8 @@ impl<T: Real> Mat3<T> {
     /// A^T B, without forming the transpose.
     #[inline(always)]
     pub fn transpose_matmul(self, other: Self) -> Self {
-        let (a, b) = (self.0, other.0);
+        let a = self.0;
+        let b = other.0;
         Self(three!(|i| three!(|j| a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j])))
     }
 

@@ -159,7 +159,8 @@ pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&m
     for end in ends {
         let (part, rest) = list.split_at_mut(end - start);
         parts.push(part);
-        (list, start) = (rest, end);
+        list = rest;
+        start = end;
     }
     parts
 }

@@ -38,7 +38,8 @@ impl<const N: usize> Connection<N> {
 
     /// Increments of displacements and rotation vectors at the nodes, in the chart of the first, from increments of the unknowns.
     pub fn variations_in_one_chart(&self, at: &State, dq: &[Vec3]) -> ([Vec3; N], [Vec3; N]) {
-        let (du, dp) = (self.nodes.map(|node| dq[node.u as usize]), self.nodes.map(|node| dq[node.p as usize]));
+        let du = self.nodes.map(|node| dq[node.u as usize]);
+        let dp = self.nodes.map(|node| dq[node.p as usize]);
         match at.mixed[self.element as usize] {
             0 => (du, dp),
             mask => {
@@ -183,7 +184,8 @@ macro_rules! for_each_batch {
         crate::effect::for_each_batch!($batches, 0..usize::MAX, |$first, $batch| $body)
     };
     ($batches:expr, $instances:expr, |$first:ident, $batch:ident| $body:expr) => {{
-        let (batches, instances) = (&$batches, $instances);
+        let batches = &$batches;
+        let instances = $instances;
         let mut before = 0;
         crate::effect::for_each_batch!(@one batches.two, instances, before, $first, $batch, $body);
         crate::effect::for_each_batch!(@one batches.three, instances, before, $first, $batch, $body);
@@ -193,7 +195,8 @@ macro_rules! for_each_batch {
     // Room to work in is not made for nothing.
     (@one $own:expr, $instances:ident, $before:ident, $first:ident, $batch:ident, $body:expr) => {
         let own = crate::effect::own_part($before, $own.len(), &$instances);
-        let ($first, $batch) = ($before + own.start, &$own[own]);
+        let $first = $before + own.start;
+        let $batch = &$own[own];
         if !$batch.is_empty() {
             $body;
         }

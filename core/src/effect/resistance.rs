@@ -56,11 +56,14 @@ impl Effect for Resistance {
         let mut system = ElementSystem::new(1);
         for k in own_part(0, self.slots.len(), &out.instances()) {
             let (slot, turns) = self.slots[k];
-            let (q, before) = (at.q[slot as usize], anchor.q[slot as usize]);
+            let q = at.q[slot as usize];
+            let before = anchor.q[slot as usize];
             system.clear();
             if turns {
-                let (rotation, base) = (Rotation::new(q), Rotation::new(before));
-                let (t, resistance) = (rotation.t, anchor.resistance * self.arm * self.arm);
+                let rotation = Rotation::new(q);
+                let base = Rotation::new(before);
+                let t = rotation.t;
+                let resistance = anchor.resistance * self.arm * self.arm;
                 let theta = log(base.r.transpose() * rotation.r);
                 system.add_force(0, t.transpose_mul(theta) * resistance);
                 system.add_tangent(0, 0, (t.transpose() * t).scale(resistance * weights.stiffness));
@@ -88,7 +91,8 @@ mod tests {
 
     /// The moment over an increment of the rotation vector.
     fn moment(p: Vec3, base: Vec3) -> Vec3 {
-        let (rotation, base) = (Rotation::new(p), Rotation::new(base));
+        let rotation = Rotation::new(p);
+        let base = Rotation::new(base);
         rotation.t.transpose_mul(log(base.r.transpose() * rotation.r))
     }
 

@@ -118,7 +118,8 @@ impl FreeSpins for SpinHold {
         let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
         for part in parts {
             for node in &part.nodes {
-                let (rotation, p) = (at.rotation(node.p), node.p as usize);
+                let rotation = at.rotation(node.p);
+                let p = node.p as usize;
                 let about = rotation.t_inverse() * part.axis;
                 for rate in [&mut at.v[p], &mut at.a[p]] {
                     *rate -= about * part.axis.dot(rotation.t * *rate);

@@ -60,7 +60,8 @@ impl Scheme {
     /// Generalised-alpha with the spectral radius rho in [0, 1] at infinite frequency: second order, with the least
     /// dissipation of low frequencies for that of high ones.
     pub fn generalized_alpha(rho: f64) -> Self {
-        let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
+        let alpha_m = (2.0 * rho - 1.0) / (rho + 1.0);
+        let alpha_f = rho / (rho + 1.0);
         let gamma = 0.5 + alpha_f - alpha_m;
         let beta = 0.25 * (gamma + 0.5) * (gamma + 0.5);
         Self { beta, gamma, alpha_m, alpha_f, rotations: Rotations::Totals }
@@ -109,7 +110,8 @@ impl Step {
     /// algorithmic acceleration comes from: on a change of step its lag changes with it. The stage has begun with [`Scheme::start`].
     pub fn predict(&self, state: &mut State, before: f64) {
         debug_assert_ne!(self.scheme.has_algorithmic(), state.algorithmic.is_empty(), "the scheme was not started");
-        let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
+        let Scheme { beta, gamma, alpha_m, .. } = self.scheme;
+        let h = self.length;
         let stretch = h / before;
         each_part(state, |_, Slots { q, v, a, algorithmic, turns }| {
             for k in 0..q.len() {
@@ -132,14 +134,16 @@ impl Step {
 
     /// The coefficients of a rotation over the step.
     pub fn coefficients(&self) -> StepCoefficients {
-        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, length) = (self.scheme, self.length);
+        let Scheme { beta, gamma, alpha_m, alpha_f, .. } = self.scheme;
+        let length = self.length;
         StepCoefficients { beta, gamma, alpha_m, alpha_f, length }
     }
 }
 
 impl Method for Step {
     fn weights(&self) -> Weights {
-        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, h) = (self.scheme, self.length);
+        let Scheme { beta, gamma, alpha_m, alpha_f, .. } = self.scheme;
+        let h = self.length;
         let mass = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * h * h);
         Weights { stiffness: 1.0, damping: gamma / (beta * h), mass }
     }

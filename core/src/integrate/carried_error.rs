@@ -117,7 +117,8 @@ struct Predicted {
 impl OfSlot {
     #[inline(always)]
     fn predicted(&self, step: &Step, stretch: f64) -> Predicted {
-        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, h) = (step.scheme, step.length);
+        let Scheme { beta, gamma, alpha_m, alpha_f, .. } = step.scheme;
+        let h = step.length;
         let own = self.algorithmic;
         let old = if stretch == 1.0 { own } else { self.rate2 + (own - self.rate2) * stretch };
         let new = (self.rate2 * alpha_f - old * alpha_m) * (1.0 / (1.0 - alpha_m));
@@ -161,7 +162,9 @@ impl CarriedError {
 
     /// An attempt at a step begins; the one before was as long as `before`.
     pub fn begin(&mut self, step: &Step, before: f64) {
-        (self.step, self.stretch, self.known) = (*step, step.length / before, Known::Nothing);
+        self.step = *step;
+        self.stretch = step.length / before;
+        self.known = Known::Nothing;
     }
 
     /// Whether what the error meets in the present step is not known yet.
@@ -180,7 +183,8 @@ impl CarriedError {
         self.swap_rates(state);
         assembly.evaluate_rates(state, &mut self.force);
         self.swap_rates(state);
-        let (system, factor) = (&assembly.system, 1.0 / self.nudge);
+        let system = &assembly.system;
+        let factor = 1.0 / self.nudge;
         let [_, inertia, _, damping] = &mut self.force;
         threads::each_part(inertia, |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -199,10 +203,14 @@ impl CarriedError {
     /// Rates that differ from those of the state by as much as those of an error that is zero at the end of the step, the other way.
     fn change_rates(&mut self, state: &State, weights: Weights) {
         let Self { slots, rates: [v, a], nudge, step, stretch, .. } = self;
-        let (slots, step, stretch, nudge) = (&slots[..], &*step, *stretch, *nudge);
+        let slots = &slots[..];
+        let step = &*step;
+        let stretch = *stretch;
+        let nudge = *nudge;
         v.copy_from(&state.v);
         a.copy_from(&state.a);
-        let (v, a) = (&mut v[..], &mut a[..]);
+        let v = &mut v[..];
+        let a = &mut a[..];
         threads::each(v.chunks_mut(PART).zip(a.chunks_mut(PART)).enumerate(), |(number, (v, a))| {
             let of_part = v.iter_mut().zip(a).zip(&slots[PART * number..]);
             for ((v, a), slot) in of_part.filter(|(_, slot)| slot.moves) {
@@ -214,7 +222,8 @@ impl CarriedError {
         for (k, turn) in turns(state) {
             let (turn, x) = slots[k].changed(turn, state.q[k], stretch, nudge);
             let (omega, acceleration) = turn.rates(x);
-            (v[k], a[k]) = (state.v[k] * 2.0 - omega, state.a[k] * 2.0 - acceleration);
+            v[k] = state.v[k] * 2.0 - omega;
+            a[k] = state.a[k] * 2.0 - acceleration;
         }
     }
 
@@ -251,7 +260,9 @@ impl CarriedError {
         let Self { slots, turned, nudge, stretch, .. } = self;
         turned.clear();
         for (k, turn) in turns(state) {
-            let (x, omega, acceleration) = (state.q[k], state.v[k], state.a[k]);
+            let x = state.q[k];
+            let omega = state.v[k];
+            let acceleration = state.a[k];
             let (changed, same) = slots[k].changed(turn, x, *stretch, *nudge);
             let other = same + error[k] * *nudge;
             let (other_omega, other_acceleration) = changed.rates(other);
@@ -274,7 +285,9 @@ impl CarriedError {
         (from, to): (&State, &State),
         increments: Option<&Increments>,
     ) {
-        let (Step { scheme, length: h }, stretch, weights) = (self.step, self.stretch, self.step.weights());
+        let Step { scheme, length: h } = self.step;
+        let stretch = self.stretch;
+        let weights = self.step.weights();
         self.steps += 1;
         let own = self.steps % WIDTH;
         self.lengths[own] = h;
@@ -283,7 +296,8 @@ impl CarriedError {
         let found = self.known == Known::Error;
         let Self { kinds, slots, step, .. } = self;
         let work = |(number, part): (usize, &mut [OfSlot])| {
-            let (mut largest, mut sizes) = (Largest::default(), [Largest::default(); 2]);
+            let mut largest = Largest::default();
+            let mut sizes = [Largest::default(); 2];
             for (k, slot) in (PART * number..).zip(part) {
                 let kind = kinds[k];
                 if kind.is_multiplier() || (kind == SlotKind::Rotation && increments.is_some()) {
@@ -318,7 +332,8 @@ impl CarriedError {
             }
             (largest, sizes)
         };
-        let (mut now, mut sizes) = (Largest::default(), [Largest::default(); 2]);
+        let mut now = Largest::default();
+        let mut sizes = [Largest::default(); 2];
         let gather = |(largest, [all, rung]): (Largest, [Largest; 2])| {
             now = now.or(largest);
             sizes = [sizes[0].or(all), sizes[1].or(rung)];
@@ -346,7 +361,8 @@ impl CarriedError {
         local: &Local,
         (largest, sizes): (&mut Largest, &mut [Largest; 2]),
     ) {
-        let (found, h) = (self.known == Known::Error, self.step.length);
+        let found = self.known == Known::Error;
+        let h = self.step.length;
         for (slot, turned) in self.turned.drain(..).filter(|_| found) {
             let slot = &mut self.slots[slot as usize];
             [slot.error, slot.rate, slot.rate2, slot.algorithmic] = turned;
@@ -369,7 +385,8 @@ impl CarriedError {
     /// Total rotation vectors are about to change their charts in a state: their errors go with them.
     pub fn change_charts(&mut self, state: &State, rotations: &[Slot]) {
         for &slot in rotations {
-            let (k, p) = (slot as usize, state.q[slot as usize]);
+            let k = slot as usize;
+            let p = state.q[slot as usize];
             if !is_to_switch(p) {
                 continue;
             }
@@ -434,7 +451,8 @@ struct Local {
 
 impl Local {
     fn new(scheme: &Scheme, h: f64, place: usize, span: f64) -> Self {
-        let (Scheme { beta, gamma, alpha_m, .. }, lag) = (*scheme, scheme.lag());
+        let Scheme { beta, gamma, alpha_m, .. } = *scheme;
+        let lag = scheme.lag();
         let of_change = 1.0 / 6.0 - lag * (alpha_m - 0.5) - gamma * (0.5 + lag);
         let of_slope = [1.0 / 6.0 - beta - 0.5 * lag, 0.5 - gamma - lag];
         Self { factors: [of_slope[0] * h * h * h, of_slope[1] * h * h, of_change * h * h], place, per_span: 1.0 / span }
@@ -458,7 +476,8 @@ impl Local {
         // While a slope becomes known its change is none of the motion's.
         let change = if usize::from(slot.age) < WIDTH { Vec3::ZERO } else { jerk - slot.jerk };
         slot.age = (WIDTH as u8).min(slot.age + 1);
-        (slot.past[self.place], slot.jerk) = (after, jerk);
+        slot.past[self.place] = after;
+        slot.jerk = jerk;
         let [of_place, of_rate, of_change] = self.factors;
         [jerk * of_place, jerk * of_rate + change * of_change]
     }

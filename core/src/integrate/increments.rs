@@ -61,7 +61,8 @@ impl Increments {
         let mut turns = std::mem::take(&mut state.turns);
         turns.resize(state.q.len(), None);
         for &(slot, carrier) in &self.carriers {
-            let (k, spin) = (slot as usize, state.spin(slot));
+            let k = slot as usize;
+            let spin = state.spin(slot);
             let start = Start {
                 rotation: spin.rotation.r,
                 omega: spin.omega,
@@ -70,7 +71,9 @@ impl Increments {
                 stretch: step.length / before,
             };
             turns[k] = Some(Turn::new(step.coefficients(), carrier, &start));
-            (state.q[k], state.v[k], state.a[k]) = (Vec3::ZERO, spin.omega, spin.acceleration);
+            state.q[k] = Vec3::ZERO;
+            state.v[k] = spin.omega;
+            state.a[k] = spin.acceleration;
         }
         state.turns = turns;
     }
@@ -89,7 +92,9 @@ impl Increments {
             switched += usize::from(nearer && !within);
             let p = if nearer && within { far } else { short };
             let (velocity, acceleration) = rates(p, state.v[k], state.a[k]);
-            (state.q[k], state.v[k], state.a[k]) = (p, velocity, acceleration);
+            state.q[k] = p;
+            state.v[k] = velocity;
+            state.a[k] = acceleration;
         }
         // The room is kept for the next step.
         state.turns = turns;

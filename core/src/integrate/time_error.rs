@@ -190,10 +190,12 @@ impl TimeError {
     /// Adds the local errors of the steps since the sum was taken last, up to this state: after some steps, and where the stage is over.
     pub fn sum_up(&mut self, dof_map: &DofMap, state: &State, increments: Option<&Increments>) {
         let Some(step) = self.longest.take() else { return };
-        let (Scheme { beta, .. }, h2) = (step.scheme, step.length * step.length);
+        let Scheme { beta, .. } = step.scheme;
+        let h2 = step.length * step.length;
         let factor = (1.0 / 6.0 - beta - 0.5 * step.scheme.lag()).abs() * h2;
         let Self { scene, start, past, .. } = self;
-        let (scene, start) = (&*scene, &start[..]);
+        let scene = &*scene;
+        let start = &start[..];
         let work = |(number, past): (usize, &mut [Vec3])| {
             let mut largest = Largest::default();
             for (k, past) in (PART * number..).zip(past) {

@@ -37,9 +37,11 @@ impl<const N: usize, L: StoredLaw> StiffnessPoint<N, f64, L> {
     /// This point, with constants of another scalar.
     #[inline(always)]
     pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T, L::Lifted<T>> {
-        let (mut shape, mut slope) = ([T::zero(); N], [T::zero(); N]);
+        let mut shape = [T::zero(); N];
+        let mut slope = [T::zero(); N];
         for i in 0..N {
-            (shape[i], slope[i]) = (T::constant(self.shape[i]), T::constant(self.slope[i]));
+            shape[i] = T::constant(self.shape[i]);
+            slope[i] = T::constant(self.slope[i]);
         }
         let free = match &self.free {
             None => None,
@@ -177,9 +179,11 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
     /// Adds the force of a stress.
     #[inline(always)]
     pub fn add_force(&self, at: &Point<T>, stress: &Stress<T>, out: &mut ElementSystem<T>) {
-        let (force, w) = (at.force(stress), self.weight);
+        let force = at.force(stress);
+        let w = self.weight;
         for i in 0..N {
-            let (n, s) = (self.shape[i] * w, self.slope[i] * w);
+            let n = self.shape[i] * w;
+            let s = self.slope[i] * w;
             out.add_force(2 * i, force.x_slope * s);
             out.add_force(2 * i + 1, force.p * n + force.p_slope * s);
         }
@@ -201,7 +205,8 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
     /// Adds w times the blocks of every pair of nodes, using the symmetry of the stiffness.
     #[inline(always)]
     fn add_stiffness(&self, k: &PointTangent<T>, w: T, out: &mut ElementSystem<T>) {
-        let (n, s) = (&self.shape, &self.slope);
+        let n = &self.shape;
+        let s = &self.slope;
         for i in 0..N {
             for j in 0..N {
                 let mut up = k.xp * (w * s[i] * n[j]);

@@ -85,11 +85,15 @@ impl<T: Real> Point<T> {
     /// for the exact tangent, the extrapolated one for the mixed-integration-point tangent.
     #[inline(always)]
     pub fn tangent(&self, stiffness: &Stiffness<T>, stress: &Stress<T>) -> PointTangent<T> {
-        let (rotation, c1) = (&self.rotation, self.c1);
-        let (r, t) = (rotation.r, rotation.t);
-        let (cn, cm) = (stiffness.cn, stiffness.cm);
+        let rotation = &self.rotation;
+        let c1 = self.c1;
+        let r = rotation.r;
+        let t = rotation.t;
+        let cn = stiffness.cn;
+        let cm = stiffness.cm;
         let a = Mat3::skew_mul(self.y, t);
-        let (cn_a, cm_c1) = (cn * a, cm * c1);
+        let cn_a = cn * a;
+        let cm_c1 = cm * c1;
         let n_y_t = Mat3::skew_mul(stress.n, a);
         let mut tangent = PointTangent {
             xx: r * cn * r.transpose(),

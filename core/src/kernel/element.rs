@@ -125,7 +125,8 @@ impl<T: Real> ElementSystem<T> {
     /// Zero, of `blocks` 3-vectors.
     #[inline(always)]
     pub fn new(blocks: usize) -> Self {
-        let (zero, across) = (T::zero(), blocks.div_ceil(2));
+        let zero = T::zero();
+        let across = blocks.div_ceil(2);
         Self { blocks, force: vec![[zero; 3]; blocks], tangent: vec![[zero; TILE]; across * across] }
     }
 

@@ -32,7 +32,8 @@ impl Inertia {
 
     /// The same for another scalar.
     pub fn lifted<T: Real>(&self) -> Inertia<T> {
-        let (offset, about_node) = (Vec3::constant(self.offset), Mat3::constant(self.about_node));
+        let offset = Vec3::constant(self.offset);
+        let about_node = Mat3::constant(self.about_node);
         Inertia { mass: T::constant(self.mass), offset, about_node }
     }
 
@@ -169,7 +170,8 @@ impl<T: Real> Spin<T> {
 /// ```
 #[inline(always)]
 pub fn rotary<T: Real>(j: Mat3<T>, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, Mat3<T>) {
-    let (rotation, omega) = (&spin.rotation, spin.omega);
+    let rotation = &spin.rotation;
+    let omega = spin.omega;
     let momentum = j * omega;
     let h = j * spin.acceleration + omega.cross(momentum);
     let force = rotation.t.transpose_mul(h);
@@ -192,8 +194,12 @@ pub fn rotary<T: Real>(j: Mat3<T>, spin: &Spin<T>, weights: Weights) -> (Vec3<T>
 /// ```
 #[inline(always)]
 pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, weights: Weights) -> VolumeForce<T> {
-    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
-    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
+    let r = spin.rotation.r;
+    let t = spin.rotation.t;
+    let omega = spin.omega;
+    let d = inertia.offset;
+    let j0 = inertia.about_node;
+    let m = inertia.mass;
     let momentum = j0 * omega;
     let pull = r.transpose_mul(u_rate2);
     let omega_d = omega.cross(d);
@@ -252,9 +258,14 @@ pub fn drag<T: Real>(
     alpha: f64,
     weights: Weights,
 ) -> VolumeForce<T> {
-    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
-    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
-    let (carried, pull) = (omega.cross(d), r.transpose_mul(velocity));
+    let r = spin.rotation.r;
+    let t = spin.rotation.t;
+    let omega = spin.omega;
+    let d = inertia.offset;
+    let j0 = inertia.about_node;
+    let m = inertia.mass;
+    let carried = omega.cross(d);
+    let pull = r.transpose_mul(velocity);
     let h = (j0 * omega + d.cross(pull) * m).scale(alpha);
     let mut out = VolumeForce::zero();
     out.u = (velocity + r * carried) * (m * alpha);
@@ -262,7 +273,8 @@ pub fn drag<T: Real>(
     if weights.stiffness == 0.0 && weights.damping == 0.0 {
         return out;
     }
-    let (s, d_omega) = (weights.stiffness, spin.omega_derivative(weights));
+    let s = weights.stiffness;
+    let d_omega = spin.omega_derivative(weights);
     let turned = Mat3::skew_mul(carried, t).scale(s);
     out.uu = Mat3::identity() * (m * (alpha * weights.damping));
     out.up = -(r * (Mat3::skew_mul(d, d_omega) + turned)) * (m * alpha);
@@ -308,11 +320,17 @@ pub fn steadily_turned<T: Real>(
     rotation: &Rotation<T>,
     weights: Weights,
 ) -> VolumeForce<T> {
-    let (r, t) = (rotation.r, rotation.t);
-    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
-    let (w, w_skew) = (r.transpose_mul(spin), spin.skew());
+    let r = rotation.r;
+    let t = rotation.t;
+    let d = inertia.offset;
+    let j0 = inertia.about_node;
+    let m = inertia.mass;
+    let w = r.transpose_mul(spin);
+    let w_skew = spin.skew();
     let a = spin.cross(spin.cross(from_axis));
-    let (pull, w_d, momentum) = (r.transpose_mul(a), w.cross(d), j0 * w);
+    let pull = r.transpose_mul(a);
+    let w_d = w.cross(d);
+    let momentum = j0 * w;
     let s = w.cross(w_d);
     let h = w.cross(momentum) + d.cross(pull) * m;
     let mut out = VolumeForce::zero();
@@ -323,7 +341,8 @@ pub fn steadily_turned<T: Real>(
     }
     let Weights { stiffness, damping, mass } = weights;
     let w_t = Mat3::skew_mul(w, t);
-    let (d_omega, d_acc) = (w_t.scale(stiffness) + t.scale(damping), w_t.scale(damping) + t.scale(mass));
+    let d_omega = w_t.scale(stiffness) + t.scale(damping);
+    let d_acc = w_t.scale(damping) + t.scale(mass);
     let da = (w_skew * w_skew).scale(stiffness) + w_skew.scale(2.0 * damping) + Mat3::identity().scale(mass);
     let gyroscopic = Mat3::skew_mul(w, j0) - momentum.skew();
     let coriolis = w_d.skew() + Mat3::skew_mul(w, d.skew());

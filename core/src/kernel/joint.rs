@@ -92,7 +92,8 @@ pub fn add_along<T: Real>(
 ) {
     let GapFactors { forces: weight, multiplier: couple } = factors;
     let [a, b] = ends;
-    let (ra, rb) = (&a.rotation, &b.rotation);
+    let ra = &a.rotation;
+    let rb = &b.rotation;
     let e = Mat3::constant(*axes);
     let arm = Vec3::constant(arms[1]);
     let w = b.place + rb.r * arm - a.place;
@@ -140,9 +141,11 @@ pub fn add_between<T: Real>(
 ) {
     let GapFactors { forces: weight, multiplier: couple } = factors;
     let [a, b] = ends;
-    let (ra, rb) = (&a.rotation, &b.rotation);
+    let ra = &a.rotation;
+    let rb = &b.rotation;
     let DirectionPair { a: da, b: db } = directions;
-    let (wa, wb) = (rb.r * db, ra.r * da);
+    let wa = rb.r * db;
+    let wb = ra.r * da;
     let ga = ra.potential_gradient(da, wa);
     let gb = rb.potential_gradient(db, wb);
     out.add_force(P_A, ga * multiplier);

@@ -13,7 +13,8 @@ use crate::tensor::{Mat3, Vec3};
 /// a moment has no potential. For total vectors the two are T m and C1(m); for increments after another rotation they are not.
 #[inline(always)]
 pub fn spatial_moment<T: Real>(rotation: &Rotation<T>, moment: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
-    let (t, material) = (rotation.t, rotation.r.transpose_mul(moment));
+    let t = rotation.t;
+    let material = rotation.r.transpose_mul(moment);
     let tangent = rotation.c2(material) + t.transpose_matmul(Mat3::skew_mul(material, t));
     (-t.transpose_mul(material), -tangent)
 }
@@ -90,13 +91,15 @@ impl<const FOLLOWS: bool> VolumeKernel for Line<'_, FOLLOWS> {
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
         if FOLLOWS {
             let (u, up) = material_force(&Rotation::new(motion.p), force);
-            (out.u, out.up) = (u, up.scale(s));
+            out.u = u;
+            out.up = up.scale(s);
         }
         if let Some(moment) = moment {
             let rotation = Rotation::new(motion.p);
             let turning = if FOLLOWS { material_moment } else { spatial_moment };
             let (p, pp) = turning(&rotation, moment);
-            (out.p, out.pp) = (p, pp.scale(s));
+            out.p = p;
+            out.pp = pp.scale(s);
         }
         out
     }
@@ -128,7 +131,8 @@ impl VolumeKernel for Weight {
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
         if let Some(offset) = offset {
             let (p, pp) = offset_force(&Rotation::new(motion.p), offset, force);
-            (out.p, out.pp) = (p, pp.scale(weights.stiffness));
+            out.p = p;
+            out.pp = pp.scale(weights.stiffness);
         }
         out
     }

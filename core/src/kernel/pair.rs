@@ -48,7 +48,9 @@ impl<T: Real> Between<T> {
         let phi = h.scale(2.0);
         let [_, f1, f2, f3, f4, f5, ..] = Series::at(h.squared()).0;
         // 2 df_m/dz = m f_{m+2} - f_{m+1}
-        let (d1, d2, d3) = ((f3 - f2) * 0.5, (f4 * 2.0 - f3) * 0.5, (f5 * 3.0 - f4) * 0.5);
+        let d1 = (f3 - f2) * 0.5;
+        let d2 = (f4 * 2.0 - f3) * 0.5;
+        let d3 = (f5 * 3.0 - f4) * 0.5;
         let e = (f2 - f3) / (f1 * 4.0);
         let e_slope = ((d2 - d3) * f1 - (f2 - f3) * d1) / (f1 * f1 * 16.0);
         let even = Mat3::diagonal([T::one() - e * phi.squared(); 3]) + phi.outer(phi) * e;
@@ -95,7 +97,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         out: &mut ElementSystem<T>,
     ) {
         debug_assert!(N == 2, "the frame of other elements does not stand at their points");
-        let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
+        let slope = point.slope[1];
+        let between = Between::new(self.half.rotation.p);
         let arm = self.arm(slope);
         let elastic = point.elastic_part(&self.pair_strain(slope, &between), free);
         let stress = point.law.stress(&elastic);
@@ -110,7 +113,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         if weight != 0.0 {
             let stress = geometric.unwrap_or(&stress);
             let forces = self.pair_forces(stress, arm, slope, &follows, &between);
-            let (stiffness, w) = (point.law.tangent(&elastic), point.weight * weight);
+            let stiffness = point.law.tangent(&elastic);
+            let w = point.weight * weight;
             self.fill_pair_tangent(rotations, slope, &stiffness, stress, &forces, &follows, &between, w, out);
         }
     }
@@ -126,7 +130,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         du: &[Vec3<T>; N],
         dp: &[Vec3<T>; N],
     ) -> Stress<T> {
-        let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
+        let slope = point.slope[1];
+        let between = Between::new(self.half.rotation.p);
         let spins = [rotations[0].t * dp[0], rotations[1].t * dp[1]];
         let frame = self.half.follows(false) * spins[0] + self.half.follows(true) * spins[1];
         let mut strain = self.pair_strain(slope, &between);
@@ -149,7 +154,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         follows: &[Mat3<T>; 2],
         between: &Between<T>,
     ) -> PairForces<T> {
-        let (frame, moment) = (stress.n.cross(arm), stress.m * slope);
+        let frame = stress.n.cross(arm);
+        let moment = stress.m * slope;
         PairForces {
             across: self.frame * stress.n,
             frame,
@@ -177,7 +183,9 @@ impl<const N: usize, T: Real> Relative<N, T> {
         let arm = self.arm(slope);
         let ends = [&rotations[0].t, &rotations[1].t];
         // The weight goes first to what it belongs to: stiff sections of short elements would overflow without it.
-        let (cn, cm, bent) = (stiffness.cn * w, stiffness.cm * (w * slope * slope), w * slope);
+        let cn = stiffness.cn * w;
+        let cm = stiffness.cm * (w * slope * slope);
+        let bent = w * slope;
         // F_i T_i and B_i T_i
         let frame = [follows[0] * *ends[0], follows[1] * *ends[1]];
         let bend = [-between.inverse.transpose_matmul(*ends[0]), between.inverse * *ends[1]];
@@ -198,7 +206,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
             }
         }
         let m = stress.m * bent;
-        let (turned, twist) = (self.half.turned(forces.frame * w), between.bend(m));
+        let turned = self.half.turned(forces.frame * w);
+        let twist = between.bend(m);
         let spun = [
             ends[0].transpose_matmul(turned[0].scale(0.5) + m.skew().scale(0.5) - twist),
             ends[1].transpose_matmul(turned[1].scale(0.5) + m.skew().scale(0.5) + twist),

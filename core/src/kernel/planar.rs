@@ -142,7 +142,8 @@ pub fn in_one_turn<const N: usize, T: Real>(nodes: &mut [PlanarNode<T>; N]) {
 /// The angle, a turn more or less where that brings it within pi of another.
 #[inline(always)]
 fn within_half_a_turn<T: Real>(angle: T, of: T) -> T {
-    let (ahead, turn) = (angle - of, T::constant(2.0 * PI));
+    let ahead = angle - of;
+    let turn = T::constant(2.0 * PI);
     angle - (ahead.above(PI, turn, T::zero()) - (-ahead).above(PI, turn, T::zero()))
 }
 
@@ -196,12 +197,16 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
     ) {
         let at = self.configuration(nodes, free);
         let stress = self.law.stress(&at.elastic);
-        let ([cos, sin], [y1, y2], [n1, n2, m]) = (at.turn, at.y, stress);
+        let [cos, sin] = at.turn;
+        let [y1, y2] = at.y;
+        let [n1, n2, m] = stress;
         // f_x' = R N, f_theta = (N x y).e, f_theta' = M
-        let (fx, fy) = (cos * n1 - sin * n2, sin * n1 + cos * n2);
+        let fx = cos * n1 - sin * n2;
+        let fy = sin * n1 + cos * n2;
         let f_angle = n1 * y2 - n2 * y1;
         for i in 0..N {
-            let (n, s) = (self.shape[i] * self.weight, self.slope[i] * self.weight);
+            let n = self.shape[i] * self.weight;
+            let s = self.slope[i] * self.weight;
             let force = &mut out.force[i];
             force[0] += fx * s;
             force[1] += fy * s;
@@ -236,8 +241,12 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
         let w = self.weight * weight;
         for i in 0..N {
             for j in 0..N {
-                let (n, s) = ([self.shape[i], self.shape[j]], [self.slope[i] * w, self.slope[j]]);
-                let (ss, sn, ns, nn) = (s[0] * s[1], s[0] * n[1], n[0] * w * s[1], n[0] * w * n[1]);
+                let n = [self.shape[i], self.shape[j]];
+                let s = [self.slope[i] * w, self.slope[j]];
+                let ss = s[0] * s[1];
+                let sn = s[0] * n[1];
+                let ns = n[0] * w * s[1];
+                let nn = n[0] * w * n[1];
                 let tile = &mut out.tangent[i][j];
                 tile[0] += first[0] * ss;
                 tile[1] += first[1] * ss;
@@ -316,12 +325,16 @@ impl<T: Real> PlanarBody<T> {
     /// `acceleration` is u'', and `spins` are w and w'.
     #[inline(always)]
     pub fn evaluate(&self, acceleration: [T; 2], angle: T, spins: [T; 2], weights: Weights) -> PlanarSystem<1, T> {
-        let ([ax, ay], [w, rate], m) = (acceleration, spins, self.mass);
+        let [ax, ay] = acceleration;
+        let [w, rate] = spins;
+        let m = self.mass;
         let [cos, over_angle, ..] = Series::at(angle * angle).0;
         let sin = over_angle * angle;
         let [x, y] = self.offset;
-        let (dx, dy) = (cos * x - sin * y, sin * x + cos * y);
-        let (mut out, square) = (PlanarSystem::zero(), w * w);
+        let dx = cos * x - sin * y;
+        let dy = sin * x + cos * y;
+        let mut out = PlanarSystem::zero();
+        let square = w * w;
         out.force[0] = [
             m * (ax - rate * dy - square * dx),
             m * (ay + rate * dx - square * dy),

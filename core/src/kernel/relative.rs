@@ -54,7 +54,8 @@ impl<T: Real> Half<T> {
     fn new(h: Vec3<T>) -> Self {
         let [_, f1, f2, f3, f4, ..] = Series::at(h.squared()).0;
         // 2 df_m/dz = m f_{m+2} - f_{m+1}
-        let (d1, d2) = ((f3 - f2) * 0.5, (f4 * 2.0 - f3) * 0.5);
+        let d1 = (f3 - f2) * 0.5;
+        let d2 = (f4 * 2.0 - f3) * 0.5;
         let c = f2 / f1 * 0.5;
         Self { rotation: Rotation::new(h), c, c_slope: (d2 * f1 - f2 * d1) / (f1 * f1) * 0.5 }
     }
@@ -62,8 +63,10 @@ impl<T: Real> Half<T> {
     /// F_i: how the frame follows the first of the two nodes, or the `second`.
     #[inline(always)]
     pub fn follows(&self, second: bool) -> Mat3<T> {
-        let (Rotation { r, p: h, .. }, c) = (self.rotation, self.c);
-        let (even, odd) = (Mat3::identity().scale(0.5), h.skew() * c);
+        let Rotation { r, p: h, .. } = self.rotation;
+        let c = self.c;
+        let even = Mat3::identity().scale(0.5);
+        let odd = h.skew() * c;
         if second { (even - odd) * r } else { (even + odd) * r.transpose() }
     }
 
@@ -77,7 +80,8 @@ impl<T: Real> Half<T> {
         let Self { rotation: Rotation { r, t, p: h, .. }, c, c_slope } = *self;
         let across = h.cross(m);
         let bend = across.outer(h) * (c_slope * 2.0) - m.skew() * c;
-        let (g1, g2) = (m.scale(0.5) - across * c, m.scale(0.5) + across * c);
+        let g1 = m.scale(0.5) - across * c;
+        let g2 = m.scale(0.5) + across * c;
         [r * (-Mat3::skew_mul(g1, t) - bend), r.transpose_matmul(Mat3::skew_mul(g2, t.transpose()) + bend)]
     }
 }
@@ -87,14 +91,17 @@ impl<const N: usize, T: Real> Relative<N, T> {
     #[inline(always)]
     pub fn new(places: &[Vec3<T>; N], u: &[Vec3<T>; N], rotations: &[Rotation<T>; N]) -> Self {
         let (first, last) = carriers(N);
-        let (a, b) = (rotations[first].r, rotations[last].r);
+        let a = rotations[first].r;
+        let b = rotations[last].r;
         let h = if first == last { Vec3::zero() } else { log(a.transpose_matmul(b)).scale(0.5) };
         let half = Half::new(h);
         let frame = if first == last { a } else { a * half.rotation.r };
         // The two nodes that carry the frame stand h away from it on either side.
-        let (mut turned, inverse) = ([half.rotation; N], half.rotation.t_inverse());
+        let mut turned = [half.rotation; N];
+        let inverse = half.rotation.t_inverse();
         let mut back = [inverse; N];
-        let (mut nodes, mut arms) = ([NodePlace::rest(); N], [Vec3::zero(); N]);
+        let mut nodes = [NodePlace::rest(); N];
+        let mut arms = [Vec3::zero(); N];
         for i in 0..N {
             if i != first && i != last {
                 turned[i] = Rotation::new(log(frame.transpose_matmul(rotations[i].r)));
@@ -105,7 +112,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
             }
             let start = places[i] - places[first];
             arms[i] = frame.transpose_mul(start + (u[i] - u[first]));
-            (nodes[i].u, nodes[i].p) = (arms[i] - start, turned[i].p);
+            nodes[i].u = arms[i] - start;
+            nodes[i].p = turned[i].p;
         }
         Self { nodes, frame, arms, turned, back, half }
     }
@@ -182,7 +190,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         let none = [Vec3::zero(); N];
         let mut out = SpinForces { displacement: none, spin: none, own: none, frame: Vec3::zero() };
         for i in 0..N {
-            let (force, moment) = (local.force_block(2 * i), local.force_block(2 * i + 1));
+            let force = local.force_block(2 * i);
+            let moment = local.force_block(2 * i + 1);
             out.displacement[i] = self.frame * force;
             out.own[i] = self.back[i].transpose_mul(moment);
             out.frame += force.cross(self.arms[i]) - self.back[i] * moment;
@@ -211,7 +220,9 @@ impl<const N: usize, T: Real> Relative<N, T> {
         let over = self.over_frame(local, source, forces, s);
         let drift = self.drift(rotations, forces.frame, s);
         // Variations over each node's rotation vector: dTheta_i = own_i dP_i - ..., t = following_i dP_i.
-        let (mut own, mut spin, mut row) = (self.back, over.spin, over.row);
+        let mut own = self.back;
+        let mut spin = over.spin;
+        let mut row = over.row;
         let mut following = [None; N];
         for i in 0..N {
             let t = rotations[i].t;
@@ -281,14 +292,18 @@ impl<const N: usize, T: Real> Relative<N, T> {
         let zero = [Mat3::zero(); N];
         let mut over = OverFrame { displacement: zero, spin: zero, row: zero, own: zero, frame: Mat3::zero() };
         for i in 0..N {
-            let (mut zx, mut zt) = (Mat3::zero(), Mat3::zero());
+            let mut zx = Mat3::zero();
+            let mut zt = Mat3::zero();
             for j in 0..N {
-                let (arm, back) = (self.arms[j].skew(), self.back[j].transpose());
+                let arm = self.arms[j].skew();
+                let back = self.back[j].transpose();
                 zx += local.tangent_block(2 * i, 2 * j) * arm - local.tangent_block(2 * i, 2 * j + 1) * back;
                 zt += local.tangent_block(2 * i + 1, 2 * j) * arm - local.tangent_block(2 * i + 1, 2 * j + 1) * back;
             }
-            let (force, moment) = (source.force_block(2 * i), source.force_block(2 * i + 1));
-            let (a, turned) = (self.back[i], &self.turned[i]);
+            let force = source.force_block(2 * i);
+            let moment = source.force_block(2 * i + 1);
+            let a = self.back[i];
+            let turned = &self.turned[i];
             let c1 = a * turned.c1(a * moment).scale(s);
             let c2 = turned.c2(forces.own[i]).scale(s);
             let a_transposed = a.transpose();
@@ -314,7 +329,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
     fn drift(&self, rotations: &[Rotation<T>; N], m: Vec3<T>, s: f64) -> Drift<N, T> {
         let (first, last) = carriers(N);
         let [over_first, over_last] = self.half.turned(m);
-        let (t1, t2) = (rotations[first].t, rotations[last].t);
+        let t1 = rotations[first].t;
+        let t2 = rotations[last].t;
         let rows = [t1.transpose_matmul(over_first), t2.transpose_matmul(over_last)];
         // T(2h)^-1
         let inverse = Rotation::new(self.half.rotation.p.scale(2.0)).t_inverse().scale(0.5 * s);

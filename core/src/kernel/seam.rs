@@ -83,7 +83,8 @@ impl<T: Real> Converted<T> {
         evaluate(weights, out);
         let needs_rates = rates && (weights.stiffness != 0.0 || weights.damping != 0.0);
         let rate_parts = needs_rates.then(|| {
-            let (mut damping, mut mass) = (out.clone(), out.clone());
+            let mut damping = out.clone();
+            let mut mass = out.clone();
             evaluate(Weights::DAMPING, &mut damping);
             evaluate(Weights::MASS, &mut mass);
             (damping, mass)

@@ -66,7 +66,8 @@ mod tests {
 
     fn sums_hold<const N: usize>() {
         for xi in [-0.83, 0.1, 0.77] {
-            let (n, d) = (values::<N>(xi), derivatives::<N>(xi));
+            let n = values::<N>(xi);
+            let d = derivatives::<N>(xi);
             assert!((n.iter().sum::<f64>() - 1.0).abs() < 1e-15);
             assert!(d.iter().sum::<f64>().abs() < 1e-14);
             let position: f64 = (0..N).map(|i| n[i] * node_coordinate(i, N)).sum();

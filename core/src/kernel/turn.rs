@@ -94,7 +94,8 @@ pub struct Turn {
 impl Turn {
     /// From the state at the start of the step.
     pub fn new(step: StepCoefficients, carrier: Carrier, start: &Start) -> Self {
-        let (omega, momentum) = (start.omega, carrier.tensor * start.omega);
+        let omega = start.omega;
+        let momentum = carrier.tensor * start.omega;
         let rate = carrier.rate(omega, start.acceleration);
         let lag = start.rotation.transpose_mul(start.algorithmic) - rate;
         let h = step.length;
@@ -161,7 +162,10 @@ impl Turn {
     /// ```
     pub fn spin(&self, x: Vec3, omega: Vec3, acceleration: Vec3) -> Spin {
         let rotation = Rotation::new(x);
-        let (e, t, inertia, k) = (rotation.r, rotation.t, self.carrier.tensor, self.stiffness());
+        let e = rotation.r;
+        let t = rotation.t;
+        let inertia = self.carrier.tensor;
+        let k = self.stiffness();
         let momentum = inertia * omega;
         let rate = self.carrier.rate(omega, acceleration);
         let (y, dy) = self.carried(e);
@@ -250,7 +254,8 @@ mod tests {
     #[test]
     fn the_rates_solve_the_equations_of_the_step() {
         let (turn, start) = turn(1.0);
-        let (StepCoefficients { beta, gamma, alpha_m, alpha_f, length: h }, carrier) = (STEP, turn.carrier);
+        let StepCoefficients { beta, gamma, alpha_m, alpha_f, length: h } = STEP;
+        let carrier = turn.carrier;
         let x = Vec3([0.2, -0.3, 0.25]);
         let (omega, acceleration) = turn.rates(x);
         let e = Rotation::new(x).r;
@@ -264,7 +269,8 @@ mod tests {
         let lag = new * (1.0 - alpha_m) + old * alpha_m - b1 * (1.0 - alpha_f) - b0 * alpha_f;
         assert!(lag.max_abs() < 1e-13, "{lag:?}");
         let phi = |omega: Vec3| -(carrier.inverse * omega.cross(carrier.tensor * omega));
-        let (w0, w1) = (start.omega, e * omega);
+        let w0 = start.omega;
+        let w1 = e * omega;
         let z = carrier.inverse * e.transpose_mul(momentum);
         let spun = e * (carrier.inverse * e.transpose_mul(new)) - carrier.inverse * old;
         let bracket = phi(w0) - e * phi(z) - w0.cross(w1);
@@ -274,7 +280,8 @@ mod tests {
 
     #[test]
     fn the_lag_stretches_with_the_step() {
-        let ((same, start), (longer, _)) = (turn(1.0), turn(2.0));
+        let (same, start) = turn(1.0);
+        let (longer, _) = turn(2.0);
         let now = same.carrier.rate(start.omega, start.acceleration);
         assert!((longer.algorithmic - now - (same.algorithmic - now) * 2.0).max_abs() < 1e-15);
     }
@@ -295,7 +302,9 @@ mod tests {
 
     #[test]
     fn the_inverse_is_one() {
-        let (a, b, w) = (0.3, 0.2, Vec3([1.0, -2.0, 0.5]));
+        let a = 0.3;
+        let b = 0.2;
+        let w = Vec3([1.0, -2.0, 0.5]);
         let product = inverse(a, b, w) * (Mat3::diagonal([a; 3]) - w.skew() * b);
         assert!((product - Mat3::IDENTITY).max_abs() < 1e-15);
     }

@@ -32,7 +32,8 @@ impl<T: Real> VolumeForce<T> {
     /// No force.
     #[inline(always)]
     pub fn zero() -> Self {
-        let (v, m) = (Vec3::zero(), Mat3::zero());
+        let v = Vec3::zero();
+        let m = Mat3::zero();
         Self { u: v, p: v, uu: m, up: m, pu: m, pp: m }
     }
 }
@@ -102,7 +103,8 @@ impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
 
     /// The same point for another scalar, with its quantity lifted by `prescribed_increment`.
     pub fn lifted<T: Real, P>(&self, prescribed_increment: impl Fn(&Q) -> P) -> VolumePoint<N, P, T> {
-        let (shape, weight) = (self.shape.map(T::constant), T::constant(self.weight));
+        let shape = self.shape.map(T::constant);
+        let weight = T::constant(self.weight);
         VolumePoint { shape, weight, quantity: prescribed_increment(&self.quantity) }
     }
 }

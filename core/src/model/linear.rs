@@ -53,14 +53,18 @@ impl Linear {
             }
             whole.values.clone()
         };
-        let (stiffness, damping, mass) = (matrix(Weights::STIFFNESS), matrix(Weights::DAMPING), matrix(Weights::MASS));
-        let (about, multipliers) = (origin.clone(), model.multipliers.clone());
+        let stiffness = matrix(Weights::STIFFNESS);
+        let damping = matrix(Weights::DAMPING);
+        let mass = matrix(Weights::MASS);
+        let about = origin.clone();
+        let multipliers = model.multipliers.clone();
         Ok(Self { origin, about, multipliers, whole, stiffness, damping, mass, formed: None })
     }
 
     /// Takes the clock, and the amplitudes that belong to it, from a state.
     pub fn follow(&mut self, state: &State) {
-        (self.about.time, self.about.load) = (state.time, state.load);
+        self.about.time = state.time;
+        self.about.load = state.load;
         self.about.amplitude.copy_from_slice(&state.amplitude);
         self.about.amplitude_rates.copy_from_slice(&state.amplitude_rates);
     }

@@ -46,7 +46,8 @@ pub fn relative_angle(a: Mat3, b: Mat3) -> f64 {
 /// The unit quaternion of `r` with a scalar part that is not negative.
 #[inline(always)]
 fn quaternion<T: Real>(r: Mat3<T>) -> (T, Vec3<T>) {
-    let (m, one) = (r.0, T::one());
+    let m = r.0;
+    let one = T::one();
     let trace = m[0][0] + m[1][1] + m[2][2];
     let larger = |a: T, b: T| (a - b).above(0.0, a, b);
     let excess = larger(larger(m[0][0], m[1][1]), m[2][2]) - trace;
@@ -59,9 +60,11 @@ fn quaternion<T: Real>(r: Mat3<T>) -> (T, Vec3<T>) {
 /// The quaternion by the largest diagonal entry where that exceeds the trace, else `by_trace`.
 #[inline(never)]
 fn by_diagonal<T: Real>(r: Mat3<T>, trace: T, excess: T, by_trace: (T, Vec3<T>)) -> (T, Vec3<T>) {
-    let (m, one) = (r.0, T::one());
+    let m = r.0;
+    let one = T::one();
     let by = |i: usize| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let j = (i + 1) % 3;
+        let k = (i + 2) % 3;
         let mut vector = [T::zero(); 3];
         vector[i] = (m[i][i] * 0.5 + (one - trace) * 0.25).sqrt();
         let scale = T::constant(0.25) / vector[i];

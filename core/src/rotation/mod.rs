@@ -37,7 +37,8 @@ impl<T: Real> Rotation<T> {
     pub fn new(p: Vec3<T>) -> Self {
         let series = Series::at(p.squared());
         let [f0, f1, f2, f3, ..] = series.0;
-        let (skew, dyad) = (p.skew(), p.outer(p));
+        let skew = p.skew();
+        let dyad = p.outer(p);
         Self {
             p,
             r: Mat3::diagonal([f0; 3]) + skew * f1 + dyad * f2,
@@ -62,7 +63,8 @@ impl<T: Real> Rotation<T> {
     /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation elsewhere.
     #[inline(always)]
     pub fn t_inverse(&self) -> Mat3<T> {
-        let (p, z) = (self.p, self.p.squared());
+        let p = self.p;
+        let z = self.p.squared();
         let [_, f1, f2, f3, ..] = Series::at(z * 0.25).0;
         let e = (f2 - f3) / (f1 * 4.0);
         // P~^2 = P(x)P - (P.P) I
@@ -76,7 +78,8 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c1(&self, v: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pv = p.dot(v);
         (v * c.c1 - p.cross(v) * c.c2 + p * (c.c3 * pv)).outer(p) - v.skew() * c.c4
             + (Mat3::diagonal([pv; 3]) + p.outer(v)) * c.c5
@@ -85,7 +88,8 @@ impl<T: Real> Rotation<T> {
     /// C2(V) = D_P (T^T V), (A4): C1 with the opposite signs of c2 and c4.
     #[inline(always)]
     pub fn c2(&self, v: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pv = p.dot(v);
         (v * c.c1 + p.cross(v) * c.c2 + p * (c.c3 * pv)).outer(p)
             + v.skew() * c.c4
@@ -99,7 +103,8 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn t_rate(&self, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pw = p.dot(w);
         Mat3::diagonal([c.c1 * pw; 3]) - p.skew() * (c.c2 * pw)
             + p.outer(p) * (c.c3 * pw)
@@ -115,9 +120,13 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c3(&self, v: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let u = v.cross(w);
-        let (vw, pu, pv, pw) = (v.dot(w), p.dot(u), p.dot(v), p.dot(w));
+        let vw = v.dot(w);
+        let pu = p.dot(u);
+        let pv = p.dot(v);
+        let pw = p.dot(w);
         let spherical = c.c1 * vw + c.c2 * pu + c.c3 * pw * pv;
         let along = c.d1 * vw + c.d2 * pu + c.d3 * pw * pv;
         let half = (u * c.c2 + v * (c.c3 * pw) + w * (c.c3 * pv)).outer(p) + w.outer(v) * c.c5;
@@ -131,7 +140,8 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c4(&self, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pw = p.dot(w);
         (Mat3::diagonal([pw; 3]) + w.outer(p)) * (c.c1 + c.c5)
             + (p * (c.c3 * pw * 2.0) - p.cross(w) * c.c2).outer(p)
@@ -147,8 +157,11 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c5(&self, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
-        let (q, ww, pxw) = (p.dot(w), w.squared(), p.cross(w));
+        let p = self.p;
+        let c = &self.c;
+        let q = p.dot(w);
+        let ww = w.squared();
+        let pxw = p.cross(w);
         Mat3::diagonal([c.c3 * q * q + c.c5 * ww; 3])
             + (p * (c.d3 * q * q + c.c3 * ww) + w * ((c.d1 + c.c3) * q) - pxw * (c.d2 * q)).outer(p)
             + (p * (c.c3 * q * 2.0) - pxw * c.c2 + w * (c.c1 + c.c5)).outer(w)

@@ -45,15 +45,19 @@ impl<T: Real> Series<T> {
     /// f6 and f7 by Horner's rule, the others downward from them.
     #[inline(always)]
     fn by_horner(z: T) -> Self {
-        let (mut f6, mut f7) = (T::zero(), T::zero());
+        let mut f6 = T::zero();
+        let mut f7 = T::zero();
         for k in (0..TERMS).rev() {
             f6 = T::constant(RECIPROCAL_FACTORIAL[2 * k + 6]) - z * f6;
             f7 = T::constant(RECIPROCAL_FACTORIAL[2 * k + 7]) - z * f7;
         }
         let down = |m: usize, above: T| T::constant(RECIPROCAL_FACTORIAL[m]) - z * above;
-        let (f5, f4) = (down(5, f7), down(4, f6));
-        let (f3, f2) = (down(3, f5), down(2, f4));
-        let (f1, f0) = (down(1, f3), down(0, f2));
+        let f5 = down(5, f7);
+        let f4 = down(4, f6);
+        let f3 = down(3, f5);
+        let f2 = down(2, f4);
+        let f1 = down(1, f3);
+        let f0 = down(0, f2);
         Self([f0, f1, f2, f3, f4, f5, f6, f7])
     }
 

@@ -92,7 +92,8 @@ impl Real for Jet {
 
     fn atan2(self, x: Self) -> Self {
         // d atan2(y, x) = (x dy - y dx) / (x^2 + y^2)
-        let (y, square) = (self, self.value * self.value + x.value * x.value);
+        let y = self;
+        let square = self.value * self.value + x.value * x.value;
         let turn = x.value * y.rate - y.value * x.rate;
         let turn_rate = x.value * y.rate2 - y.value * x.rate2;
         let growth = 2.0 * (x.value * x.rate + y.value * y.rate);

@@ -43,7 +43,8 @@ impl<I: Interpolation> BeamElasticity<I> {
 
     /// The integration points of the elements before this one.
     pub(super) fn points_before(&self, element: usize) -> usize {
-        let (two, three) = (self.elements.two.len(), self.elements.three.len());
+        let two = self.elements.two.len();
+        let three = self.elements.three.len();
         element + element.saturating_sub(two) + element.saturating_sub(two + three)
     }
 
@@ -434,7 +435,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// Strain and stress at each integration point (material, global components).
     pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
-        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
+        let view = I::see(self.member(), at);
+        let free = self.free_amplitude(at);
         self.points().map(|point| point.strain_and_stress(view.nodes(), free))
     }
 
@@ -445,7 +447,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
-        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
+        let view = I::see(self.member(), at);
+        let change = I::variation(self.member(), at, field);
         let at_point = |point: &ElasticPoint<N>| {
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
@@ -455,8 +458,10 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
-        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
-        let (free, length) = (self.free_amplitude(at), self.points().iter().map(|point| point.weight).sum::<f64>());
+        let view = I::see(self.member(), at);
+        let change = I::variation(self.member(), at, field);
+        let free = self.free_amplitude(at);
+        let length = self.points().iter().map(|point| point.weight).sum::<f64>();
         let at_point = |point: &ElasticPoint<N>| {
             let elastic = point.elastic_strain(view.nodes(), free);
             if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
@@ -488,7 +493,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// The stress that each point is expected to have after the correction `dq`.
     #[inline(never)]
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
-        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
+        let view = I::see(self.member(), at);
+        let free = self.free_amplitude(at);
         let (du, dp) = self.connection.variations_in_one_chart(at, dq);
         let stresses = view.extrapolated(&self.points(), free, &du, &dp);
         out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));

@@ -27,7 +27,8 @@ impl<const N: usize> Posture<N> {
     /// Of an element whose nodes move so.
     #[inline(always)]
     pub fn new(member: Member<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
-        let (u, p) = (nodes.map(|node| node.u), nodes.map(|node| node.p));
+        let u = nodes.map(|node| node.u);
+        let p = nodes.map(|node| node.p);
         let base = || std::array::from_fn(|i| base_of(member.connection, i, at));
         Self { arms: member.arms, u, p, base: (!at.turns.is_empty()).then(base) }
     }
@@ -162,7 +163,8 @@ fn extrapolated<const N: usize, const G: usize, T: Real>(
     du: &[Vec3<T>; N],
     dp: &[Vec3<T>; N],
 ) -> [Stress<T>; G] {
-    let (nodes, change) = (view.nodes(), view.variation(du, dp));
+    let nodes = view.nodes();
+    let change = view.variation(du, dp);
     let mut out = [Stress { n: Vec3::zero(), m: Vec3::zero() }; G];
     for g in 0..G {
         out[g] = points[g].extrapolated_stress(nodes, free, |i| change[i].0, |i| change[i].1);
@@ -246,7 +248,8 @@ impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
     fn new(posture: &Posture<N, T>) -> Self {
         let mut nodes = [NodePlace::rest(); N];
         for i in 0..N {
-            (nodes[i].u, nodes[i].p) = (posture.u[i], posture.p[i]);
+            nodes[i].u = posture.u[i];
+            nodes[i].p = posture.p[i];
         }
         Self { nodes }
     }

@@ -170,7 +170,8 @@ impl<const N: usize> Motion<N> {
         points: &[ElasticPoint<N>; G],
         factor: f64,
     ) -> [Stress; G] {
-        let (nodes, rates) = (view.nodes(), view.variation(&self.displacements, &self.rotations.map(|of| of.rate)));
+        let nodes = view.nodes();
+        let rates = view.variation(&self.displacements, &self.rotations.map(|of| of.rate));
         std::array::from_fn(|g| {
             let place = points[g].configuration(nodes);
             let rate = points[g].strain_variation(&place, |i| rates[i].0, |i| rates[i].1);
@@ -256,7 +257,8 @@ impl Strains {
         let blocks = std::array::from_fn(|component| {
             moving.fill(&UnitStress { point, place: &place, component }, 0.0, scratch, system);
             let block = |(b, moved): (usize, &[Jet; 3])| {
-                let (force, bent) = (Vec3(moved.map(|jet| jet.value)), Vec3(moved.map(|jet| jet.rate)));
+                let force = Vec3(moved.map(|jet| jet.value));
+                let bent = Vec3(moved.map(|jet| jet.rate));
                 let (over_rate, lost) = motion.pull_back(b, force);
                 StrainBlock { force, over_rate, over_unknown: lost + bent }
             };
@@ -273,8 +275,10 @@ impl Strains {
                 let block = self.blocks[component][column];
                 (block.over_rate * weights.damping + block.over_unknown * weights.stiffness) * factor
             };
-            let (gamma, kappa) = (Mat3([over(0).0, over(1).0, over(2).0]), Mat3([over(3).0, over(4).0, over(5).0]));
-            let (mut n, mut m) = (stiffness.cn * gamma, stiffness.cm * kappa);
+            let gamma = Mat3([over(0).0, over(1).0, over(2).0]);
+            let kappa = Mat3([over(3).0, over(4).0, over(5).0]);
+            let mut n = stiffness.cn * gamma;
+            let mut m = stiffness.cm * kappa;
             if let Some(coupling) = stiffness.cc {
                 n += coupling * kappa;
                 m += coupling.transpose_matmul(gamma);

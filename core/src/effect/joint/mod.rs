@@ -84,7 +84,8 @@ impl Joint {
         };
         std::array::from_fn(|k| match self.nodes[k] {
             Some(node) => {
-                let (u, p) = (node.u as usize, node.p as usize);
+                let u = node.u as usize;
+                let p = node.p as usize;
                 let place = jet(self.places[k] + at.q[u], at.v[u]);
                 End { place, rotation: Rotation::new(jet(at.q[p], at.v[p])) }
             }

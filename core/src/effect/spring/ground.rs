@@ -99,7 +99,8 @@ impl Effect for GroundSprings {
 
     fn energy(&self, at: &State) -> Energy {
         let one = |spring: &GroundSpring| {
-            let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
+            let u = at.q[spring.node.u as usize];
+            let p = at.q[spring.node.p as usize];
             let unwrapped = unwound(p, at.unwrapped_at(spring.node.p));
             0.5 * at.amplitude[spring.amplitude]
                 * (u.dot(spring.translation * u) + unwrapped.dot(spring.rotation * unwrapped))
@@ -113,7 +114,8 @@ impl Effect for GroundSprings {
             if largest == 0.0 { 0.0 } else { (along.dot(stiffness * along) / largest).max(0.0).sqrt() }
         };
         let one = |spring: &GroundSpring| {
-            let (u, p) = (field[spring.node.u as usize], field[spring.node.p as usize]);
+            let u = field[spring.node.u as usize];
+            let p = field[spring.node.p as usize];
             held(spring.translation, u).max(held(spring.rotation, p) * length) / length
         };
         let acting = self.springs.iter().filter(|spring| at.amplitude[spring.amplitude] != 0.0);

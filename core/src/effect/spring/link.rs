@@ -149,7 +149,8 @@ impl Effect for Links {
     fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let one = |link: &Link| {
             let [a, b] = link.nodes.map(|node| field[node.u as usize]);
-            let (d, change) = (link.between(at).0, b - a);
+            let d = link.between(at).0;
+            let change = b - a;
             let distance = d.norm();
             let slack = link.tension_only && distance <= link.length;
             // Ends in one place have no direction of their own.
