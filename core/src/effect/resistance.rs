@@ -1,4 +1,5 @@
-//! An artificial resistance against motion, by which a static stage finds the state of rest of what only its loads hold.
+//! An artificial resistance against motion, by which a static stage finds the state of rest of what
+//! only its loads hold.
 //!
 //! Each node is pulled back to where an anchor saw it, by the potential
 //!
@@ -6,9 +7,11 @@
 //! c/2 (|u - u_n|^2 + l^2 |theta|^2),   theta = log(R_n^T R)
 //! ```
 //!
-//! with the resistance c, a force per displacement, and an arm l. Balance against it is a step of an implicit Euler scheme for a motion
-//! along the forces, c dq/dt = -g (proximal point method: Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it
-//! stands beside the effects of a stage only while that looks for rest, and nothing is left of it in the balance that is found.
+//! with the resistance c, a force per displacement, and an arm l. Balance against it is a step of
+//! an implicit Euler scheme for a motion along the forces, c dq/dt = -g (proximal point method:
+//! Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it stands beside the
+//! effects of a stage only while that looks for rest, and nothing is left of it in the balance that
+//! is found.
 
 use super::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::{ElementSystem, Weights};

@@ -1,29 +1,34 @@
 //! The error that fixed steps make, followed through a stage beside the motion itself.
 //!
-//! What a step leaves out of the motion is known to first order from accelerations (the local error, by which adaptive steps are
-//! chosen). What becomes of it is decided by the linearised equations of motion: the scheme itself carries the error e of the
-//! unknowns from step to step, with the tangent that Newton's method has anyway.
+//! What a step leaves out of the motion is known to first order from accelerations (the local
+//! error, by which adaptive steps are chosen). What becomes of it is decided by the linearised
+//! equations of motion: the scheme itself carries the error e of the unknowns from step to step,
+//! with the tangent that Newton's method has anyway.
 //!
 //! ```text
-//! e1  = e0 + h e0' + h^2 [(1/2 - beta) E0 + beta E1]      (1 - alpha_m) E1 + alpha_m E0 = (1 - alpha_f) e1'' + alpha_f e0''
-//! e1' = e0' + h [(1 - gamma) E0 + gamma E1]               K e1 + C e1' + M e1'' = 0
+//! e1  = e0 + h e0' + h^2 [(1/2 - beta) E0 + beta E1]
+//! e1' = e0' + h [(1 - gamma) E0 + gamma E1]
+//! (1 - alpha_m) E1 + alpha_m E0 = (1 - alpha_f) e1'' + alpha_f e0''
+//! K e1 + C e1' + M e1'' = 0
 //! ```
 //!
-//! With e^ for e1 where e1'' = 0, and J = K + c1 C + c2 M, balance is J e1 = M c2 e^ + C (c1 e^ - e^'). So a step costs one
-//! evaluation of inertia and damping and one substitution. At its end it adds its own local errors, with d = alpha_m - alpha_f:
+//! With e^ for e1 where e1'' = 0, and J = K + c1 C + c2 M, balance is J e1 = M c2 e^ + C (c1 e^ -
+//! e^'). So a step costs one evaluation of inertia and damping and one substitution. At its end it
+//! adds its own local errors, with d = alpha_m - alpha_f:
 //!
 //! ```text
 //! tau  = (1/6 - beta - d/2) h^3 q'''
 //! tau' = (1/2 - gamma - d) h^2 q''' + [1/6 - d (alpha_m - 1/2) - gamma (1/2 + d)] h^3 q''''
 //! ```
 //!
-//! The derivatives are slopes of accelerations over several steps. A motion that steps do not resolve errs by its own size and no
-//! more, which a linear equation does not know; over several steps nothing is seen of it.
+//! The derivatives are slopes of accelerations over several steps. A motion that steps do not
+//! resolve errs by its own size and no more, which a linear equation does not know; over several
+//! steps nothing is seen of it.
 
 use super::time_error::{Correct, Largest, Scene, is_to_switch};
 use super::{Increments, Method, Scheme, Step};
 use crate::kernel::Weights;
-use crate::kernel::turn::Turn;
+use crate::kernel::turn::{StartChange, Turn};
 use crate::model::{Assembly, SlotKind};
 use crate::rotation::{Complement, Rotation, log};
 use crate::system::{Category, DofMap, Field, Slot, State, System};
@@ -34,18 +39,20 @@ use std::sync::Arc;
 /// Steps over which slopes of accelerations are taken.
 pub(super) const WIDTH: usize = 4;
 
-/// The part of h^4 w^2 times the change of the acceleration of a free spin that a step of increments errs by, measured on bodies that turn
-/// about their middle axes.
+/// The part of h^4 w^2 times the change of the acceleration of a free spin that a step of
+/// increments errs by, measured on bodies that turn about their middle axes.
 pub(super) const FREE_SPIN: f64 = 1.0 / 8.0;
 
-/// The change of rates that shows how forces follow them: that of an error of this size, in radians or over the length of the scene.
+/// The change of rates that shows how forces follow them: that of an error of this size, in radians
+/// or over the length of the scene.
 const NUDGE: f64 = 1e-6;
 
-/// The most that an error is taken to grow to, over the sum of the sizes of local errors. What is carried along beyond that has grown from
-/// roundoff or second-order terms in an unstable motion (a body about its middle axis), which the motion itself has not.
+/// The most that an error is taken to grow to, over the sum of the sizes of local errors. What is
+/// carried along beyond that has grown from roundoff or second-order terms in an unstable motion (a
+/// body about its middle axis), which the motion itself has not.
 const MOST_GROWTH: f64 = 800.0;
-/// The same where accelerations ring from step to step: frequencies far above those that steps resolve let the carried error grow by itself in
-/// a frame that turns.
+/// The same where accelerations ring from step to step: frequencies far above those that steps
+/// resolve let the carried error grow by itself in a frame that turns.
 const MOST_GROWTH_RINGING: f64 = 8.0;
 /// The part of the local errors from which on that is so.
 const RUNG: f64 = 0.05;
@@ -62,16 +69,19 @@ pub(super) struct CarriedError {
     rates: [Field; 2],
     /// Their forces, then what the error meets; by category and slot
     force: [Vec<Vec3>; 4],
-    /// The errors at the end of the present step of rotations whose unknowns are increments, as they stand in [`OfSlot`]
+    /// The errors at the end of the present step of rotations whose unknowns are increments, as
+    /// they stand in [`OfSlot`]
     turned: Vec<(Slot, [Vec3; 4])>,
     /// What the error is multiplied by to show; zero where there is none yet
     nudge: f64,
     known: Known,
-    /// How many steps there were, and the lengths of the last of them, each at the place of its number
+    /// How many steps there were, and the lengths of the last of them, each at the place of its
+    /// number
     steps: usize,
     lengths: [f64; WIDTH],
     largest: Largest,
-    /// The sizes of local errors, summed over the steps, and of those among them that come from ringing
+    /// The sizes of local errors, summed over the steps, and of those among them that come from
+    /// ringing
     sums: [Largest; 2],
 }
 
@@ -86,8 +96,9 @@ enum Known {
     Error,
 }
 
-/// What is known of a slot. The error of a rotation whose unknown is an increment is a material turn, with the material errors of the spin
-/// and its rate, and the spatial one of the rate of the momentum that it carries.
+/// What is known of a slot. The error of a rotation whose unknown is an increment is a material
+/// turn, with the material errors of the spin and its rate, and the spatial one of the rate of the
+/// momentum that it carries.
 #[derive(Clone, Copy, Default)]
 struct OfSlot {
     /// e, e', e'' and E at the end of the last step
@@ -129,17 +140,23 @@ impl OfSlot {
         }
     }
 
-    /// The turn of a rotation that begins with a part of the error, and the increment with which it ends where the other one ends.
+    /// The turn of a rotation that begins with a part of the error, and the increment with which it
+    /// ends where the other one ends.
     fn changed(&self, turn: &Turn, x: Vec3, stretch: f64, part: f64) -> (Turn, Vec3) {
-        let turned = self.error * part;
-        let rates = [self.rate, self.rate2, self.algorithmic].map(|error| error * part);
-        (turn.changed(turned, rates, stretch), log(Rotation::new(-turned).r * Rotation::new(x).r))
+        let by = StartChange {
+            turned: self.error * part,
+            omega: self.rate * part,
+            acceleration: self.rate2 * part,
+            algorithmic: self.algorithmic * part,
+        };
+        (turn.changed(&by, stretch), log(Rotation::new(-by.turned).r * Rotation::new(x).r))
     }
 }
 
 impl CarriedError {
-    /// From a state on, in which a step has ended that was as long as the next ones will be; `start` is q where the stage began. `moves` tells
-    /// for each slot whether its accelerations mean something.
+    /// From a state on, in which a step has ended that was as long as the next ones will be;
+    /// `start` is q where the stage began. `moves` tells for each slot whether its accelerations
+    /// mean something.
     pub fn new(scene: &Scene, force: [Vec<Vec3>; 4], state: &State, start: &[Vec3], step: Step) -> Self {
         let of_slot = |slot: usize| OfSlot { moves: scene.moves(slot), start: start[slot], ..OfSlot::default() };
         Self {
@@ -172,8 +189,8 @@ impl CarriedError {
         self.known == Known::Nothing
     }
 
-    /// Looks at what the error meets of inertia and damping in the state that the tangent of the step belongs to. The forces of the system
-    /// are those of that state, and stay.
+    /// Looks at what the error meets of inertia and damping in the state that the tangent of the
+    /// step belongs to. The forces of the system are those of that state, and stay.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {
         if self.nudge == 0.0 {
             return;
@@ -200,7 +217,8 @@ impl CarriedError {
         }
     }
 
-    /// Rates that differ from those of the state by as much as those of an error that is zero at the end of the step, the other way.
+    /// Rates that differ from those of the state by as much as those of an error that is zero at
+    /// the end of the step, the other way.
     fn change_rates(&mut self, state: &State, weights: Weights) {
         let Self { slots, rates: [v, a], nudge, step, stretch, .. } = self;
         let slots = &slots[..];
@@ -238,7 +256,8 @@ impl CarriedError {
         if self.known != Known::Forces {
             return;
         }
-        // The solver takes the sum of all forces: what the others have of it is taken away from what it shall see.
+        // The solver takes the sum of all forces: what the others have of it is taken away from
+        // what it shall see.
         const INERTIA: usize = Category::Inertia as usize;
         threads::each_part(&mut self.force[INERTIA], |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -255,7 +274,8 @@ impl CarriedError {
         }
     }
 
-    /// The errors of rotations whose unknowns are increments, of which `error` has those of the increments.
+    /// The errors of rotations whose unknowns are increments, of which `error` has those of the
+    /// increments.
     fn find_turned(&mut self, state: &State, error: &[Vec3]) {
         let Self { slots, turned, nudge, stretch, .. } = self;
         turned.clear();
@@ -277,7 +297,8 @@ impl CarriedError {
         }
     }
 
-    /// The step is taken from one state to another, both in one chart, with the error that was found at its end.
+    /// The step is taken from one state to another, both in one chart, with the error that was
+    /// found at its end.
     pub fn end(
         &mut self,
         dof_map: &DofMap,
@@ -292,7 +313,8 @@ impl CarriedError {
         let own = self.steps % WIDTH;
         self.lengths[own] = h;
         let local = Local::new(&scheme, h, own, self.lengths.iter().sum());
-        // Where nothing is found an error stays as it was: to go on freely would be much for what is stiff.
+        // Where nothing is found an error stays as it was: to go on freely would be much for what
+        // is stiff.
         let found = self.known == Known::Error;
         let Self { kinds, slots, step, .. } = self;
         let work = |(number, part): (usize, &mut [OfSlot])| {
@@ -382,7 +404,8 @@ impl CarriedError {
         }
     }
 
-    /// Total rotation vectors are about to change their charts in a state: their errors go with them.
+    /// Total rotation vectors are about to change their charts in a state: their errors go with
+    /// them.
     pub fn change_charts(&mut self, state: &State, rotations: &[Slot]) {
         for &slot in rotations {
             let k = slot as usize;
@@ -420,7 +443,8 @@ impl CarriedError {
     }
 }
 
-/// Whether local errors of places tell how large those of rates are: those of a scheme of first order, or with a beta near 1/6, do not.
+/// Whether local errors of places tell how large those of rates are: those of a scheme of first
+/// order, or with a beta near 1/6, do not.
 fn is_told_by_places(scheme: &Scheme) -> bool {
     let lag = scheme.lag();
     (0.5 - scheme.gamma - lag).abs() < 1e-9 && (1.0 / 6.0 - scheme.beta - 0.5 * lag).abs() > 0.04

@@ -92,7 +92,8 @@ impl Linear {
     }
 
     fn add_part(&self, values: &[f64], field: &[Vec3], force: &mut [Vec3]) {
-        // Without held directions the equations are the components of the slots, one after the other.
+        // Without held directions the equations are the components of the slots, one after the
+        // other.
         let x: Vec<f64> = field.iter().flat_map(|v| v.0).collect();
         let product = self.whole.multiply(values, &x);
         for (force, part) in force.iter_mut().zip(product.as_chunks::<3>().0) {

@@ -1,8 +1,9 @@
-//! The rotation manifold SO(3) in terms of the total rotation vector (Makinen 2007, section 2 and appendix A).
+//! The rotation manifold SO(3) in terms of the total rotation vector (Makinen 2007, section 2 and
+//! appendix A).
 //!
-//! [`Rotation`] holds what follows from one rotation vector P: the rotation tensor R, the tangent tensor T that takes
-//! rates of P to material spins, and the derivative tensors C1 … C5. [`complement`] changes the chart, [`log`] is the
-//! inverse of the exponential.
+//! [`Rotation`] holds a rotation vector P, the rotation tensor R, the tangent tensor T that takes
+//! rates of P to material spins, and the coefficients of the derivative tensors C1 … C5.
+//! [`complement`] changes the chart, [`log`] is the inverse of the exponential.
 
 mod chart;
 mod log;
@@ -47,8 +48,8 @@ impl<T: Real> Rotation<T> {
         }
     }
 
-    /// The same vector as an increment that follows the rotation `base`: R = base exp(P). T and the derivative tensors are
-    /// those of the increment, since they speak of material spins.
+    /// The rotation R = base exp(P): P is an increment that follows the rotation `base`. T and the
+    /// derivative tensors remain those of the increment, since they give material spins.
     #[inline(always)]
     pub fn after(self, base: Mat3<T>) -> Self {
         Self { r: base * self.r, ..self }
@@ -60,7 +61,8 @@ impl<T: Real> Rotation<T> {
         Self { p: -self.p, r: self.r.transpose(), t: self.t.transpose(), c: self.c }
     }
 
-    /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation elsewhere.
+    /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation
+    /// elsewhere.
     #[inline(always)]
     pub fn t_inverse(&self) -> Mat3<T> {
         let p = self.p;
@@ -115,7 +117,8 @@ impl<T: Real> Rotation<T> {
     /// C3(V, W) = D_P (C1(W)^T V), (A8); symmetric. With S(a,b) = a(x)b + b(x)a and u = V x W:
     ///
     /// ```text
-    /// C3 = [c1 V.W + c2 P.u + c3 (P.W)(P.V)] I + c2 S(P,u) + c3 (P.W) S(P,V) + c3 (P.V) S(P,W) + c5 S(W,V)
+    /// C3 = [c1 V.W + c2 P.u + c3 (P.W)(P.V)] I
+    ///    + c2 S(P,u) + c3 (P.W) S(P,V) + c3 (P.V) S(P,W) + c5 S(W,V)
     ///    + [d1 V.W + d2 P.u + d3 (P.W)(P.V)] P(x)P
     /// ```
     #[inline(always)]
@@ -168,14 +171,16 @@ impl<T: Real> Rotation<T> {
             + w.skew() * (c.c2 * q)
     }
 
-    /// The gradient with respect to P of the potential w . R v of a vector fixed in the body: T^T (v x R^T w).
+    /// The gradient with respect to P of the potential w . R v of a vector fixed in the body: T^T
+    /// (v x R^T w).
     #[inline(always)]
     pub fn potential_gradient(&self, v: Vec3<T>, w: Vec3<T>) -> Vec3<T> {
         self.t.transpose_mul(v.cross(self.r.transpose_mul(w)))
     }
 
-    /// The Hessian of w . R v: C2(v x R^T w) + T^T v~ (R^T w)~ T; symmetric. It serves gravity on an eccentric mass,
-    /// forces at an offset and constraints on directions (the family of equation (75)).
+    /// The Hessian of w . R v: C2(v x R^T w) + T^T v~ (R^T w)~ T; symmetric. It serves gravity on
+    /// an eccentric mass, forces at an offset and constraints on directions (the family of equation
+    /// (75)).
     #[inline(always)]
     pub fn potential_hessian(&self, v: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
         let material = self.r.transpose_mul(w);

@@ -24,7 +24,8 @@ pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, E
 pub struct BeamElasticity<I> {
     /// The elements
     pub elements: ElasticElements,
-    /// The stress that geometric parts of the tangent are formed with, where that is not the scene's: none
+    /// The stress that geometric parts of the tangent are formed with, where that is not the
+    /// scene's: none
     unstressed: Option<Vec<[f64; 6]>>,
     way: PhantomData<I>,
 }
@@ -60,8 +61,8 @@ impl<I: Interpolation> BeamElasticity<I> {
 
 /// Strain and stress in beam elements, however they interpolate.
 pub trait StressField: Send + Sync {
-    /// Strain and stress (material, global components) at the integration points of an element; `None` where it is not
-    /// one of these.
+    /// Strain and stress (material, global components) at the integration points of an element;
+    /// `None` where it is not one of these.
     fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>>;
 }
 
@@ -213,10 +214,12 @@ impl<I: Interpolation> Driven for BeamElasticity<I> {
     }
 }
 
-/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the stiffness against bending by 1e-7 of itself.
+/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the
+/// stiffness against bending by 1e-7 of itself.
 const UNSTRAINED: f64 = 1e-14;
 
-/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000 elements they add up to 1e-8.
+/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000
+/// elements they add up to 1e-8.
 const UNBENT: f64 = 1e-12;
 
 /// The largest round-off of the forces of some elements.
@@ -230,8 +233,8 @@ fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: 
     largest
 }
 
-/// Adds the elements of one order, `first` instances after the first one of the effect; `remembered` are the stresses of
-/// geometric parts.
+/// Adds the elements of one order, `first` instances after the first one of the effect;
+/// `remembered` are the stresses of geometric parts.
 #[inline(always)]
 fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
@@ -272,8 +275,8 @@ pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> 
     Some(std::array::from_fn(|g| unpack(&own[g])))
 }
 
-/// The points of an element, or of several side by side, with the stresses that geometric parts are formed with where these are
-/// not the present ones.
+/// The points of an element, or of several side by side, with the stresses that geometric parts are
+/// formed with where these are not the present ones.
 struct Sum<const N: usize, const G: usize, T> {
     points: [ElasticPoint<N, T>; G],
     stresses: Option<[Stress<T>; G]>,
@@ -456,7 +459,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         self.points().iter().map(at_point).fold(0.0, f64::max)
     }
 
-    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
+    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None`
+    /// where the element is stressed.
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
         let view = I::see(self.member(), at);
         let change = I::variation(self.member(), at, field);

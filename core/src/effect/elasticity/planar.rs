@@ -1,4 +1,5 @@
-//! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a node.
+//! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a
+//! node.
 
 use super::beam::{BeamElasticity, stresses_of, workspace};
 use super::element::{BeamLaw, ElasticElement};
@@ -13,8 +14,8 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// The elements of an effect in space, side by side in their order. Where axes are turned in the plane, or nodes sit in
-/// different charts, the effect in space does the work.
+/// The elements of an effect in space, side by side in their order. Where axes are turned in the
+/// plane, or nodes sit in different charts, the effect in space does the work.
 pub struct PlanarElasticity<I> {
     plane: Plane,
     spatial: Arc<BeamElasticity<I>>,
@@ -83,7 +84,8 @@ fn free<const N: usize, const G: usize>(elements: &[ElasticElement<N, G>], at: &
     Lanes(each_lane!(|k| elements[k.min(elements.len() - 1)].free_amplitude(at)))
 }
 
-/// The stresses that geometric parts are formed with, of the point with this number in each element.
+/// The stresses that geometric parts are formed with, of the point with this number in each
+/// element.
 #[inline(always)]
 fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> PlanarStress<Lanes> {
     let last = memory.len() / G - 1;

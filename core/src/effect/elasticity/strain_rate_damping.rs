@@ -1,5 +1,5 @@
-//! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so that rigid motion is not
-//! damped. C is the stiffness of the section at rest.
+//! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so
+//! that rigid motion is not damped. C is the stiffness of the section at rest.
 //!
 //! With b_k = w dE_k/dq for each strain component E_k of a point of weight w, and G_k = db_k/dq:
 //!
@@ -8,8 +8,9 @@
 //! df/dqd = sum b_k (beta C / w)_kl b_l,   df/dq = sum s_k G_k + sum b_k (beta C / w)_kl (G_l qd)
 //! ```
 //!
-//! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s, whatever its interpolation. b_k is
-//! its force under a unit stress, and G_k qd the rate of that: a jet along the motion brings both.
+//! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s,
+//! whatever its interpolation. b_k is its force under a unit stress, and G_k qd the rate of that: a
+//! jet along the motion brings both.
 
 use super::beam::BeamElasticity;
 use super::element::{ElasticElement, ElasticPoint, Member};
@@ -124,7 +125,8 @@ impl<const N: usize> Motion<N> {
         }
     }
 
-    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the derivative over the rate of the state.
+    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the
+    /// derivative over the rate of the state.
     fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
         if block.is_multiple_of(2) { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }

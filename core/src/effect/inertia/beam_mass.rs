@@ -1,4 +1,5 @@
-//! Translational inertia of beams without eccentric mass: consistent mass matrices, which never change and know no charts.
+//! Translational inertia of beams without eccentric mass: consistent mass matrices, which never
+//! change and know no charts.
 
 use crate::effect::volume::{VolumeElement, VolumeElements};
 use crate::effect::{AT_ONCE, ByOrder, Effect, Energy, Masses, Momentum, Roles, TangentForm, for_each_batch, shared};

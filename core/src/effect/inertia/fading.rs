@@ -1,9 +1,11 @@
-//! Forces of inertia and damping of a structure that a static stage finds in motion: they fade with its load factor.
+//! Forces of inertia and damping of a structure that a static stage finds in motion: they fade with
+//! its load factor.
 //!
-//! A static stage knows no inertia. Where it follows a dynamic one the state that it begins with is out of balance by all that inertia and
-//! damping carried, and no smaller load level would bring balance nearer. So the stage begins in balance with these forces, and takes them
-//! away from load factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that this had: they have a
-//! potential, and their tangent is zero until the chart changes.
+//! A static stage knows no inertia. Where it follows a dynamic one the state that it begins with is
+//! out of balance by all that inertia and damping carried, and no smaller load level would bring
+//! balance nearer. So the stage begins in balance with these forces, and takes them away from load
+//! factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that
+//! this had: they have a potential, and their tangent is zero until the chart changes.
 
 use crate::effect::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::load::force_on_complement;

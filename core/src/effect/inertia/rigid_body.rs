@@ -21,11 +21,13 @@ pub struct Body {
     pub node: Node,
     /// The node's initial place
     pub place: Vec3,
-    /// Its mass properties about the node; those that neighbours along a beam have in common stand once.
+    /// Its mass properties about the node; those that neighbours along a beam have in common stand
+    /// once.
     pub inertia: Arc<Inertia>,
 }
 
-/// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at their nodes.
+/// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at
+/// their nodes.
 #[derive(Clone, Debug)]
 pub struct RigidBody {
     /// The effect's name

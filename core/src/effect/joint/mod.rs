@@ -1,5 +1,6 @@
-//! Joints between two nodes, or a node and ground: multipliers close the gaps that a [kind](JointKind) keeps closed; see
-//! [`crate::kernel::joint`]. Springs, dampers and motors act on a free coordinate.
+//! Joints between two nodes, or a node and ground: multipliers close the gaps that a
+//! [kind](JointKind) keeps closed; see [`crate::kernel::joint`]. Springs, dampers and motors act on
+//! a free coordinate.
 
 mod coordinate;
 mod drive;
@@ -167,8 +168,8 @@ impl Joint {
         Gaps { along, between }
     }
 
-    /// Puts forces, tangent and the rows of the multipliers in the place of what stands in `out`: u_A, P_A, u_B, P_B, and multipliers
-    /// along and between, see [`block`].
+    /// Puts forces, tangent and the rows of the multipliers in the place of what stands in `out`:
+    /// u_A, P_A, u_B, P_B, and multipliers along and between, see [`block`].
     pub fn system(&self, at: &State, weights: Weights, out: &mut ElementSystem) {
         out.clear();
         let ends = self.ends(at);

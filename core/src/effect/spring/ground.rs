@@ -1,8 +1,9 @@
 //! Springs from nodes to ground.
 //!
-//! A rotational spring acts on the rotation vector continued since the start (`State::unwrapped`): unwrapped up by two turns
-//! it pulls with 4 pi times its stiffness, and it does not notice when the node changes its chart. With the unwrapped vector
-//! Pw = P + 2 pi k n, D = dPw/dP and stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
+//! A rotational spring acts on the rotation vector continued since the start (`State::unwrapped`):
+//! unwrapped up by two turns it pulls with 4 pi times its stiffness, and it does not notice when
+//! the node changes its chart. With the unwrapped vector Pw = P + 2 pi k n, D = dPw/dP and
+//! stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
 
 use crate::effect::{Effect, Energy, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
@@ -132,8 +133,8 @@ impl GroundSpring {
         self.translation_damping != Mat3::ZERO || self.rotation_damping != Mat3::ZERO
     }
 
-    /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P = T c w, whose tangent is
-    /// C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
+    /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P
+    /// = T c w, whose tangent is C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
     fn damping(&self, at: &State, weights: Weights) -> (Vec3, Vec3, [Mat3; 2]) {
         let force = self.translation_damping * at.v[self.node.u as usize];
         let over_velocity = self.translation_damping * weights.damping;
@@ -155,8 +156,9 @@ impl GroundSpring {
     }
 }
 
-/// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an increment X after which
-/// it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
+/// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an
+/// increment X after which it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and
+/// dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
 fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     let unwrapped = at.unwrapped_at(slot);
     if at.turn(slot).is_none() {
@@ -175,8 +177,8 @@ fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     (t.transpose_mul(moment), t.transpose_matmul(spun * t) + increment.c2(moment))
 }
 
-/// Force and tangent of a rotational spring whose node was last unwrapped by `unwrapped`. At a whole turn P has no axis of its own
-/// and keeps the one of before.
+/// Force and tangent of a rotational spring whose node was last unwrapped by `unwrapped`. At a
+/// whole turn P has no axis of its own and keeps the one of before.
 fn wound_up(stiffness: Mat3, p: Vec3, unwrapped: Vec3) -> (Vec3, Mat3) {
     if p.norm() < WHOLE_TURN {
         (stiffness * unwound(p, unwrapped), stiffness)

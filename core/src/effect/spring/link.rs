@@ -36,7 +36,8 @@ pub struct Links {
     pub links: Vec<Link>,
 }
 
-/// The force at the second node and its derivatives over its place and velocity, relative to the first.
+/// The force at the second node and its derivatives over its place and velocity, relative to the
+/// first.
 #[derive(Clone, Copy, Debug)]
 pub struct Pull<T = f64> {
     /// k (l - l0) n
