@@ -1,12 +1,13 @@
 //! Vectors and second-order tensors of three-dimensional space over any [`Real`].
 //!
-//! Every function is `#[inline(always)]`, so that a kernel compiled for a wider instruction set keeps all of its
-//! body there.
+//! Every function is `#[inline(always)]`, so that a kernel compiled for a wider instruction set
+//! keeps all of its operations in that instruction set.
 
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// [f(0), f(1), f(2)], written out: no closure that may stay outside of a kernel, no index that may be out of bounds.
+/// The array [f(0), f(1), f(2)], written out: no closure that the compiler may leave outside of a
+/// kernel, no bounds checks.
 macro_rules! three {
     (|$i:ident| $f:expr) => {
         [
@@ -26,18 +27,19 @@ macro_rules! three {
     };
 }
 
-/// The largest magnitude; unlike `f64::max` it does not pass over NaN.
+/// The largest magnitude among numbers; NaN if one is (`f64::max` would pass over it).
 fn largest(components: &[f64]) -> f64 {
     components.iter().fold(0.0, |largest, c| if c.abs() > largest || c.is_nan() { c.abs() } else { largest })
 }
 
-/// So many vectors of zeros, in memory that comes from the system as zeros: what nobody writes to takes none. (That the compiler leaves nothing of
-/// the loop over them is seen in measurements, and nothing but memory depends on it.)
+/// `count` vectors of zeros, in zeroed memory of the operating system: pages that nobody writes to
+/// take no memory. (The compiler removes the loop over the vectors; only memory depends on that,
+/// and it was measured.)
 pub fn zeros(count: usize) -> Vec<Vec3> {
     vec![[0.0; 3]; count].into_iter().map(Vec3).collect()
 }
 
-/// A copy of vectors, which takes no memory while all of them are zero.
+/// A copy of vectors; if all of them are zero, it takes no memory until it is written to.
 pub fn copied(vectors: &[Vec3]) -> Vec<Vec3> {
     if vectors.iter().all(|vector| *vector == Vec3::ZERO) { zeros(vectors.len()) } else { vectors.to_vec() }
 }
@@ -97,7 +99,7 @@ impl Vec3<f64> {
         largest(&self.0)
     }
 
-    /// |a| without underflow or overflow of squares.
+    /// The norm |a|, without underflow or overflow of squares.
     pub fn size(self) -> f64 {
         let square = self.squared();
         if (1e-280..=1e280).contains(&square) {
@@ -105,7 +107,7 @@ impl Vec3<f64> {
         }
         let scale = self.max_abs();
         match scale {
-            // Reciprocals are safe.
+            // The reciprocal of the scale neither underflows nor overflows.
             1e-300..=1e300 => self.scale(1.0 / scale).norm() * scale,
             _ => scale,
         }
@@ -139,7 +141,8 @@ impl<T: Real> Vec3<T> {
     /// a x b
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
-        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        let [a, b, c] = self.0;
+        let [x, y, z] = other.0;
         Self([b * z - c * y, c * x - a * z, a * y - b * x])
     }
 
@@ -247,7 +250,8 @@ impl<T: Real> Mat3<T> {
     /// A^T B, without forming the transpose.
     #[inline(always)]
     pub fn transpose_matmul(self, other: Self) -> Self {
-        let (a, b) = (self.0, other.0);
+        let a = self.0;
+        let b = other.0;
         Self(three!(|i| three!(|j| a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j])))
     }
 

@@ -1,7 +1,7 @@
-//! Many items of work at once, on the threads that whoever calls has given for it.
+//! Parallel loops over items of work, on the threads of the caller's pool.
 //!
-//! Who has much to do cuts it by the scene alone, never by the number of threads, and puts together what items give in their order:
-//! results are the same on any number of threads, to the last bit.
+//! Work is cut by the scene alone, never by the number of threads, and results of items are
+//! combined in the order of the items: results are equal on any number of threads, to the last bit.
 
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use std::io;
@@ -9,32 +9,33 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
-/// Of each thread; that of the main thread on most systems
-const STACK: usize = 8 << 20;
+/// Bytes of stack of each thread, as the main thread has them on most systems.
+const STACK_BYTES: usize = 8 << 20;
 
-/// Does work that may use so many threads; with one, and where the system gives no more, nothing is done at once.
+/// Runs work that may use `threads` threads. With one thread, or if the system gives no more, the
+/// work runs serially.
 pub fn on<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK);
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK_BYTES);
     match (threads > 1).then(|| builder.build().ok()).flatten() {
         Some(pool) => pool.install(work),
         None => work(),
     }
 }
 
-/// A thread for a whole scene. `Err`: the system gives none.
+/// Spawns a thread with enough stack for a whole scene. `Err` if the system gives none.
 pub fn beside<'scope, R: Send + 'scope>(
     scope: &'scope Scope<'scope, '_>,
     work: impl FnOnce() -> R + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, R>> {
-    thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work)
+    thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work)
 }
 
-/// Does something with each item.
+/// Calls `work` with each item.
 pub fn each<T: Send>(items: impl Iterator<Item = T>, work: impl Fn(T) + Send + Sync) {
     in_order(items, work, |()| ());
 }
 
-/// Takes what items give, in their order.
+/// Calls `work` with each item, and `take` with each result in the order of the items.
 pub fn in_order<T: Send, R: Send>(
     items: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Send + Sync,
@@ -57,34 +58,35 @@ pub fn in_order<T: Send, R: Send>(
     }
 }
 
-/// One item of work: before it is done, while it is done, and what came of it.
+/// An item of work: waiting, running, or done with its result.
 enum Job<T, R> {
     Waiting(T),
     Running,
     Done(R),
 }
 
-/// Does numbered work, one number at a time a thread. The machinery of rayon is compiled once, here, not once for each caller.
+/// Calls `work` with the numbers below `count`, a thread taking one number at a time. The generic
+/// code of rayon is compiled once, here, not for each caller.
 fn at_once(count: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().with_max_len(1).for_each(work);
 }
 
-/// A list of what items give, in their order.
+/// The list of the results of items, in their order.
 pub fn map<T: Send, R: Send>(items: impl Iterator<Item = T>, work: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
     let mut list = Vec::new();
     in_order(items, work, |result| list.push(result));
     list
 }
 
-/// Whether whoever calls has given threads.
+/// True if the caller runs in a pool of threads.
 fn are_given() -> bool {
     rayon::current_thread_index().is_some()
 }
 
-/// Entries of a long list that one thread takes at a time.
+/// Entries of a part: the piece of a long list that one thread takes at a time.
 pub const PART: usize = 2048;
 
-/// Does something with each part of a list, which begins at a place in it.
+/// Calls `work` with each part of a list and the index of the part's first entry.
 pub fn each_part<T: Send>(list: &mut [T], work: impl Fn(usize, &mut [T]) + Send + Sync) {
     if !are_given() {
         return work(0, list);
@@ -92,7 +94,7 @@ pub fn each_part<T: Send>(list: &mut [T], work: impl Fn(usize, &mut [T]) + Send 
     each(list.chunks_mut(PART).enumerate(), |(number, part)| work(PART * number, part));
 }
 
-/// A list of what is found for each place.
+/// The list of `entry(k)` for each index k below `length`.
 pub fn list<T: Send>(length: usize, entry: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     if !are_given() {
         return (0..length).map(entry).collect();
@@ -103,7 +105,8 @@ pub fn list<T: Send>(length: usize, entry: impl Fn(usize) -> T + Send + Sync) ->
     list
 }
 
-/// The largest of what parts of a list give: ranges of places.
+/// The largest of zero and the values `of_part(range)` over the parts of a list, given as ranges of
+/// indices.
 pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Sync) -> f64 {
     if !are_given() {
         return of_part(0..length).max(0.0);
@@ -113,14 +116,16 @@ pub fn largest(length: usize, of_part: impl Fn(Range<usize>) -> f64 + Send + Syn
     largest
 }
 
-/// The sums of what parts of a list give: ranges of places, the same ones for any number of threads.
+/// The sums of the values `of_part(range)` over the parts of a list, given as ranges of indices.
+/// Parts, and so the order of additions, do not depend on the number of threads.
 pub fn sums<const N: usize>(length: usize, of_part: impl Fn(Range<usize>) -> [f64; N] + Send + Sync) -> [f64; N] {
     let mut sums = [0.0; N];
     in_order(parts(length), of_part, |part| sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part));
     sums
 }
 
-/// The first thing that is found in parts of a list: ranges of places.
+/// The first finding of `in_part(range)` in the order of the parts of a list, given as ranges of
+/// indices.
 pub fn first<T: Send>(length: usize, in_part: impl Fn(Range<usize>) -> Option<T> + Send + Sync) -> Option<T> {
     if !are_given() {
         return in_part(0..length);
@@ -130,12 +135,12 @@ pub fn first<T: Send>(length: usize, in_part: impl Fn(Range<usize>) -> Option<T>
     first
 }
 
-/// Parts of a list, as ranges of places.
+/// The parts of a list, as ranges of indices.
 pub fn parts(length: usize) -> impl Iterator<Item = Range<usize>> {
     (0..length).step_by(PART).map(move |start| start..length.min(start + PART))
 }
 
-/// Copies a list over another one, which becomes as long.
+/// Copies `from` to `to`, which takes its length.
 pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
     if to.len() != from.len() {
         to.clear();
@@ -144,12 +149,12 @@ pub fn copy<T: Copy + Send + Sync>(to: &mut Vec<T>, from: &[T]) {
     copy_over(to, from);
 }
 
-/// Copies a list over another one, which is as long.
+/// Copies `from` over `to`, which has its length.
 pub fn copy_over<T: Copy + Send + Sync>(to: &mut [T], from: &[T]) {
     each_part(to, |start, to| to.copy_from_slice(&from[start..start + to.len()]));
 }
 
-/// A list in consecutive parts that end there; none of an empty one.
+/// Splits a list into consecutive parts that end at `ends`; an empty list has no parts.
 pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
     let mut start = 0;
     let mut parts = Vec::new();
@@ -159,7 +164,8 @@ pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&m
     for end in ends {
         let (part, rest) = list.split_at_mut(end - start);
         parts.push(part);
-        (list, start) = (rest, end);
+        list = rest;
+        start = end;
     }
     parts
 }
@@ -168,7 +174,7 @@ pub fn split<T>(mut list: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&m
 mod tests {
     use super::*;
 
-    /// What `work` gives without threads, after a look that it gives the same with some.
+    /// The result of `work` without threads, after a check that three threads give an equal one.
     fn same<R: PartialEq + std::fmt::Debug + Send>(work: impl Fn() -> R + Sync) -> R {
         let alone = work();
         assert_eq!(on(3, &work), alone);

@@ -1,4 +1,5 @@
-//! What decks and runs can be warned of: names that are part of the contract with users, each said once.
+//! What decks and runs can be warned of: names that are part of the contract with users, each said
+//! once.
 
 /// What a warning puts in doubt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +82,8 @@ warning_kinds! {
     PathEnds: "path_ends", Path;
     /// A buckling load is an estimate: no critical point was found.
     BucklingEstimate: "buckling_estimate", Path;
-    /// Modes exist that a modal stage has not found: unstable ones, or some among those that were asked for.
+    /// Modes exist that a modal stage has not found: unstable ones, or some among those that were
+    /// asked for.
     MissingModes: "missing_modes", Path;
     /// The state of a modal or buckling stage is no equilibrium.
     OutOfBalance: "out_of_balance", Path;

@@ -411,7 +411,7 @@ fn a_rotating_frame_sees_the_same_inertia() {
             seen(o, o, variables(zero, 0), c, o, variables(zero, 3)),
         ];
         for weights in WEIGHTS {
-            let got = steadily_turned(&inertia, (w, arm), &Rotation::new(p), weights);
+            let got = steadily_turned(&inertia, w, arm, &Rotation::new(p), weights);
             let what = format!("rotating frame around {base}, {weights:?}");
             let force = [got.u.0, got.p.0].concat();
             let expected = [values(forces[0].u).0, values(forces[0].p).0].concat();

@@ -1,4 +1,5 @@
-//! Elements side by side: their nodes, batches by order, the rows that a thread takes, and the macro that walks through batches.
+//! Elements side by side: their nodes, batches by order, the rows that a thread takes, and the
+//! macro that walks through batches.
 
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
@@ -36,9 +37,11 @@ impl<const N: usize> Connection<N> {
         }
     }
 
-    /// Increments of displacements and rotation vectors at the nodes, in the chart of the first, from increments of the unknowns.
+    /// Increments of displacements and rotation vectors at the nodes, in the chart of the first,
+    /// from increments of the unknowns.
     pub fn variations_in_one_chart(&self, at: &State, dq: &[Vec3]) -> ([Vec3; N], [Vec3; N]) {
-        let (du, dp) = (self.nodes.map(|node| dq[node.u as usize]), self.nodes.map(|node| dq[node.p as usize]));
+        let du = self.nodes.map(|node| dq[node.u as usize]);
+        let dp = self.nodes.map(|node| dq[node.p as usize]);
         match at.mixed[self.element as usize] {
             0 => (du, dp),
             mask => {
@@ -53,7 +56,8 @@ impl<const N: usize> Connection<N> {
         self.nodes.into_iter().flat_map(|node| [node.u, node.p])
     }
 
-    /// Evaluates the element in one chart, and where its nodes sit in different ones pulls the result back.
+    /// Evaluates the element in one chart, and where its nodes sit in different ones pulls the
+    /// result back.
     pub(super) fn evaluate(
         &self,
         at: &State,
@@ -78,8 +82,8 @@ impl<const N: usize> Connection<N> {
     }
 }
 
-/// The rows of [`LANES`] elements that an assembler takes of a batch of this length, before which there are `before` instances: it takes
-/// whole rows.
+/// The rows of [`LANES`] elements that an assembler takes of a batch of this length, before which
+/// there are `before` instances: it takes whole rows.
 pub(super) fn own_blocks(before: usize, length: usize, out: &Assembler) -> Range<usize> {
     let own = own_part(before, length, &out.instances());
     own.start.div_ceil(LANES)..own.end.div_ceil(LANES)
@@ -176,14 +180,15 @@ pub(super) fn shared<T: PartialEq>(own: T, neighbours: Option<&Arc<T>>) -> Arc<T
     neighbours.filter(|known| ***known == own).cloned().unwrap_or_else(|| Arc::new(own))
 }
 
-/// Walks through batches in the order two, three, four: the number of the first instance of each, and its elements. With a range of
-/// instances, the part of each batch that is in it.
+/// Walks through batches in the order two, three, four: the number of the first instance of each,
+/// and its elements. With a range of instances, the part of each batch that is in it.
 macro_rules! for_each_batch {
     ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {
         crate::effect::batch::for_each_batch!($batches, 0..usize::MAX, |$first, $batch| $body)
     };
     ($batches:expr, $instances:expr, |$first:ident, $batch:ident| $body:expr) => {{
-        let (batches, instances) = (&$batches, $instances);
+        let batches = &$batches;
+        let instances = $instances;
         let mut before = 0;
         crate::effect::batch::for_each_batch!(@one batches.two, instances, before, $first, $batch, $body);
         crate::effect::batch::for_each_batch!(@one batches.three, instances, before, $first, $batch, $body);
@@ -193,7 +198,8 @@ macro_rules! for_each_batch {
     // Room to work in is not made for nothing.
     (@one $own:expr, $instances:ident, $before:ident, $first:ident, $batch:ident, $body:expr) => {
         let own = crate::effect::batch::own_part($before, $own.len(), &$instances);
-        let ($first, $batch) = ($before + own.start, &$own[own]);
+        let $first = $before + own.start;
+        let $batch = &$own[own];
         if !$batch.is_empty() {
             $body;
         }
@@ -202,7 +208,8 @@ macro_rules! for_each_batch {
 }
 pub(super) use for_each_batch;
 
-/// The elements of a batch of this length, before which there are `before` instances, that are among `instances`.
+/// The elements of a batch of this length, before which there are `before` instances, that are
+/// among `instances`.
 #[inline]
 pub(super) fn own_part(before: usize, length: usize, instances: &Range<usize>) -> Range<usize> {
     let place = |instance: usize| instance.clamp(before, before + length) - before;

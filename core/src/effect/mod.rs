@@ -1,7 +1,9 @@
-//! Physical effects: one file an effect, one value a kind, holding every instance of that kind in the scene.
+//! Physical effects: one file an effect, one value a kind, holding every instance of that kind in
+//! the scene.
 //!
-//! An effect exists in a run only because the deck calls for it; see `scene::compose`. [`Effect`] is what each of them does. What only
-//! some do are [`Roles`]: constraints, stresses, masses, coordinates driven from outside, spins that nothing resists.
+//! An effect exists in a run only because the deck calls for it; see `scene::compose`. [`Effect`]
+//! is what each of them does. What only some do are [`Roles`]: constraints, stresses, masses,
+//! coordinates driven from outside, spins that nothing resists.
 
 mod batch;
 pub mod elasticity;
@@ -130,13 +132,16 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// The slots that meet in each instance; [divisible](Connectivity::divisible) where many instances make it worth while.
+    /// The slots that meet in each instance; [divisible](Connectivity::divisible) where many
+    /// instances make it worth while.
     fn connectivity(&self) -> Connectivity;
 
-    /// The form of its tangent: a general one makes the whole tangent unsymmetric, and costs twice the factorisation.
+    /// The form of its tangent: a general one makes the whole tangent unsymmetric, and costs twice
+    /// the factorisation.
     fn tangent(&self) -> TangentForm;
 
-    /// It acts in a stage: inertia and damping do where something moves, inertia not where a rotating frame holds it.
+    /// It acts in a stage: inertia and damping do where something moves, inertia not where a
+    /// rotating frame holds it.
     fn acts(&self, stage: &StageContext) -> bool {
         let moves = stage.kind.needs_inertia();
         match self.category() {
@@ -146,10 +151,12 @@ pub trait Effect: Send + Sync {
         }
     }
 
-    /// Shows the data of which a mirror decides whether the scene lies in a plane. [`MirrorData::Spatial`]: the scene is never treated in one.
+    /// Shows the data of which a mirror decides whether the scene lies in a plane.
+    /// [`MirrorData::Spatial`]: the scene is never treated in one.
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData));
 
-    /// A kernel of its own for a plane that it lies in, where that is less work than the one in space.
+    /// A kernel of its own for a plane that it lies in, where that is less work than the one in
+    /// space.
     fn in_plane(self: Arc<Self>, _plane: &Plane) -> Option<Box<dyn PlanarForm>> {
         None
     }
@@ -162,9 +169,10 @@ pub trait Effect: Send + Sync {
         Energy::default()
     }
 
-    /// The largest strain that a field of small increments of the unknowns makes, curvatures and springs' displacements
-    /// measured by `length`: a number without units, of the size of the field itself where the effect stands in its way,
-    /// zero where not. Strains tell soft from loose where the tangent has lost a stiffness to round-off.
+    /// The largest strain that a field of small increments of the unknowns makes, curvatures and
+    /// springs' displacements measured by `length`: a number without units, of the size of the
+    /// field itself where the effect stands in its way, zero where not. Strains tell soft from
+    /// loose where the tangent has lost a stiffness to round-off.
     fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64;
 
     /// The roles that it has beside adding forces.
@@ -193,8 +201,9 @@ impl Roles<'_> {
 
 /// Constraints: gaps that multipliers keep closed, and the motors that open them as prescribed.
 pub trait Constraint {
-    /// First and second derivatives over time of the gaps, for a motion without accelerations; by slot of the multipliers. A dynamic stage
-    /// begins with velocities and accelerations that keep the gaps closed.
+    /// First and second derivatives over time of the gaps, for a motion without accelerations; by
+    /// slot of the multipliers. A dynamic stage begins with velocities and accelerations that keep
+    /// the gaps closed.
     fn drift(&self, at: &State, rates: &mut [Vec3], rates2: &mut [Vec3]);
 
     /// After each converged state: continues angles that the state remembers.
@@ -203,11 +212,12 @@ pub trait Constraint {
     /// Shows its motors.
     fn motors(&self, at: &State, show: &mut dyn FnMut(MotorState));
 
-    /// How far motors turn their nodes at once when amplitudes change: the slot that turns most, and radians.
+    /// How far motors turn their nodes at once when amplitudes change: the slot that turns most,
+    /// and radians.
     fn turned(&self, from: &[f64], to: &[f64]) -> Option<(Slot, f64)>;
 
-    /// The forces on a node of joints to ground that multipliers hold, in this sign of forces: force, and moment conjugate to its rotation
-    /// vector.
+    /// The forces on a node of joints to ground that multipliers hold, in this sign of forces:
+    /// force, and moment conjugate to its rotation vector.
     fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3);
 }
 
@@ -216,12 +226,12 @@ pub trait StressPoints {
     /// The number of points whose stresses the robust tangent remembers.
     fn memory_points(&self) -> usize;
 
-    /// Remembers the stresses of the next tangent, extrapolated from unknowns and charts before they were corrected by `dq`. Rates of `at`
-    /// may be those after it.
+    /// Remembers the stresses of the next tangent, extrapolated from unknowns and charts before
+    /// they were corrected by `dq`. Rates of `at` may be those after it.
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory);
 
-    /// x.K x of a field of increments, from the strains that it makes: no digits are lost between nodes that move alike. `None` where the
-    /// tangent alone tells, as under stress.
+    /// x.K x of a field of increments, from the strains that it makes: no digits are lost between
+    /// nodes that move alike. `None` where the tangent alone tells, as under stress.
     fn stiffness_along(&self, at: &State, field: &[Vec3]) -> Option<f64>;
 
     /// The round-off of its forces.
@@ -239,7 +249,8 @@ pub trait Masses {
 
 /// Coordinates that are driven from outside: motors, free strains.
 pub trait Driven {
-    /// Shows each coordinate with the derivative of the stored energy over it, for the energy account.
+    /// Shows each coordinate with the derivative of the stored energy over it, for the energy
+    /// account.
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64));
 }
 
@@ -248,11 +259,13 @@ pub trait FreeSpins {
     /// Shows motions against which nothing acts, each by the increments of some unknowns.
     fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements));
 
-    /// Before a step is predicted from the velocities: takes the round-off of free spins out of them.
+    /// Before a step is predicted from the velocities: takes the round-off of free spins out of
+    /// them.
     fn steady(&self, at: &mut State);
 }
 
-/// An effect's kernel of its own for a plane: what it adds to the system there. All else the effect itself tells.
+/// An effect's kernel of its own for a plane: what it adds to the system there. All else the effect
+/// itself tells.
 pub trait PlanarForm: Send + Sync {
     /// Its tangent is symmetric, whatever the weights.
     fn is_symmetric(&self) -> bool;

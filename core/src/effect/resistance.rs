@@ -1,4 +1,5 @@
-//! An artificial resistance against motion, by which a static stage finds the state of rest of what only its loads hold.
+//! An artificial resistance against motion, by which a static stage finds the state of rest of what
+//! only its loads hold.
 //!
 //! Each node is pulled back to where an anchor saw it, by the potential
 //!
@@ -6,9 +7,11 @@
 //! c/2 (|u - u_n|^2 + l^2 |theta|^2),   theta = log(R_n^T R)
 //! ```
 //!
-//! with the resistance c, a force per displacement, and an arm l. Balance against it is a step of an implicit Euler scheme for a motion
-//! along the forces, c dq/dt = -g (proximal point method: Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it
-//! stands beside the effects of a stage only while that looks for rest, and nothing is left of it in the balance that is found.
+//! with the resistance c, a force per displacement, and an arm l. Balance against it is a step of
+//! an implicit Euler scheme for a motion along the forces, c dq/dt = -g (proximal point method:
+//! Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it stands beside the
+//! effects of a stage only while that looks for rest, and nothing is left of it in the balance that
+//! is found.
 
 use super::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::{ElementSystem, Weights};
@@ -56,11 +59,14 @@ impl Effect for Resistance {
         let mut system = ElementSystem::new(1);
         for k in own_part(0, self.slots.len(), &out.instances()) {
             let (slot, turns) = self.slots[k];
-            let (q, before) = (at.q[slot as usize], anchor.q[slot as usize]);
+            let q = at.q[slot as usize];
+            let before = anchor.q[slot as usize];
             system.clear();
             if turns {
-                let (rotation, base) = (Rotation::new(q), Rotation::new(before));
-                let (t, resistance) = (rotation.t, anchor.resistance * self.arm * self.arm);
+                let rotation = Rotation::new(q);
+                let base = Rotation::new(before);
+                let t = rotation.t;
+                let resistance = anchor.resistance * self.arm * self.arm;
                 let theta = log(base.r.transpose() * rotation.r);
                 system.add_force(0, t.transpose_mul(theta) * resistance);
                 system.add_tangent(0, 0, (t.transpose() * t).scale(resistance * weights.stiffness));
@@ -88,7 +94,8 @@ mod tests {
 
     /// The moment over an increment of the rotation vector.
     fn moment(p: Vec3, base: Vec3) -> Vec3 {
-        let (rotation, base) = (Rotation::new(p), Rotation::new(base));
+        let rotation = Rotation::new(p);
+        let base = Rotation::new(base);
         rotation.t.transpose_mul(log(base.r.transpose() * rotation.r))
     }
 

@@ -1,5 +1,6 @@
-//! Holds spins that nothing resists: a straight part between ball joints may spin about its own axis without any force, in statics
-//! always and in a dynamic stage without rotary inertia; then round-off alone would tell by how much.
+//! Holds spins that nothing resists: a straight part between ball joints may spin about its own
+//! axis without any force, in statics always and in a dynamic stage without rotary inertia; then
+//! round-off alone would tell by how much.
 
 use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
@@ -19,8 +20,8 @@ pub struct SpinningPart {
     pub stiffness: f64,
 }
 
-/// The hold in load levels and time steps, as part of GJ/L: residuals that Newton tolerates may not turn the beam by much, and the swing of a
-/// beam that sags must not notice.
+/// The hold in load levels and time steps, as part of GJ/L: residuals that Newton tolerates may not
+/// turn the beam by much, and the swing of a beam that sags must not notice.
 const HOLD: f64 = 1e-3;
 
 /// The hold where no mass stands beside it, as part of GJ/L: modes must not notice at all.
@@ -37,8 +38,9 @@ pub enum HeldIn {
 
 /// The hold of all parts that may spin.
 ///
-/// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness against corrections
-/// t.T dP about the axis t, and keeps predictions from carrying spins on, so that what no force asks for does not happen.
+/// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness
+/// against corrections t.T dP about the axis t, and keeps predictions from carrying spins on, so
+/// that what no force asks for does not happen.
 #[derive(Clone, Debug)]
 pub struct SpinHold {
     /// The parts
@@ -118,7 +120,8 @@ impl FreeSpins for SpinHold {
         let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
         for part in parts {
             for node in &part.nodes {
-                let (rotation, p) = (at.rotation(node.p), node.p as usize);
+                let rotation = at.rotation(node.p);
+                let p = node.p as usize;
                 let about = rotation.t_inverse() * part.axis;
                 for rate in [&mut at.v[p], &mut at.a[p]] {
                     *rate -= about * part.axis.dot(rotation.t * *rate);

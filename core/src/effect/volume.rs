@@ -1,4 +1,5 @@
-//! Elements over which something per length is integrated: shared by the effects of rotary and eccentric inertia, weight and line loads.
+//! Elements over which something per length is integrated: shared by the effects of rotary and
+//! eccentric inertia, weight and line loads.
 
 use super::{AT_ONCE, ByOrder, Connection, for_each_batch, motions, shared, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
@@ -99,7 +100,8 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
 pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, VolumeElement<4, Q>>;
 
 impl<Q: Copy> VolumeElements<Q> {
-    /// The slots that meet in each element; effects add no others than those that an assembler takes.
+    /// The slots that meet in each element; effects add no others than those that an assembler
+    /// takes.
     pub fn connectivity(&self, blocks: Blocks) -> Connectivity {
         let mut connectivity = Connectivity::divisible();
         for_each_batch!(self, |_first, batch| for element in batch {
@@ -130,8 +132,9 @@ impl<Q: Copy> VolumeElements<Q> {
         });
     }
 
-    /// Sums over points: `add` is shown each one's quantity, its weight, its initial place and its motion, and `take` the sums of parts in
-    /// their order, which are the same for any number of threads.
+    /// Sums over points: `add` is shown each one's quantity, its weight, its initial place and its
+    /// motion, and `take` the sums of parts in their order, which are the same for any number of
+    /// threads.
     pub fn sum<S: Default + Send>(
         &self,
         at: &State,

@@ -1,17 +1,17 @@
-//! The family of generalised-alpha methods in displacements and total rotation vectors, as coefficients; rotations may take
-//! increments instead ([`super::Increments`]).
+//! The family of generalised-alpha methods, as coefficients. The unknowns are displacements and
+//! total rotation vectors, or increments of rotation ([`super::Increments`]).
 //!
-//! Equilibrium is kept at the end of each step with the true acceleration a = q''; beside it an algorithmic acceleration A is
-//! carried, which approximates q'' at t + (alpha_m - alpha_f) h:
+//! Equilibrium is kept at the end of each step with the true acceleration a = q''; beside it an
+//! algorithmic acceleration A is carried, which approximates q'' at t + (alpha_m - alpha_f) h:
 //!
 //! ```text
 //! (1 - alpha_m) A1 + alpha_m A0 = (1 - alpha_f) a1 + alpha_f a0
 //! q1 = q0 + h v0 + h^2 [(1/2 - beta) A0 + beta A1]        v1 = v0 + h [(1 - gamma) A0 + gamma A1]
 //! ```
 //!
-//! Newmark (1959, doi:10.1061/JMCEA3.0000098): alpha_m = alpha_f = 0, A = a. Hilber, Hughes & Taylor
-//! (1977, doi:10.1002/eqe.4290050306): alpha_m = 0. Chung & Hulbert (1993, doi:10.1115/1.2900803): both from the spectral
-//! radius at infinite frequency.
+//! Newmark (1959, doi:10.1061/JMCEA3.0000098): alpha_m = alpha_f = 0, A = a. Hilber, Hughes &
+//! Taylor (1977, doi:10.1002/eqe.4290050306): alpha_m = 0. Chung & Hulbert (1993,
+//! doi:10.1115/1.2900803): alpha_m and alpha_f from the spectral radius at infinite frequency.
 
 use super::Method;
 use crate::kernel::Weights;
@@ -21,7 +21,9 @@ use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 use std::iter::repeat_with;
 
-/// The coefficients of a method.
+/// The coefficients of a generalised-alpha method.
+///
+/// See the [module](self) for their equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scheme {
     /// beta
@@ -32,7 +34,7 @@ pub struct Scheme {
     pub alpha_m: f64,
     /// alpha_f
     pub alpha_f: f64,
-    /// What the unknowns of rotations are
+    /// The unknowns of rotations in a step
     pub rotations: Rotations,
 }
 
@@ -41,12 +43,17 @@ pub struct Scheme {
 pub enum Rotations {
     /// Total rotation vectors with their rates
     Totals,
-    /// Increments from the last converged rotation, with material spins as velocities: see [`super::Increments`]
+    /// Increments from the last converged rotation, with material spins as velocities: see
+    /// [`super::Increments`]
     Increments,
 }
 
+/// Factors of the local error below this, without unit, count as zero.
+const LEAST_ERROR_FACTOR: f64 = 1e-6;
+
 impl Scheme {
-    /// Newmark's family; beta = 1/4, gamma = 1/2 is the trapezoidal rule: second order, without dissipation.
+    /// Newmark's family; beta = 1/4, gamma = 1/2 is the trapezoidal rule: second order, without
+    /// dissipation.
     pub fn newmark(beta: f64, gamma: f64) -> Self {
         Self { beta, gamma, alpha_m: 0.0, alpha_f: 0.0, rotations: Rotations::Totals }
     }
@@ -57,41 +64,44 @@ impl Scheme {
         Self { beta, gamma: 0.5 + alpha, alpha_m: 0.0, alpha_f: alpha, rotations: Rotations::Totals }
     }
 
-    /// Generalised-alpha with the spectral radius rho in [0, 1] at infinite frequency: second order, with the least
-    /// dissipation of low frequencies for that of high ones.
+    /// Generalised-alpha with the spectral radius rho in [0, 1] at infinite frequency: second
+    /// order, with the least dissipation of low frequencies for that of high ones.
     pub fn generalized_alpha(rho: f64) -> Self {
-        let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
+        let alpha_m = (2.0 * rho - 1.0) / (rho + 1.0);
+        let alpha_f = rho / (rho + 1.0);
         let gamma = 0.5 + alpha_f - alpha_m;
         let beta = 0.25 * (gamma + 0.5) * (gamma + 0.5);
         Self { beta, gamma, alpha_m, alpha_f, rotations: Rotations::Totals }
     }
 
-    /// The same on increments of rotation (Bruls, Cardona & Arnold 2012, doi:10.1016/j.mechmachtheory.2011.07.017), as
-    /// [`crate::kernel::turn`] has them.
+    /// Generalised-alpha on increments of rotation (Bruls, Cardona & Arnold 2012,
+    /// doi:10.1016/j.mechmachtheory.2011.07.017), in the form of [`crate::kernel::turn`], with the
+    /// spectral radius rho in [0, 1] at infinite frequency.
     pub fn lie_generalized_alpha(rho: f64) -> Self {
         Self { rotations: Rotations::Increments, ..Self::generalized_alpha(rho) }
     }
 
-    /// How far, in steps, the algorithmic acceleration lags: it belongs to t + lag h.
+    /// The lag of the algorithmic acceleration in steps: it belongs to the time t + lag h.
     pub fn lag(&self) -> f64 {
         self.alpha_m - self.alpha_f
     }
 
-    /// At the start of a stage, what is algorithmic is what is; where the scheme has nothing of the kind it takes no memory.
+    /// Starts a stage: the algorithmic acceleration begins as the true one. A scheme without one
+    /// takes no memory for it.
     pub fn start(&self, state: &mut State) {
         state.algorithmic = if self.has_algorithmic() { state.a.clone() } else { Field::none() };
     }
 
-    /// Whether it carries an algorithmic acceleration beside the true one.
+    /// True if the scheme carries an algorithmic acceleration beside the true one.
     fn has_algorithmic(&self) -> bool {
         self.rotations == Rotations::Increments || self.alpha_m != 0.0 || self.alpha_f != 0.0
     }
 
-    /// The factor of h^2 (a1 - a0) in the local error of a step: beta - 1/6 + (alpha_m - alpha_f)/2. `None` where it is
-    /// zero, so that this difference tells nothing.
+    /// The factor of h^2 (a1 - a0) in the local error of a step: beta - 1/6 + (alpha_m -
+    /// alpha_f)/2. `None` if it is zero, so that a1 - a0 says nothing about the error.
     pub fn error_factor(&self) -> Option<f64> {
         let factor = self.beta - 1.0 / 6.0 + 0.5 * self.lag();
-        (factor.abs() > 1e-6).then_some(factor)
+        (factor.abs() > LEAST_ERROR_FACTOR).then_some(factor)
     }
 }
 
@@ -100,16 +110,19 @@ impl Scheme {
 pub struct Step {
     /// The coefficients
     pub scheme: Scheme,
-    /// Its length h
+    /// h, the length of the step, a time
     pub length: f64,
 }
 
 impl Step {
-    /// Predicts the end of the step with the acceleration of its start. `before` is the length of the step that the
-    /// algorithmic acceleration comes from: on a change of step its lag changes with it. The stage has begun with [`Scheme::start`].
+    /// Predicts the end of the step with the acceleration of its start.
+    ///
+    /// `before` is the length of the step that the algorithmic acceleration comes from: its lag
+    /// changes with the length of the step. The stage must have begun with [`Scheme::start`].
     pub fn predict(&self, state: &mut State, before: f64) {
         debug_assert_ne!(self.scheme.has_algorithmic(), state.algorithmic.is_empty(), "the scheme was not started");
-        let (Scheme { beta, gamma, alpha_m, .. }, h) = (self.scheme, self.length);
+        let Scheme { beta, gamma, alpha_m, .. } = self.scheme;
+        let h = self.length;
         let stretch = h / before;
         each_part(state, |_, Slots { q, v, a, algorithmic, turns }| {
             for k in 0..q.len() {
@@ -132,14 +145,16 @@ impl Step {
 
     /// The coefficients of a rotation over the step.
     pub fn coefficients(&self) -> StepCoefficients {
-        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, length) = (self.scheme, self.length);
+        let Scheme { beta, gamma, alpha_m, alpha_f, .. } = self.scheme;
+        let length = self.length;
         StepCoefficients { beta, gamma, alpha_m, alpha_f, length }
     }
 }
 
 impl Method for Step {
     fn weights(&self) -> Weights {
-        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, h) = (self.scheme, self.length);
+        let Scheme { beta, gamma, alpha_m, alpha_f, .. } = self.scheme;
+        let h = self.length;
         let mass = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * h * h);
         Weights { stiffness: 1.0, damping: gamma / (beta * h), mass }
     }
@@ -147,7 +162,7 @@ impl Method for Step {
     fn correct(&self, state: &mut State, dq: &[Vec3]) {
         let Weights { damping, mass, .. } = self.weights();
         let filtered = 1.0 / (self.scheme.beta * self.length * self.length);
-        // Where a motion is prescribed nothing is corrected, and rates stay as they are prescribed.
+        // Prescribed motions are not corrected: their rates stay as prescribed.
         each_part(state, |start, Slots { q, v, a, algorithmic, turns }| {
             let dq = dq[start..start + q.len()].iter().enumerate();
             for (k, &dq) in dq.filter(|(_, dq)| **dq != Vec3::ZERO) {
@@ -166,18 +181,18 @@ impl Method for Step {
     }
 }
 
-/// Some slots that follow each other, of a state.
+/// Consecutive slots of a state.
 struct Slots<'a> {
     q: &'a mut [Vec3],
     v: &'a mut [Vec3],
     a: &'a mut [Vec3],
-    /// Where the scheme has one
+    /// Algorithmic accelerations; empty if the scheme has none
     algorithmic: &'a mut [Vec3],
-    /// From the first of them on, where there are any
+    /// Rotations over the step, from the first slot on; empty if the scheme has none
     turns: &'a [Option<Turn>],
 }
 
-/// Does something with each part of a state, which begins at a slot: parts at once.
+/// Calls `work` with each part of a state and the number of the part's first slot, in parallel.
 fn each_part(state: &mut State, work: impl Fn(usize, Slots) + Send + Sync) {
     let State { q, v, a, algorithmic, turns, .. } = state;
     let algorithmic = algorithmic.chunks_mut(PART).chain(repeat_with(|| &mut [][..]));

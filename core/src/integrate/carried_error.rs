@@ -1,29 +1,34 @@
 //! The error that fixed steps make, followed through a stage beside the motion itself.
 //!
-//! What a step leaves out of the motion is known to first order from accelerations (the local error, by which adaptive steps are
-//! chosen). What becomes of it is decided by the linearised equations of motion: the scheme itself carries the error e of the
-//! unknowns from step to step, with the tangent that Newton's method has anyway.
+//! What a step leaves out of the motion is known to first order from accelerations (the local
+//! error, by which adaptive steps are chosen). What becomes of it is decided by the linearised
+//! equations of motion: the scheme itself carries the error e of the unknowns from step to step,
+//! with the tangent that Newton's method has anyway.
 //!
 //! ```text
-//! e1  = e0 + h e0' + h^2 [(1/2 - beta) E0 + beta E1]      (1 - alpha_m) E1 + alpha_m E0 = (1 - alpha_f) e1'' + alpha_f e0''
-//! e1' = e0' + h [(1 - gamma) E0 + gamma E1]               K e1 + C e1' + M e1'' = 0
+//! e1  = e0 + h e0' + h^2 [(1/2 - beta) E0 + beta E1]
+//! e1' = e0' + h [(1 - gamma) E0 + gamma E1]
+//! (1 - alpha_m) E1 + alpha_m E0 = (1 - alpha_f) e1'' + alpha_f e0''
+//! K e1 + C e1' + M e1'' = 0
 //! ```
 //!
-//! With e^ for e1 where e1'' = 0, and J = K + c1 C + c2 M, balance is J e1 = M c2 e^ + C (c1 e^ - e^'). So a step costs one
-//! evaluation of inertia and damping and one substitution. At its end it adds its own local errors, with d = alpha_m - alpha_f:
+//! With e^ for e1 where e1'' = 0, and J = K + c1 C + c2 M, balance is J e1 = M c2 e^ + C (c1 e^ -
+//! e^'). So a step costs one evaluation of inertia and damping and one substitution. At its end it
+//! adds its own local errors, with d = alpha_m - alpha_f:
 //!
 //! ```text
 //! tau  = (1/6 - beta - d/2) h^3 q'''
 //! tau' = (1/2 - gamma - d) h^2 q''' + [1/6 - d (alpha_m - 1/2) - gamma (1/2 + d)] h^3 q''''
 //! ```
 //!
-//! The derivatives are slopes of accelerations over several steps. A motion that steps do not resolve errs by its own size and no
-//! more, which a linear equation does not know; over several steps nothing is seen of it.
+//! The derivatives are slopes of accelerations over several steps. A motion that steps do not
+//! resolve errs by its own size and no more, which a linear equation does not know; over several
+//! steps nothing is seen of it.
 
 use super::time_error::{Correct, Largest, Scene, is_to_switch};
 use super::{Increments, Method, Scheme, Step};
 use crate::kernel::Weights;
-use crate::kernel::turn::Turn;
+use crate::kernel::turn::{StartChange, Turn};
 use crate::model::{Assembly, SlotKind};
 use crate::rotation::{Complement, Rotation, log};
 use crate::system::{Category, DofMap, Field, Slot, State, System};
@@ -34,18 +39,20 @@ use std::sync::Arc;
 /// Steps over which slopes of accelerations are taken.
 pub(super) const WIDTH: usize = 4;
 
-/// The part of h^4 w^2 times the change of the acceleration of a free spin that a step of increments errs by, measured on bodies that turn
-/// about their middle axes.
+/// The part of h^4 w^2 times the change of the acceleration of a free spin that a step of
+/// increments errs by, measured on bodies that turn about their middle axes.
 pub(super) const FREE_SPIN: f64 = 1.0 / 8.0;
 
-/// The change of rates that shows how forces follow them: that of an error of this size, in radians or over the length of the scene.
+/// The change of rates that shows how forces follow them: that of an error of this size, in radians
+/// or over the length of the scene.
 const NUDGE: f64 = 1e-6;
 
-/// The most that an error is taken to grow to, over the sum of the sizes of local errors. What is carried along beyond that has grown from
-/// roundoff or second-order terms in an unstable motion (a body about its middle axis), which the motion itself has not.
+/// The most that an error is taken to grow to, over the sum of the sizes of local errors. What is
+/// carried along beyond that has grown from roundoff or second-order terms in an unstable motion (a
+/// body about its middle axis), which the motion itself has not.
 const MOST_GROWTH: f64 = 800.0;
-/// The same where accelerations ring from step to step: frequencies far above those that steps resolve let the carried error grow by itself in
-/// a frame that turns.
+/// The same where accelerations ring from step to step: frequencies far above those that steps
+/// resolve let the carried error grow by itself in a frame that turns.
 const MOST_GROWTH_RINGING: f64 = 8.0;
 /// The part of the local errors from which on that is so.
 const RUNG: f64 = 0.05;
@@ -62,16 +69,19 @@ pub(super) struct CarriedError {
     rates: [Field; 2],
     /// Their forces, then what the error meets; by category and slot
     force: [Vec<Vec3>; 4],
-    /// The errors at the end of the present step of rotations whose unknowns are increments, as they stand in [`OfSlot`]
+    /// The errors at the end of the present step of rotations whose unknowns are increments, as
+    /// they stand in [`OfSlot`]
     turned: Vec<(Slot, [Vec3; 4])>,
     /// What the error is multiplied by to show; zero where there is none yet
     nudge: f64,
     known: Known,
-    /// How many steps there were, and the lengths of the last of them, each at the place of its number
+    /// How many steps there were, and the lengths of the last of them, each at the place of its
+    /// number
     steps: usize,
     lengths: [f64; WIDTH],
     largest: Largest,
-    /// The sizes of local errors, summed over the steps, and of those among them that come from ringing
+    /// The sizes of local errors, summed over the steps, and of those among them that come from
+    /// ringing
     sums: [Largest; 2],
 }
 
@@ -86,8 +96,9 @@ enum Known {
     Error,
 }
 
-/// What is known of a slot. The error of a rotation whose unknown is an increment is a material turn, with the material errors of the spin
-/// and its rate, and the spatial one of the rate of the momentum that it carries.
+/// What is known of a slot. The error of a rotation whose unknown is an increment is a material
+/// turn, with the material errors of the spin and its rate, and the spatial one of the rate of the
+/// momentum that it carries.
 #[derive(Clone, Copy, Default)]
 struct OfSlot {
     /// e, e', e'' and E at the end of the last step
@@ -117,7 +128,8 @@ struct Predicted {
 impl OfSlot {
     #[inline(always)]
     fn predicted(&self, step: &Step, stretch: f64) -> Predicted {
-        let (Scheme { beta, gamma, alpha_m, alpha_f, .. }, h) = (step.scheme, step.length);
+        let Scheme { beta, gamma, alpha_m, alpha_f, .. } = step.scheme;
+        let h = step.length;
         let own = self.algorithmic;
         let old = if stretch == 1.0 { own } else { self.rate2 + (own - self.rate2) * stretch };
         let new = (self.rate2 * alpha_f - old * alpha_m) * (1.0 / (1.0 - alpha_m));
@@ -128,17 +140,23 @@ impl OfSlot {
         }
     }
 
-    /// The turn of a rotation that begins with a part of the error, and the increment with which it ends where the other one ends.
+    /// The turn of a rotation that begins with a part of the error, and the increment with which it
+    /// ends where the other one ends.
     fn changed(&self, turn: &Turn, x: Vec3, stretch: f64, part: f64) -> (Turn, Vec3) {
-        let turned = self.error * part;
-        let rates = [self.rate, self.rate2, self.algorithmic].map(|error| error * part);
-        (turn.changed(turned, rates, stretch), log(Rotation::new(-turned).r * Rotation::new(x).r))
+        let by = StartChange {
+            turned: self.error * part,
+            omega: self.rate * part,
+            acceleration: self.rate2 * part,
+            algorithmic: self.algorithmic * part,
+        };
+        (turn.changed(&by, stretch), log(Rotation::new(-by.turned).r * Rotation::new(x).r))
     }
 }
 
 impl CarriedError {
-    /// From a state on, in which a step has ended that was as long as the next ones will be; `start` is q where the stage began. `moves` tells
-    /// for each slot whether its accelerations mean something.
+    /// From a state on, in which a step has ended that was as long as the next ones will be;
+    /// `start` is q where the stage began. `moves` tells for each slot whether its accelerations
+    /// mean something.
     pub fn new(scene: &Scene, force: [Vec<Vec3>; 4], state: &State, start: &[Vec3], step: Step) -> Self {
         let of_slot = |slot: usize| OfSlot { moves: scene.moves(slot), start: start[slot], ..OfSlot::default() };
         Self {
@@ -161,7 +179,9 @@ impl CarriedError {
 
     /// An attempt at a step begins; the one before was as long as `before`.
     pub fn begin(&mut self, step: &Step, before: f64) {
-        (self.step, self.stretch, self.known) = (*step, step.length / before, Known::Nothing);
+        self.step = *step;
+        self.stretch = step.length / before;
+        self.known = Known::Nothing;
     }
 
     /// Whether what the error meets in the present step is not known yet.
@@ -169,8 +189,8 @@ impl CarriedError {
         self.known == Known::Nothing
     }
 
-    /// Looks at what the error meets of inertia and damping in the state that the tangent of the step belongs to. The forces of the system
-    /// are those of that state, and stay.
+    /// Looks at what the error meets of inertia and damping in the state that the tangent of the
+    /// step belongs to. The forces of the system are those of that state, and stay.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {
         if self.nudge == 0.0 {
             return;
@@ -180,7 +200,8 @@ impl CarriedError {
         self.swap_rates(state);
         assembly.evaluate_rates(state, &mut self.force);
         self.swap_rates(state);
-        let (system, factor) = (&assembly.system, 1.0 / self.nudge);
+        let system = &assembly.system;
+        let factor = 1.0 / self.nudge;
         let [_, inertia, _, damping] = &mut self.force;
         threads::each_part(inertia, |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -196,13 +217,18 @@ impl CarriedError {
         }
     }
 
-    /// Rates that differ from those of the state by as much as those of an error that is zero at the end of the step, the other way.
+    /// Rates that differ from those of the state by as much as those of an error that is zero at
+    /// the end of the step, the other way.
     fn change_rates(&mut self, state: &State, weights: Weights) {
         let Self { slots, rates: [v, a], nudge, step, stretch, .. } = self;
-        let (slots, step, stretch, nudge) = (&slots[..], &*step, *stretch, *nudge);
+        let slots = &slots[..];
+        let step = &*step;
+        let stretch = *stretch;
+        let nudge = *nudge;
         v.copy_from(&state.v);
         a.copy_from(&state.a);
-        let (v, a) = (&mut v[..], &mut a[..]);
+        let v = &mut v[..];
+        let a = &mut a[..];
         threads::each(v.chunks_mut(PART).zip(a.chunks_mut(PART)).enumerate(), |(number, (v, a))| {
             let of_part = v.iter_mut().zip(a).zip(&slots[PART * number..]);
             for ((v, a), slot) in of_part.filter(|(_, slot)| slot.moves) {
@@ -214,7 +240,8 @@ impl CarriedError {
         for (k, turn) in turns(state) {
             let (turn, x) = slots[k].changed(turn, state.q[k], stretch, nudge);
             let (omega, acceleration) = turn.rates(x);
-            (v[k], a[k]) = (state.v[k] * 2.0 - omega, state.a[k] * 2.0 - acceleration);
+            v[k] = state.v[k] * 2.0 - omega;
+            a[k] = state.a[k] * 2.0 - acceleration;
         }
     }
 
@@ -229,7 +256,8 @@ impl CarriedError {
         if self.known != Known::Forces {
             return;
         }
-        // The solver takes the sum of all forces: what the others have of it is taken away from what it shall see.
+        // The solver takes the sum of all forces: what the others have of it is taken away from
+        // what it shall see.
         const INERTIA: usize = Category::Inertia as usize;
         threads::each_part(&mut self.force[INERTIA], |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -246,12 +274,15 @@ impl CarriedError {
         }
     }
 
-    /// The errors of rotations whose unknowns are increments, of which `error` has those of the increments.
+    /// The errors of rotations whose unknowns are increments, of which `error` has those of the
+    /// increments.
     fn find_turned(&mut self, state: &State, error: &[Vec3]) {
         let Self { slots, turned, nudge, stretch, .. } = self;
         turned.clear();
         for (k, turn) in turns(state) {
-            let (x, omega, acceleration) = (state.q[k], state.v[k], state.a[k]);
+            let x = state.q[k];
+            let omega = state.v[k];
+            let acceleration = state.a[k];
             let (changed, same) = slots[k].changed(turn, x, *stretch, *nudge);
             let other = same + error[k] * *nudge;
             let (other_omega, other_acceleration) = changed.rates(other);
@@ -266,7 +297,8 @@ impl CarriedError {
         }
     }
 
-    /// The step is taken from one state to another, both in one chart, with the error that was found at its end.
+    /// The step is taken from one state to another, both in one chart, with the error that was
+    /// found at its end.
     pub fn end(
         &mut self,
         dof_map: &DofMap,
@@ -274,16 +306,20 @@ impl CarriedError {
         (from, to): (&State, &State),
         increments: Option<&Increments>,
     ) {
-        let (Step { scheme, length: h }, stretch, weights) = (self.step, self.stretch, self.step.weights());
+        let Step { scheme, length: h } = self.step;
+        let stretch = self.stretch;
+        let weights = self.step.weights();
         self.steps += 1;
         let own = self.steps % WIDTH;
         self.lengths[own] = h;
         let local = Local::new(&scheme, h, own, self.lengths.iter().sum());
-        // Where nothing is found an error stays as it was: to go on freely would be much for what is stiff.
+        // Where nothing is found an error stays as it was: to go on freely would be much for what
+        // is stiff.
         let found = self.known == Known::Error;
         let Self { kinds, slots, step, .. } = self;
         let work = |(number, part): (usize, &mut [OfSlot])| {
-            let (mut largest, mut sizes) = (Largest::default(), [Largest::default(); 2]);
+            let mut largest = Largest::default();
+            let mut sizes = [Largest::default(); 2];
             for (k, slot) in (PART * number..).zip(part) {
                 let kind = kinds[k];
                 if kind.is_multiplier() || (kind == SlotKind::Rotation && increments.is_some()) {
@@ -318,7 +354,8 @@ impl CarriedError {
             }
             (largest, sizes)
         };
-        let (mut now, mut sizes) = (Largest::default(), [Largest::default(); 2]);
+        let mut now = Largest::default();
+        let mut sizes = [Largest::default(); 2];
         let gather = |(largest, [all, rung]): (Largest, [Largest; 2])| {
             now = now.or(largest);
             sizes = [sizes[0].or(all), sizes[1].or(rung)];
@@ -346,7 +383,8 @@ impl CarriedError {
         local: &Local,
         (largest, sizes): (&mut Largest, &mut [Largest; 2]),
     ) {
-        let (found, h) = (self.known == Known::Error, self.step.length);
+        let found = self.known == Known::Error;
+        let h = self.step.length;
         for (slot, turned) in self.turned.drain(..).filter(|_| found) {
             let slot = &mut self.slots[slot as usize];
             [slot.error, slot.rate, slot.rate2, slot.algorithmic] = turned;
@@ -366,10 +404,12 @@ impl CarriedError {
         }
     }
 
-    /// Total rotation vectors are about to change their charts in a state: their errors go with them.
+    /// Total rotation vectors are about to change their charts in a state: their errors go with
+    /// them.
     pub fn change_charts(&mut self, state: &State, rotations: &[Slot]) {
         for &slot in rotations {
-            let (k, p) = (slot as usize, state.q[slot as usize]);
+            let k = slot as usize;
+            let p = state.q[slot as usize];
             if !is_to_switch(p) {
                 continue;
             }
@@ -403,7 +443,8 @@ impl CarriedError {
     }
 }
 
-/// Whether local errors of places tell how large those of rates are: those of a scheme of first order, or with a beta near 1/6, do not.
+/// Whether local errors of places tell how large those of rates are: those of a scheme of first
+/// order, or with a beta near 1/6, do not.
 fn is_told_by_places(scheme: &Scheme) -> bool {
     let lag = scheme.lag();
     (0.5 - scheme.gamma - lag).abs() < 1e-9 && (1.0 / 6.0 - scheme.beta - 0.5 * lag).abs() > 0.04
@@ -434,7 +475,8 @@ struct Local {
 
 impl Local {
     fn new(scheme: &Scheme, h: f64, place: usize, span: f64) -> Self {
-        let (Scheme { beta, gamma, alpha_m, .. }, lag) = (*scheme, scheme.lag());
+        let Scheme { beta, gamma, alpha_m, .. } = *scheme;
+        let lag = scheme.lag();
         let of_change = 1.0 / 6.0 - lag * (alpha_m - 0.5) - gamma * (0.5 + lag);
         let of_slope = [1.0 / 6.0 - beta - 0.5 * lag, 0.5 - gamma - lag];
         Self { factors: [of_slope[0] * h * h * h, of_slope[1] * h * h, of_change * h * h], place, per_span: 1.0 / span }
@@ -458,7 +500,8 @@ impl Local {
         // While a slope becomes known its change is none of the motion's.
         let change = if usize::from(slot.age) < WIDTH { Vec3::ZERO } else { jerk - slot.jerk };
         slot.age = (WIDTH as u8).min(slot.age + 1);
-        (slot.past[self.place], slot.jerk) = (after, jerk);
+        slot.past[self.place] = after;
+        slot.jerk = jerk;
         let [of_place, of_rate, of_change] = self.factors;
         [jerk * of_place, jerk * of_rate + change * of_change]
     }

@@ -1,8 +1,8 @@
 //! Steps whose rotational unknowns are increments.
 //!
-//! Between steps a state holds total rotation vectors, as everywhere. While a step is iterated it holds, for each rotation,
-//! the increment X with R = R_n exp(X), and the spin that belongs to it (see [`crate::kernel::turn`]); nothing then depends on where
-//! the total vector happens to be.
+//! Between steps a state holds total rotation vectors, as everywhere. While a step is iterated it
+//! holds, for each rotation, the increment X with R = R_n exp(X), and the spin that belongs to it
+//! (see [`crate::kernel::turn`]); nothing then depends on where the total vector happens to be.
 
 use super::Step;
 use crate::kernel::inertia::Inertia;
@@ -16,8 +16,8 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Principal values of a carrier are at least the largest over this: the smaller they are, the more they make of the error of
-/// a momentum.
+/// Principal values of a carrier are at least the largest over this: the smaller they are, the more
+/// they make of the error of a momentum.
 const LARGEST_RATIO: f64 = 10.0;
 
 /// What h^4 w^2 times a change of phi is divided by to be the error of a rotation.
@@ -61,7 +61,8 @@ impl Increments {
         let mut turns = std::mem::take(&mut state.turns);
         turns.resize(state.q.len(), None);
         for &(slot, carrier) in &self.carriers {
-            let (k, spin) = (slot as usize, state.spin(slot));
+            let k = slot as usize;
+            let spin = state.spin(slot);
             let start = Start {
                 rotation: spin.rotation.r,
                 omega: spin.omega,
@@ -70,12 +71,15 @@ impl Increments {
                 stretch: step.length / before,
             };
             turns[k] = Some(Turn::new(step.coefficients(), carrier, &start));
-            (state.q[k], state.v[k], state.a[k]) = (Vec3::ZERO, spin.omega, spin.acceleration);
+            state.q[k] = Vec3::ZERO;
+            state.v[k] = spin.omega;
+            state.a[k] = spin.acceleration;
         }
         state.turns = turns;
     }
 
-    /// From increments to total vectors, each in the chart of `before` unless that has been left; returns how many have.
+    /// From increments to total vectors, each in the chart of `before` unless that has been left;
+    /// returns how many have.
     pub fn end(&self, state: &mut State, before: &State) -> usize {
         let mut switched = 0;
         let mut turns = std::mem::take(&mut state.turns);
@@ -89,17 +93,20 @@ impl Increments {
             switched += usize::from(nearer && !within);
             let p = if nearer && within { far } else { short };
             let (velocity, acceleration) = rates(p, state.v[k], state.a[k]);
-            (state.q[k], state.v[k], state.a[k]) = (p, velocity, acceleration);
+            state.q[k] = p;
+            state.v[k] = velocity;
+            state.a[k] = acceleration;
         }
         // The room is kept for the next step.
         state.turns = turns;
         switched
     }
 
-    /// The local errors of rotations over a step between two states with total vectors, with their slots. What moments give, mu = E J^-1 E^T b,
-    /// is integrated to second order, with the error factor h^2 (mu1 - mu0). The rest of the acceleration, phi, is integrated to
-    /// fourth order: h^5/720 of the fourth derivative of the spin, which is about |w|^2 times the second, (phi1 - phi0)/h, and as
-    /// much again from each of the two next terms of Magnus' series.
+    /// The local errors of rotations over a step between two states with total vectors, with their
+    /// slots. What moments give, mu = E J^-1 E^T b, is integrated to second order, with the error
+    /// factor h^2 (mu1 - mu0). The rest of the acceleration, phi, is integrated to fourth order:
+    /// h^5/720 of the fourth derivative of the spin, which is about |w|^2 times the second, (phi1 -
+    /// phi0)/h, and as much again from each of the two next terms of Magnus' series.
     pub fn errors<'a>(
         &'a self,
         start: &'a State,
@@ -150,7 +157,8 @@ fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     sums
 }
 
-/// The carrier of an angular momentum; `None` without inertia about some axis. Of slender inertias the small principal values are raised.
+/// The carrier of an angular momentum; `None` without inertia about some axis. Of slender inertias
+/// the small principal values are raised.
 fn momentum(inertia: Mat3) -> Option<Carrier> {
     let SymmetricEigen { eigenvectors, eigenvalues } =
         SymmetricEigen::new(Matrix3::from_fn(|i, j| 0.5 * (inertia.0[i][j] + inertia.0[j][i])));

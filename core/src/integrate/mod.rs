@@ -1,5 +1,5 @@
-//! Time integration as coefficients: how a correction of the unknowns changes velocities and accelerations, and with
-//! which weights stiffness, damping and mass enter the tangent.
+//! Time integration as coefficients: how a correction of the unknowns changes velocities and
+//! accelerations, and with which weights stiffness, damping and mass enter the tangent.
 
 mod alpha;
 mod carried_error;

@@ -1,17 +1,21 @@
 //! What the corrections of the last steps tell about the next one.
 //!
-//! A scheme predicts the end of a step with the acceleration of its start. What Newton's method then adds, c = q1 - q1(predicted), grows with
-//! the third power of the step and goes on as the motion does: smoothly in soft directions, while in stiff ones accelerations swing from step
-//! to step (the trapezoidal rule turns them round), and c with them. Sums of such motions follow from those before them,
+//! A scheme predicts the end of a step with the acceleration of its start. What Newton's method
+//! then adds, c = q1 - q1(predicted), grows with the third power of the step and goes on as the
+//! motion does: smoothly in soft directions, while in stiff ones accelerations swing from step to
+//! step (the trapezoidal rule turns them round), and c with them. Sums of such motions follow from
+//! those before them,
 //!
 //! ```text
 //! c(n) = a1 c(n-1) + a2 c(n-2) + ...
 //! ```
 //!
-//! and the factors are those that would have left the least in the last steps (linear prediction: Makhoul 1975,
-//! doi:10.1109/PROC.1975.9792). What counts is the size of c, not that of its forces: they are large where it is stiff, which the first correction
-//! takes away, but what that correction leaves grows with the square of how far things turn. Where motion has no rule the factors are small, and the
-//! prediction is the scheme's own; where it jolts they are too large to be those of a motion, and lower orders are asked.
+//! and the factors are those that would have left the least in the last steps (linear prediction:
+//! Makhoul 1975, doi:10.1109/PROC.1975.9792). What counts is the size of c, not that of its forces:
+//! they are large where it is stiff, which the first correction takes away, but what that
+//! correction leaves grows with the square of how far things turn. Where motion has no rule the
+//! factors are small, and the prediction is the scheme's own; where it jolts they are too large to
+//! be those of a motion, and lower orders are asked.
 
 use super::{Method, Step};
 use crate::model::{Model, SlotKind};
@@ -24,14 +28,16 @@ use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// The order of the prediction: so many steps tell of the next one. One more is remembered, to learn from.
+/// The order of the prediction: so many steps tell of the next one. One more is remembered, to
+/// learn from.
 const MOST: usize = 4;
 
 /// The forgetting factor: what a step counts for beside the next one.
 const MEMORY: f64 = 0.5;
 
-/// Motions that do not grow have factors whose sizes add up to this at most: (1 + 1)^MOST - 1, of roots in the unit disc. Where small corrections are
-/// followed by a jolt, the one is no multiple of the others, although the factors say so.
+/// Motions that do not grow have factors whose sizes add up to this at most: (1 + 1)^MOST - 1, of
+/// roots in the unit disc. Where small corrections are followed by a jolt, the one is no multiple
+/// of the others, although the factors say so.
 const LARGEST: f64 = ((1 << MOST) - 1) as f64;
 
 /// A step that is longer or shorter than another one by more than this has nothing to say of it.
@@ -40,7 +46,8 @@ const ALIKE: f64 = 4.0;
 /// The power of the length of a step with which corrections grow
 const GROWTH: i32 = 3;
 
-/// Directions in which the corrections of the last steps differ by less than this share, in squares, are those of their six digits.
+/// Directions in which the corrections of the last steps differ by less than this share, in
+/// squares, are those of their six digits.
 const DIGITS: f64 = 1e-11;
 
 /// Factors of the last corrections, the latest first
@@ -49,7 +56,8 @@ type Factors = [f64; MOST];
 /// The corrections of the last steps of a stage.
 #[derive(Default)]
 pub struct Predictor {
-    /// What corrections are compared by: of each slot its kind, and of each kind a factor of squares
+    /// What corrections are compared by: of each slot its kind, and of each kind a factor of
+    /// squares
     kinds: Arc<Vec<SlotKind>>,
     weights: [f64; SlotKind::ALL.len()],
     /// The latest first
@@ -63,7 +71,8 @@ pub struct Predictor {
     has_foreseen: bool,
 }
 
-/// The normal equations of some factors, of corrections over the power of the length of their steps.
+/// The normal equations of some factors, of corrections over the power of the length of their
+/// steps.
 #[derive(Clone, Default)]
 struct Fit {
     /// Lower triangle
@@ -149,24 +158,28 @@ impl Predictor {
         self.fits[..known].iter_mut().zip(1..).for_each(|(fit, count)| fit.learn(&told, count));
     }
 
-    /// The last corrections, the latest first; in the place of what is not known stands the first of them.
+    /// The last corrections, the latest first; in the place of what is not known stands the first
+    /// of them.
     fn corrections<const N: usize>(&self) -> [&CompressedField<1>; N] {
         from_fn(|number| &self.past.get(number).unwrap_or(&self.past[0]).correction)
     }
 
-    /// The product of a correction with one `later` than it, both over the power of the length of their steps.
+    /// The product of a correction with one `later` than it, both over the power of the length of
+    /// their steps.
     fn product(&self, later: usize, earlier: usize) -> f64 {
         let [of, with] = [later, earlier].map(|number| &self.past[number]);
         of.products[earlier - later] * of.rate * with.rate
     }
 
-    /// How many of the steps from the one `since` on, at most [`MOST`], have something to say of one of this length.
+    /// How many of the steps from the one `since` on, at most [`MOST`], have something to say of
+    /// one of this length.
     fn alike(&self, length: f64, since: usize) -> usize {
         let past = self.past.iter().skip(since).take(MOST);
         past.take_while(|past| (1.0 / ALIKE..=ALIKE).contains(&(length / past.length))).count()
     }
 
-    /// The factors of the last corrections in what is foreseen of a step of this length; `None` where nothing is known.
+    /// The factors of the last corrections in what is foreseen of a step of this length; `None`
+    /// where nothing is known.
     fn factors(&self, length: f64) -> Option<Factors> {
         let fits = self.fits[..self.alike(length, 0)].iter();
         let factors = fits.rev().find_map(Fit::solve)?;
@@ -180,12 +193,14 @@ impl Predictor {
         self.fits = self.before.clone();
     }
 
-    /// Forgets all steps, since unknowns have changed their meaning; how they followed each other stays known.
+    /// Forgets all steps, since unknowns have changed their meaning; how they followed each other
+    /// stays known.
     pub fn forget(&mut self) {
         self.past.clear();
     }
 
-    /// The last step has failed, perhaps for what was foreseen of it: what foresaw it would do so again.
+    /// The last step has failed, perhaps for what was foreseen of it: what foresaw it would do so
+    /// again.
     pub fn fail(&mut self) {
         self.forget();
         (self.fits, self.before) = Default::default();
@@ -200,8 +215,8 @@ impl Fit {
         self.goals = self.goals * MEMORY + SVector::from_fn(|row, _| if row < count { told.goals[row] } else { 0.0 });
     }
 
-    /// Factors that leave least; of steps of which nothing is known they are zero. `None` where there is nothing to learn from, or they are those
-    /// of no motion.
+    /// Factors that leave least; of steps of which nothing is known they are zero. `None` where
+    /// there is nothing to learn from, or they are those of no motion.
     fn solve(&self) -> Option<SVector<f64, MOST>> {
         let size = self.matrix.trace();
         if !(size > 0.0 && size.is_finite()) {
@@ -257,14 +272,16 @@ mod tests {
         assert!(foreseen.iter().zip(wanted).all(is_near), "{foreseen:?}, not {wanted:?}");
     }
 
-    /// Smooth in one direction, swinging in others: each obeys a rule of its own, and both the same one.
+    /// Smooth in one direction, swinging in others: each obeys a rule of its own, and both the same
+    /// one.
     #[test]
     fn sums_of_smooth_and_swinging_motions_go_on() {
         let at = |step: i32| {
             let t = f64::from(step);
             [1.0 + 0.3 * t, (-1.0_f64).powi(step), (2.0 * t).cos() * 0.1 + 0.2, 0.0]
         };
-        // A constant, a line, and what turns round: three factors. A cosine has two more, and is one of five.
+        // A constant, a line, and what turns round: three factors. A cosine has two more, and is
+        // one of five.
         let three: Vec<_> = (0..12).map(|k| (0.1, [at(k)[0], at(k)[1], at(k)[0] - at(k)[1]])).collect();
         assert_foreseen(&with(&three), 0.1, &[at(12)[0], at(12)[1], at(12)[0] - at(12)[1]], 1e-3);
         let cosine: Vec<_> = (0..12).map(|k| (0.1, [at(k)[2], at(k)[3]])).collect();
@@ -302,7 +319,8 @@ mod tests {
         assert_eq!(after([0.0; 5]).factors(1.0), None);
     }
 
-    /// Round-off at rest, and then a load: its correction is 1e8 times the last one, and the next one is not 1e8 times it.
+    /// Round-off at rest, and then a load: its correction is 1e8 times the last one, and the next
+    /// one is not 1e8 times it.
     #[test]
     fn a_jolt_does_not_run_away() {
         let mut trend = after((0..6).map(|k| 1e-8 * f64::from(2 + k % 2)));

@@ -1,9 +1,11 @@
 //! The estimated error of the fixed steps of a stage.
 //!
-//! A step leaves tau = (1/6 - beta - d/2) h^3 q''' out of a motion, d = alpha_m - alpha_f. In all steps the sizes of these sum up to
+//! A step leaves tau = (1/6 - beta - d/2) h^3 q''' out of a motion, d = alpha_m - alpha_f. In all
+//! steps the sizes of these sum up to
 //! |1/6 - beta - d/2| h^2 times the way that accelerations take, which is 2/pi of the error of an oscillation: errors of its phase add up,
-//! one quarter period like the other. Where that sum stays far below what is worth a warning nothing else is done; where it will not, and
-//! in small scenes, where errors may grow by themselves, the error is carried along with the motion (`carried_error`).
+//! one quarter period like the other. Where that sum stays far below what is worth a warning
+//! nothing else is done; where it will not, and in small scenes, where errors may grow by
+//! themselves, the error is carried along with the motion (`carried_error`).
 
 use super::carried_error::{CarriedError, FREE_SPIN, WIDTH};
 use super::{Increments, Scheme, Step};
@@ -22,12 +24,14 @@ const FEW_SLOTS: usize = 100;
 /// Errors of larger scenes are not carried along, which would take a quarter of their memory.
 const MOST_SLOTS: usize = 200_000;
 
-/// The sum of local errors, over the largest motion, for which errors are carried along where a stage would come to it at its present rate.
+/// The sum of local errors, over the largest motion, for which errors are carried along where a
+/// stage would come to it at its present rate.
 const WORTH_CARRYING: f64 = 0.02;
 /// The sum of local errors of rotations, in radians, for which errors are carried along, likewise.
 const WORTH_CARRYING_TURNS: f64 = 0.1;
 
-/// Steps, and the part of a stage, after which that rate is believed: at first little has moved yet.
+/// Steps, and the part of a stage, after which that rate is believed: at first little has moved
+/// yet.
 const FIRST_STEPS: usize = 4 * WIDTH;
 const FIRST_PART: f64 = 0.125;
 
@@ -65,7 +69,8 @@ impl Largest {
     }
 }
 
-/// Finds the correction that the forces of a system ask for with the factors of its tangent; `false` where there are none.
+/// Finds the correction that the forces of a system ask for with the factors of its tangent;
+/// `false` where there are none.
 pub type Correct<'a> = dyn FnMut(&System, &mut [Vec3]) -> bool + 'a;
 
 /// What is needed to know of a scene.
@@ -88,9 +93,11 @@ pub struct TimeError {
     scene: Scene,
     /// q where the stage began
     start: Vec<Vec3>,
-    /// Accelerations where the sum was taken last; not a number where they are those of another chart
+    /// Accelerations where the sum was taken last; not a number where they are those of another
+    /// chart
     past: Field,
-    /// Of rotations whose unknowns are increments those from moments and from their own spin, spatial
+    /// Of rotations whose unknowns are increments those from moments and from their own spin,
+    /// spatial
     past_turns: Vec<[Vec3; 2]>,
     /// How many steps there were, of how many
     steps: usize,
@@ -103,8 +110,8 @@ pub struct TimeError {
 }
 
 impl TimeError {
-    /// For a stage that begins in a state, with a first step, and lasts for `duration`; `massive` tells for each slot whether its accelerations
-    /// mean something.
+    /// For a stage that begins in a state, with a first step, and lasts for `duration`; `massive`
+    /// tells for each slot whether its accelerations mean something.
     pub fn new(
         model: &Model,
         assembly: &Assembly,
@@ -150,8 +157,8 @@ impl TimeError {
         self.carried.as_ref().is_some_and(|carried| carried.knows_no_forces())
     }
 
-    /// Looks at what the error meets of inertia and damping in the state that the tangent of the step belongs to. The forces of the system
-    /// are those of that state, and stay.
+    /// Looks at what the error meets of inertia and damping in the state that the tangent of the
+    /// step belongs to. The forces of the system are those of that state, and stay.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {
         if let Some(carried) = &mut self.carried {
             carried.look(assembly, state, weights);
@@ -165,7 +172,8 @@ impl TimeError {
         }
     }
 
-    /// A step is taken from one state to another, both in one chart, with the error that was found at its end.
+    /// A step is taken from one state to another, both in one chart, with the error that was found
+    /// at its end.
     pub fn end(
         &mut self,
         system: &System,
@@ -187,13 +195,16 @@ impl TimeError {
         }
     }
 
-    /// Adds the local errors of the steps since the sum was taken last, up to this state: after some steps, and where the stage is over.
+    /// Adds the local errors of the steps since the sum was taken last, up to this state: after
+    /// some steps, and where the stage is over.
     pub fn sum_up(&mut self, dof_map: &DofMap, state: &State, increments: Option<&Increments>) {
         let Some(step) = self.longest.take() else { return };
-        let (Scheme { beta, .. }, h2) = (step.scheme, step.length * step.length);
+        let Scheme { beta, .. } = step.scheme;
+        let h2 = step.length * step.length;
         let factor = (1.0 / 6.0 - beta - 0.5 * step.scheme.lag()).abs() * h2;
         let Self { scene, start, past, .. } = self;
-        let (scene, start) = (&*scene, &start[..]);
+        let scene = &*scene;
+        let start = &start[..];
         let work = |(number, past): (usize, &mut [Vec3])| {
             let mut largest = Largest::default();
             for (k, past) in (PART * number..).zip(past) {
@@ -235,7 +246,8 @@ impl TimeError {
         is_large && self.steps >= FIRST_STEPS && done >= FIRST_PART && self.scene.kinds.len() <= MOST_SLOTS
     }
 
-    /// Total rotation vectors are about to change their charts in a state: their errors go with them.
+    /// Total rotation vectors are about to change their charts in a state: their errors go with
+    /// them.
     pub fn change_charts(&mut self, state: &State, rotations: &[Slot]) {
         match &mut self.carried {
             Some(carried) => carried.change_charts(state, rotations),

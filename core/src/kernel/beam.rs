@@ -11,15 +11,16 @@ use crate::tensor::Vec3;
 pub struct StiffnessPoint<const N: usize, T = f64, L = Linear<T>> {
     /// Shape functions
     pub shape: [T; N],
-    /// Their derivatives over initial arc length
+    /// Derivatives of the shape functions over initial arc length, 1/length
     pub slope: [T; N],
-    /// Gauss weight times ds/dxi
+    /// Gauss weight times ds/dxi, a length
     pub weight: T,
     /// E1, the unit tangent of the initial centre line
     pub tangent: Vec3<T>,
     /// The law of the section in global components
     pub law: L,
-    /// The strain that makes no stress, where there is one (natural curvature, thermal strain), for an amplitude of one
+    /// Free strain (natural curvature, thermal strain), which makes no stress, at an amplitude of
+    /// one; material. `None` where there is none
     pub free: Option<Strain<T>>,
 }
 
@@ -34,12 +35,14 @@ pub fn interpolate<T: Real, const N: usize>(shape: &[T; N], value: impl Fn(usize
 }
 
 impl<const N: usize, L: StoredLaw> StiffnessPoint<N, f64, L> {
-    /// This point, with constants of another scalar.
+    /// A copy of this point whose numbers are constants of another scalar, say dual numbers.
     #[inline(always)]
     pub fn lifted<T: Real>(&self) -> StiffnessPoint<N, T, L::Lifted<T>> {
-        let (mut shape, mut slope) = ([T::zero(); N], [T::zero(); N]);
+        let mut shape = [T::zero(); N];
+        let mut slope = [T::zero(); N];
         for i in 0..N {
-            (shape[i], slope[i]) = (T::constant(self.shape[i]), T::constant(self.slope[i]));
+            shape[i] = T::constant(self.shape[i]);
+            slope[i] = T::constant(self.slope[i]);
         }
         let free = match &self.free {
             None => None,
@@ -73,7 +76,7 @@ impl<const N: usize, L: StoredLaw> Pack for StiffnessPoint<N, f64, L> {
 }
 
 impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
-    /// Takes the point to an element that is so many times as long.
+    /// Moves the point to an element that is `times` as long: derivatives shrink, the weight grows.
     #[inline(always)]
     pub fn lengthen(&mut self, times: T) {
         let inverse = T::one() / times;
@@ -105,19 +108,21 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
         self.elastic_part(&self.configuration(nodes).strain(self.tangent), free)
     }
 
-    /// The strain energy of this point, its weight included; `free` is the amplitude of the free strain.
+    /// The strain energy of this point, its weight included; `free` is the amplitude of the free
+    /// strain.
     #[inline(always)]
     pub fn energy(&self, nodes: &[impl Placed<T>; N], free: T) -> T {
         self.law.energy(&self.elastic_strain(nodes, free)) * self.weight
     }
 
-    /// The stress of a strain, less its free part.
+    /// The stress resultants of a total strain: the law sees the strain less its free part. `free`
+    /// is the amplitude of the free strain.
     #[inline(always)]
     pub fn stress(&self, strain: &Strain<T>, free: T) -> Stress<T> {
         self.law.stress(&self.elastic_part(strain, free))
     }
 
-    /// The strain less its free part.
+    /// The elastic strain: the total strain less the free strain times its amplitude `free`.
     #[inline(always)]
     pub fn elastic_part(&self, strain: &Strain<T>, free: T) -> Strain<T> {
         match &self.free {
@@ -126,7 +131,8 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
         }
     }
 
-    /// How the strain varies with the nodes.
+    /// The variation of the strain (material) when node i varies by the displacement `du(i)` and
+    /// the rotation vector `dp(i)`.
     #[inline(always)]
     pub fn strain_variation(
         &self,
@@ -138,7 +144,8 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
         at.strain_variation(slopes.0, slopes.1, interpolate(&self.shape, &dp))
     }
 
-    /// The stress that a correction of the nodes is expected to lead to: that of the strain and its variation, strain + B dq.
+    /// The stress resultants extrapolated over a correction of the nodes: those of the linearised
+    /// strain, strain + B dq.
     #[inline(always)]
     pub fn extrapolated_stress(
         &self,
@@ -154,8 +161,10 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
         self.stress(&next, free)
     }
 
-    /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the
-    /// stress of the geometric part, if it is not the present one.
+    /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness.
+    ///
+    /// `free` is the amplitude of the free strain; `geometric` the stress of the geometric part, if
+    /// it is not the stress of this configuration.
     #[inline(always)]
     pub fn add_elastic(
         &self,
@@ -174,12 +183,14 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
         }
     }
 
-    /// Adds the force of a stress.
+    /// Adds the nodal forces of a stress, (77).
     #[inline(always)]
     pub fn add_force(&self, at: &Point<T>, stress: &Stress<T>, out: &mut ElementSystem<T>) {
-        let (force, w) = (at.force(stress), self.weight);
+        let force = at.force(stress);
+        let w = self.weight;
         for i in 0..N {
-            let (n, s) = (self.shape[i] * w, self.slope[i] * w);
+            let n = self.shape[i] * w;
+            let s = self.slope[i] * w;
             out.add_force(2 * i, force.x_slope * s);
             out.add_force(2 * i + 1, force.p * n + force.p_slope * s);
         }
@@ -201,7 +212,8 @@ impl<const N: usize, T: Real, L: SectionLaw<T>> StiffnessPoint<N, T, L> {
     /// Adds w times the blocks of every pair of nodes, using the symmetry of the stiffness.
     #[inline(always)]
     fn add_stiffness(&self, k: &PointTangent<T>, w: T, out: &mut ElementSystem<T>) {
-        let (n, s) = (&self.shape, &self.slope);
+        let n = &self.shape;
+        let s = &self.slope;
         for i in 0..N {
             for j in 0..N {
                 let mut up = k.xp * (w * s[i] * n[j]);

@@ -1,14 +1,15 @@
 //! Strains, internal force and stiffness at a point of the beam (section 3, equations (45)–(80)).
 //!
-//! All tensors are material, with global components: P is measured from the initial placement, so that
-//! K = T P' already is the change of curvature of an initially curved or twisted beam.
+//! All tensors are material, with global components: P is measured from the initial placement, so
+//! that K = T P' already is the change of curvature of an initially curved or twisted beam.
 
 use super::law::{Stiffness, Strain, Stress};
 use crate::rotation::Rotation;
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
-/// The configuration at a point: the rotation, x' (spatial) and P', both derivatives over initial arc length.
+/// The configuration at a point: the rotation, x' (spatial) and P', both derivatives over initial
+/// arc length.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<T = f64> {
     /// R, T and the derivative tensors of the interpolated rotation vector
@@ -45,7 +46,8 @@ pub struct PointTangent<T = f64> {
     pub ss: Mat3<T>,
     /// K_P'P = T^T Cm C1 + C2(M) [+ T^T Cc^T A]
     pub sp: Mat3<T>,
-    /// K_PP = A^T Cn A + C1^T Cm C1 + C3(M, P') + C2(N x y) + T^T N~ y~ T [+ A^T Cc C1 + C1^T Cc^T A]
+    /// K_PP = A^T Cn A + C1^T Cm C1 + C3(M, P') + C2(N x y) + T^T N~ y~ T [+ A^T Cc C1 + C1^T Cc^T
+    /// A]
     pub pp: Mat3<T>,
 }
 
@@ -57,13 +59,14 @@ impl<T: Real> Point<T> {
         Self { y: rotation.r.transpose_mul(x_slope), c1: rotation.c1(p_slope), rotation, p_slope }
     }
 
-    /// The strains; `e1` is the unit tangent of the initial centre line.
+    /// The strains Gamma = y - E1 and K = T P' (material); `e1` is the unit tangent of the initial
+    /// centre line.
     #[inline(always)]
     pub fn strain(&self, e1: Vec3<T>) -> Strain<T> {
         Strain { gamma: self.y - e1, kappa: self.rotation.t * self.p_slope }
     }
 
-    /// Their variation: dGamma = R^T du' + y~ T dP, dK = T dP' + C1 dP.
+    /// The variation of the strains: dGamma = R^T du' + y~ T dP, dK = T dP' + C1 dP.
     #[inline(always)]
     pub fn strain_variation(&self, du_slope: Vec3<T>, dp_slope: Vec3<T>, dp: Vec3<T>) -> Strain<T> {
         let Rotation { r, t, .. } = self.rotation;
@@ -81,15 +84,20 @@ impl<T: Real> Point<T> {
         }
     }
 
-    /// The stiffness, (78)–(80). `stress` is what the geometric part is formed with: the stress of this configuration
-    /// for the exact tangent, the extrapolated one for the mixed-integration-point tangent.
+    /// The stiffness, (78)–(80). `stress` forms the geometric part: the stress of this
+    /// configuration for the exact tangent, the extrapolated one for the mixed-integration-point
+    /// tangent.
     #[inline(always)]
     pub fn tangent(&self, stiffness: &Stiffness<T>, stress: &Stress<T>) -> PointTangent<T> {
-        let (rotation, c1) = (&self.rotation, self.c1);
-        let (r, t) = (rotation.r, rotation.t);
-        let (cn, cm) = (stiffness.cn, stiffness.cm);
+        let rotation = &self.rotation;
+        let c1 = self.c1;
+        let r = rotation.r;
+        let t = rotation.t;
+        let cn = stiffness.cn;
+        let cm = stiffness.cm;
         let a = Mat3::skew_mul(self.y, t);
-        let (cn_a, cm_c1) = (cn * a, cm * c1);
+        let cn_a = cn * a;
+        let cm_c1 = cm * c1;
         let n_y_t = Mat3::skew_mul(stress.n, a);
         let mut tangent = PointTangent {
             xx: r * cn * r.transpose(),

@@ -1,9 +1,10 @@
-//! What a kernel reads and writes: the motion of a node, weights, and the force and tangent of one element.
+//! The interface of the kernels: they read motions of nodes and weights, and write the force and
+//! tangent of one element.
 
 use crate::scalar::{Lanes, Real};
 use crate::tensor::{Mat3, Vec3};
 
-/// Most nodes an element has.
+/// The largest number of nodes of an element.
 pub const MAX_NODES: usize = 4;
 
 /// The weights of J = s K + d C + m M. A weight of zero means: do not compute it.
@@ -28,7 +29,8 @@ impl Weights {
     pub const NONE: Self = Self { stiffness: 0.0, damping: 0.0, mass: 0.0 };
 }
 
-/// Displacement, rotation vector and their rates at a node or, interpolated, at a point (global components).
+/// Displacement, rotation vector and their rates at a node or, interpolated, at a point (global
+/// components).
 #[derive(Clone, Copy, Debug)]
 pub struct NodeMotion<T = f64> {
     /// u
@@ -55,16 +57,16 @@ pub struct NodePlace<T = f64> {
 }
 
 impl<T: Real> NodePlace<T> {
-    /// The initial one.
+    /// The initial placement: no displacement, no rotation.
     #[inline(always)]
     pub fn rest() -> Self {
         Self { u: Vec3::zero(), p: Vec3::zero() }
     }
 }
 
-/// What has a displacement and a rotation vector.
+/// A node, moving or not, that has a displacement and a rotation vector.
 pub trait Placed<T> {
-    /// These two.
+    /// The displacement and the rotation vector.
     fn place(&self) -> NodePlace<T>;
 }
 
@@ -92,8 +94,9 @@ impl<T: Real> NodeMotion<T> {
 
 /// The force g and the tangent J of one element, in 3-vectors and 3x3 blocks.
 ///
-/// Elements with displacements and rotations order their blocks node by node: u1, P1, u2, P2, …; elements with one kind
-/// of unknown: u1, u2, … or P1, P2, …. The tangent is kept in tiles of two blocks by two, which are those of nodes.
+/// Elements with displacements and rotations order their blocks node by node: u1, P1, u2, P2, …;
+/// elements with one kind of unknown: u1, u2, … or P1, P2, …. The tangent is kept in tiles of two
+/// blocks by two, which are those of nodes.
 #[derive(Clone, Debug)]
 pub struct ElementSystem<T = f64> {
     blocks: usize,
@@ -101,14 +104,14 @@ pub struct ElementSystem<T = f64> {
     tangent: Vec<[T; TILE]>,
 }
 
-/// Rows and columns of a tile: two blocks of three
+/// Rows and columns of a tile: two blocks of three.
 pub const WIDTH: usize = 6;
 
-/// Numbers in a tile
+/// Numbers in a tile.
 pub const TILE: usize = WIDTH * WIDTH;
 
 impl ElementSystem<Lanes> {
-    /// The system of one of the elements that stand side by side.
+    /// The system of lane `k`: one of the elements that are evaluated together.
     pub fn lane(&self, k: usize) -> ElementSystem {
         let mut out = ElementSystem::new(self.blocks);
         for (one, all) in out.force.iter_mut().zip(&self.force) {
@@ -125,7 +128,8 @@ impl<T: Real> ElementSystem<T> {
     /// Zero, of `blocks` 3-vectors.
     #[inline(always)]
     pub fn new(blocks: usize) -> Self {
-        let (zero, across) = (T::zero(), blocks.div_ceil(2));
+        let zero = T::zero();
+        let across = blocks.div_ceil(2);
         Self { blocks, force: vec![[zero; 3]; blocks], tangent: vec![[zero; TILE]; across * across] }
     }
 
@@ -142,13 +146,14 @@ impl<T: Real> ElementSystem<T> {
         self.force.fill([T::zero(); 3]);
     }
 
-    /// Sets to zero what is going to be added to with these weights.
+    /// Sets the force to zero and, unless all weights are zero, the tangent, so that both can be
+    /// summed up.
     #[inline(always)]
     pub fn clear_for(&mut self, weights: Weights) {
         if weights == Weights::NONE { self.clear_force() } else { self.clear() }
     }
 
-    /// Adds the force of another system of the same blocks, and the tangent where it has one.
+    /// Adds the force of another system with equal blocks, and its tangent if `tangent` is set.
     pub fn add_system(&mut self, other: &Self, tangent: bool) {
         let add = |to: &mut [T], of: &[T]| to.iter_mut().zip(of).for_each(|(sum, part)| *sum += *part);
         add(self.force.as_flattened_mut(), other.force.as_flattened());
@@ -163,7 +168,7 @@ impl<T: Real> ElementSystem<T> {
         self.blocks
     }
 
-    /// Tiles side by side
+    /// Tiles in a row of tiles.
     #[inline(always)]
     fn across(&self) -> usize {
         self.blocks.div_ceil(2)
@@ -181,8 +186,8 @@ impl<T: Real> ElementSystem<T> {
         &self.force
     }
 
-    /// The tangent tile by tile, those of one row of tiles after the other; each by its columns. The last tiles of an odd number of
-    /// blocks are not full.
+    /// The tangent by tiles: row of tiles after row of tiles, each tile by columns. With an odd
+    /// number of blocks the last tiles are only partly used.
     #[inline(always)]
     pub fn tiles(&self) -> &[[T; TILE]] {
         &self.tangent
@@ -214,7 +219,7 @@ impl<T: Real> ElementSystem<T> {
         self.force[block] = f.0;
     }
 
-    /// The tile of a block, and where it begins there.
+    /// The number of the tile that holds a block, and the place of the block's first entry in it.
     #[inline(always)]
     fn place(&self, row: usize, column: usize) -> (usize, usize) {
         (row / 2 * self.across() + column / 2, column % 2 * 3 * WIDTH + row % 2 * 3)
@@ -259,7 +264,7 @@ impl<T: Real> ElementSystem<T> {
         out
     }
 
-    /// The system of these blocks alone, in their order.
+    /// A system of the chosen blocks alone, in the order of `blocks`.
     pub fn part(&self, blocks: &[usize]) -> Self {
         let mut out = Self::new(blocks.len());
         for (row, &i) in blocks.iter().enumerate() {

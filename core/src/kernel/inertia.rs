@@ -1,4 +1,5 @@
-//! Inertia at a point: of a cross-section or of a rigid body (equations (51), (52), (68)–(71), and their form with an offset).
+//! Inertia at a point of a cross-section or of a rigid body (equations (51), (52), (68)–(71) of
+//! Makinen 2007, and their form for a mass centre with an offset).
 
 use super::element::{NodeMotion, Weights};
 use super::volume::{Blocks, VolumeForce, VolumeKernel};
@@ -11,9 +12,10 @@ use crate::tensor::{Mat3, Vec3};
 pub struct Inertia<T = f64> {
     /// m: mass, or mass per length
     pub mass: T,
-    /// d: the mass centre as seen from the node or the centre line
+    /// d: the vector from the node or the centre line to the mass centre, a length
     pub offset: Vec3<T>,
-    /// J0: the inertia about the node or the centre line (not about the mass centre)
+    /// J0: the inertia about the node or the centre line (not about the mass centre), mass times
+    /// length squared, or that per length
     pub about_node: Mat3<T>,
 }
 
@@ -27,16 +29,17 @@ impl Pack for Inertia {
 }
 
 impl Inertia {
-    /// Of nothing.
+    /// The inertia of a massless body.
     pub const NONE: Self = Self { mass: 0.0, offset: Vec3::ZERO, about_node: Mat3::ZERO };
 
-    /// The same for another scalar.
+    /// These mass properties as constants of another scalar, say dual numbers.
     pub fn lifted<T: Real>(&self) -> Inertia<T> {
-        let (offset, about_node) = (Vec3::constant(self.offset), Mat3::constant(self.about_node));
+        let offset = Vec3::constant(self.offset);
+        let about_node = Mat3::constant(self.about_node);
         Inertia { mass: T::constant(self.mass), offset, about_node }
     }
 
-    /// Together with another body at the same node.
+    /// The mass properties of this body joined rigidly with another one at the same node.
     pub fn with(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
         let moment = self.offset * self.mass + other.offset * other.mass;
@@ -63,26 +66,27 @@ pub struct Spin<T = f64> {
     rates: Rates<T>,
 }
 
-/// What a spin depends on.
+/// The unknowns that a spin depends on.
 #[derive(Clone, Copy, Debug)]
 enum Rates<T> {
-    /// The rotation vector and its rates
-    OfVector(Vec3<T>, Vec3<T>),
-    /// One unknown alone
-    OfUnknown(Derivatives<T>),
+    /// The rotation vector P and its rates, Pd and Pdd
+    OfVector { p_rate: Vec3<T>, p_rate2: Vec3<T> },
+    /// The increment of a time step alone, with the derivatives over it
+    OfIncrement(Derivatives<T>),
 }
 
-/// The derivatives of a spin over the one unknown that it is a function of: the increment of a step.
+/// Derivatives of a spin over its rotation unknown: the weighted ones over a rotation vector and
+/// its rates, or those over the increment of a time step.
 #[derive(Clone, Copy, Debug)]
 pub struct Derivatives<T = f64> {
-    /// dOmega
+    /// dOmega, of the material angular velocity
     pub d_omega: Mat3<T>,
-    /// dAcc
+    /// dAcc, of the material angular acceleration
     pub d_acceleration: Mat3<T>,
 }
 
 impl<T: Real> Derivatives<T> {
-    /// Of a spin that depends on nothing.
+    /// Zero: the derivatives of a prescribed spin.
     pub fn none() -> Self {
         Self { d_omega: Mat3::zero(), d_acceleration: Mat3::zero() }
     }
@@ -95,36 +99,40 @@ impl<T: Real> Spin<T> {
         let rotation = Rotation::new(p);
         let omega = rotation.t * p_rate;
         let acceleration = rotation.t * p_rate2 + rotation.t_rate(p_rate) * p_rate;
-        Self { rotation, omega, acceleration, rates: Rates::OfVector(p_rate, p_rate2) }
+        Self { rotation, omega, acceleration, rates: Rates::OfVector { p_rate, p_rate2 } }
     }
 
-    /// A spin that is a function of one unknown.
+    /// A spin that is a function of the increment of a time step; `over` holds its derivatives over
+    /// the increment.
     #[inline]
     pub fn direct(rotation: Rotation<T>, omega: Vec3<T>, acceleration: Vec3<T>, over: Derivatives<T>) -> Self {
-        Self { rotation, omega, acceleration, rates: Rates::OfUnknown(over) }
+        Self { rotation, omega, acceleration, rates: Rates::OfIncrement(over) }
     }
 
-    /// The same spin, or one whose forces are those of its acceleration alone.
+    /// This spin if gyroscopic forces count; otherwise one without velocity, whose only forces come
+    /// from its acceleration.
     #[inline(always)]
     pub fn with_gyroscopic_forces(mut self, they_count: bool) -> Self {
         if !they_count {
-            // All of them are products of the spin with itself.
+            // All gyroscopic forces are products of the spin with itself.
             self.omega = Vec3::zero();
         }
         self
     }
 
-    /// The derivatives over the one unknown, where there is but one.
+    /// The derivatives over the increment of a time step; `None` for a spin of a rotation vector
+    /// and its rates.
     pub fn over_unknown(&self) -> Option<&Derivatives<T>> {
         match &self.rates {
-            Rates::OfVector(..) => None,
-            Rates::OfUnknown(over) => Some(over),
+            Rates::OfVector { .. } => None,
+            Rates::OfIncrement(over) => Some(over),
         }
     }
 
-    /// s dOmega/dP + d dOmega/drate: of the weighted derivatives of Omega with respect to the rotation unknowns.
+    /// The weighted derivative of Omega with respect to the rotation unknowns, s dOmega/dP + d
+    /// dOmega/dPd.
     pub fn omega_derivative(&self, weights: Weights) -> Mat3<T> {
-        self.derivatives(weights).1
+        self.derivatives(weights).d_omega
     }
 
     /// The weighted derivatives of Acc and of Omega with respect to the rotation unknowns:
@@ -133,18 +141,19 @@ impl<T: Real> Spin<T> {
     /// dAcc   = s (C5 + C1(Pdd)) + d C4 + m T          dOmega = s C1(Pd) + d T
     /// ```
     ///
-    /// Of a function of one unknown, in which the weights are already: dAcc and dOmega themselves.
+    /// A spin of an increment returns its own derivatives, in which the weights of the step are
+    /// already.
     #[inline(always)]
-    fn derivatives(&self, w: Weights) -> (Mat3<T>, Mat3<T>) {
+    fn derivatives(&self, w: Weights) -> Derivatives<T> {
         let rotation = &self.rotation;
         let (p_rate, p_rate2) = match self.rates {
-            Rates::OfVector(p_rate, p_rate2) => (p_rate, p_rate2),
-            Rates::OfUnknown(over) => {
+            Rates::OfVector { p_rate, p_rate2 } => (p_rate, p_rate2),
+            Rates::OfIncrement(over) => {
                 debug_assert!(
                     w.stiffness == 1.0 || w == Weights::NONE,
                     "the weights of a step stand in the derivatives"
                 );
-                return (over.d_acceleration, over.d_omega);
+                return over;
             }
         };
         let mut acceleration = rotation.t.scale(w.mass);
@@ -157,7 +166,7 @@ impl<T: Real> Spin<T> {
             acceleration += (rotation.c5(p_rate) + rotation.c1(p_rate2)).scale(w.stiffness);
             omega += rotation.c1(p_rate).scale(w.stiffness);
         }
-        (acceleration, omega)
+        Derivatives { d_omega: omega, d_acceleration: acceleration }
     }
 }
 
@@ -169,14 +178,15 @@ impl<T: Real> Spin<T> {
 /// ```
 #[inline(always)]
 pub fn rotary<T: Real>(j: Mat3<T>, spin: &Spin<T>, weights: Weights) -> (Vec3<T>, Mat3<T>) {
-    let (rotation, omega) = (&spin.rotation, spin.omega);
+    let rotation = &spin.rotation;
+    let omega = spin.omega;
     let momentum = j * omega;
     let h = j * spin.acceleration + omega.cross(momentum);
     let force = rotation.t.transpose_mul(h);
     if weights == Weights::NONE {
         return (force, Mat3::zero());
     }
-    let (d_acceleration, d_omega) = spin.derivatives(weights);
+    let Derivatives { d_omega, d_acceleration } = spin.derivatives(weights);
     let gyroscopic = Mat3::skew_mul(omega, j) - momentum.skew();
     let mut tangent = rotation.t.transpose_matmul(j * d_acceleration + gyroscopic * d_omega);
     if weights.stiffness != 0.0 {
@@ -185,15 +195,21 @@ pub fn rotary<T: Real>(j: Mat3<T>, spin: &Spin<T>, weights: Weights) -> (Vec3<T>
     (force, tangent)
 }
 
-/// With s = Acc x d + Omega x (Omega x d) and h = J0 Acc + Omega x J0 Omega + m d x R^T u'':
+/// Force and tangent of the inertia of a body whose mass centre has the offset d, conjugate to u
+/// (spatial) and P. With s = Acc x d + Omega x (Omega x d) and h = J0 Acc + Omega x J0 Omega + m d
+/// x R^T u'':
 ///
 /// ```text
 /// f_u = m (u'' + R s),  f_P = T^T h
 /// ```
 #[inline(always)]
 pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, weights: Weights) -> VolumeForce<T> {
-    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
-    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
+    let r = spin.rotation.r;
+    let t = spin.rotation.t;
+    let omega = spin.omega;
+    let d = inertia.offset;
+    let j0 = inertia.about_node;
+    let m = inertia.mass;
     let momentum = j0 * omega;
     let pull = r.transpose_mul(u_rate2);
     let omega_d = omega.cross(d);
@@ -205,7 +221,7 @@ pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, wei
     if weights == Weights::NONE {
         return out;
     }
-    let (d_acceleration, d_omega) = spin.derivatives(weights);
+    let Derivatives { d_omega, d_acceleration } = spin.derivatives(weights);
     let gyroscopic = Mat3::skew_mul(omega, j0) - momentum.skew();
     let coriolis = omega_d.skew() + Mat3::skew_mul(omega, d.skew());
     let mut up = -(Mat3::skew_mul(d, d_acceleration) + coriolis * d_omega);
@@ -224,7 +240,7 @@ pub fn body<T: Real>(inertia: &Inertia<T>, u_rate2: Vec3<T>, spin: &Spin<T>, wei
     out
 }
 
-/// [`body`] for mass centres at the node.
+/// Force and tangent of the inertia of a body whose mass centre is its node: [`body`] with d = 0.
 #[inline(always)]
 pub fn centred_body<T: Real>(
     inertia: &Inertia<T>,
@@ -239,7 +255,8 @@ pub fn centred_body<T: Real>(
     out
 }
 
-/// Forces proportional to velocities, as mass-proportional damping has them: with v = u' and h = J0 Omega + m d x R^T v
+/// Force and tangent of mass-proportional damping, conjugate to u (spatial) and P. With the
+/// velocity v = du/dt, the damping factor alpha (1/time) and h = J0 Omega + m d x R^T v
 ///
 /// ```text
 /// f_u = alpha m (v + R (Omega x d)),  f_P = alpha T^T h
@@ -252,9 +269,14 @@ pub fn drag<T: Real>(
     alpha: f64,
     weights: Weights,
 ) -> VolumeForce<T> {
-    let (r, t, omega) = (spin.rotation.r, spin.rotation.t, spin.omega);
-    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
-    let (carried, pull) = (omega.cross(d), r.transpose_mul(velocity));
+    let r = spin.rotation.r;
+    let t = spin.rotation.t;
+    let omega = spin.omega;
+    let d = inertia.offset;
+    let j0 = inertia.about_node;
+    let m = inertia.mass;
+    let carried = omega.cross(d);
+    let pull = r.transpose_mul(velocity);
     let h = (j0 * omega + d.cross(pull) * m).scale(alpha);
     let mut out = VolumeForce::zero();
     out.u = (velocity + r * carried) * (m * alpha);
@@ -262,7 +284,8 @@ pub fn drag<T: Real>(
     if weights.stiffness == 0.0 && weights.damping == 0.0 {
         return out;
     }
-    let (s, d_omega) = (weights.stiffness, spin.omega_derivative(weights));
+    let s = weights.stiffness;
+    let d_omega = spin.omega_derivative(weights);
     let turned = Mat3::skew_mul(carried, t).scale(s);
     out.uu = Mat3::identity() * (m * (alpha * weights.damping));
     out.up = -(r * (Mat3::skew_mul(d, d_omega) + turned)) * (m * alpha);
@@ -272,9 +295,9 @@ pub fn drag<T: Real>(
     out
 }
 
-/// Mass-proportional damping per length, see [`drag`].
+/// Mass-proportional damping of a beam, force per initial length: see [`drag`].
 pub struct Drag {
-    /// alpha
+    /// alpha, 1/time
     pub factor: f64,
 }
 
@@ -295,8 +318,10 @@ impl VolumeKernel for Drag {
     }
 }
 
-/// Inertia at rest in a frame that turns with the constant angular velocity w about x0, in components of that frame, and its
-/// derivatives for small motions. With W = R^T w and a = w x (w x (x - x0)) it is [`body`] for Omega = W, Acc = 0, u'' = a;
+/// Centrifugal forces on a body at rest in a frame that turns with the constant angular velocity w
+/// about x0, in components of that frame, and their derivatives for small motions. `spin` is w, and
+/// `from_axis` is x - x0. With W = R^T w and a = w x (w x (x - x0)) they are those of [`body`] for
+/// Omega = W, Acc = 0, u'' = a, with the derivatives
 ///
 /// ```text
 /// dOmega = s W~ T + d T,   dAcc = d W~ T + m T,   da = s w~ w~ + 2 d w~ + m I
@@ -304,15 +329,22 @@ impl VolumeKernel for Drag {
 #[inline(always)]
 pub fn steadily_turned<T: Real>(
     inertia: &Inertia<T>,
-    (spin, from_axis): (Vec3<T>, Vec3<T>),
+    spin: Vec3<T>,
+    from_axis: Vec3<T>,
     rotation: &Rotation<T>,
     weights: Weights,
 ) -> VolumeForce<T> {
-    let (r, t) = (rotation.r, rotation.t);
-    let (d, j0, m) = (inertia.offset, inertia.about_node, inertia.mass);
-    let (w, w_skew) = (r.transpose_mul(spin), spin.skew());
+    let r = rotation.r;
+    let t = rotation.t;
+    let d = inertia.offset;
+    let j0 = inertia.about_node;
+    let m = inertia.mass;
+    let w = r.transpose_mul(spin);
+    let w_skew = spin.skew();
     let a = spin.cross(spin.cross(from_axis));
-    let (pull, w_d, momentum) = (r.transpose_mul(a), w.cross(d), j0 * w);
+    let pull = r.transpose_mul(a);
+    let w_d = w.cross(d);
+    let momentum = j0 * w;
     let s = w.cross(w_d);
     let h = w.cross(momentum) + d.cross(pull) * m;
     let mut out = VolumeForce::zero();
@@ -323,7 +355,8 @@ pub fn steadily_turned<T: Real>(
     }
     let Weights { stiffness, damping, mass } = weights;
     let w_t = Mat3::skew_mul(w, t);
-    let (d_omega, d_acc) = (w_t.scale(stiffness) + t.scale(damping), w_t.scale(damping) + t.scale(mass));
+    let d_omega = w_t.scale(stiffness) + t.scale(damping);
+    let d_acc = w_t.scale(damping) + t.scale(mass);
     let da = (w_skew * w_skew).scale(stiffness) + w_skew.scale(2.0 * damping) + Mat3::identity().scale(mass);
     let gyroscopic = Mat3::skew_mul(w, j0) - momentum.skew();
     let coriolis = w_d.skew() + Mat3::skew_mul(w, d.skew());
@@ -336,11 +369,12 @@ pub fn steadily_turned<T: Real>(
     out
 }
 
-/// Mass per length with its initial place, see [`steadily_turned`].
+/// Centrifugal forces per initial length in a turning frame, see [`steadily_turned`]. The quantity
+/// of a point is its mass properties and its initial place.
 pub struct SteadilyTurned {
-    /// w
+    /// w, the angular velocity of the frame, 1/time
     pub spin: Vec3,
-    /// x0
+    /// x0, a point on the axis of the frame
     pub about: Vec3,
 }
 
@@ -362,11 +396,11 @@ impl VolumeKernel for SteadilyTurned {
         weights: Weights,
     ) -> VolumeForce<T> {
         let from_axis = *place - Vec3::constant(self.about) + motion.u;
-        steadily_turned(inertia, (Vec3::constant(self.spin), from_axis), &Rotation::new(motion.p), weights)
+        steadily_turned(inertia, Vec3::constant(self.spin), from_axis, &Rotation::new(motion.p), weights)
     }
 }
 
-/// Rotary inertia per length, see [`rotary`].
+/// Rotary inertia of a beam per initial length, see [`rotary`].
 pub struct Rotary {
     /// Whether forces that spins have without accelerations count
     pub gyroscopic: bool,
@@ -390,7 +424,7 @@ impl VolumeKernel for Rotary {
     }
 }
 
-/// Eccentric mass per length, see [`body`].
+/// Inertia of a beam with an eccentric mass per initial length, see [`body`].
 pub struct Eccentric {
     /// Whether forces that spins have without accelerations count
     pub gyroscopic: bool,

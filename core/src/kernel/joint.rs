@@ -1,14 +1,16 @@
 //! Joints between two nodes as gaps that Lagrange multipliers close.
 //!
-//! A joint sits at the ends of two rigid arms, d_A and d_B, and has the axes e_1, e_2, e_3 (material, global components at the
-//! start, carried by both nodes). With w = x_B + R_B d_B - x_A it knows gaps of two kinds:
+//! A joint sits at the ends of two rigid arms, d_A and d_B, and has the axes e_1, e_2, e_3
+//! (material, global components at the start, carried by both nodes). With w = x_B + R_B d_B - x_A
+//! there are gaps of two kinds:
 //!
 //! ```text
-//! along an axis:     (R_A e_k) . w - e_k . d_A             (how far B has slid along an axis of A)
-//! between directions: (R_A a) . (R_B b)                    (zero while a and b stay normal to each other)
+//! along an axis:      (R_A e_k) . w - e_k . d_A      (the slide of B along an axis of A, a length)
+//! between directions: (R_A a) . (R_B b)              (a cosine, zero while both stay normal)
 //! ```
 //!
-//! Forces are the derivatives of L = lambda . gaps, conjugate to u_A, P_A, u_B, P_B and the multipliers.
+//! Forces are the derivatives of L = lambda . gaps, conjugate to u_A, P_A, u_B, P_B and the
+//! multipliers.
 
 use super::element::ElementSystem;
 use crate::rotation::Rotation;
@@ -18,9 +20,9 @@ use crate::tensor::{Mat3, Vec3};
 /// One of the two nodes of a joint.
 #[derive(Clone, Copy, Debug)]
 pub struct End<T = f64> {
-    /// Its place
+    /// x, its place, spatial
     pub place: Vec3<T>,
-    /// Its rotation
+    /// R, its rotation from the initial placement
     pub rotation: Rotation<T>,
 }
 
@@ -38,7 +40,7 @@ pub mod block {
     pub const ALONG: usize = 4;
     /// Multipliers of gaps between directions
     pub const BETWEEN: usize = 5;
-    /// Their number
+    /// The number of blocks
     pub const COUNT: usize = 6;
 }
 use block::{ALONG, BETWEEN, P_A, P_B, U_A, U_B};
@@ -46,42 +48,44 @@ use block::{ALONG, BETWEEN, P_A, P_B, U_A, U_B};
 /// A direction that A carries and one that B carries: material, global components at the start.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectionPair<T = f64> {
-    /// Of A
+    /// The direction that A carries
     pub a: Vec3<T>,
-    /// Of B
+    /// The direction that B carries
     pub b: Vec3<T>,
 }
 
 /// Factors of the tangent that a gap adds.
 #[derive(Clone, Copy, Debug)]
 pub struct GapFactors {
-    /// Of the tangent of its forces
+    /// Factor of the tangent of the gap's forces
     pub forces: f64,
-    /// Of the row and the column of its multiplier
+    /// Factor of the row and the column of the gap's multiplier
     pub multiplier: f64,
 }
 
 impl GapFactors {
-    /// Forces alone
+    /// Forces without a tangent, and without the row and the column of the multiplier
     pub const NONE: Self = Self { forces: 0.0, multiplier: 0.0 };
-    /// Forces of a multiplier of one are the gradient of its gap, their tangent is the Hessian.
+    /// The tangent of forces alone. With a multiplier of one, forces are the gradient of the gap
+    /// and their tangent is its Hessian.
     pub const HESSIAN: Self = Self { forces: 1.0, multiplier: 0.0 };
 }
 
-/// How far B has slid from the end of A's arm, along the three axes of A.
+/// Gaps along the axes, (R_A e_k) . w - e_k . d_A: lengths by which B has slid from the end of A's
+/// arm along the three axes of A.
 pub fn slides<T: Real>(axes: &Mat3, arms: &[Vec3; 2], a: &End<T>, b: &End<T>) -> Vec3<T> {
     let w = b.place + b.rotation.r * Vec3::constant(arms[1]) - a.place;
     let seen = a.rotation.r.transpose_mul(w) - Vec3::constant(arms[0]);
     Mat3::constant(*axes).transpose_mul(seen)
 }
 
-/// (R_A a) . (R_B b)
+/// The gap between two directions, the cosine of their present angle: (R_A a) . (R_B b).
 pub fn cosine<T: Real>(directions: DirectionPair<T>, a: &End<T>, b: &End<T>) -> T {
     (a.rotation.r * directions.a).dot(b.rotation.r * directions.b)
 }
 
-/// Adds the forces that `force` (components along the axes of A) makes on both nodes, their tangent, and the blocks of multipliers
-/// along the axes.
+/// Adds the forces that `force` (components along the axes of A) makes on both nodes, their
+/// tangent, and the rows and columns of the multipliers along the axes.
 pub fn add_along<T: Real>(
     axes: &Mat3,
     arms: &[Vec3; 2],
@@ -92,7 +96,8 @@ pub fn add_along<T: Real>(
 ) {
     let GapFactors { forces: weight, multiplier: couple } = factors;
     let [a, b] = ends;
-    let (ra, rb) = (&a.rotation, &b.rotation);
+    let ra = &a.rotation;
+    let rb = &b.rotation;
     let e = Mat3::constant(*axes);
     let arm = Vec3::constant(arms[1]);
     let w = b.place + rb.r * arm - a.place;
@@ -128,8 +133,8 @@ pub fn add_along<T: Real>(
     }
 }
 
-/// Adds the forces of a multiplier on a gap between two directions, their tangent, and the multiplier's own row and column, number `row`
-/// of its block.
+/// Adds the forces of a multiplier on a gap between two directions, their tangent, and the row and
+/// column of the multiplier, which is number `row` of the block [`BETWEEN`].
 pub fn add_between<T: Real>(
     directions: DirectionPair<T>,
     ends: &[End<T>; 2],
@@ -140,9 +145,11 @@ pub fn add_between<T: Real>(
 ) {
     let GapFactors { forces: weight, multiplier: couple } = factors;
     let [a, b] = ends;
-    let (ra, rb) = (&a.rotation, &b.rotation);
+    let ra = &a.rotation;
+    let rb = &b.rotation;
     let DirectionPair { a: da, b: db } = directions;
-    let (wa, wb) = (rb.r * db, ra.r * da);
+    let wa = rb.r * db;
+    let wb = ra.r * da;
     let ga = ra.potential_gradient(da, wa);
     let gb = rb.potential_gradient(db, wb);
     out.add_force(P_A, ga * multiplier);

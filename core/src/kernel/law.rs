@@ -1,7 +1,9 @@
-//! Laws of sections: stress resultants, tangent and energy of strains, in space (equations (45) and (46)) and in a plane.
+//! Laws of sections: stress resultants, tangent and energy of strains, in space (equations (45) and
+//! (46) of Makinen 2007) and in a plane.
 //!
-//! All vectors and tensors are material, with global components. Kernels ask a law for nothing but these three, and show it elastic
-//! strains: the free strain of a point (natural curvature, thermal strain) makes no stress and is taken off before.
+//! All vectors and tensors are material, with global components. Kernels give a law elastic
+//! strains: the free strain of a point (natural curvature, thermal strain) makes no stress and is
+//! subtracted first.
 
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
@@ -18,9 +20,9 @@ pub struct Strain<T = f64> {
 /// The stress resultants N (force) and M (moment), both material.
 #[derive(Clone, Copy, Debug)]
 pub struct Stress<T = f64> {
-    /// N
+    /// N, force
     pub n: Vec3<T>,
-    /// M
+    /// M, force times length
     pub m: Vec3<T>,
 }
 
@@ -29,7 +31,8 @@ pub struct Stress<T = f64> {
 pub struct Stiffness<T = f64> {
     /// Cn, symmetric; force. R0 diag(EA, GA2, GA3) R0^T where strains do not couple
     pub cn: Mat3<T>,
-    /// Cm, symmetric; force times length squared. R0 diag(GJ, EI2, EI3) R0^T where curvatures do not couple
+    /// Cm, symmetric; force times length squared. R0 diag(GJ, EI2, EI3) R0^T where curvatures do
+    /// not couple
     pub cm: Mat3<T>,
     /// Cc, the coupling of strain and curvature, where there is one; force times length
     pub cc: Option<Mat3<T>>,
@@ -44,15 +47,15 @@ pub type PlanarStress<T> = [T; 3];
 /// The tangent of a law in the axes of a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarStiffness<T = f64> {
-    /// Cn: its diagonal, and the entry beside it
+    /// Cn: its two diagonal entries, then the entry beside the diagonal
     pub cn: [T; 3],
-    /// Bending stiffness
+    /// Cm: bending stiffness about the normal of the plane
     pub cm: T,
-    /// The coupling of strain and curvature, where there is one
+    /// Cc: the coupling of strain and curvature; `None` where the section does not couple them
     pub cc: Option<[T; 2]>,
 }
 
-/// How a section answers to strains.
+/// The constitutive law of a section in space.
 pub trait SectionLaw<T: Real>: Copy {
     /// Stress resultants: the derivatives of the energy over the strain.
     fn stress(&self, elastic: &Strain<T>) -> Stress<T>;
@@ -70,43 +73,46 @@ pub trait SectionLaw<T: Real>: Copy {
     }
 }
 
-/// How a section answers to strains in a plane.
+/// The constitutive law of a section in a plane.
 pub trait PlanarLaw<T: Real>: Copy {
-    /// Stress resultants.
+    /// Stress resultants: the derivatives of the energy over the in-plane strain.
     fn stress(&self, elastic: &PlanarStrain<T>) -> PlanarStress<T>;
 
     /// Derivatives of the stress resultants over the strain.
     fn tangent(&self, elastic: &PlanarStrain<T>) -> PlanarStiffness<T>;
 }
 
-/// A law as elements store it, in plain numbers.
+/// A law in the form that elements store: plain `f64` numbers, packed into lanes or planes on
+/// demand.
 pub trait StoredLaw: SectionLaw<f64> + Pack<Packed = Self::Lifted<Lanes>> {
-    /// This law for another scalar.
+    /// The law over another scalar.
     type Lifted<T: Real>: SectionLaw<T>;
-    /// This law in a plane.
+    /// The law restricted to a plane.
     type InPlane: PlanarLaw<f64> + Pack<Packed: PlanarLaw<Lanes>>;
 
-    /// This law, with constants of another scalar.
+    /// A copy of the law whose numbers are constants of another scalar, say dual numbers.
     fn lifted<T: Real>(&self) -> Self::Lifted<T>;
 
-    /// The law of strains in the plane with these axes (columns, the third one normal), for a section that the plane mirrors.
+    /// The law of strains in the plane with these axes (columns, the third one normal), for a
+    /// section that the plane mirrors.
     fn in_plane(&self, axes: &Mat3) -> Self::InPlane;
 
-    /// Shows stiffnesses that have the directions of the law: a mirror that changes none of them does not change the law.
+    /// Calls `show` with stiffness tensors that carry the directions of the law: a reflection that
+    /// leaves all of them unchanged leaves the law unchanged.
     fn show_directions(&self, show: &mut dyn FnMut(&Stiffness));
 }
 
 /// A linear elastic section: N = Cn Gamma + Cc K, M = Cc^T Gamma + Cm K.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linear<T = f64> {
-    /// The tangent at any strain
+    /// The tangent, constant over strains
     pub stiffness: Stiffness<T>,
 }
 
-/// A linear elastic section in a plane.
+/// A linear elastic section in a plane: N = Cn Gamma + Cc K, M = Cc.Gamma + Cm K.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarLinear<T = f64> {
-    /// The tangent at any strain
+    /// The tangent, constant over strains
     pub stiffness: PlanarStiffness<T>,
 }
 

@@ -1,6 +1,7 @@
-//! Loads at a point: dead and following forces and moments, with their tangents (equations (72)–(75), (A4)).
+//! Loads at a point: dead and following forces and moments, with their tangents (equations
+//! (72)–(75) and (A4) of Makinen 2007).
 //!
-//! Everything is returned as g = -f_ext and dg, see [`crate::kernel`].
+//! All functions return g = -f_ext and its tangent dg, in the sign of [`crate::kernel`].
 
 use super::element::{NodeMotion, Weights};
 use super::inertia::Inertia;
@@ -9,11 +10,13 @@ use crate::rotation::{Complement, Rotation};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
-/// A moment that stays fixed in space: M_I = T^T M with M = R^T m; its tangent C2(M) + T^T M~ T is not symmetric, since such
-/// a moment has no potential. For total vectors the two are T m and C1(m); for increments after another rotation they are not.
+/// A moment that stays fixed in space: M_I = T^T M with M = R^T m; its tangent C2(M) + T^T M~ T is
+/// not symmetric, since such a moment has no potential. For total vectors the two are T m and
+/// C1(m); for increments after another rotation they are not.
 #[inline(always)]
 pub fn spatial_moment<T: Real>(rotation: &Rotation<T>, moment: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
-    let (t, material) = (rotation.t, rotation.r.transpose_mul(moment));
+    let t = rotation.t;
+    let material = rotation.r.transpose_mul(moment);
     let tangent = rotation.c2(material) + t.transpose_matmul(Mat3::skew_mul(material, t));
     (-t.transpose_mul(material), -tangent)
 }
@@ -30,31 +33,33 @@ pub fn material_force<T: Real>(rotation: &Rotation<T>, force: Vec3<T>) -> (Vec3<
     (-(rotation.r * force), rotation.r * Mat3::skew_mul(force, rotation.t))
 }
 
-/// A force fixed in space that acts at the material offset `d`: what it does to P, T^T (d x R^T f), and the tangent.
+/// The moment of a force f fixed in space that acts at the material offset d, conjugate to P: T^T
+/// (d x R^T f), and its tangent.
 #[inline(always)]
 pub fn offset_force<T: Real>(rotation: &Rotation<T>, offset: Vec3<T>, force: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
     (-rotation.potential_gradient(offset, force), -rotation.potential_hessian(offset, force))
 }
 
-/// A force that is conjugate to the complement of a rotation vector P: f_P = B^T f, and its tangent (88).
+/// A force that is conjugate to the complement of a rotation vector P: f_P = B^T f, and its tangent
+/// (88).
 pub fn force_on_complement<T: Real>(p: Vec3<T>, force: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
     let b = Complement::new(p, Vec3::zero(), Vec3::zero()).b;
     (b.transpose_mul(force), Complement::geometric(p, force))
 }
 
-/// Force and moment per initial length, and the number of their amplitude.
+/// A line load: force and moment per initial length at an amplitude of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intensity {
-    /// Force per length
+    /// Force per initial length: spatial for a dead load, material for a following one
     pub force: Vec3,
-    /// Moment per length
+    /// Moment per initial length, in the frame of the force
     pub moment: Vec3,
-    /// The number of the amplitude
+    /// The index of its amplitude in the amplitudes of a state
     pub amplitude: usize,
 }
 
 impl Intensity {
-    /// Force and, where there is one, moment.
+    /// Force and, unless it is zero, moment at the present amplitude.
     #[inline(always)]
     fn at(&self, amplitudes: &[f64]) -> (Vec3, Option<Vec3>) {
         let amplitude = amplitudes[self.amplitude];
@@ -65,7 +70,7 @@ impl Intensity {
 
 /// Line loads: fixed in space, or turning with the section where they follow it.
 pub struct Line<'a, const FOLLOWS: bool> {
-    /// The amplitudes of the state
+    /// The amplitudes of the loads at the present time
     pub amplitudes: &'a [f64],
 }
 
@@ -90,21 +95,23 @@ impl<const FOLLOWS: bool> VolumeKernel for Line<'_, FOLLOWS> {
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
         if FOLLOWS {
             let (u, up) = material_force(&Rotation::new(motion.p), force);
-            (out.u, out.up) = (u, up.scale(s));
+            out.u = u;
+            out.up = up.scale(s);
         }
         if let Some(moment) = moment {
             let rotation = Rotation::new(motion.p);
             let turning = if FOLLOWS { material_moment } else { spatial_moment };
             let (p, pp) = turning(&rotation, moment);
-            (out.p, out.pp) = (p, pp.scale(s));
+            out.p = p;
+            out.pp = pp.scale(s);
         }
         out
     }
 }
 
-/// Weight per length. Mass on the centre line needs no rotation and no tangent.
+/// Weight per initial length. Mass on the centre line needs no rotation and no tangent.
 pub struct Weight {
-    /// The acceleration of gravity
+    /// The acceleration of gravity, spatial
     pub acceleration: Vec3,
 }
 
@@ -128,7 +135,8 @@ impl VolumeKernel for Weight {
         let mut out = VolumeForce { u: -force, ..VolumeForce::zero() };
         if let Some(offset) = offset {
             let (p, pp) = offset_force(&Rotation::new(motion.p), offset, force);
-            (out.p, out.pp) = (p, pp.scale(weights.stiffness));
+            out.p = p;
+            out.pp = pp.scale(weights.stiffness);
         }
         out
     }

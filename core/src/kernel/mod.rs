@@ -1,7 +1,8 @@
-//! Pure functions at a Gauss point or of one element (Makinen 2007, section 3): no ids, no files, no allocation.
+//! Pure functions at a Gauss point or of one element (Makinen 2007, section 3): no ids, no files,
+//! no allocation.
 //!
-//! Every kernel writes forces in one sign, g = f_int + f_acc - f_ext, and tangents as derivatives of g, so that loads,
-//! stiffness and inertia add up without a case distinction.
+//! Every kernel writes forces in one sign, g = f_int + f_acc - f_ext, and tangents as derivatives
+//! of g, so that loads, stiffness and inertia add up without a case distinction.
 
 pub mod beam;
 pub mod elastic;

@@ -1,5 +1,6 @@
-//! Elements of two nodes seen from half way between them: [`Relative`] elements whose only integration point is in the middle,
-//! where the frame itself stands, so that nothing is interpolated:
+//! Relative elements of two nodes in closed form: [`Relative`] elements whose only integration
+//! point lies half way between the nodes, where the rotation is that of the frame, so that nothing
+//! is interpolated:
 //!
 //! ```text
 //! Gamma = s (R_r^T dx - dX),   K = s phi,   phi = log(R_1^T R_2) = 2h,   s = 1/length
@@ -8,7 +9,8 @@
 //! With t_i the material spins of the nodes, A = T(phi)^-1 and a = s R_r^T dx
 //!
 //! ```text
-//! dGamma = s R_r^T d(dx) + a~ (F_1 t_1 + F_2 t_2),   dK = s (A t_2 - A^T t_1) = s (B_1 t_1 + B_2 t_2)
+//! dGamma = s R_r^T d(dx) + a~ (F_1 t_1 + F_2 t_2)
+//! dK = s (A t_2 - A^T t_1) = s (B_1 t_1 + B_2 t_2)
 //! f_x = w s R_r N,   f_t_i = w (F_i^T q + s B_i^T M),   q = N x a
 //! ```
 //!
@@ -17,11 +19,13 @@
 //! ```text
 //! x,x:     w s^2 R_r Cn R_r^T
 //! x,t_j:   w s R_r (G F_j + s Cc B_j)
-//! t_i,t_j: w (F_i^T (S F_j - s a~ Cc B_j) + s B_i^T (Cc^T a~ F_j + s Cm B_j) + E_i B_j),   E_i dphi = d(F_i^T) q + s d(B_i^T) M
+//! t_i,t_j: w (F_i^T (S F_j - s a~ Cc B_j) + s B_i^T (Cc^T a~ F_j + s Cm B_j) + E_i B_j)
+//! E_i dphi = d(F_i^T) q + s d(B_i^T) M
 //! ```
 //!
-//! Cn, Cc and Cm are the blocks of the law's tangent. T_i takes spins to rotation vectors, whose own second variation is C2. A third of the work
-//! of the general way.
+//! Cn, Cc and Cm are the blocks of the law's tangent, F_i and R_r those of [`super::relative`]. T_i
+//! takes spins to rotation vectors, whose own second variation is C2. This takes a third of the
+//! operations of [`Relative::carry_back`].
 
 use super::beam::StiffnessPoint;
 use super::element::ElementSystem;
@@ -31,7 +35,8 @@ use crate::rotation::{Rotation, Series};
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
-/// The vector phi from the one node to the other, and how it follows them.
+/// The rotation vector phi = log(R_1^T R_2) between the two nodes, and the coefficients of its
+/// variation.
 struct Between<T> {
     phi: Vec3<T>,
     /// A = T(phi)^-1
@@ -48,14 +53,17 @@ impl<T: Real> Between<T> {
         let phi = h.scale(2.0);
         let [_, f1, f2, f3, f4, f5, ..] = Series::at(h.squared()).0;
         // 2 df_m/dz = m f_{m+2} - f_{m+1}
-        let (d1, d2, d3) = ((f3 - f2) * 0.5, (f4 * 2.0 - f3) * 0.5, (f5 * 3.0 - f4) * 0.5);
+        let d1 = (f3 - f2) * 0.5;
+        let d2 = (f4 * 2.0 - f3) * 0.5;
+        let d3 = (f5 * 3.0 - f4) * 0.5;
         let e = (f2 - f3) / (f1 * 4.0);
         let e_slope = ((d2 - d3) * f1 - (f2 - f3) * d1) / (f1 * f1 * 16.0);
         let even = Mat3::diagonal([T::one() - e * phi.squared(); 3]) + phi.outer(phi) * e;
         Self { phi, inverse: even + h.skew(), e, e_slope }
     }
 
-    /// The part of the derivatives of A m and of A^T m over phi that both share: that of e phi~^2 m.
+    /// The derivative of e phi~^2 m over phi for a fixed m: the part that the derivatives of A m
+    /// and of A^T m share.
     #[inline(always)]
     fn bend(&self, m: Vec3<T>) -> Mat3<T> {
         let phi = self.phi;
@@ -66,24 +74,28 @@ impl<T: Real> Between<T> {
     }
 }
 
-/// Forces conjugate to the difference of displacements and to the spins of the nodes, over the weight.
+/// Forces conjugate to the difference of displacements (spatial) and to the material spins of the
+/// nodes, divided by the weight of the integration point.
 struct PairForces<T> {
     /// R_r N
     across: Vec3<T>,
-    /// q
+    /// q = N x a
     frame: Vec3<T>,
+    /// F_i^T q + s B_i^T M
     spin: [Vec3<T>; 2],
 }
 
 impl<const N: usize, T: Real> Relative<N, T> {
-    /// s R_r^T dx
+    /// The arm a = s R_r^T dx, in the axes of the frame.
     #[inline(always)]
     fn arm(&self, slope: T) -> Vec3<T> {
         (self.arms[1] - self.arms[0]) * slope
     }
 
-    /// Puts the force and, where `weight` is not zero, `weight` times the stiffness of the point half way between two nodes in the place
-    /// of what stands in `out`; results as those of [`StiffnessPoint::add_elastic`], carried back.
+    /// Overwrites `out` with the force and, where `weight` is not zero, `weight` times the
+    /// stiffness of an element of two nodes and one integration point half way between them. It
+    /// equals [`StiffnessPoint::add_elastic`] in the frame of the element followed by
+    /// [`Relative::carry_back`].
     #[inline(always)]
     pub fn fill_half_way<L: SectionLaw<T>>(
         &self,
@@ -95,7 +107,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         out: &mut ElementSystem<T>,
     ) {
         debug_assert!(N == 2, "the frame of other elements does not stand at their points");
-        let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
+        let slope = point.slope[1];
+        let between = Between::new(self.half.rotation.p);
         let arm = self.arm(slope);
         let elastic = point.elastic_part(&self.pair_strain(slope, &between), free);
         let stress = point.law.stress(&elastic);
@@ -110,13 +123,15 @@ impl<const N: usize, T: Real> Relative<N, T> {
         if weight != 0.0 {
             let stress = geometric.unwrap_or(&stress);
             let forces = self.pair_forces(stress, arm, slope, &follows, &between);
-            let (stiffness, w) = (point.law.tangent(&elastic), point.weight * weight);
+            let stiffness = point.law.tangent(&elastic);
+            let w = point.weight * weight;
             self.fill_pair_tangent(rotations, slope, &stiffness, stress, &forces, &follows, &between, w, out);
         }
     }
 
-    /// The stress that variations of displacements and rotation vectors are expected to lead to; results as those of
-    /// [`StiffnessPoint::extrapolated_stress`].
+    /// The stress extrapolated over variations of displacements and rotation vectors, at the point
+    /// half way between the nodes. It equals [`StiffnessPoint::extrapolated_stress`] in the frame
+    /// of the element.
     #[inline(always)]
     pub fn extrapolated_half_way<L: SectionLaw<T>>(
         &self,
@@ -126,7 +141,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         du: &[Vec3<T>; N],
         dp: &[Vec3<T>; N],
     ) -> Stress<T> {
-        let (slope, between) = (point.slope[1], Between::new(self.half.rotation.p));
+        let slope = point.slope[1];
+        let between = Between::new(self.half.rotation.p);
         let spins = [rotations[0].t * dp[0], rotations[1].t * dp[1]];
         let frame = self.half.follows(false) * spins[0] + self.half.follows(true) * spins[1];
         let mut strain = self.pair_strain(slope, &between);
@@ -149,7 +165,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
         follows: &[Mat3<T>; 2],
         between: &Between<T>,
     ) -> PairForces<T> {
-        let (frame, moment) = (stress.n.cross(arm), stress.m * slope);
+        let frame = stress.n.cross(arm);
+        let moment = stress.m * slope;
         PairForces {
             across: self.frame * stress.n,
             frame,
@@ -176,8 +193,11 @@ impl<const N: usize, T: Real> Relative<N, T> {
     ) {
         let arm = self.arm(slope);
         let ends = [&rotations[0].t, &rotations[1].t];
-        // The weight goes first to what it belongs to: stiff sections of short elements would overflow without it.
-        let (cn, cm, bent) = (stiffness.cn * w, stiffness.cm * (w * slope * slope), w * slope);
+        // The weight multiplies each stiffness before any other product: stiff sections of short
+        // elements would overflow otherwise.
+        let cn = stiffness.cn * w;
+        let cm = stiffness.cm * (w * slope * slope);
+        let bent = w * slope;
         // F_i T_i and B_i T_i
         let frame = [follows[0] * *ends[0], follows[1] * *ends[1]];
         let bend = [-between.inverse.transpose_matmul(*ends[0]), between.inverse * *ends[1]];
@@ -198,7 +218,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
             }
         }
         let m = stress.m * bent;
-        let (turned, twist) = (self.half.turned(forces.frame * w), between.bend(m));
+        let turned = self.half.turned(forces.frame * w);
+        let twist = between.bend(m);
         let spun = [
             ends[0].transpose_matmul(turned[0].scale(0.5) + m.skew().scale(0.5) - twist),
             ends[1].transpose_matmul(turned[1].scale(0.5) + m.skew().scale(0.5) + twist),

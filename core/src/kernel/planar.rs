@@ -1,12 +1,13 @@
-//! Beams that stay in a plane: two displacements and an angle a node, in the axes of the plane.
+//! Planar beams: two displacements and an angle at each node, in the axes of the plane.
 //!
-//! With T = 1 for rotations about one axis the strains of section 3 become
+//! Rotations about one axis have T = 1, and the strains of Makinen 2007, section 3, become
 //!
 //! ```text
 //! y = R(theta)^T x',   Gamma = y - E1,   K = theta',   N = Cn Gamma + cc K,   M = cc.Gamma + cm K
 //! ```
 //!
-//! and rotation vectors and angles are interpolated alike, so that `total` and `relative` elements are the same.
+//! Rotation vectors and angles are interpolated alike, so that `total` and `relative` elements
+//! agree.
 
 use super::beam::StiffnessPoint;
 use super::element::Weights;
@@ -23,24 +24,25 @@ use std::f64::consts::PI;
 pub struct PlanarPoint<const N: usize, T = f64, P = PlanarLinear<T>> {
     /// Shape functions
     pub shape: [T; N],
-    /// Their derivatives over initial arc length
+    /// Derivatives of the shape functions over initial arc length, 1/length
     pub slope: [T; N],
-    /// Gauss weight times ds/dxi
+    /// Gauss weight times ds/dxi, a length
     pub weight: T,
-    /// E1
+    /// E1, the unit tangent of the initial centre line
     pub tangent: [T; 2],
     /// The law of the section in the axes of the plane
     pub law: P,
-    /// The strain that makes no stress, where there is one: Gamma and K
+    /// Free strain, which makes no stress, at an amplitude of one: Gamma and K. `None` where there
+    /// is none
     pub free: Option<PlanarStrain<T>>,
 }
 
 /// Displacement and angle of a node, or their increments.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanarNode<T = f64> {
-    /// In the axes of the plane
+    /// Displacement along the two axes of the plane
     pub u: [T; 2],
-    /// About its normal
+    /// Angle about the normal of the plane, radians
     pub angle: T,
 }
 
@@ -49,7 +51,7 @@ pub struct PlanarNode<T = f64> {
 pub struct PlanarSystem<const N: usize, T = f64> {
     /// Two forces and a moment for each node
     pub force: [[T; 3]; N],
-    /// The tile of each pair of nodes, by columns
+    /// The 3x3 tile of each pair of nodes, by columns
     pub tangent: [[[T; 9]; N]; N],
 }
 
@@ -60,7 +62,8 @@ impl<const N: usize, T: Real> PlanarSystem<N, T> {
         Self { force: [[T::zero(); 3]; N], tangent: [[[T::zero(); 9]; N]; N] }
     }
 
-    /// Sets the force to zero, and the tangent where it is going to be added to.
+    /// Sets the force to zero and, if the weight of the stiffness is not zero, the tangent, so that
+    /// both can be summed up.
     #[inline(always)]
     pub fn clear_for(&mut self, stiffness: f64) {
         for force in &mut self.force {
@@ -73,7 +76,8 @@ impl<const N: usize, T: Real> PlanarSystem<N, T> {
         }
     }
 
-    /// Forces and moments of the nodes (global components); the plane's axes are the columns of `axes`.
+    /// Forces and moments of the nodes (global components); the plane's axes are the columns of
+    /// `axes`.
     #[inline(always)]
     pub fn forces_in_space(&self, axes: &Mat3) -> [[Vec3<T>; 2]; N] {
         let [a, b, e] = [0, 1, 2].map(|k| axes.column(k));
@@ -125,8 +129,9 @@ impl<const N: usize, P: PlanarLaw<f64> + Pack> Pack for PlanarPoint<N, f64, P> {
     }
 }
 
-/// Angles without the whole turns that the charts of nodes differ by: each within pi of the frame that turns with the element, so that
-/// its ends may turn further against each other, as they may in space.
+/// Removes whole turns by which the charts of the nodes differ: afterwards each angle is within pi
+/// of the frame that turns with the element. The ends of an element may turn by more than pi
+/// against each other, as in space.
 #[inline(always)]
 pub fn in_one_turn<const N: usize, T: Real>(nodes: &mut [PlanarNode<T>; N]) {
     let (first, last) = carriers(N);
@@ -139,20 +144,21 @@ pub fn in_one_turn<const N: usize, T: Real>(nodes: &mut [PlanarNode<T>; N]) {
     }
 }
 
-/// The angle, a turn more or less where that brings it within pi of another.
+/// The angle, one turn more or less if that brings it within pi of the angle `of`.
 #[inline(always)]
 fn within_half_a_turn<T: Real>(angle: T, of: T) -> T {
-    let (ahead, turn) = (angle - of, T::constant(2.0 * PI));
+    let ahead = angle - of;
+    let turn = T::constant(2.0 * PI);
     angle - (ahead.above(PI, turn, T::zero()) - (-ahead).above(PI, turn, T::zero()))
 }
 
 /// The in-plane configuration at a point.
 struct Configuration<T> {
-    /// cos and sin of the angle
+    /// Cosine and sine of the angle of the section
     turn: [T; 2],
     /// x' in the axes of the turned section
     y: [T; 2],
-    /// Strain less its free part
+    /// Elastic strain: the strain less its free part
     elastic: PlanarStrain<T>,
 }
 
@@ -183,8 +189,10 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
         Configuration { turn: [cos, sin], y, elastic: strain }
     }
 
-    /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness. `geometric` is the stress of the
-    /// geometric part, if it is not the present one; `free` the amplitude of the free strain.
+    /// Adds the internal force and, where `weight` is not zero, `weight` times the stiffness.
+    ///
+    /// `free` is the amplitude of the free strain; `geometric` the stress of the geometric part, if
+    /// it is not the stress of this configuration.
     #[inline(always)]
     pub fn add(
         &self,
@@ -196,12 +204,16 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
     ) {
         let at = self.configuration(nodes, free);
         let stress = self.law.stress(&at.elastic);
-        let ([cos, sin], [y1, y2], [n1, n2, m]) = (at.turn, at.y, stress);
+        let [cos, sin] = at.turn;
+        let [y1, y2] = at.y;
+        let [n1, n2, m] = stress;
         // f_x' = R N, f_theta = (N x y).e, f_theta' = M
-        let (fx, fy) = (cos * n1 - sin * n2, sin * n1 + cos * n2);
+        let fx = cos * n1 - sin * n2;
+        let fy = sin * n1 + cos * n2;
         let f_angle = n1 * y2 - n2 * y1;
         for i in 0..N {
-            let (n, s) = (self.shape[i] * self.weight, self.slope[i] * self.weight);
+            let n = self.shape[i] * self.weight;
+            let s = self.slope[i] * self.weight;
             let force = &mut out.force[i];
             force[0] += fx * s;
             force[1] += fy * s;
@@ -212,8 +224,13 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
         }
     }
 
-    /// With A = y x e: K_xx = R Cn R^T, K_x theta = R (Cn A - N x e), K_theta theta = A.Cn A - N.y, K_theta' theta' = cm, and where
-    /// the section couples K_x theta' = R cc, K_theta' theta = cc.A.
+    /// Adds `weight` times the stiffness, with e the normal and A = y x e:
+    ///
+    /// ```text
+    /// K_xx = R Cn R^T,   K_x theta = R (Cn A - N x e)
+    /// K_theta theta = A.Cn A - N.y,   K_theta' theta' = cm
+    /// K_x theta' = R cc,   K_theta' theta = cc.A    (where the section couples strain and curvature)
+    /// ```
     #[inline(always)]
     fn add_stiffness(
         &self,
@@ -236,8 +253,12 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
         let w = self.weight * weight;
         for i in 0..N {
             for j in 0..N {
-                let (n, s) = ([self.shape[i], self.shape[j]], [self.slope[i] * w, self.slope[j]]);
-                let (ss, sn, ns, nn) = (s[0] * s[1], s[0] * n[1], n[0] * w * s[1], n[0] * w * n[1]);
+                let n = [self.shape[i], self.shape[j]];
+                let s = [self.slope[i] * w, self.slope[j]];
+                let ss = s[0] * s[1];
+                let sn = s[0] * n[1];
+                let ns = n[0] * w * s[1];
+                let nn = n[0] * w * n[1];
                 let tile = &mut out.tangent[i][j];
                 tile[0] += first[0] * ss;
                 tile[1] += first[1] * ss;
@@ -259,7 +280,8 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
         }
     }
 
-    /// The stress that a correction `change` of the nodes is expected to lead to: that of the strain and its variation, strain + B dq.
+    /// The stress extrapolated over the correction `change` of the nodes: that of the linearised
+    /// strain, strain + B dq.
     #[inline(always)]
     pub fn extrapolated_stress(
         &self,
@@ -283,14 +305,15 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
 pub struct PlanarBody<T = f64> {
     /// Mass
     pub mass: T,
-    /// The mass centre from the node, in the initial placement
+    /// The vector from the node to the mass centre in the initial placement
     pub offset: [T; 2],
-    /// Inertia about the node, against rotation in the plane
+    /// J0: moment of inertia about the normal of the plane through the node
     pub about_node: T,
 }
 
 impl PlanarBody {
-    /// The in-plane part of mass properties, for the plane with these axes (columns, the third one normal).
+    /// The in-plane part of mass properties, for the plane with these axes (columns, the third one
+    /// normal).
     pub fn new(inertia: &Inertia, axes: &Mat3) -> Self {
         let [x, y, _] = axes.transpose_mul(inertia.offset).0;
         let normal = axes.column(2);
@@ -307,7 +330,8 @@ impl Pack for PlanarBody {
 }
 
 impl<T: Real> PlanarBody<T> {
-    /// Force and tangent. With the spin w and its rate w', d the offset turned into its present place, and e the normal
+    /// Force and tangent of the inertia of a body in a plane. With the spin w and its rate w', d
+    /// the present (spatial) offset, and e the normal
     ///
     /// ```text
     /// f_u = m (u'' + w' e x d - w^2 d),   f_theta = J0 w' + m (d x u'').e
@@ -316,12 +340,16 @@ impl<T: Real> PlanarBody<T> {
     /// `acceleration` is u'', and `spins` are w and w'.
     #[inline(always)]
     pub fn evaluate(&self, acceleration: [T; 2], angle: T, spins: [T; 2], weights: Weights) -> PlanarSystem<1, T> {
-        let ([ax, ay], [w, rate], m) = (acceleration, spins, self.mass);
+        let [ax, ay] = acceleration;
+        let [w, rate] = spins;
+        let m = self.mass;
         let [cos, over_angle, ..] = Series::at(angle * angle).0;
         let sin = over_angle * angle;
         let [x, y] = self.offset;
-        let (dx, dy) = (cos * x - sin * y, sin * x + cos * y);
-        let (mut out, square) = (PlanarSystem::zero(), w * w);
+        let dx = cos * x - sin * y;
+        let dy = sin * x + cos * y;
+        let mut out = PlanarSystem::zero();
+        let square = w * w;
         out.force[0] = [
             m * (ax - rate * dy - square * dx),
             m * (ay + rate * dx - square * dy),
@@ -331,7 +359,7 @@ impl<T: Real> PlanarBody<T> {
             return out;
         }
         let Weights { stiffness, damping, mass } = weights;
-        // d turns by dtheta e x d.
+        // The variation of the offset is dd = dtheta e x d.
         let twice = w * (2.0 * damping);
         let over_x = (square * dy - rate * dx) * stiffness - twice * dx - dy * mass;
         let over_y = -(rate * dy + square * dx) * stiffness - twice * dy + dx * mass;
@@ -347,7 +375,8 @@ impl<T: Real> PlanarBody<T> {
     }
 }
 
-/// The in-plane part of a stress in space, for the plane with these axes.
+/// The in-plane part of a stress in space; the plane's axes are the columns of `axes`, the third
+/// one normal.
 #[inline(always)]
 pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
     let along = |v: &Vec3<T>, k: usize| {
@@ -357,7 +386,8 @@ pub fn flattened<T: Real>(stress: &Stress<T>, axes: &Mat3) -> PlanarStress<T> {
     [along(&stress.n, 0), along(&stress.n, 1), along(&stress.m, 2)]
 }
 
-/// The stress in space, in global components, of a stress in the plane with these axes.
+/// A stress of the plane as a stress in space, in global components; the plane's axes are the
+/// columns of `axes`.
 #[inline(always)]
 pub fn in_space<T: Real>([x, y, m]: PlanarStress<T>, axes: &Mat3) -> Stress<T> {
     let [a, b, e] = [0, 1, 2].map(|k| axes.column(k));

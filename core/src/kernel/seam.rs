@@ -1,34 +1,40 @@
-//! Elements whose nodes sit in different charts (section 3.4.1).
+//! Elements whose nodes have rotation vectors in different charts (Makinen 2007, section 3.4.1).
 //!
-//! Such an element is evaluated with all nodes in the chart of its first node; what it gives is then pulled back to
-//! the charts of the others. With G = blockdiag(I or B) and B of each converted node:
+//! Such an element is evaluated with all nodes in the chart of its first node; force f^C and
+//! matrices are then pulled back to the charts of the others. With G = blockdiag(I or B) and B of
+//! each converted node:
 //!
 //! ```text
 //! f = G^T f^C
 //! J = G^T [ J^C G + s C^C Gd + M^C (s Gdd + 2 d Gd) ] + s diag( Bd(g_P^C) )
 //! ```
 //!
-//! This corrects the paper's (84), whose last relation is printed with B where it must be 2 Bd, and adds the
-//! off-diagonal blocks that (86)–(89) leave out.
+//! This corrects the paper's (84), whose last relation is printed with B where it must be 2 Bd, and
+//! adds the off-diagonal blocks that (86)–(89) leave out.
 
 use super::element::{ElementSystem, MAX_NODES, NodeMotion, Weights};
 use crate::rotation::Complement;
 use crate::scalar::Real;
 use crate::tensor::Vec3;
 
-/// Which nodes of an element are converted: bit j for node j.
+/// The converted nodes of an element, as a mask: bit j for node j.
 pub type Conversion = u8;
 
-/// Chooses the charts of an element: node j is converted where its complement lies nearer to the first node's vector
-/// than itself. Stateless, and right through any number of turns as long as neighbours turn less than pi against
-/// each other.
+/// A squared distance of rotation vectors, rad^2, a little below pi^2: nearer nodes need no
+/// conversion.
+const LEAST_SQUARED_DISTANCE: f64 = 9.8;
+
+/// Chooses the charts of an element: node j is converted if the complement of its rotation vector
+/// lies nearer to the vector of the first node. Needs no history, and holds through any number of
+/// turns as long as neighbours turn by less than pi against each other.
 #[inline]
 pub fn conversion(p: &[Vec3]) -> Conversion {
     let mut mask = 0;
     for (j, &p_j) in p.iter().enumerate().skip(1) {
         let distance = (p_j - p[0]).squared();
-        // The two representatives lie 2 pi apart, so the complement can only be nearer beyond pi.
-        if distance > 9.8 && (crate::rotation::complement(p_j) - p[0]).squared() < distance {
+        // A vector and its complement lie 2 pi apart, so the complement can be nearer only beyond
+        // pi.
+        if distance > LEAST_SQUARED_DISTANCE && (crate::rotation::complement(p_j) - p[0]).squared() < distance {
             mask |= 1 << j;
         }
     }
@@ -37,14 +43,14 @@ pub fn conversion(p: &[Vec3]) -> Conversion {
 
 /// The nodes of one element in the chart of its first node.
 pub struct Converted<T = f64> {
-    /// All nodes in one chart
+    /// The nodes, all in the chart of the first one
     pub nodes: [NodeMotion<T>; MAX_NODES],
     original: [Vec3<T>; MAX_NODES],
     change: [Option<Complement<T>>; MAX_NODES],
 }
 
 impl<T: Real> Converted<T> {
-    /// Converts the nodes that `mask` names.
+    /// Converts the nodes whose bits are set in `mask`.
     pub fn new(nodes: &[NodeMotion<T>], mask: Conversion) -> Self {
         let mut out = Self {
             nodes: [NodeMotion::rest(); MAX_NODES],
@@ -70,8 +76,11 @@ impl<T: Real> Converted<T> {
         self.change[j].as_ref().map_or(dp, |change| change.b * dp)
     }
 
-    /// Evaluates the element in one chart and pulls the result back. `rotation_block` gives the block of node j's
-    /// rotation; `evaluate` clears what it is given and fills it; `rates` says whether it depends on rates of P.
+    /// Evaluates the element in one chart and pulls force and tangent back to the charts of the
+    /// nodes.
+    ///
+    /// `rotation_block` gives the block of the rotation of node j; `evaluate` clears the system
+    /// that it is given and fills it; `rates` is true if forces depend on rates of P.
     pub fn pull_back(
         &self,
         weights: Weights,
@@ -83,7 +92,8 @@ impl<T: Real> Converted<T> {
         evaluate(weights, out);
         let needs_rates = rates && (weights.stiffness != 0.0 || weights.damping != 0.0);
         let rate_parts = needs_rates.then(|| {
-            let (mut damping, mut mass) = (out.clone(), out.clone());
+            let mut damping = out.clone();
+            let mut mass = out.clone();
             evaluate(Weights::DAMPING, &mut damping);
             evaluate(Weights::MASS, &mut mass);
             (damping, mass)

@@ -8,7 +8,7 @@ pub fn values<const N: usize>(xi: f64) -> [f64; N] {
     })
 }
 
-/// Their derivatives over xi.
+/// The derivatives over xi of the shape functions of an element of N nodes at `xi`.
 pub fn derivatives<const N: usize>(xi: f64) -> [f64; N] {
     std::array::from_fn(|i| {
         let term = |left_out: usize| -> f64 {
@@ -21,7 +21,7 @@ pub fn derivatives<const N: usize>(xi: f64) -> [f64; N] {
     })
 }
 
-/// Where node `i` of `n` lies on [-1, 1].
+/// The coordinate on [-1, 1] of node `i` of `n`.
 pub fn node_coordinate(i: usize, n: usize) -> f64 {
     2.0 * i as f64 / (n - 1) as f64 - 1.0
 }
@@ -47,7 +47,8 @@ pub fn gauss(count: usize) -> &'static [(f64, f64)] {
     }
 }
 
-/// Abscissas and weights of the closed Newton–Cotes rule on the nodes of an element of `count` nodes (2 to 4) on [-1, 1].
+/// Abscissas and weights of the closed Newton–Cotes rule on the nodes of an element of `count`
+/// nodes (2 to 4) on [-1, 1].
 pub fn newton_cotes(count: usize) -> &'static [(f64, f64)] {
     const TWO: [(f64, f64); 2] = [(-1.0, 1.0), (1.0, 1.0)];
     const THREE: [(f64, f64); 3] = [(-1.0, 1.0 / 3.0), (0.0, 4.0 / 3.0), (1.0, 1.0 / 3.0)];
@@ -66,7 +67,8 @@ mod tests {
 
     fn sums_hold<const N: usize>() {
         for xi in [-0.83, 0.1, 0.77] {
-            let (n, d) = (values::<N>(xi), derivatives::<N>(xi));
+            let n = values::<N>(xi);
+            let d = derivatives::<N>(xi);
             assert!((n.iter().sum::<f64>() - 1.0).abs() < 1e-15);
             assert!(d.iter().sum::<f64>().abs() < 1e-14);
             let position: f64 = (0..N).map(|i| n[i] * node_coordinate(i, N)).sum();

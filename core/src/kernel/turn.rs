@@ -1,23 +1,28 @@
-//! One rotation over one time step, as a function of its increment alone.
+//! The rotation of a node over one time step, as a function of its increment alone.
 //!
-//! The step starts at R0 with the spin Omega0; all vectors of the formulas stand in the axes of R0. With R = R0 E, E = exp(X),
-//! and a constant symmetric J, let w = E Omega be the spin in space, L = E J Omega the momentum that is carried, and
-//! b = dL/dt. L and X advance as coordinates do in the generalised-alpha method, with B for the algorithmic rate of L:
+//! The step starts at R0 with the spin Omega0; all vectors of the formulas stand in the axes of R0.
+//! With R = R0 E, E = exp(X), and a constant symmetric J, let w = E Omega be the spin in space, L =
+//! E J Omega the momentum that is carried, and b = dL/dt. L and X advance as coordinates do in the
+//! generalised-alpha method, with B for the algorithmic rate of L:
 //!
 //! ```text
-//! L1 = L0 + h [(1-gamma) B0 + gamma B1]      (1-alpha_m) B1 + alpha_m B0 = (1-alpha_f) b1 + alpha_f b0
-//! X = h/2 (w0 + w1) + h^2 (beta - gamma/2) (E J^-1 E^T B1 - J^-1 B0) + h^2/12 (phi0 - E phi1 - w0 x w1)
+//! L1 = L0 + h [(1-gamma) B0 + gamma B1]
+//! (1-alpha_m) B1 + alpha_m B0 = (1-alpha_f) b1 + alpha_f b0
+//! X = h/2 (w0 + w1) + h^2 (beta - gamma/2) (E J^-1 E^T B1 - J^-1 B0)
+//!     + h^2/12 (phi0 - E phi1 - w0 x w1)
 //! b = E (J Acc + Omega x J Omega)            phi(Omega) = -J^-1 (Omega x J Omega)
 //! ```
 //!
-//! Without the last bracket and with J = I this is the counterpart in space of the method of Bruls, Cardona & Arnold
-//! (2012, doi:10.1016/j.mechmachtheory.2011.07.017), who add spins of the body. The last bracket is of the order of the
-//! error of a step: phi is what a spin changes by without a moment (Euler), and with it the sum is the fourth-order
-//! integral of a spin (Hermite's quadrature, and Magnus 1954, doi:10.1002/cpa.3160070404: one rotation does not commute
-//! with the next). phi1 is taken at the momentum L0, so that all is explicit in X.
+//! Without the last bracket and with J = I this is the spatial counterpart of the method of Bruls,
+//! Cardona & Arnold (2012, doi:10.1016/j.mechmachtheory.2011.07.017), who add spins of the body.
+//! The last bracket is of the order of the error of a step: phi is the rate of a spin without a
+//! moment (Euler), and with the bracket the sum is the fourth-order integral of a spin (Hermite's
+//! quadrature; the commutator of successive rotations after Magnus 1954,
+//! doi:10.1002/cpa.3160070404). phi1 is taken at the momentum L0, so that all is explicit in X.
 //!
-//! With J the inertia, L is the angular momentum: without moments it is constant, and what remains is the error of the bracket,
-//! of order four. Any J keeps order two, but its error grows with the ratio of J's principal values.
+//! With J the inertia, L is the angular momentum: without moments it is constant, and the remaining
+//! error is that of the bracket, of order four. Any J keeps order two, but the error grows with the
+//! ratio of the principal values of J.
 
 use super::inertia::{Derivatives, Spin};
 use crate::rotation::Rotation;
@@ -35,11 +40,12 @@ pub struct StepCoefficients {
     pub alpha_m: f64,
     /// alpha_f
     pub alpha_f: f64,
-    /// h
+    /// h, the length of the step, a time
     pub length: f64,
 }
 
-/// The tensor J that makes a momentum of a spin, global components of the initial placement.
+/// The tensor J that takes a spin to its momentum; material, in global components of the initial
+/// placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carrier {
     /// J, symmetric and positive definite
@@ -49,16 +55,16 @@ pub struct Carrier {
 }
 
 impl Carrier {
-    /// J = I: what is carried is the spin.
+    /// J = I: the momentum is the spin itself.
     pub const SPIN: Self = Self { tensor: Mat3::IDENTITY, inverse: Mat3::IDENTITY };
 
-    /// b in the axes of the body: J Acc + Omega x J Omega
+    /// The rate b of the momentum in the axes of the body: J Acc + Omega x J Omega.
     pub fn rate(&self, omega: Vec3, acceleration: Vec3) -> Vec3 {
         self.tensor * acceleration + omega.cross(self.tensor * omega)
     }
 }
 
-/// Where a step of one rotation starts.
+/// The rotation of a node and its rates at the start of a time step.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// R0
@@ -69,11 +75,24 @@ pub struct Start {
     pub acceleration: Vec3,
     /// B0, spatial
     pub algorithmic: Vec3,
-    /// By how much the step is longer than the one that B0 comes from: its lag stretches with it.
+    /// The ratio of the length of the step to that of the step before, by which the lag of B0 grows
     pub stretch: f64,
 }
 
-/// A rotation over a step.
+/// A change of the [start](Start) of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct StartChange {
+    /// The rotation vector by which R0 turns, material
+    pub turned: Vec3,
+    /// The change of Omega0, material
+    pub omega: Vec3,
+    /// The change of Acc0, material
+    pub acceleration: Vec3,
+    /// The change of B0, spatial
+    pub algorithmic: Vec3,
+}
+
+/// The rotation of a node over a time step, as a function of its increment X.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn {
     base: Mat3,
@@ -92,9 +111,10 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// From the state at the start of the step.
+    /// The step that begins at `start`.
     pub fn new(step: StepCoefficients, carrier: Carrier, start: &Start) -> Self {
-        let (omega, momentum) = (start.omega, carrier.tensor * start.omega);
+        let omega = start.omega;
+        let momentum = carrier.tensor * start.omega;
         let rate = carrier.rate(omega, start.acceleration);
         let lag = start.rotation.transpose_mul(start.algorithmic) - rate;
         let h = step.length;
@@ -110,27 +130,27 @@ impl Turn {
         }
     }
 
-    /// The same from another start: turned by a material vector, with other rates (Omega0 and Acc0 material, B0 spatial). `stretch` is that
-    /// of the [start](Start).
-    pub fn changed(&self, turned: Vec3, [omega, acceleration, algorithmic]: [Vec3; 3], stretch: f64) -> Self {
+    /// This step from a start that is changed by `by`; `stretch` is that of its [start](Start).
+    pub fn changed(&self, by: &StartChange, stretch: f64) -> Self {
         let Self { base, carrier, step, .. } = *self;
         let own = carrier.inverse * (self.rate - self.omega.cross(self.momentum));
         let start = Start {
-            rotation: base * Rotation::new(turned).r,
-            omega: self.omega + omega,
-            acceleration: own + acceleration,
-            algorithmic: base * (self.rate + (self.algorithmic - self.rate) * (1.0 / stretch)) + algorithmic,
+            rotation: base * Rotation::new(by.turned).r,
+            omega: self.omega + by.omega,
+            acceleration: own + by.acceleration,
+            algorithmic: base * (self.rate + (self.algorithmic - self.rate) * (1.0 / stretch)) + by.algorithmic,
             stretch,
         };
         Self::new(step, carrier, &start)
     }
 
-    /// R0
+    /// R0, the rotation at the start of the step.
     pub fn base(&self) -> Mat3 {
         self.base
     }
 
-    /// The increment of a step over which the rate of the momentum stays as it is.
+    /// The predictor of X: the increment of a step over which the rate of the momentum does not
+    /// change.
     pub fn guess(&self) -> Vec3 {
         let StepCoefficients { beta, gamma, alpha_m, length: h, .. } = self.step;
         let algorithmic = (self.rate - self.algorithmic * alpha_m) * (1.0 / (1.0 - alpha_m));
@@ -152,16 +172,20 @@ impl Turn {
         (omega, inverse * (turned.transpose_mul(rate) - omega.cross(momentum)))
     }
 
-    /// The rotation after the increment `x`, with the rates that belong to it and their derivatives over it. With
-    /// X = gain^-1 w1 + constant + E y:
+    /// The rotation after the increment `x`, with its rates `omega` and `acceleration` (material)
+    /// and their derivatives over the increment. With X = gain^-1 w1 + constant + E y:
     ///
     /// ```text
     /// dOmega = [Omega~ T + E^T gain (I - E (dy - y~) T)] dX
-    /// J dAcc = [(J Acc + Omega x J Omega)~ T - k (J Omega)~ T + (k J - Omega~ J + (J Omega)~) dOmega] dX
+    /// J dAcc = [(J Acc + Omega x J Omega)~ T - k (J Omega)~ T
+    ///           + (k J - Omega~ J + (J Omega)~) dOmega] dX
     /// ```
     pub fn spin(&self, x: Vec3, omega: Vec3, acceleration: Vec3) -> Spin {
         let rotation = Rotation::new(x);
-        let (e, t, inertia, k) = (rotation.r, rotation.t, self.carrier.tensor, self.stiffness());
+        let e = rotation.r;
+        let t = rotation.t;
+        let inertia = self.carrier.tensor;
+        let k = self.stiffness();
         let momentum = inertia * omega;
         let rate = self.carrier.rate(omega, acceleration);
         let (y, dy) = self.carried(e);
@@ -180,7 +204,8 @@ impl Turn {
         self.base * (gained * (1.0 / (gamma * h)) - self.algorithmic * ((1.0 - gamma) / gamma))
     }
 
-    /// The part of X that no end of the step changes: h/2 w0 - h^2 (beta - gamma/2) J^-1 B0 + h^2/12 phi0.
+    /// The part of X that does not depend on the end of the step:
+    /// h/2 w0 - h^2 (beta - gamma/2) J^-1 B0 + h^2/12 phi0.
     fn constant(&self) -> Vec3 {
         let StepCoefficients { beta, gamma, length: h, .. } = self.step;
         let inverse = self.carrier.inverse;
@@ -188,10 +213,12 @@ impl Turn {
         self.omega * (0.5 * h) - inverse * self.algorithmic * (h * h * (beta - 0.5 * gamma)) - free * (h * h / 12.0)
     }
 
-    /// The part E y of X that the momenta of the start bring, turned into the end: y, and dy over a material turn.
+    /// The vector y of the part E y of X that the momenta of the start bring, and its derivative dy
+    /// over a material rotation of E.
     ///
     /// ```text
-    /// y = J^-1 E^T s - h^2/12 phi(z),   z = J^-1 E^T L0,   s = -(beta - gamma/2)/gamma [h L0 + h^2 (1-gamma) B0]
+    /// y = J^-1 E^T s - h^2/12 phi(z),   z = J^-1 E^T L0
+    /// s = -(beta - gamma/2)/gamma [h L0 + h^2 (1-gamma) B0]
     /// ```
     fn carried<T: Real>(&self, turned: Mat3<T>) -> (Vec3<T>, Mat3<T>) {
         let StepCoefficients { beta, gamma, length: h, .. } = self.step;
@@ -206,13 +233,13 @@ impl Turn {
         (y, inverse * dy)
     }
 
-    /// b1 = k L1 + r: k
+    /// The factor k of b1 = k L1 + r, the rate of the momentum at the end of the step; 1/time.
     fn stiffness(&self) -> f64 {
         let StepCoefficients { gamma, alpha_m, alpha_f, length: h, .. } = self.step;
         (1.0 - alpha_m) / ((1.0 - alpha_f) * gamma * h)
     }
 
-    /// b1 = k L1 + r: r
+    /// The constant r of b1 = k L1 + r, the rate of the momentum at the end of the step.
     fn rest(&self) -> Vec3 {
         let StepCoefficients { gamma, alpha_m, alpha_f, .. } = self.step;
         let lagging = self.algorithmic * (alpha_m - (1.0 - alpha_m) * (1.0 - gamma) / gamma) - self.rate * alpha_f;
@@ -220,7 +247,7 @@ impl Turn {
     }
 }
 
-/// (a I - b w~)^-1
+/// The inverse of a I - b w~.
 fn inverse(a: f64, b: f64, w: Vec3) -> Mat3 {
     let whole = Mat3::diagonal([a * a; 3]) + w.skew() * (a * b) + w.outer(w) * (b * b);
     whole * (1.0 / (a * (a * a + b * b * w.squared())))
@@ -232,7 +259,7 @@ mod tests {
 
     const STEP: StepCoefficients = StepCoefficients { beta: 0.3, gamma: 0.6, alpha_m: 0.2, alpha_f: 0.4, length: 0.3 };
 
-    /// A slanted inertia and a start in motion, without lag.
+    /// A step of a body with an inclined inertia tensor that starts in motion.
     fn turn(stretch: f64) -> (Turn, Start) {
         let inertia = Mat3([[2.0, 0.3, -0.1], [0.3, 1.5, 0.2], [-0.1, 0.2, 3.0]]);
         let matrix = nalgebra::Matrix3::from_fn(|i, j| inertia.0[i][j]).try_inverse().unwrap();
@@ -250,7 +277,8 @@ mod tests {
     #[test]
     fn the_rates_solve_the_equations_of_the_step() {
         let (turn, start) = turn(1.0);
-        let (StepCoefficients { beta, gamma, alpha_m, alpha_f, length: h }, carrier) = (STEP, turn.carrier);
+        let StepCoefficients { beta, gamma, alpha_m, alpha_f, length: h } = STEP;
+        let carrier = turn.carrier;
         let x = Vec3([0.2, -0.3, 0.25]);
         let (omega, acceleration) = turn.rates(x);
         let e = Rotation::new(x).r;
@@ -264,7 +292,8 @@ mod tests {
         let lag = new * (1.0 - alpha_m) + old * alpha_m - b1 * (1.0 - alpha_f) - b0 * alpha_f;
         assert!(lag.max_abs() < 1e-13, "{lag:?}");
         let phi = |omega: Vec3| -(carrier.inverse * omega.cross(carrier.tensor * omega));
-        let (w0, w1) = (start.omega, e * omega);
+        let w0 = start.omega;
+        let w1 = e * omega;
         let z = carrier.inverse * e.transpose_mul(momentum);
         let spun = e * (carrier.inverse * e.transpose_mul(new)) - carrier.inverse * old;
         let bracket = phi(w0) - e * phi(z) - w0.cross(w1);
@@ -274,7 +303,8 @@ mod tests {
 
     #[test]
     fn the_lag_stretches_with_the_step() {
-        let ((same, start), (longer, _)) = (turn(1.0), turn(2.0));
+        let (same, start) = turn(1.0);
+        let (longer, _) = turn(2.0);
         let now = same.carrier.rate(start.omega, start.acceleration);
         assert!((longer.algorithmic - now - (same.algorithmic - now) * 2.0).max_abs() < 1e-15);
     }
@@ -295,7 +325,9 @@ mod tests {
 
     #[test]
     fn the_inverse_is_one() {
-        let (a, b, w) = (0.3, 0.2, Vec3([1.0, -2.0, 0.5]));
+        let a = 0.3;
+        let b = 0.2;
+        let w = Vec3([1.0, -2.0, 0.5]);
         let product = inverse(a, b, w) * (Mat3::diagonal([a; 3]) - w.skew() * b);
         assert!((product - Mat3::IDENTITY).max_abs() < 1e-15);
     }

@@ -1,22 +1,23 @@
-//! What acts per initial length without derivatives of the unknowns: inertia, weight, line loads.
+//! Forces per initial length that depend on u, P and their rates, but not on slopes: inertia,
+//! weight, line loads.
 
 use super::beam::interpolate;
 use super::element::{ElementSystem, NodeMotion, Weights};
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
 use crate::tensor::{Mat3, Vec3};
 
-/// An integration point for such a quantity.
+/// An integration point of a force per initial length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumePoint<const N: usize, Q, T = f64> {
     /// Shape functions
     pub shape: [T; N],
-    /// Gauss weight times ds/dxi
+    /// Gauss weight times ds/dxi, a length
     pub weight: T,
-    /// What is integrated, per initial length
+    /// The data of the kernel at this point, per initial length
     pub quantity: Q,
 }
 
-/// Force and tangent at a point, conjugate to u and P.
+/// Force and tangent at a point, conjugate to u (spatial) and P.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub struct VolumeForce<T = f64> {
@@ -32,13 +33,15 @@ impl<T: Real> VolumeForce<T> {
     /// No force.
     #[inline(always)]
     pub fn zero() -> Self {
-        let (v, m) = (Vec3::zero(), Mat3::zero());
+        let v = Vec3::zero();
+        let m = Mat3::zero();
         Self { u: v, p: v, uu: m, up: m, pu: m, pp: m }
     }
 }
 
 impl<T: Real> VolumeForce<T> {
-    /// Puts itself, with a tangent of weights that are not zero, in the place of what stands in an element of one node.
+    /// Overwrites the system of an element of one node with this force and, unless all weights are
+    /// zero, this tangent.
     #[inline(always)]
     pub fn write(&self, weights: Weights, out: &mut ElementSystem<T>) {
         out.set_force(0, self.u);
@@ -52,12 +55,13 @@ impl<T: Real> VolumeForce<T> {
     }
 }
 
-/// Which unknowns of its nodes a kernel couples, and so the blocks of its element: P1, P2, … or u1, P1, u2, ….
+/// The unknowns of nodes that a kernel couples, and so the blocks of its element: P1, P2, … or u1,
+/// P1, u2, ….
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blocks {
     /// Rotation vectors alone
     Rotations,
-    /// Both
+    /// Displacements and rotation vectors
     Both,
 }
 
@@ -74,36 +78,37 @@ impl Blocks {
     }
 }
 
-/// A physical law at a point.
+/// A force per initial length as a function of the motion of a point.
 pub trait VolumeKernel {
-    /// What it needs to know of the point.
+    /// Constant data of a point.
     type Quantity: Copy;
-    /// The same at this moment, for any scalar.
+    /// Data of a point at the present time, over any scalar.
     type Present<T: Real>: Copy;
-    /// The unknowns it couples
+    /// The unknowns that the force couples
     const BLOCKS: Blocks;
-    /// Whether it depends on rates of P
+    /// True if the force depends on rates of P
     const RATES: bool;
 
-    /// What a point's quantity is at this moment.
+    /// The data of a point at the present time.
     fn at_present(&self, quantity: &Self::Quantity) -> Self::Present<f64>;
 
-    /// Force per length, and the tangent of the weights that are not zero.
+    /// Force per initial length and, unless all weights are zero, its tangent.
     fn evaluate<T: Real>(&self, present: &Self::Present<T>, motion: &NodeMotion<T>, weights: Weights)
     -> VolumeForce<T>;
 }
 
 impl<const N: usize, Q: Copy> VolumePoint<N, Q> {
-    /// The point with what `change` makes of its quantity.
+    /// The point with `change` applied to its quantity.
     #[inline(always)]
     pub fn map<P>(&self, change: impl Fn(&Q) -> P) -> VolumePoint<N, P> {
         VolumePoint { shape: self.shape, weight: self.weight, quantity: change(&self.quantity) }
     }
 
-    /// The same point for another scalar, with its quantity lifted by `prescribed_increment`.
-    pub fn lifted<T: Real, P>(&self, prescribed_increment: impl Fn(&Q) -> P) -> VolumePoint<N, P, T> {
-        let (shape, weight) = (self.shape.map(T::constant), T::constant(self.weight));
-        VolumePoint { shape, weight, quantity: prescribed_increment(&self.quantity) }
+    /// The point over another scalar, with `lift` applied to its quantity.
+    pub fn lifted<T: Real, P>(&self, lift: impl Fn(&Q) -> P) -> VolumePoint<N, P, T> {
+        let shape = self.shape.map(T::constant);
+        let weight = T::constant(self.weight);
+        VolumePoint { shape, weight, quantity: lift(&self.quantity) }
     }
 }
 
@@ -117,7 +122,7 @@ impl<const N: usize, Q: Pack> Pack for VolumePoint<N, Q> {
 }
 
 impl<const N: usize, Q: Copy, T: Real> VolumePoint<N, Q, T> {
-    /// The motion at this point.
+    /// The interpolated motion at this point.
     #[inline(always)]
     pub fn motion(&self, nodes: &[NodeMotion<T>; N]) -> NodeMotion<T> {
         let shape = &self.shape;
@@ -131,7 +136,7 @@ impl<const N: usize, Q: Copy, T: Real> VolumePoint<N, Q, T> {
         }
     }
 
-    /// Adds the force of `kernel`, and its tangent where a weight is not zero.
+    /// Adds the force of `kernel` and, unless all weights are zero, its tangent.
     #[inline(always)]
     pub fn add<K: VolumeKernel<Present<T> = Q>>(
         &self,

@@ -225,7 +225,8 @@ impl Assembly {
         self.linear.is_none() && self.effects.iter().any(|acting| !acting.memory.points.is_empty())
     }
 
-    /// Lets effects remember what the next tangent is formed with, see [`StressPoints::extrapolate`](crate::effect::StressPoints::extrapolate).
+    /// Lets effects remember what the next tangent is formed with, see
+    /// [`StressPoints::extrapolate`](crate::effect::StressPoints::extrapolate).
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
         if !self.foresees() {
             return;

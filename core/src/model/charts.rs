@@ -53,7 +53,8 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
             if !is_beyond(p, band) {
                 break;
             }
-            let (velocity, acceleration) = (state.v[slot], state.a[slot]);
+            let velocity = state.v[slot];
+            let acceleration = state.a[slot];
             let change = Complement::new(p, velocity, acceleration);
             if let Some(lag) = lag.filter(|_| !state.algorithmic.is_empty()) {
                 let drift = (change.b_rate * acceleration) * 2.0 + change.b_rate2 * velocity;
@@ -106,7 +107,8 @@ pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
     }
     let State { q, unwrapped, .. } = state;
     each_rotation(unwrapped, rotations, |k, unwrapped| {
-        let (old, increment) = (q[k], dq[k]);
+        let old = q[k];
+        let increment = dq[k];
         let p = old + increment;
         *unwrapped = match () {
             () if increment == Vec3::ZERO => *unwrapped,
@@ -172,7 +174,9 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     }
     let State { q, unwrapped: carried, .. } = state;
     each_rotation(carried, rotations, |k, carried| {
-        let (p, old, unwrapped) = (q[k], before.q[k], before.unwrapped_at(k as Slot));
+        let p = q[k];
+        let old = before.q[k];
+        let unwrapped = before.unwrapped_at(k as Slot);
         // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away
         // from it.
         let is_near = unwrapped == old && (p - old).norm() < 0.4 * FAR;
@@ -180,12 +184,14 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
             *carried = p;
             return;
         }
-        let (shortest, tracked) = (rotated(old, p), *carried - unwrapped);
+        let shortest = rotated(old, p);
+        let tracked = *carried - unwrapped;
         let turned = if tracked.norm() > HALF_TURN { unwound(shortest, tracked) } else { shortest };
         *carried = continued(p, unwrapped, turned);
     });
     let is_ambiguous = |&slot: &Slot| {
-        let (p, unwrapped) = (q[slot as usize], carried[slot as usize]);
+        let p = q[slot as usize];
+        let unwrapped = carried[slot as usize];
         p != unwrapped && (unwound(p, unwrapped) - unwrapped).norm() >= FAR
     };
     let mut ambiguous = Vec::new();

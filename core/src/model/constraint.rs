@@ -93,7 +93,8 @@ impl Motion {
     /// Returns how far it turns the node from the last converged state: beyond half a turn nobody
     /// could tell in which direction it went.
     pub(super) fn impose(&self, [value, rate, rate2]: [f64; 3], state: &mut State) -> f64 {
-        let (slot, n) = (self.slot as usize, self.axis);
+        let slot = self.slot as usize;
+        let n = self.axis;
         match self.kind {
             MotionKind::Translation => {
                 let replaced = |old: Vec3, value: f64| old + n * (value - old.dot(n));

@@ -169,7 +169,8 @@ impl History for Table {
             return [self.values[last], 0.0, 0.0];
         }
         let k = self.times.partition_point(|&t| t <= x) - 1;
-        let (width, rise) = (self.times[k + 1] - self.times[k], self.values[k + 1] - self.values[k]);
+        let width = self.times[k + 1] - self.times[k];
+        let rise = self.values[k + 1] - self.values[k];
         let s = (x - self.times[k]) / width;
         if !self.smooth {
             return [self.values[k] + rise * s, rise / width, 0.0];
@@ -241,7 +242,8 @@ mod tests {
         let h = 1e-5;
         for x in [0.6, 1.0, 1.7] {
             let [_, slope, bend] = ramp.at(x);
-            let (before, after) = (ramp.at(x - h), ramp.at(x + h));
+            let before = ramp.at(x - h);
+            let after = ramp.at(x + h);
             assert!((slope - (after[0] - before[0]) / (2.0 * h)).abs() < 1e-8);
             assert!((bend - (after[1] - before[1]) / (2.0 * h)).abs() < 1e-8);
         }

@@ -53,14 +53,18 @@ impl Linear {
             }
             whole.values.clone()
         };
-        let (stiffness, damping, mass) = (matrix(Weights::STIFFNESS), matrix(Weights::DAMPING), matrix(Weights::MASS));
-        let (about, multipliers) = (origin.clone(), model.multipliers.clone());
+        let stiffness = matrix(Weights::STIFFNESS);
+        let damping = matrix(Weights::DAMPING);
+        let mass = matrix(Weights::MASS);
+        let about = origin.clone();
+        let multipliers = model.multipliers.clone();
         Ok(Self { origin, about, multipliers, whole, stiffness, damping, mass, formed: None })
     }
 
     /// Takes the clock, and the amplitudes that belong to it, from a state.
     pub fn follow(&mut self, state: &State) {
-        (self.about.time, self.about.load) = (state.time, state.load);
+        self.about.time = state.time;
+        self.about.load = state.load;
         self.about.amplitude.copy_from_slice(&state.amplitude);
         self.about.amplitude_rates.copy_from_slice(&state.amplitude_rates);
     }
@@ -88,7 +92,8 @@ impl Linear {
     }
 
     fn add_part(&self, values: &[f64], field: &[Vec3], force: &mut [Vec3]) {
-        // Without held directions the equations are the components of the slots, one after the other.
+        // Without held directions the equations are the components of the slots, one after the
+        // other.
         let x: Vec<f64> = field.iter().flat_map(|v| v.0).collect();
         let product = self.whole.multiply(values, &x);
         for (force, part) in force.iter_mut().zip(product.as_chunks::<3>().0) {

@@ -1,12 +1,14 @@
-//! The complement chart (definition 2.2, equations (81)–(84)): the same rotation by the complement vector
-//! P^C = P - (2 pi / psi) P, whose length is |2 pi - psi|. At psi = pi both have length pi; changing there keeps every
-//! rotation vector within the ball in which the tangent tensor T is regular.
+//! The complement chart (Makinen 2007, definition 2.2, equations (81)–(84)): the rotation of P,
+//! with psi = |P|, is also that of the complement vector P^C = P - (2 pi / psi) P, whose length is
+//! |2 pi - psi|. At psi = pi both have length pi; a change of chart there keeps every rotation
+//! vector within the ball in which the tangent tensor T is regular.
 
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
-/// A rotation vector with its rates, carried into the complement chart, and the tensors of the change.
+/// A rotation vector with its rates, carried into the complement chart, and the tensors of the
+/// change.
 #[derive(Clone, Copy, Debug)]
 pub struct Complement<T = f64> {
     /// P^C
@@ -17,9 +19,9 @@ pub struct Complement<T = f64> {
     pub acceleration: Vec3<T>,
     /// B = dP^C/dP = (1 - 2 pi/psi) I + (2 pi/psi) n(x)n
     pub b: Mat3<T>,
-    /// dB/dt, which is also dP^Cd/dP
+    /// dB/dt, equal to the derivative of dP^C/dt over P
     pub b_rate: Mat3<T>,
-    /// d2B/dt2, which is also dP^Cdd/dP
+    /// d2B/dt2, equal to the derivative of d2P^C/dt2 over P
     pub b_rate2: Mat3<T>,
 }
 
@@ -35,21 +37,22 @@ impl<T: Real> Complement<T> {
         Self { p: p * (T::one() - turn), velocity: b * w, acceleration: b * a + b_rate * w, b, b_rate, b_rate2 }
     }
 
-    /// The geometric matrix of a force that is conjugate to P^C: d(B^T f)/dP for constant `f`, (88).
+    /// The geometric matrix of a force that is conjugate to P^C: d(B^T f)/dP for constant `f`,
+    /// (88).
     pub fn geometric(p: Vec3<T>, f: Vec3<T>) -> Mat3<T> {
         let psi = p.norm();
         derivative(psi, p * (T::one() / psi), f)
     }
 }
 
-/// Bd(W) = (2 pi / psi^2) [(n.W) I + W(x)n + n(x)W - 3 (n.W) n(x)n]
+/// The derivative of B over time: Bd(W) = (2 pi / psi^2) [(n.W) I + W(x)n + n(x)W - 3 (n.W) n(x)n].
 fn derivative<T: Real>(psi: T, n: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
     let nw = n.dot(w);
     (Mat3::diagonal([nw; 3]) + w.outer(n) + n.outer(w) - n.outer(n) * (nw * 3.0))
         * (T::constant(2.0 * PI) / (psi * psi))
 }
 
-/// Bdd, (83), with nd = (W - n (n.W))/psi and s = n.A + nd.W.
+/// The second derivative Bdd of B over time, (83), with nd = (W - n (n.W))/psi and s = n.A + nd.W.
 fn second_derivative<T: Real>(psi: T, n: Vec3<T>, w: Vec3<T>, a: Vec3<T>, b_rate: Mat3<T>) -> Mat3<T> {
     let nw = n.dot(w);
     let n_rate = (w - n * nw) * (T::one() / psi);
@@ -60,7 +63,7 @@ fn second_derivative<T: Real>(psi: T, n: Vec3<T>, w: Vec3<T>, a: Vec3<T>, b_rate
     linear * turn - cubic * (turn * 3.0) - b_rate * (nw * 2.0 / psi)
 }
 
-/// The complement of a rotation vector alone.
+/// The complement of a rotation vector, without rates. The rotation must not be zero.
 pub fn complement(p: Vec3) -> Vec3 {
     p * (1.0 - 2.0 * PI / p.norm())
 }
@@ -74,18 +77,21 @@ pub fn nearest_turn(p: Vec3, reference: Vec3) -> f64 {
     ((reference.dot(p) / psi - psi) / (2.0 * PI)).round()
 }
 
-/// The representative of the rotation of `p` that continues `previous` without a jump (ten turns read 20 pi).
+/// The representative of the rotation of `p` that continues `previous` without a jump: ten turns
+/// have the length 20 pi.
 pub fn unwound(p: Vec3, previous: Vec3) -> Vec3 {
     let psi = p.norm();
     if psi < 1e-9 {
-        // No axis of its own: it keeps the axis of before, at the whole turn that is nearest.
+        // A rotation of almost zero has no axis of its own: it keeps the previous axis, at the
+        // nearest whole turn.
         let turns = (previous.norm() / (2.0 * PI)).round();
         return previous.normalized().map_or(p, |axis| axis * (2.0 * PI * turns) + p);
     }
     p * (1.0 + 2.0 * PI * nearest_turn(p, previous) / psi)
 }
 
-/// The representative with |P| <= pi; at pi the one whose first non-zero component is positive.
+/// The representative of a rotation vector with |P| <= pi; at pi the one whose first non-zero
+/// component is positive.
 pub fn principal(p: Vec3) -> Vec3 {
     let psi = p.norm();
     if psi < PI - 1e-12 {

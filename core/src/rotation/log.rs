@@ -1,12 +1,14 @@
-//! The inverse of the exponential: a rotation vector of a rotation tensor, through the unit quaternion.
+//! The inverse of the exponential: a rotation vector of a rotation tensor, through the unit
+//! quaternion.
 
 use crate::scalar::Real;
 use crate::tensor::{Mat3, Vec3};
 
 /// The rotation vector P of `r` with |P| <= pi, accurate at 0 and at pi.
 ///
-/// The quaternion (q0, q) comes from the largest of tr R, R11, R22, R33, so that nothing cancels (Spurrier 1978); then
-/// P = 2 atan2(|q|, q0) q/|q| with q0 >= 0. Within 4e-16 of the angle's scale for angles from 1e-9 to pi.
+/// The quaternion (q0, q) comes from the largest of tr R, R11, R22, R33, so that nothing cancels
+/// (Spurrier 1978, doi:10.2514/3.57311); then P = 2 atan2(|q|, q0) q/|q| with q0 >= 0. The error is
+/// within 4e-16 of the angle for angles from 1e-9 to pi.
 #[inline(always)]
 pub fn log<T: Real>(r: Mat3<T>) -> Vec3<T> {
     let (scalar, vector) = quaternion(r);
@@ -15,8 +17,8 @@ pub fn log<T: Real>(r: Mat3<T>) -> Vec3<T> {
 
 /// 2 atan2(|q|, q0)/|q| for z = |q|^2 of a unit quaternion with q0 >= 0; smooth at zero.
 ///
-/// With t = tan(psi/4) = |q|/(1 + q0) and two more halvings, t -> t/(1 + sqrt(1 + t^2)), the arctangent's series serves: no
-/// branch, and no angle in a denominator.
+/// After t = tan(psi/4) = |q|/(1 + q0) and two more halvings of the angle, t -> t/(1 + sqrt(1 +
+/// t^2)), the series of the arctangent converges quickly: no branch, and no angle in a denominator.
 #[inline(always)]
 fn angle_over_sine<T: Real>(z: T, scalar: T) -> T {
     let one = T::one();
@@ -28,14 +30,15 @@ fn angle_over_sine<T: Real>(z: T, scalar: T) -> T {
     let t = t * sixteenth * sixteenth;
     // atan(x)/x = 1 - x^2/3 + x^4/5 - ..., x = tan(psi/16) < 0.2
     let mut sum = T::zero();
-    for k in (0..TERMS).rev() {
+    for k in (0..ARCTANGENT_TERMS).rev() {
         sum = T::constant(1.0 / (2 * k + 1) as f64) - t * sum;
     }
     quarter * eighth * sixteenth * sum * 16.0
 }
 
-/// The first term left out is below 1e-18.
-const TERMS: usize = 12;
+/// Terms of the series of atan(x)/x for x = tan(psi/16) < 0.2: the first one left out is below
+/// 1e-18.
+const ARCTANGENT_TERMS: usize = 12;
 
 /// The angle in [0, pi] that takes the rotation `a` into the rotation `b`.
 pub fn relative_angle(a: Mat3, b: Mat3) -> f64 {
@@ -46,7 +49,8 @@ pub fn relative_angle(a: Mat3, b: Mat3) -> f64 {
 /// The unit quaternion of `r` with a scalar part that is not negative.
 #[inline(always)]
 fn quaternion<T: Real>(r: Mat3<T>) -> (T, Vec3<T>) {
-    let (m, one) = (r.0, T::one());
+    let m = r.0;
+    let one = T::one();
     let trace = m[0][0] + m[1][1] + m[2][2];
     let larger = |a: T, b: T| (a - b).above(0.0, a, b);
     let excess = larger(larger(m[0][0], m[1][1]), m[2][2]) - trace;
@@ -56,12 +60,15 @@ fn quaternion<T: Real>(r: Mat3<T>) -> (T, Vec3<T>) {
     if excess.largest() > 0.0 { by_diagonal(r, trace, excess, by_trace) } else { by_trace }
 }
 
-/// The quaternion by the largest diagonal entry where that exceeds the trace, else `by_trace`.
+/// The unit quaternion from the largest diagonal entry if that exceeds the trace, otherwise
+/// `by_trace`.
 #[inline(never)]
 fn by_diagonal<T: Real>(r: Mat3<T>, trace: T, excess: T, by_trace: (T, Vec3<T>)) -> (T, Vec3<T>) {
-    let (m, one) = (r.0, T::one());
+    let m = r.0;
+    let one = T::one();
     let by = |i: usize| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let j = (i + 1) % 3;
+        let k = (i + 2) % 3;
         let mut vector = [T::zero(); 3];
         vector[i] = (m[i][i] * 0.5 + (one - trace) * 0.25).sqrt();
         let scale = T::constant(0.25) / vector[i];

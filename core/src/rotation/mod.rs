@@ -1,8 +1,9 @@
-//! The rotation manifold SO(3) in terms of the total rotation vector (Makinen 2007, section 2 and appendix A).
+//! The rotation manifold SO(3) in terms of the total rotation vector (Makinen 2007, section 2 and
+//! appendix A).
 //!
-//! [`Rotation`] holds what follows from one rotation vector P: the rotation tensor R, the tangent tensor T that takes
-//! rates of P to material spins, and the derivative tensors C1 … C5. [`complement`] changes the chart, [`log`] is the
-//! inverse of the exponential.
+//! [`Rotation`] holds a rotation vector P, the rotation tensor R, the tangent tensor T that takes
+//! rates of P to material spins, and the coefficients of the derivative tensors C1 … C5.
+//! [`complement`] changes the chart, [`log`] is the inverse of the exponential.
 
 mod chart;
 mod log;
@@ -37,7 +38,8 @@ impl<T: Real> Rotation<T> {
     pub fn new(p: Vec3<T>) -> Self {
         let series = Series::at(p.squared());
         let [f0, f1, f2, f3, ..] = series.0;
-        let (skew, dyad) = (p.skew(), p.outer(p));
+        let skew = p.skew();
+        let dyad = p.outer(p);
         Self {
             p,
             r: Mat3::diagonal([f0; 3]) + skew * f1 + dyad * f2,
@@ -46,8 +48,8 @@ impl<T: Real> Rotation<T> {
         }
     }
 
-    /// The same vector as an increment that follows the rotation `base`: R = base exp(P). T and the derivative tensors are
-    /// those of the increment, since they speak of material spins.
+    /// The rotation R = base exp(P): P is an increment that follows the rotation `base`. T and the
+    /// derivative tensors remain those of the increment, since they give material spins.
     #[inline(always)]
     pub fn after(self, base: Mat3<T>) -> Self {
         Self { r: base * self.r, ..self }
@@ -59,10 +61,12 @@ impl<T: Real> Rotation<T> {
         Self { p: -self.p, r: self.r.transpose(), t: self.t.transpose(), c: self.c }
     }
 
-    /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation elsewhere.
+    /// T^-1 = I + P~/2 + e P~^2. Its only pole is at |P| = 2 pi: e is formed without cancellation
+    /// elsewhere.
     #[inline(always)]
     pub fn t_inverse(&self) -> Mat3<T> {
-        let (p, z) = (self.p, self.p.squared());
+        let p = self.p;
+        let z = self.p.squared();
         let [_, f1, f2, f3, ..] = Series::at(z * 0.25).0;
         let e = (f2 - f3) / (f1 * 4.0);
         // P~^2 = P(x)P - (P.P) I
@@ -76,7 +80,8 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c1(&self, v: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pv = p.dot(v);
         (v * c.c1 - p.cross(v) * c.c2 + p * (c.c3 * pv)).outer(p) - v.skew() * c.c4
             + (Mat3::diagonal([pv; 3]) + p.outer(v)) * c.c5
@@ -85,7 +90,8 @@ impl<T: Real> Rotation<T> {
     /// C2(V) = D_P (T^T V), (A4): C1 with the opposite signs of c2 and c4.
     #[inline(always)]
     pub fn c2(&self, v: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pv = p.dot(v);
         (v * c.c1 + p.cross(v) * c.c2 + p * (c.c3 * pv)).outer(p)
             + v.skew() * c.c4
@@ -99,7 +105,8 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn t_rate(&self, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pw = p.dot(w);
         Mat3::diagonal([c.c1 * pw; 3]) - p.skew() * (c.c2 * pw)
             + p.outer(p) * (c.c3 * pw)
@@ -110,14 +117,19 @@ impl<T: Real> Rotation<T> {
     /// C3(V, W) = D_P (C1(W)^T V), (A8); symmetric. With S(a,b) = a(x)b + b(x)a and u = V x W:
     ///
     /// ```text
-    /// C3 = [c1 V.W + c2 P.u + c3 (P.W)(P.V)] I + c2 S(P,u) + c3 (P.W) S(P,V) + c3 (P.V) S(P,W) + c5 S(W,V)
+    /// C3 = [c1 V.W + c2 P.u + c3 (P.W)(P.V)] I
+    ///    + c2 S(P,u) + c3 (P.W) S(P,V) + c3 (P.V) S(P,W) + c5 S(W,V)
     ///    + [d1 V.W + d2 P.u + d3 (P.W)(P.V)] P(x)P
     /// ```
     #[inline(always)]
     pub fn c3(&self, v: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let u = v.cross(w);
-        let (vw, pu, pv, pw) = (v.dot(w), p.dot(u), p.dot(v), p.dot(w));
+        let vw = v.dot(w);
+        let pu = p.dot(u);
+        let pv = p.dot(v);
+        let pw = p.dot(w);
         let spherical = c.c1 * vw + c.c2 * pu + c.c3 * pw * pv;
         let along = c.d1 * vw + c.d2 * pu + c.d3 * pw * pv;
         let half = (u * c.c2 + v * (c.c3 * pw) + w * (c.c3 * pv)).outer(p) + w.outer(v) * c.c5;
@@ -131,7 +143,8 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c4(&self, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
+        let p = self.p;
+        let c = &self.c;
         let pw = p.dot(w);
         (Mat3::diagonal([pw; 3]) + w.outer(p)) * (c.c1 + c.c5)
             + (p * (c.c3 * pw * 2.0) - p.cross(w) * c.c2).outer(p)
@@ -147,22 +160,27 @@ impl<T: Real> Rotation<T> {
     /// ```
     #[inline(always)]
     pub fn c5(&self, w: Vec3<T>) -> Mat3<T> {
-        let (p, c) = (self.p, &self.c);
-        let (q, ww, pxw) = (p.dot(w), w.squared(), p.cross(w));
+        let p = self.p;
+        let c = &self.c;
+        let q = p.dot(w);
+        let ww = w.squared();
+        let pxw = p.cross(w);
         Mat3::diagonal([c.c3 * q * q + c.c5 * ww; 3])
             + (p * (c.d3 * q * q + c.c3 * ww) + w * ((c.d1 + c.c3) * q) - pxw * (c.d2 * q)).outer(p)
             + (p * (c.c3 * q * 2.0) - pxw * c.c2 + w * (c.c1 + c.c5)).outer(w)
             + w.skew() * (c.c2 * q)
     }
 
-    /// The gradient with respect to P of the potential w . R v of a vector fixed in the body: T^T (v x R^T w).
+    /// The gradient with respect to P of the potential w . R v of a vector fixed in the body: T^T
+    /// (v x R^T w).
     #[inline(always)]
     pub fn potential_gradient(&self, v: Vec3<T>, w: Vec3<T>) -> Vec3<T> {
         self.t.transpose_mul(v.cross(self.r.transpose_mul(w)))
     }
 
-    /// The Hessian of w . R v: C2(v x R^T w) + T^T v~ (R^T w)~ T; symmetric. It serves gravity on an eccentric mass,
-    /// forces at an offset and constraints on directions (the family of equation (75)).
+    /// The Hessian of w . R v: C2(v x R^T w) + T^T v~ (R^T w)~ T; symmetric. It serves gravity on
+    /// an eccentric mass, forces at an offset and constraints on directions (the family of equation
+    /// (75)).
     #[inline(always)]
     pub fn potential_hessian(&self, v: Vec3<T>, w: Vec3<T>) -> Mat3<T> {
         let material = self.r.transpose_mul(w);

@@ -1,22 +1,25 @@
-//! The entire functions from which every coefficient of the rotation algebra is made.
+//! The entire functions f_m from which all coefficients of the rotation algebra are formed.
 //!
 //! With z = psi^2,
 //!
 //! ```text
-//! f_m(z) = sum_k (-z)^k / (2k+m)!        f0 = cos psi, f1 = sin psi / psi, f2 = (1 - cos psi) / psi^2, ...
-//! f_m    = 1/m! - z f_{m+2}              2 df_m/dz = m f_{m+2} - f_{m+1}
+//! f_m(z) = sum_k (-z)^k / (2k+m)!
+//! f0 = cos psi,   f1 = sin psi / psi,   f2 = (1 - cos psi) / psi^2,   ...
+//! f_m = 1/m! - z f_{m+2}
+//! 2 df_m/dz = m f_{m+2} - f_{m+1}
 //! ```
 //!
-//! The coefficients c1 … c5 of the tensors C1 … C5 (Makinen 2007, (A2), (A9)) and their derivatives over psi are
-//! linear in f2 … f7: no cancellation, no division by the angle, no branch near zero.
+//! The coefficients c1 … c5 of the tensors C1 … C5 (Makinen 2007, (A2), (A9)) and their derivatives
+//! over psi are linear in f2 … f7: no cancellation, no division by the angle, no branch near zero.
 
 use crate::scalar::Real;
 
-/// The functions f0 … f7 at one argument.
+/// The functions f0 … f7 at one argument z = psi^2.
 #[derive(Clone, Copy, Debug)]
 pub struct Series<T>(pub [T; 8]);
 
-/// Above this argument the series is evaluated at a quarter of it and doubled up again.
+/// The largest argument z = psi^2, rad^2, at which the series is summed; above it, it is summed at
+/// a quarter of the argument (once or more often) and the angle doubled again.
 const LARGEST_ARGUMENT: f64 = 16.0;
 
 /// Reciprocals of the factorials, 1/0! … 1/32!.
@@ -32,7 +35,8 @@ const RECIPROCAL_FACTORIAL: [f64; 33] = {
     table
 };
 
-/// Terms of the two series that are summed: the first left out is below 1e-19 of the sum at the largest argument.
+/// Terms of the two series that are summed: the first left out is below 1e-19 of the sum at the
+/// largest argument.
 const TERMS: usize = 13;
 
 impl<T: Real> Series<T> {
@@ -45,20 +49,25 @@ impl<T: Real> Series<T> {
     /// f6 and f7 by Horner's rule, the others downward from them.
     #[inline(always)]
     fn by_horner(z: T) -> Self {
-        let (mut f6, mut f7) = (T::zero(), T::zero());
+        let mut f6 = T::zero();
+        let mut f7 = T::zero();
         for k in (0..TERMS).rev() {
             f6 = T::constant(RECIPROCAL_FACTORIAL[2 * k + 6]) - z * f6;
             f7 = T::constant(RECIPROCAL_FACTORIAL[2 * k + 7]) - z * f7;
         }
         let down = |m: usize, above: T| T::constant(RECIPROCAL_FACTORIAL[m]) - z * above;
-        let (f5, f4) = (down(5, f7), down(4, f6));
-        let (f3, f2) = (down(3, f5), down(2, f4));
-        let (f1, f0) = (down(1, f3), down(0, f2));
+        let f5 = down(5, f7);
+        let f4 = down(4, f6);
+        let f3 = down(3, f5);
+        let f2 = down(2, f4);
+        let f1 = down(1, f3);
+        let f0 = down(0, f2);
         Self([f0, f1, f2, f3, f4, f5, f6, f7])
     }
 
-    /// Quarters the argument until the series serves, then doubles the angle again: exact relations between
-    /// entire functions, so a Newton iterate may land anywhere, beyond 2 pi too.
+    /// Quarters the argument until the series can be summed, then doubles the angle again by exact
+    /// relations between entire functions: an iterate of Newton's method may have any angle, also
+    /// beyond 2 pi.
     #[cold]
     fn by_doubling(z: T) -> Self {
         let quarter = |z: T| z.above(LARGEST_ARGUMENT, z * 0.25, z);
@@ -77,12 +86,12 @@ impl<T: Real> Series<T> {
         f
     }
 
-    /// `doubled` where the argument is too large for the series.
+    /// `doubled` if the argument is too large for the series, otherwise `f`; lane by lane.
     fn chosen(argument: T, doubled: Self, f: Self) -> Self {
         Self(std::array::from_fn(|m| argument.above(LARGEST_ARGUMENT, doubled.0[m], f.0[m])))
     }
 
-    /// The functions at four times the argument, which is `z`.
+    /// The functions at `z`, from these at z/4.
     fn doubled(self, z: T) -> Self {
         let [f0, f1, f2, f3, f4, f5, ..] = self.0;
         let g0 = f0 * f0 * 2.0 - T::one();
@@ -113,7 +122,7 @@ impl<T: Real> Series<T> {
     }
 }
 
-/// c1 … c5 of (A2), and d1 … d3 = c1'/psi … c3'/psi of (A9).
+/// Coefficients c1 … c5 of (A2), and d1 … d3 = c1'/psi … c3'/psi of (A9), in Makinen 2007.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
 pub struct Coefficients<T> {

@@ -1,16 +1,16 @@
-//! Long lists of which the first digits are enough, in half the memory.
+//! Long lists of numbers to six digits, in half the memory.
 
 use crate::threads;
 
-/// Vectors of N numbers with six digits each: what is only compared or guessed with, never what results are made of.
+/// Vectors of N numbers with six digits each. They serve comparisons and predictors, never results.
 #[derive(Clone, Debug, Default)]
 pub struct CompressedField<const N: usize> {
-    /// The upper half of each number: sign, exponent and twenty bits
+    /// The upper half of each number: sign, exponent and the first twenty bits of the mantissa
     vectors: Vec<[u32; N]>,
 }
 
 impl<const N: usize> CompressedField<N> {
-    /// Takes so many vectors over what was there, into the memory that it has.
+    /// Replaces the contents by `count` vectors, in the memory that is already allocated.
     #[inline]
     pub fn take(&mut self, count: usize, vector: impl Fn(usize) -> [f64; N] + Send + Sync) {
         self.vectors.resize(count, [0; N]);
@@ -19,30 +19,30 @@ impl<const N: usize> CompressedField<N> {
         });
     }
 
-    /// Forgets all of them.
+    /// Removes all vectors.
     pub fn clear(&mut self) {
         self.vectors.clear();
     }
 
-    /// How many there are.
+    /// The number of vectors.
     pub fn len(&self) -> usize {
         self.vectors.len()
     }
 
-    /// Whether there is none.
+    /// True if there are no vectors.
     pub fn is_empty(&self) -> bool {
         self.vectors.is_empty()
     }
 
-    /// One of them.
+    /// Vector `k`, to six digits.
     #[inline(always)]
     pub fn get(&self, k: usize) -> [f64; N] {
         self.vectors[k].map(|half| f64::from_bits(u64::from(half) << 32))
     }
 }
 
-/// The upper 32 bits. What is cut off makes a number smaller by a millionth of it at most, of numbers below 1e-307 by 2e-314; infinities stay
-/// what they are, and what arithmetic gives instead of a number stays none.
+/// The upper 32 bits of a number. Cutting off the others makes it smaller by at most a millionth of
+/// itself, or by 2e-314 for numbers below 1e-307; infinities and NaN stay such.
 #[inline(always)]
 fn upper_half(number: f64) -> u32 {
     (number.to_bits() >> 32) as u32

@@ -1,21 +1,24 @@
-//! A number with its first two derivatives over time, through any kernel.
+//! A number with its first two derivatives over time: a scalar that carries rates through any
+//! kernel.
 
 use super::Real;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A function of time near an instant, up to the second order: what is computed from jets comes with its rates.
+/// A function of time near an instant, to second order: results computed from jets have their rates
+/// with them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jet {
     /// The value
     pub value: f64,
-    /// Its first derivative
+    /// The first derivative over time
     pub rate: f64,
-    /// Its second derivative
+    /// The second derivative over time
     pub rate2: f64,
 }
 
 impl Jet {
-    /// A function of `self` whose value and first two derivatives are these.
+    /// The composition with a function whose value is `f`, first derivative `slope` and second
+    /// derivative `bend` at this value.
     fn through(self, f: f64, slope: f64, bend: f64) -> Self {
         Self { value: f, rate: slope * self.rate, rate2: slope * self.rate2 + bend * self.rate * self.rate }
     }
@@ -92,7 +95,8 @@ impl Real for Jet {
 
     fn atan2(self, x: Self) -> Self {
         // d atan2(y, x) = (x dy - y dx) / (x^2 + y^2)
-        let (y, square) = (self, self.value * self.value + x.value * x.value);
+        let y = self;
+        let square = self.value * self.value + x.value * x.value;
         let turn = x.value * y.rate - y.value * x.rate;
         let turn_rate = x.value * y.rate2 - y.value * x.rate2;
         let growth = 2.0 * (x.value * x.rate + y.value * y.rate);

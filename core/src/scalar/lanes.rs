@@ -1,13 +1,13 @@
-//! Several elements side by side: one number of each in every operation.
+//! Lanes: several elements side by side, one number of each in every operation.
 //!
-//! Lanes know nothing of each other, so that what an element gives does not depend on who stands beside it; and the same
-//! operations are done, in the same order, whatever instructions carry them out.
+//! No operation mixes lanes, so that the results of an element do not depend on the elements beside
+//! it. Operations and their order are equal on every instruction set.
 
 use super::Real;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::sync::OnceLock;
 
-/// Elements side by side: what an AVX2 register holds.
+/// The number of elements side by side: the numbers in an AVX2 register.
 pub const LANES: usize = 4;
 
 /// One number of each element.
@@ -15,7 +15,8 @@ pub const LANES: usize = 4;
 #[repr(align(32))]
 pub struct Lanes(pub [f64; LANES]);
 
-/// What `f` is for each lane, written out: no closure that may stay outside of a kernel, no index that may be out of bounds.
+/// The array of f(k) for each lane k, written out: no closure that the compiler may leave outside
+/// of a kernel, no bounds checks.
 macro_rules! each_lane {
     (|$k:ident| $f:expr) => {
         [
@@ -40,7 +41,7 @@ macro_rules! each_lane {
 }
 pub(crate) use each_lane;
 
-/// One field of several elements side by side.
+/// Packs a field of several elements into lanes.
 macro_rules! pack {
     ($of:ident.$($field:tt)+) => {
         $crate::scalar::Pack::pack($crate::scalar::each_lane!(|k| &$of[k].$($field)+))
@@ -136,12 +137,12 @@ impl Real for Lanes {
     }
 }
 
-/// What can be put side by side.
+/// Data of elements that can be packed into lanes.
 pub trait Pack: Sized {
-    /// The same with lanes for numbers
+    /// The data of several elements, with lanes for numbers
     type Packed: Copy;
 
-    /// One of each element.
+    /// Packs the data of several elements, lane by lane.
     fn pack(of: [&Self; LANES]) -> Self::Packed;
 }
 
@@ -176,7 +177,7 @@ impl<A: Pack, B: Pack> Pack for (A, B) {
     }
 }
 
-/// Beside others that are there, an absent one is nothing.
+/// `None` if all lanes are; otherwise an absent value counts as the default, zero.
 impl<A: Pack + Default> Pack for Option<A> {
     type Packed = Option<A::Packed>;
 
@@ -190,18 +191,18 @@ impl<A: Pack + Default> Pack for Option<A> {
     }
 }
 
-/// The instructions that lanes run on.
+/// The instruction set that lanes run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
-    /// What every machine of its kind has
+    /// The instruction set that every machine of this architecture has
     Baseline,
-    /// 256-bit registers
+    /// AVX2 on x86-64: 256-bit registers
     Avx2,
 }
 
 impl Instructions {
-    /// The most that this machine has, unless the environment variable `BEAMSIM_INSTRUCTIONS` asks for the `baseline`. Results
-    /// do not depend on it.
+    /// The widest instruction set of this machine, or the baseline if the environment variable
+    /// `BEAMSIM_INSTRUCTIONS` is `baseline`. Results do not depend on it.
     pub fn here() -> Self {
         static HERE: OnceLock<Instructions> = OnceLock::new();
         *HERE.get_or_init(|| match std::env::var("BEAMSIM_INSTRUCTIONS") {
@@ -217,7 +218,8 @@ impl Instructions {
         if pulp::x86::V3::is_available() { Self::Avx2 } else { Self::Baseline }
     }
 
-    /// Runs `work`, compiled for these instructions; everything in it that is `#[inline(always)]` is too.
+    /// Runs `work`, compiled for this instruction set together with everything in it that is
+    /// `#[inline(always)]`.
     #[inline(always)]
     pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
         match pulp::x86::V3::try_new() {
@@ -226,7 +228,8 @@ impl Instructions {
         }
     }
 
-    /// The same for work on elements side by side; `None` where that is not worth it, since two numbers fill a register.
+    /// Runs work on lanes, compiled for this instruction set; `None` on the baseline, whose
+    /// registers of two numbers make lanes no faster than single elements.
     #[inline(always)]
     pub fn run_side_by_side<R>(self, work: impl FnOnce() -> R) -> Option<R> {
         match pulp::x86::V3::try_new() {
@@ -247,7 +250,7 @@ impl Instructions {
         work()
     }
 
-    /// Work on elements side by side is not worth it, as far as that has been measured.
+    /// `None`: on this architecture lanes have not been measured to be faster than single elements.
     pub fn run_side_by_side<R>(self, _work: impl FnOnce() -> R) -> Option<R> {
         None
     }

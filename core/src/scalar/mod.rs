@@ -1,5 +1,5 @@
-//! The scalar of the kernels: `f64` in a run, dual numbers in the tests that hold every tangent
-//! against automatic differentiation, lanes of several elements where speed asks for it.
+//! Scalars of the kernels: `f64` or lanes of several elements in a run, dual numbers in the tests
+//! that compare every tangent with automatic differentiation.
 
 mod compressed_field;
 mod jet;
@@ -12,8 +12,8 @@ pub(crate) use lanes::{each_lane, pack};
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// What a kernel may ask of a number. Only operations that IEEE 754 rounds exactly, so that a history does
-/// not depend on the machine: no fused multiply-add, no function of the platform's `libm`.
+/// A scalar of the kernels. It has only operations that IEEE 754 rounds exactly, so that results
+/// do not depend on the machine: no fused multiply-add, no function of the platform's `libm`.
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -31,13 +31,15 @@ pub trait Real:
     /// The square root.
     fn sqrt(self) -> Self;
 
-    /// The angle in (-pi, pi] whose tangent is `self` / `x`, by the sign of both.
+    /// The angle in (-pi, pi], radians, whose tangent is `self` / `x`, in the quadrant of the signs
+    /// of both.
     fn atan2(self, x: Self) -> Self;
 
-    /// The value itself; of several lanes the largest. It may tell whether an algorithm is needed at all, never enter a result.
+    /// The value itself, or the largest one of lanes. It may decide if an algorithm is needed, but
+    /// must not enter a result.
     fn largest(self) -> f64;
 
-    /// `then` where the value is above `limit`, else `otherwise`; each lane for itself.
+    /// `then` if the value is above `limit`, otherwise `otherwise`; lane by lane.
     fn above(self, limit: f64, then: Self, otherwise: Self) -> Self;
 
     /// Zero.

@@ -24,7 +24,8 @@ pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, E
 pub struct BeamElasticity<I> {
     /// The elements
     pub elements: ElasticElements,
-    /// The stress that geometric parts of the tangent are formed with, where that is not the scene's: none
+    /// The stress that geometric parts of the tangent are formed with, where that is not the
+    /// scene's: none
     unstressed: Option<Vec<[f64; 6]>>,
     way: PhantomData<I>,
 }
@@ -43,7 +44,8 @@ impl<I: Interpolation> BeamElasticity<I> {
 
     /// The integration points of the elements before this one.
     pub(super) fn points_before(&self, element: usize) -> usize {
-        let (two, three) = (self.elements.two.len(), self.elements.three.len());
+        let two = self.elements.two.len();
+        let three = self.elements.three.len();
         element + element.saturating_sub(two) + element.saturating_sub(two + three)
     }
 
@@ -59,8 +61,8 @@ impl<I: Interpolation> BeamElasticity<I> {
 
 /// Strain and stress in beam elements, however they interpolate.
 pub trait StressField: Send + Sync {
-    /// Strain and stress (material, global components) at the integration points of an element; `None` where it is not
-    /// one of these.
+    /// Strain and stress (material, global components) at the integration points of an element;
+    /// `None` where it is not one of these.
     fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>>;
 }
 
@@ -212,10 +214,12 @@ impl<I: Interpolation> Driven for BeamElasticity<I> {
     }
 }
 
-/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the stiffness against bending by 1e-7 of itself.
+/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the
+/// stiffness against bending by 1e-7 of itself.
 const UNSTRAINED: f64 = 1e-14;
 
-/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000 elements they add up to 1e-8.
+/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000
+/// elements they add up to 1e-8.
 const UNBENT: f64 = 1e-12;
 
 /// The largest round-off of the forces of some elements.
@@ -229,8 +233,8 @@ fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: 
     largest
 }
 
-/// Adds the elements of one order, `first` instances after the first one of the effect; `remembered` are the stresses of
-/// geometric parts.
+/// Adds the elements of one order, `first` instances after the first one of the effect;
+/// `remembered` are the stresses of geometric parts.
 #[inline(always)]
 fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
@@ -271,8 +275,8 @@ pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> 
     Some(std::array::from_fn(|g| unpack(&own[g])))
 }
 
-/// The points of an element, or of several side by side, with the stresses that geometric parts are formed with where these are
-/// not the present ones.
+/// The points of an element, or of several side by side, with the stresses that geometric parts are
+/// formed with where these are not the present ones.
 struct Sum<const N: usize, const G: usize, T> {
     points: [ElasticPoint<N, T>; G],
     stresses: Option<[Stress<T>; G]>,
@@ -434,7 +438,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// Strain and stress at each integration point (material, global components).
     pub fn strains_and_stresses<I: Interpolation>(&self, at: &State) -> [(Strain, Stress); G] {
-        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
+        let view = I::see(self.member(), at);
+        let free = self.free_amplitude(at);
         self.points().map(|point| point.strain_and_stress(view.nodes(), free))
     }
 
@@ -445,7 +450,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
 
     /// The largest |dGamma| or |dK| length that increments of the unknowns make.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
-        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
+        let view = I::see(self.member(), at);
+        let change = I::variation(self.member(), at, field);
         let at_point = |point: &ElasticPoint<N>| {
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
             strain.gamma.norm().max(strain.kappa.norm() * length)
@@ -453,10 +459,13 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         self.points().iter().map(at_point).fold(0.0, f64::max)
     }
 
-    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None` where the element is stressed.
+    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None`
+    /// where the element is stressed.
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
-        let (view, change) = (I::see(self.member(), at), I::variation(self.member(), at, field));
-        let (free, length) = (self.free_amplitude(at), self.points().iter().map(|point| point.weight).sum::<f64>());
+        let view = I::see(self.member(), at);
+        let change = I::variation(self.member(), at, field);
+        let free = self.free_amplitude(at);
+        let length = self.points().iter().map(|point| point.weight).sum::<f64>();
         let at_point = |point: &ElasticPoint<N>| {
             let elastic = point.elastic_strain(view.nodes(), free);
             if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
@@ -488,7 +497,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     /// The stress that each point is expected to have after the correction `dq`.
     #[inline(never)]
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
-        let (view, free) = (I::see(self.member(), at), self.free_amplitude(at));
+        let view = I::see(self.member(), at);
+        let free = self.free_amplitude(at);
         let (du, dp) = self.connection.variations_in_one_chart(at, dq);
         let stresses = view.extrapolated(&self.points(), free, &du, &dp);
         out.iter_mut().zip(&stresses).for_each(|(remembered, stress)| *remembered = packed(stress));

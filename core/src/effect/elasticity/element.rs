@@ -8,7 +8,8 @@ use crate::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The law of all sections. It is one type, so that elements of different sections stand side by side in lanes.
+/// The law of all sections. It is one type, so that elements of different sections stand side by
+/// side in lanes.
 pub type BeamLaw<T = f64> = Linear<T>;
 
 /// An integration point of a beam.
@@ -21,8 +22,9 @@ pub struct ElasticElement<const N: usize, const G: usize> {
     pub connection: Connection<N>,
     /// The number of the amplitude of its free strain
     free: Option<u32>,
-    /// Its length over that of what it shares. Round-off makes all of them different, and had better do so: what it leaves of stiffnesses that are
-    /// none would add up otherwise, and pass for one.
+    /// Its length over that of what it shares. Round-off makes all of them different, and had
+    /// better do so: what it leaves of stiffnesses that are none would add up otherwise, and pass
+    /// for one.
     length: f64,
     /// All else, for it and neighbours of the same length with the same sections in the same axes
     common: Arc<Common<N, G>>,
@@ -52,8 +54,9 @@ impl<const N: usize, const G: usize> Common<N, G> {
 }
 
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
-    /// So much longer than these arms from its first node and these points tell, and with the number of the amplitude of its free strain; it
-    /// shares with a neighbour what both have in common.
+    /// So much longer than these arms from its first node and these points tell, and with the
+    /// number of the amplitude of its free strain; it shares with a neighbour what both have in
+    /// common.
     pub fn new(
         connection: Connection<N>,
         length: f64,
@@ -85,8 +88,9 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         Member { connection: &self.connection, arms: self.common.arms.map(|arm| arm * self.length) }
     }
 
-    /// Shows what round-off may leave of the force of each point, where displacements are at most `u`: these and rotations carry a relative
-    /// error of one unit in the last place; strains divide it by the element's length, and stiff sections multiply it.
+    /// Shows what round-off may leave of the force of each point, where displacements are at most
+    /// `u`: these and rotations carry a relative error of one unit in the last place; strains
+    /// divide it by the element's length, and stiff sections multiply it.
     #[inline]
     pub fn each_noise(&self, u: f64, mut show: impl FnMut(RoundOff)) {
         for (point, rounding) in self.common.points.iter().zip(&self.common.rounding) {

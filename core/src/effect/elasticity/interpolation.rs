@@ -1,5 +1,5 @@
-//! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and carries what the kernel
-//! gives back to the nodes of the scene.
+//! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and
+//! carries what the kernel gives back to the nodes of the scene.
 
 use super::element::{ElasticPoint, Member};
 use crate::effect::{Connection, after_displacement, at_slots};
@@ -11,7 +11,8 @@ use crate::scalar::{LANES, Lanes, Pack, Real, each_lane, pack};
 use crate::system::{Assembler, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// Where the nodes of an element are, or those of several elements side by side; rotation vectors all in one chart.
+/// Where the nodes of an element are, or those of several elements side by side; rotation vectors
+/// all in one chart.
 pub struct Posture<const N: usize, T = f64> {
     /// Where they started, as seen from the first
     pub arms: [Vec3<T>; N],
@@ -27,7 +28,8 @@ impl<const N: usize> Posture<N> {
     /// Of an element whose nodes move so.
     #[inline(always)]
     pub fn new(member: Member<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
-        let (u, p) = (nodes.map(|node| node.u), nodes.map(|node| node.p));
+        let u = nodes.map(|node| node.u);
+        let p = nodes.map(|node| node.p);
         let base = || std::array::from_fn(|i| base_of(member.connection, i, at));
         Self { arms: member.arms, u, p, base: (!at.turns.is_empty()).then(base) }
     }
@@ -72,7 +74,8 @@ pub trait PointSum<const N: usize, T: Real> {
     /// Adds the forces that geometric parts are formed with; `false` where they are those of `add`.
     fn add_geometric(&self, nodes: &[NodePlace<T>; N], out: &mut ElementSystem<T>) -> bool;
 
-    /// The elastic point half way between two nodes, where it is all there is: for it the way is short.
+    /// The elastic point half way between two nodes, where it is all there is: for it the way is
+    /// short.
     fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
         None
     }
@@ -83,7 +86,8 @@ pub const fn is_half_way(nodes: usize, points: usize) -> bool {
     nodes == 2 && points == 1
 }
 
-/// An elastic point with the amplitude of its free strain, and the stress of its geometric part where that is not the present one.
+/// An elastic point with the amplitude of its free strain, and the stress of its geometric part
+/// where that is not the present one.
 pub struct HalfWay<'a, const N: usize, T> {
     /// The point
     pub point: &'a ElasticPoint<N, T>,
@@ -134,7 +138,8 @@ pub trait View<const N: usize, T: Real> {
     /// How these vary with displacements and rotation vectors.
     fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N];
 
-    /// Adds up the points, and puts what they give, carried back to the nodes of the scene, in the place of what stands in `out`.
+    /// Adds up the points, and puts what they give, carried back to the nodes of the scene, in the
+    /// place of what stands in `out`.
     fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>);
 
     /// The stresses that variations of displacements and rotation vectors are expected to lead to.
@@ -162,7 +167,8 @@ fn extrapolated<const N: usize, const G: usize, T: Real>(
     du: &[Vec3<T>; N],
     dp: &[Vec3<T>; N],
 ) -> [Stress<T>; G] {
-    let (nodes, change) = (view.nodes(), view.variation(du, dp));
+    let nodes = view.nodes();
+    let change = view.variation(du, dp);
     let mut out = [Stress { n: Vec3::zero(), m: Vec3::zero() }; G];
     for g in 0..G {
         out[g] = points[g].extrapolated_stress(nodes, free, |i| change[i].0, |i| change[i].1);
@@ -176,7 +182,8 @@ pub trait Interpolation: Send + Sync + 'static {
     const NAME: &'static str;
     /// The name of their damping by strain rates
     const DAMPING_NAME: &'static str;
-    /// Forces and tangents of the kernel are carried back to other nodes, which takes systems to work in
+    /// Forces and tangents of the kernel are carried back to other nodes, which takes systems to
+    /// work in
     const CARRIES_BACK: bool;
     /// An element as its kernel sees it
     type View<const N: usize, T: Real>: View<N, T>;
@@ -195,7 +202,8 @@ pub trait Interpolation: Send + Sync + 'static {
         Self::see(member, at).variation(&du, &dp)
     }
 
-    /// The sum over an element's points, carried back to the nodes of the scene and to their charts.
+    /// The sum over an element's points, carried back to the nodes of the scene and to their
+    /// charts.
     #[inline(never)]
     fn evaluate<const N: usize, K: PointSum<N, f64>>(
         member: Member<N>,
@@ -225,7 +233,8 @@ impl Interpolation for TotalVectors {
     type View<const N: usize, T: Real> = AsItIs<N, T>;
 }
 
-/// Rotations relative to a frame that turns with the element: strains do not notice rigid rotations, and charts do not matter.
+/// Rotations relative to a frame that turns with the element: strains do not notice rigid
+/// rotations, and charts do not matter.
 #[derive(Clone, Copy, Debug)]
 pub struct RelativeVectors;
 
@@ -246,7 +255,8 @@ impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
     fn new(posture: &Posture<N, T>) -> Self {
         let mut nodes = [NodePlace::rest(); N];
         for i in 0..N {
-            (nodes[i].u, nodes[i].p) = (posture.u[i], posture.p[i]);
+            nodes[i].u = posture.u[i];
+            nodes[i].p = posture.p[i];
         }
         Self { nodes }
     }

@@ -1,4 +1,5 @@
-//! Beams as elastic bodies: their stresses, interpolated in two ways, and the damping of strain rates.
+//! Beams as elastic bodies: their stresses, interpolated in two ways, and the damping of strain
+//! rates.
 
 mod beam;
 mod element;

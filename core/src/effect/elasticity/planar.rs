@@ -1,4 +1,5 @@
-//! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a node.
+//! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a
+//! node.
 
 use super::beam::{BeamElasticity, stresses_of, workspace};
 use super::element::{BeamLaw, ElasticElement};
@@ -13,8 +14,8 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// The elements of an effect in space, side by side in their order. Where axes are turned in the plane, or nodes sit in
-/// different charts, the effect in space does the work.
+/// The elements of an effect in space, side by side in their order. Where axes are turned in the
+/// plane, or nodes sit in different charts, the effect in space does the work.
 pub struct PlanarElasticity<I> {
     plane: Plane,
     spatial: Arc<BeamElasticity<I>>,
@@ -69,7 +70,8 @@ impl<const N: usize, const G: usize> Block<N, G> {
         let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
         let mut out = [PlanarNode { u: [Lanes::zero(); 2], angle: Lanes::zero() }; N];
         for i in 0..N {
-            let (u, p) = (at_slots(field, self.u[i]), at_slots(field, self.p[i]));
+            let u = at_slots(field, self.u[i]);
+            let p = at_slots(field, self.p[i]);
             out[i] = PlanarNode { u: [along(u, a), along(u, b)], angle: along(p, e) };
         }
         out
@@ -82,7 +84,8 @@ fn free<const N: usize, const G: usize>(elements: &[ElasticElement<N, G>], at: &
     Lanes(each_lane!(|k| elements[k.min(elements.len() - 1)].free_amplitude(at)))
 }
 
-/// The stresses that geometric parts are formed with, of the point with this number in each element.
+/// The stresses that geometric parts are formed with, of the point with this number in each
+/// element.
 #[inline(always)]
 fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> PlanarStress<Lanes> {
     let last = memory.len() / G - 1;
@@ -107,13 +110,17 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Assembler,
 ) {
-    let (stiffness, mut alone, mut system) = (weights.stiffness, None, PlanarSystem::zero());
+    let stiffness = weights.stiffness;
+    let mut alone = None;
+    let mut system = PlanarSystem::zero();
     for number in own_blocks(first, batch.len(), out) {
-        let (block, start) = (&blocks[number], number * LANES);
+        let block = &blocks[number];
+        let start = number * LANES;
         let elements = &batch[start..batch.len().min(start + LANES)];
         let mut nodes = block.nodes(&at.q, plane);
         in_one_turn(&mut nodes);
-        let (free, own) = (free(elements, at), memory.get(start * G..).filter(|own| !own.is_empty()));
+        let free = free(elements, at);
+        let own = memory.get(start * G..).filter(|own| !own.is_empty());
         system.clear_for(stiffness);
         for g in 0..G {
             let geometric = own.map(|own| remembered::<G>(own, g, plane));
@@ -156,7 +163,8 @@ fn extrapolate_blocks<const N: usize, const G: usize>(
     for (number, block) in blocks.iter().enumerate() {
         let start = number * LANES;
         let elements = &batch[start..batch.len().min(start + LANES)];
-        let (mut nodes, change) = (block.nodes(&at.q, plane), block.nodes(dq, plane));
+        let mut nodes = block.nodes(&at.q, plane);
+        let change = block.nodes(dq, plane);
         in_one_turn(&mut nodes);
         for g in 0..G {
             let stress = block.points[g].extrapolated_stress(&nodes, free(elements, at), &change);
@@ -174,8 +182,11 @@ impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
     }
 
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler) {
-        let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
-        let (two, three) = (elements.two.len(), elements.three.len());
+        let elements = &self.spatial.elements;
+        let blocks = &self.blocks;
+        let plane = &self.plane;
+        let two = elements.two.len();
+        let three = elements.three.len();
         let known = |first: usize| {
             let points = self.spatial.points_before(first);
             self.spatial.remembered(memory).get(points..).unwrap_or_default()
@@ -192,7 +203,9 @@ impl<I: Interpolation> PlanarForm for PlanarElasticity<I> {
     }
 
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory) {
-        let (elements, blocks, plane) = (&self.spatial.elements, &self.blocks, &self.plane);
+        let elements = &self.spatial.elements;
+        let blocks = &self.blocks;
+        let plane = &self.plane;
         let (two, rest) = memory.points.split_at_mut(elements.two.len());
         let (three, four) = rest.split_at_mut(2 * elements.three.len());
         extrapolate_batch(plane, &blocks.two, &elements.two, at, dq, two);

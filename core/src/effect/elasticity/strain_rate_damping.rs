@@ -1,5 +1,5 @@
-//! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so that rigid motion is not
-//! damped. C is the stiffness of the section at rest.
+//! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so
+//! that rigid motion is not damped. C is the stiffness of the section at rest.
 //!
 //! With b_k = w dE_k/dq for each strain component E_k of a point of weight w, and G_k = db_k/dq:
 //!
@@ -8,8 +8,9 @@
 //! df/dqd = sum b_k (beta C / w)_kl b_l,   df/dq = sum s_k G_k + sum b_k (beta C / w)_kl (G_l qd)
 //! ```
 //!
-//! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s, whatever its interpolation. b_k is
-//! its force under a unit stress, and G_k qd the rate of that: a jet along the motion brings both.
+//! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s,
+//! whatever its interpolation. b_k is its force under a unit stress, and G_k qd the rate of that: a
+//! jet along the motion brings both.
 
 use super::beam::BeamElasticity;
 use super::element::{ElasticElement, ElasticPoint, Member};
@@ -124,7 +125,8 @@ impl<const N: usize> Motion<N> {
         }
     }
 
-    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the derivative over the rate of the state.
+    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the
+    /// derivative over the rate of the state.
     fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
         if block.is_multiple_of(2) { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }
@@ -170,7 +172,8 @@ impl<const N: usize> Motion<N> {
         points: &[ElasticPoint<N>; G],
         factor: f64,
     ) -> [Stress; G] {
-        let (nodes, rates) = (view.nodes(), view.variation(&self.displacements, &self.rotations.map(|of| of.rate)));
+        let nodes = view.nodes();
+        let rates = view.variation(&self.displacements, &self.rotations.map(|of| of.rate));
         std::array::from_fn(|g| {
             let place = points[g].configuration(nodes);
             let rate = points[g].strain_variation(&place, |i| rates[i].0, |i| rates[i].1);
@@ -256,7 +259,8 @@ impl Strains {
         let blocks = std::array::from_fn(|component| {
             moving.fill(&UnitStress { point, place: &place, component }, 0.0, scratch, system);
             let block = |(b, moved): (usize, &[Jet; 3])| {
-                let (force, bent) = (Vec3(moved.map(|jet| jet.value)), Vec3(moved.map(|jet| jet.rate)));
+                let force = Vec3(moved.map(|jet| jet.value));
+                let bent = Vec3(moved.map(|jet| jet.rate));
                 let (over_rate, lost) = motion.pull_back(b, force);
                 StrainBlock { force, over_rate, over_unknown: lost + bent }
             };
@@ -273,8 +277,10 @@ impl Strains {
                 let block = self.blocks[component][column];
                 (block.over_rate * weights.damping + block.over_unknown * weights.stiffness) * factor
             };
-            let (gamma, kappa) = (Mat3([over(0).0, over(1).0, over(2).0]), Mat3([over(3).0, over(4).0, over(5).0]));
-            let (mut n, mut m) = (stiffness.cn * gamma, stiffness.cm * kappa);
+            let gamma = Mat3([over(0).0, over(1).0, over(2).0]);
+            let kappa = Mat3([over(3).0, over(4).0, over(5).0]);
+            let mut n = stiffness.cn * gamma;
+            let mut m = stiffness.cm * kappa;
             if let Some(coupling) = stiffness.cc {
                 n += coupling * kappa;
                 m += coupling.transpose_matmul(gamma);

@@ -1,4 +1,5 @@
-//! Translational inertia of beams without eccentric mass: consistent mass matrices, which never change and know no charts.
+//! Translational inertia of beams without eccentric mass: consistent mass matrices, which never
+//! change and know no charts.
 
 use crate::effect::volume::{VolumeElement, VolumeElements};
 use crate::effect::{AT_ONCE, ByOrder, Effect, Energy, Masses, Momentum, Roles, TangentForm, for_each_batch, shared};
@@ -183,8 +184,10 @@ mod tests {
 
     /// Spins an element about a pivot beside it, as a rigid body.
     fn spins<const N: usize>(elements: &VolumeElements<f64>) {
-        let (mass, mut state) = (BeamMass::new(elements), State::rest(2 * N, 1, 0, 0));
-        let (spin, pivot) = (Vec3([0.3, -0.7, 1.1]), Vec3([0.5, -2.0, 0.0]));
+        let mass = BeamMass::new(elements);
+        let mut state = State::rest(2 * N, 1, 0, 0);
+        let spin = Vec3([0.3, -0.7, 1.1]);
+        let pivot = Vec3([0.5, -2.0, 0.0]);
         for i in 0..N {
             let place = Vec3([LENGTH * i as f64 / (N - 1) as f64, 0.0, 0.0]);
             state.v[2 * i] = spin.cross(place - pivot);

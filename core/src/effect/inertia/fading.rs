@@ -1,9 +1,11 @@
-//! Forces of inertia and damping of a structure that a static stage finds in motion: they fade with its load factor.
+//! Forces of inertia and damping of a structure that a static stage finds in motion: they fade with
+//! its load factor.
 //!
-//! A static stage knows no inertia. Where it follows a dynamic one the state that it begins with is out of balance by all that inertia and
-//! damping carried, and no smaller load level would bring balance nearer. So the stage begins in balance with these forces, and takes them
-//! away from load factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that this had: they have a
-//! potential, and their tangent is zero until the chart changes.
+//! A static stage knows no inertia. Where it follows a dynamic one the state that it begins with is
+//! out of balance by all that inertia and damping carried, and no smaller load level would bring
+//! balance nearer. So the stage begins in balance with these forces, and takes them away from load
+//! factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that
+//! this had: they have a potential, and their tangent is zero until the chart changes.
 
 use crate::effect::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::load::force_on_complement;
@@ -51,7 +53,8 @@ impl Effect for FadingInertia {
         if at.fading.is_empty() {
             return;
         }
-        let (share, mut system) = (1.0 - at.load, ElementSystem::new(1));
+        let share = 1.0 - at.load;
+        let mut system = ElementSystem::new(1);
         for k in own_part(0, self.slots.len(), &out.instances()) {
             let (slot, turns) = self.slots[k];
             let (force, tangent) = fading_force(&at.fading[slot as usize], turns, at.q[slot as usize]);
@@ -88,9 +91,11 @@ mod tests {
     #[test]
     fn a_change_of_chart_changes_no_work() {
         let fading = Fading { force: Vec3([1.0, -2.0, 0.5]), at: Vec3([0.2, 2.9, 0.3]) };
-        let (p, increment) = (Vec3([0.3, 3.2, 0.4]), Vec3([1e-6, 2e-6, -3e-6]));
+        let p = Vec3([0.3, 3.2, 0.4]);
+        let increment = Vec3([1e-6, 2e-6, -3e-6]);
         let work = |from: Vec3, to: Vec3| fading_force(&fading, true, from).0.dot(to - from);
-        let (near, far) = (work(p, p + increment), work(complement(p), complement(p + increment)));
+        let near = work(p, p + increment);
+        let far = work(complement(p), complement(p + increment));
         assert!((near - far).abs() < 1e-11 && near.abs() > 1e-6, "{near} {far}");
         assert_eq!(fading_force(&fading, true, Vec3::ZERO), (fading.force, Mat3::ZERO));
         assert_eq!(fading_force(&fading, false, complement(p)), (fading.force, Mat3::ZERO));

@@ -1,4 +1,5 @@
-//! Mass of beams and bodies: inertia at rest and in rotating frames, the damping that goes with mass, and inertia that fades.
+//! Mass of beams and bodies: inertia at rest and in rotating frames, the damping that goes with
+//! mass, and inertia that fades.
 
 mod beam_mass;
 mod fading;

@@ -40,14 +40,17 @@ impl PlanarBodies {
 
     #[inline(always)]
     fn add_side_by_side(&self, at: &State, weights: Weights, out: &mut Assembler) {
-        let (plane, bodies) = (&self.plane, &self.spatial.bodies);
+        let plane = &self.plane;
+        let bodies = &self.spatial.bodies;
         let normal = plane.normal();
         let along = |v: Vec3<Lanes>, axis: Vec3| v.0[0] * axis.0[0] + v.0[1] * axis.0[1] + v.0[2] * axis.0[2];
         let in_plane = |v: Vec3<Lanes>| [along(v, plane.axes().column(0)), along(v, plane.axes().column(1))];
         let gyroscopic = if self.spatial.gyroscopic { 1.0 } else { 0.0 };
-        let (mut alone, centred) = (None, are_centred(&bodies[out.instances()]));
+        let mut alone = None;
+        let centred = are_centred(&bodies[out.instances()]);
         for number in own_blocks(0, bodies.len(), out) {
-            let (block, first) = (&self.blocks[number], number * LANES);
+            let block = &self.blocks[number];
+            let first = number * LANES;
             let angle = along(at_slots(&at.q, block.p), normal);
             let spin = along(at_slots(&at.v, block.p), normal) * gyroscopic;
             let spin_rate = along(at_slots(&at.a, block.p), normal);

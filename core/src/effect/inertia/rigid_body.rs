@@ -21,11 +21,13 @@ pub struct Body {
     pub node: Node,
     /// The node's initial place
     pub place: Vec3,
-    /// Its mass properties about the node; those that neighbours along a beam have in common stand once.
+    /// Its mass properties about the node; those that neighbours along a beam have in common stand
+    /// once.
     pub inertia: Arc<Inertia>,
 }
 
-/// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at their nodes.
+/// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at
+/// their nodes.
 #[derive(Clone, Debug)]
 pub struct RigidBody {
     /// The effect's name
@@ -121,7 +123,8 @@ impl RigidBody {
         out: &mut Assembler,
     ) {
         let body = &self.bodies[k];
-        let (acceleration, spin) = (at.a[body.node.u as usize], at.spin(body.node.p));
+        let acceleration = at.a[body.node.u as usize];
+        let spin = at.spin(body.node.p);
         self.put(&body.inertia, centred, acceleration, spin, weights, system);
         out.add(k, system);
     }
@@ -129,7 +132,8 @@ impl RigidBody {
     #[inline(always)]
     fn add_side_by_side(&self, centred: bool, at: &State, weights: Weights, out: &mut Assembler) {
         let mut systems = out.lend(2, weights != Weights::NONE);
-        let (own, before) = (&self.bodies[out.instances()], out.instances().start);
+        let own = &self.bodies[out.instances()];
+        let before = out.instances().start;
         for first in (0..own.len()).step_by(LANES) {
             let bodies = side_by_side(own, first);
             let inertia = Inertia::pack(each_lane!(|k| &*bodies[k].inertia));
@@ -205,7 +209,8 @@ pub(super) fn kinetic<T: Real>(inertia: &Inertia<T>, motion: &NodeMotion<T>) -> 
 /// The momenta of `weight` times these mass properties at the node that started at `place`.
 pub(super) fn momentum(inertia: &Inertia, place: Vec3, motion: &NodeMotion, weight: f64) -> Momentum {
     let spin = Spin::new(motion.p, motion.p_rate, Vec3::ZERO);
-    let (r, m) = (spin.rotation.r, inertia.mass);
+    let r = spin.rotation.r;
+    let m = inertia.mass;
     let x = place + motion.u;
     let arm = r * inertia.offset;
     let linear = (motion.u_rate + r * spin.omega.cross(inertia.offset)) * m;

@@ -1,4 +1,5 @@
-//! Rotary inertia of beam sections without eccentric mass: mass, gyroscopic and centrifugal terms ((51), (52), (68)–(71)).
+//! Rotary inertia of beam sections without eccentric mass: mass, gyroscopic and centrifugal terms
+//! ((51), (52), (68)–(71)).
 
 use crate::effect::volume::VolumeElements;
 use crate::effect::{Effect, Energy, Masses, Momentum, Roles, TangentForm, quadratic};
@@ -9,7 +10,8 @@ use crate::rotation::Rotation;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// All beam elements whose sections have rotary inertia, by J per length in global components of the initial placement.
+/// All beam elements whose sections have rotary inertia, by J per length in global components of
+/// the initial placement.
 #[derive(Clone, Debug, Default)]
 pub struct RotaryInertia {
     /// The elements

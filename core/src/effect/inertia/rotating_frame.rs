@@ -1,4 +1,5 @@
-//! Inertia as seen from a frame that turns steadily: centrifugal and Coriolis forces, gyroscopic moments of sections.
+//! Inertia as seen from a frame that turns steadily: centrifugal and Coriolis forces, gyroscopic
+//! moments of sections.
 //!
 //! It stands for all inertia of its stage: of steady states, and of small motions about them.
 
@@ -65,7 +66,7 @@ impl Effect for RotatingFrame {
         for k in own_part(first, self.bodies.len(), &out.instances()) {
             let body = &self.bodies[k];
             let from_axis = body.place - self.about + at.q[body.node.u as usize];
-            let force = steadily_turned(&body.inertia, (spin, from_axis), &at.rotation(body.node.p), weights);
+            let force = steadily_turned(&body.inertia, spin, from_axis, &at.rotation(body.node.p), weights);
             force.write(weights, &mut system);
             out.add(first + k, &system);
         }

@@ -1,4 +1,5 @@
-//! Inertia of beam sections with a full 6x6 mass: the mass centre lies off the centre line, or J couples.
+//! Inertia of beam sections with a full 6x6 mass: the mass centre lies off the centre line, or J
+//! couples.
 
 use super::{inertia_mirror_data, rigid_body};
 use crate::effect::volume::VolumeElements;

@@ -33,8 +33,8 @@ pub fn nearest_angle(angle: f64) -> f64 {
 }
 
 impl Coordinate {
-    /// Adds the forces of a multiplier on this coordinate, their tangent, and the multiplier's own row and column, number `row` of its
-    /// block.
+    /// Adds the forces of a multiplier on this coordinate, their tangent, and the multiplier's own
+    /// row and column, number `row` of its block.
     pub fn add_multiplier(&self, multiplier: f64, factors: GapFactors, row: usize, out: &mut ElementSystem) {
         let mut unit = Vec3::ZERO;
         unit.0[row] = factors.multiplier;
@@ -75,10 +75,12 @@ impl Joint {
         }
     }
 
-    /// The angle atan2(s, c) between e_2 of A and of B, with c = (R_A e_2).(R_B e_2), s = -(R_A e_2).(R_B e_3):
+    /// The angle atan2(s, c) between e_2 of A and of B, with c = (R_A e_2).(R_B e_2), s = -(R_A
+    /// e_2).(R_B e_3):
     ///
     /// ```text
-    /// r^2 dx = c ds - s dc,   r^2 d2x = c d2s - s d2c + ds dc' - dc ds' - 2 dx (c dc' + s ds'),   r^2 = c^2 + s^2
+    /// r^2 dx = c ds - s dc,   r^2 = c^2 + s^2
+    /// r^2 d2x = c d2s - s d2c + ds dc' - dc ds' - 2 dx (c dc' + s ds')
     /// ```
     pub(super) fn angle_of(&self, ends: &[End; 2]) -> Coordinate {
         let e = |k: usize| self.axes.column(k);

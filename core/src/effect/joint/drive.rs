@@ -114,7 +114,8 @@ impl Joint {
         0.5 * stiffness * value * value
     }
 
-    /// By how much a field of increments changes the coordinate of its spring: radians, or a part of `length`; zero without a stiffness.
+    /// By how much a field of increments changes the coordinate of its spring: radians, or a part
+    /// of `length`; zero without a stiffness.
     pub(super) fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let Some((on, SpringDamper { stiffness, .. })) = self.spring() else { return 0.0 };
         if stiffness == 0.0 {

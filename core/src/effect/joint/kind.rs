@@ -1,5 +1,5 @@
-//! Kinds of joints, one row of data each. Nothing else in the code knows one kind from another: a new kind is a row here, and its word
-//! in the deck's JSON Schema.
+//! Kinds of joints, one row of data each. Nothing else in the code knows one kind from another: a
+//! new kind is a row here, and its word in the deck's JSON Schema.
 
 use std::fmt;
 
@@ -25,16 +25,19 @@ impl FreeCoordinate {
     }
 }
 
-/// A joint to ground that sits at its node, without arms: held components of the node's own unknowns do most of its work.
+/// A joint to ground that sits at its node, without arms: held components of the node's own
+/// unknowns do most of its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroundHold {
-    /// Held displacements along e_1, e_2, e_3 and held components of the rotation vector along these axes. Two held components make a hinge.
+    /// Held displacements along e_1, e_2, e_3 and held components of the rotation vector along
+    /// these axes. Two held components make a hinge.
     pub components: [bool; 6],
     /// Pairs that no held component keeps normal, and that need multipliers
     pub normal: &'static [NormalPair],
 }
 
-/// A kind of joint. The joint's axes are e_1, e_2, e_3; the deck gives none of them, e_1, or e_1 and e_2.
+/// A kind of joint. The joint's axes are e_1, e_2, e_3; the deck gives none of them, e_1, or e_1
+/// and e_2.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct JointKind {
     /// The deck's word
@@ -92,7 +95,8 @@ impl JointKind {
             word: "prismatic", axes: 1, held: ACROSS, normal: LOCKED, driven: Some(FreeCoordinate::Slide),
             ground: by_components([false, true, true, true, true, true]),
         },
-        // B slides along e_1 and turns about it. A drive would have to say on which of the two it acts: there is none.
+        // B slides along e_1 and turns about it. A drive would have to say on which of the two it
+        // acts: there is none.
         Self {
             word: "cylindrical", axes: 1, held: ACROSS, normal: HINGE, driven: None,
             ground: by_components([false, true, true, false, true, true]),

@@ -1,5 +1,6 @@
-//! Joints between two nodes, or a node and ground: multipliers close the gaps that a [kind](JointKind) keeps closed; see
-//! [`crate::kernel::joint`]. Springs, dampers and motors act on a free coordinate.
+//! Joints between two nodes, or a node and ground: multipliers close the gaps that a
+//! [kind](JointKind) keeps closed; see [`crate::kernel::joint`]. Springs, dampers and motors act on
+//! a free coordinate.
 
 mod coordinate;
 mod drive;
@@ -84,7 +85,8 @@ impl Joint {
         };
         std::array::from_fn(|k| match self.nodes[k] {
             Some(node) => {
-                let (u, p) = (node.u as usize, node.p as usize);
+                let u = node.u as usize;
+                let p = node.p as usize;
                 let place = jet(self.places[k] + at.q[u], at.v[u]);
                 End { place, rotation: Rotation::new(jet(at.q[p], at.v[p])) }
             }
@@ -166,8 +168,8 @@ impl Joint {
         Gaps { along, between }
     }
 
-    /// Puts forces, tangent and the rows of the multipliers in the place of what stands in `out`: u_A, P_A, u_B, P_B, and multipliers
-    /// along and between, see [`block`].
+    /// Puts forces, tangent and the rows of the multipliers in the place of what stands in `out`:
+    /// u_A, P_A, u_B, P_B, and multipliers along and between, see [`block`].
     pub fn system(&self, at: &State, weights: Weights, out: &mut ElementSystem) {
         out.clear();
         let ends = self.ends(at);

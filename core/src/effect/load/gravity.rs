@@ -10,7 +10,8 @@ use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
-/// The weight of all beams. Elements with their mass on the centre line need no rotation and no tangent.
+/// The weight of all beams. Elements with their mass on the centre line need no rotation and no
+/// tangent.
 #[derive(Clone, Debug)]
 pub struct BeamGravity {
     /// The acceleration of gravity

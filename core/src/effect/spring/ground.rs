@@ -1,8 +1,9 @@
 //! Springs from nodes to ground.
 //!
-//! A rotational spring acts on the rotation vector continued since the start (`State::unwrapped`): unwrapped up by two turns
-//! it pulls with 4 pi times its stiffness, and it does not notice when the node changes its chart. With the unwrapped vector
-//! Pw = P + 2 pi k n, D = dPw/dP and stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
+//! A rotational spring acts on the rotation vector continued since the start (`State::unwrapped`):
+//! unwrapped up by two turns it pulls with 4 pi times its stiffness, and it does not notice when
+//! the node changes its chart. With the unwrapped vector Pw = P + 2 pi k n, D = dPw/dP and
+//! stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
 
 use crate::effect::{Effect, Energy, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
@@ -99,7 +100,8 @@ impl Effect for GroundSprings {
 
     fn energy(&self, at: &State) -> Energy {
         let one = |spring: &GroundSpring| {
-            let (u, p) = (at.q[spring.node.u as usize], at.q[spring.node.p as usize]);
+            let u = at.q[spring.node.u as usize];
+            let p = at.q[spring.node.p as usize];
             let unwrapped = unwound(p, at.unwrapped_at(spring.node.p));
             0.5 * at.amplitude[spring.amplitude]
                 * (u.dot(spring.translation * u) + unwrapped.dot(spring.rotation * unwrapped))
@@ -113,7 +115,8 @@ impl Effect for GroundSprings {
             if largest == 0.0 { 0.0 } else { (along.dot(stiffness * along) / largest).max(0.0).sqrt() }
         };
         let one = |spring: &GroundSpring| {
-            let (u, p) = (field[spring.node.u as usize], field[spring.node.p as usize]);
+            let u = field[spring.node.u as usize];
+            let p = field[spring.node.p as usize];
             held(spring.translation, u).max(held(spring.rotation, p) * length) / length
         };
         let acting = self.springs.iter().filter(|spring| at.amplitude[spring.amplitude] != 0.0);
@@ -130,8 +133,8 @@ impl GroundSpring {
         self.translation_damping != Mat3::ZERO || self.rotation_damping != Mat3::ZERO
     }
 
-    /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P = T c w, whose tangent is
-    /// C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
+    /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P
+    /// = T c w, whose tangent is C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
     fn damping(&self, at: &State, weights: Weights) -> (Vec3, Vec3, [Mat3; 2]) {
         let force = self.translation_damping * at.v[self.node.u as usize];
         let over_velocity = self.translation_damping * weights.damping;
@@ -153,8 +156,9 @@ impl GroundSpring {
     }
 }
 
-/// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an increment X after which
-/// it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
+/// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an
+/// increment X after which it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and
+/// dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
 fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     let unwrapped = at.unwrapped_at(slot);
     if at.turn(slot).is_none() {
@@ -173,8 +177,8 @@ fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     (t.transpose_mul(moment), t.transpose_matmul(spun * t) + increment.c2(moment))
 }
 
-/// Force and tangent of a rotational spring whose node was last unwrapped by `unwrapped`. At a whole turn P has no axis of its own
-/// and keeps the one of before.
+/// Force and tangent of a rotational spring whose node was last unwrapped by `unwrapped`. At a
+/// whole turn P has no axis of its own and keeps the one of before.
 fn wound_up(stiffness: Mat3, p: Vec3, unwrapped: Vec3) -> (Vec3, Mat3) {
     if p.norm() < WHOLE_TURN {
         (stiffness * unwound(p, unwrapped), stiffness)

@@ -36,7 +36,8 @@ pub struct Links {
     pub links: Vec<Link>,
 }
 
-/// The force at the second node and its derivatives over its place and velocity, relative to the first.
+/// The force at the second node and its derivatives over its place and velocity, relative to the
+/// first.
 #[derive(Clone, Copy, Debug)]
 pub struct Pull<T = f64> {
     /// k (l - l0) n
@@ -149,7 +150,8 @@ impl Effect for Links {
     fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let one = |link: &Link| {
             let [a, b] = link.nodes.map(|node| field[node.u as usize]);
-            let (d, change) = (link.between(at).0, b - a);
+            let d = link.between(at).0;
+            let change = b - a;
             let distance = d.norm();
             let slack = link.tension_only && distance <= link.length;
             // Ends in one place have no direction of their own.
