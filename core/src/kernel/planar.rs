@@ -229,7 +229,7 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
     /// ```text
     /// K_xx = R Cn R^T,   K_x theta = R (Cn A - N x e)
     /// K_theta theta = A.Cn A - N.y,   K_theta' theta' = cm
-    /// K_x theta' = R cc,   K_theta' theta = cc.A    (where the section couples strain and curvature)
+    /// K_x theta' = R cc,   K_theta' theta = cc.A    (where the section couples)
     /// ```
     #[inline(always)]
     fn add_stiffness(
