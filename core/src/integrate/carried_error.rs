@@ -315,7 +315,7 @@ impl CarriedError {
         self.steps += 1;
         let own = self.steps % SLOPE_STEPS;
         self.lengths[own] = h;
-        let local = Local::new(&scheme, h, own, self.lengths.iter().sum());
+        let local = LocalErrors::new(&scheme, h, own, self.lengths.iter().sum());
         // Without a solution the error is kept: a free continuation would exaggerate errors of
         // stiff motions.
         let found = self.known == Known::Error;
@@ -384,7 +384,7 @@ impl CarriedError {
         &mut self,
         increments: &Increments,
         StepEnds { from, to }: StepEnds,
-        local: &Local,
+        local: &LocalErrors,
         largest: &mut Largest,
         sizes: &mut [Largest; 2],
     ) {
@@ -474,7 +474,7 @@ fn turns(state: &State) -> impl Iterator<Item = (usize, &Turn)> {
 }
 
 /// The coefficients of the local errors of a step.
-struct Local {
+struct LocalErrors {
     /// The factors of q''' in tau and in tau', and of the change of q''' in tau'
     factors: [f64; 3],
     /// The index of the step in lists of the last steps
@@ -483,7 +483,7 @@ struct Local {
     per_span: f64,
 }
 
-impl Local {
+impl LocalErrors {
     fn new(scheme: &Scheme, h: f64, place: usize, span: f64) -> Self {
         let Scheme { beta, gamma, alpha_m, .. } = *scheme;
         let lag = scheme.lag();

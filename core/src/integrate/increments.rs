@@ -141,13 +141,13 @@ impl Increments {
 /// The angular acceleration of a rotation by its causes, spatial.
 pub struct Accelerations {
     /// The slot of the rotation
-    pub slot: Slot,
+    pub(crate) slot: Slot,
     /// mu: the part by moments
-    pub driven: Vec3,
+    pub(crate) driven: Vec3,
     /// phi: the part by the spin itself, without moments
-    pub free: Vec3,
+    pub(crate) free: Vec3,
     /// The spin, material
-    pub spin: Vec3,
+    pub(crate) spin: Vec3,
 }
 
 /// The mass properties at each rotation, summed up, with the slot of the displacement of its node.

@@ -182,7 +182,7 @@ impl TimeError {
         }
     }
 
-    /// The step is in balance: its tangent tells the error at its end, unless it has been given up.
+    /// Solves for a carried error at the end of a step in balance, and writes it to `error`.
     pub fn solve(&mut self, correct: &mut Correct, system: &mut System, state: &State, error: &mut [Vec3]) {
         if let Some(carried) = &mut self.carried {
             carried.solve(correct, system, state, error);

@@ -14,12 +14,12 @@ use std::sync::Arc;
 /// The effects of one stage with their memory, and the system that they add to.
 pub struct Assembly {
     /// The stage that the effects act in
-    pub stage: StageContext,
+    pub(crate) stage: StageContext,
     effects: Vec<Acting>,
     /// Forces and tangent
     pub system: System,
     /// The number of evaluated instances of each effect so far, by name
-    pub evaluations: Vec<(&'static str, u64)>,
+    pub(crate) evaluations: Vec<(&'static str, u64)>,
     /// The matrices of a linear stage; `None` in other stages
     linear: Option<Box<LinearisedSystem>>,
 }

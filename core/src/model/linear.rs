@@ -16,9 +16,9 @@ use crate::tensor::Vec3;
 /// The matrices of a linear stage.
 pub struct LinearisedSystem {
     /// The state of linearisation, at rest, with the clock and the loads of the start of the stage
-    pub origin: State,
+    pub(crate) origin: State,
     /// The state of linearisation, at rest, with the present clock and loads
-    pub about: State,
+    pub(crate) about: State,
     /// The slots of multipliers, whose rates have no forces
     multipliers: Vec<Slot>,
     /// The system of all directions, held ones included, which have reactions and prescribed
@@ -28,7 +28,7 @@ pub struct LinearisedSystem {
     damping: Vec<f64>,
     mass: Vec<f64>,
     /// The weights of the last tangent, and the revision of the system at that time
-    pub formed: Option<(Weights, u64)>,
+    pub(crate) formed: Option<(Weights, u64)>,
 }
 
 impl LinearisedSystem {
