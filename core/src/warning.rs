@@ -124,7 +124,7 @@ warning_kinds! {
     EqualPlaces: "equal_places", Deck;
     /// Beams of a section have no mass, while bodies have.
     MasslessSection: "massless_section", Deck;
-    /// `step_tolerance` stands in a stage of fixed steps.
+    /// A stage of fixed steps has a `step_tolerance`.
     IdleStepTolerance: "idle_step_tolerance", Deck;
     /// A key of `[cost]` varies something that the deck does not have.
     IdleCostKey: "idle_cost_key", Deck;

@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub struct Connection<const N: usize> {
     /// The number of the element in the scene, an index of [`State::mixed`]
     pub(crate) element: u32,
-    /// Its nodes
+    /// The nodes of the element
     pub(crate) nodes: [Node; N],
 }
 

@@ -50,7 +50,7 @@ impl Effect for Resistance {
         true
     }
 
-    /// Its forces lie in the plane of a planar motion: there are no data to show.
+    /// Forces of resistance lie in the plane of a planar motion: there are no data to show.
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
 
     /// Adds force and tangent; the tangent of rotations is that at theta = 0, up to terms of order

@@ -14,7 +14,7 @@ pub struct SpinningPart {
     pub node: Node,
     /// All nodes of the part
     pub nodes: Vec<Node>,
-    /// Its axis in the initial placement, a unit vector
+    /// The axis of the part in the initial placement, a unit vector
     pub axis: Vec3,
     /// GJ/L, a moment per radian
     pub stiffness: f64,

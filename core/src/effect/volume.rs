@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// An element of N nodes and N integration points with the quantities `Q`.
 #[derive(Clone, Debug)]
 pub struct VolumeElement<const N: usize, Q> {
-    /// Its number and its nodes
+    /// The number and the nodes of the element
     pub(crate) connection: Connection<N>,
     /// The initial place of its first node
     place: Vec3,
@@ -56,7 +56,7 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
         &self.common.arms
     }
 
-    /// Its integration points.
+    /// The integration points of the element.
     #[inline(always)]
     pub fn points(&self) -> &[VolumePoint<N, Q>; N] {
         &self.common.points

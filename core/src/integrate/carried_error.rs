@@ -91,7 +91,7 @@ pub(super) struct CarriedError {
 /// The quantities of the present step that have been computed.
 #[derive(Clone, Copy, PartialEq)]
 enum Known {
-    /// Nothing
+    /// No quantity
     Nothing,
     /// The forces of inertia and damping on the error
     Forces,

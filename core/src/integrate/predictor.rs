@@ -84,7 +84,7 @@ struct NormalEquations {
 /// A completed step.
 #[derive(Default)]
 struct PastStep {
-    /// Its length, a time
+    /// The length of the step, a time
     length: f64,
     /// One over the power [`GROWTH_POWER`] of its length: makes corrections of steps of different
     /// lengths comparable

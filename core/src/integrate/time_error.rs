@@ -97,9 +97,9 @@ impl Scene {
 /// The states at both ends of a time step, in one chart.
 #[derive(Clone, Copy)]
 pub struct StepEnds<'a> {
-    /// At the start of the step
+    /// The state at the start of the step
     pub from: &'a State,
-    /// At its end
+    /// The state at the end of the step
     pub to: &'a State,
 }
 

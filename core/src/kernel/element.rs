@@ -85,7 +85,7 @@ impl<T: Copy> Placed<T> for NodeMotion<T> {
 }
 
 impl<T: Real> NodeMotion<T> {
-    /// At rest in the initial placement.
+    /// The motion of a node at rest in the initial placement.
     pub fn rest() -> Self {
         let o = Vec3::zero();
         Self { u: o, u_rate: o, u_rate2: o, p: o, p_rate: o, p_rate2: o }

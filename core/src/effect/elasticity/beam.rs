@@ -1,7 +1,9 @@
 //! Elasticity of beams (Makinen 2007, sections 3.2–3.4), for each interpolation of rotations.
 
 use super::element::{ElasticElement, ElasticPoint};
-use super::interpolation::{ElementConfiguration, HalfWayPoint, Interpolation, PointSum, Scratch, View, is_half_way};
+use super::interpolation::{
+    ElementConfiguration, HalfWayPoint, Interpolation, PointSum, Scratch, View, Workspace, is_half_way,
+};
 use super::planar::PlanarElasticity;
 use crate::effect::{
     ByOrder, DrivenCoordinates, ELEMENTS_PER_TASK, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints,
@@ -268,9 +270,9 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     scratch.give_back(out);
 }
 
-/// Element systems for the computation of single elements of a batch.
-pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> (ElementSystem, Scratch) {
-    (ElementSystem::new(2 * N), Scratch::new(N))
+/// Memory for the computation of single elements of a batch.
+pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> Workspace {
+    Workspace::new(N)
 }
 
 /// The remembered stresses of the points of element k; `None` if there are none.
@@ -493,7 +495,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         stresses: Option<[Stress; G]>,
         at: &State,
         stiffness: f64,
-        (system, scratch): &mut (ElementSystem, Scratch),
+        Workspace { system, scratch }: &mut Workspace,
         out: &mut Assembler,
     ) {
         let sum = ElasticSum { points: self.points(), stresses, free: self.free_amplitude(at) };

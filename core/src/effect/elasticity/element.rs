@@ -18,7 +18,7 @@ pub type ElasticPoint<const N: usize, T = f64> = StiffnessPoint<N, T, BeamLaw<T>
 /// An element of N nodes with G = N - 1 points for internal forces.
 #[derive(Clone, Debug)]
 pub struct ElasticElement<const N: usize, const G: usize> {
-    /// Its number and its nodes
+    /// The number and the nodes of the element
     pub(crate) connection: Connection<N>,
     /// The index of the amplitude of its free strain; `None` without free strain
     free: Option<u32>,
@@ -74,7 +74,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         Arc::ptr_eq(&self.common, &other.common)
     }
 
-    /// Its integration points.
+    /// The integration points of the element.
     #[inline(always)]
     pub fn points(&self) -> [ElasticPoint<N>; G] {
         let mut points = self.common.points;
@@ -82,7 +82,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         points
     }
 
-    /// Its nodes with their initial places.
+    /// The nodes of the element with their initial places.
     #[inline(always)]
     pub fn member(&self) -> ElementNodes<'_, N> {
         ElementNodes { connection: &self.connection, arms: self.common.arms.map(|arm| arm * self.length) }

@@ -104,6 +104,21 @@ pub struct Scratch<T = f64> {
     systems: Option<[ElementSystem<T>; 2]>,
 }
 
+/// An element system with its scratch memory, for elements that are computed one by one.
+pub struct Workspace<T = f64> {
+    /// The system of the element
+    pub system: ElementSystem<T>,
+    /// Scratch memory of the interpolation
+    pub scratch: Scratch<T>,
+}
+
+impl<T: Real> Workspace<T> {
+    /// Memory for elements of `nodes` nodes.
+    pub fn new(nodes: usize) -> Self {
+        Self { system: ElementSystem::new(2 * nodes), scratch: Scratch::new(nodes) }
+    }
+}
+
 impl<T: Real> Scratch<T> {
     /// Scratch memory for elements of `nodes` nodes.
     pub fn new(nodes: usize) -> Self {

@@ -14,7 +14,7 @@
 
 use super::beam::BeamElasticity;
 use super::element::{ElasticElement, ElasticPoint, ElementNodes};
-use super::interpolation::{ElementConfiguration, Interpolation, PointSum, Scratch, View};
+use super::interpolation::{ElementConfiguration, Interpolation, PointSum, View, Workspace};
 use crate::effect::{Effect, Roles, TangentForm, after_displacement, for_each_batch};
 use crate::kernel::elastic::Point;
 use crate::kernel::law::{SectionLaw, Stiffness, Strain, Stress};
@@ -77,7 +77,7 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Assembler,
 ) {
-    let scratch_memory = RefCell::new(DampingScratch::new(2 * N));
+    let scratch_memory = RefCell::new(DampingScratch { element: Workspace::new(N), jets: Workspace::new(N) });
     let mut system = ElementSystem::new(2 * N);
     for (k, element) in batch.iter().enumerate() {
         let member = element.member();
@@ -91,18 +91,8 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
 
 /// Scratch memory, kept between elements.
 struct DampingScratch {
-    element: (ElementSystem, Scratch),
-    jets: (ElementSystem<Jet>, Scratch<Jet>),
-}
-
-impl DampingScratch {
-    fn new(blocks: usize) -> Self {
-        let nodes = blocks / 2;
-        Self {
-            element: (ElementSystem::new(blocks), Scratch::new(nodes)),
-            jets: (ElementSystem::new(blocks), Scratch::new(nodes)),
-        }
-    }
+    element: Workspace,
+    jets: Workspace<Jet>,
 }
 
 /// The configuration of an element in one chart, with the rates of its nodes.
@@ -153,7 +143,7 @@ impl<const N: usize> ElementMotion<N> {
     ) {
         let view = I::View::<N, f64>::new(&self.configuration);
         let sum = Stressed { points, stresses: &self.stresses(&view, points, factor) };
-        let (system, scratch) = &mut scratch_memory.element;
+        let Workspace { system, scratch } = &mut scratch_memory.element;
         view.fill(&sum, weights.stiffness, scratch, system);
         out.add_system(system, weights.stiffness != 0.0);
         if weights.stiffness != 0.0 || weights.damping != 0.0 {
@@ -254,7 +244,7 @@ impl Strains {
         motion: &ElementMotion<N>,
         moving: &impl View<N, Jet>,
         point: &ElasticPoint<N, Jet>,
-        (system, scratch): &mut (ElementSystem<Jet>, Scratch<Jet>),
+        Workspace { system, scratch }: &mut Workspace<Jet>,
     ) -> Self {
         let place = point.configuration(moving.nodes());
         let blocks = std::array::from_fn(|component| {

@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// A rigid body at a node.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Its node
+    /// The node of the body
     pub node: Node,
     /// The node's initial place
     pub place: Vec3,

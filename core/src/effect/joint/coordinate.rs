@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 /// A free coordinate of a joint in some state.
 pub(super) struct Coordinate {
-    /// Its value: radians, or a length
+    /// The value of the coordinate: radians, or a length
     pub value: f64,
     /// First derivatives over u_A, P_A, u_B, P_B
     pub gradient: [Vec3; 4],
@@ -21,9 +21,9 @@ pub(super) struct Coordinate {
 pub(super) struct Rate {
     /// The rate: radians or a length over time
     pub value: f64,
-    /// Its derivatives over the rates of the unknowns
+    /// Derivatives of the rate over the rates of the unknowns
     pub over_rate: [Vec3; 4],
-    /// Its derivatives over the unknowns
+    /// Derivatives of the rate over the unknowns
     pub over_unknown: [Vec3; 4],
 }
 

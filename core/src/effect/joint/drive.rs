@@ -49,7 +49,7 @@ pub enum Drive {
 }
 
 impl Joint {
-    /// Its motor, if it acts on this coordinate.
+    /// The motor of the joint, if it acts on this coordinate.
     pub(super) fn motor_on(&self, coordinate: FreeCoordinate) -> Option<Motor> {
         match self.drive {
             Some(Drive::Motor(on, motor)) if on == coordinate => Some(motor),
@@ -57,7 +57,7 @@ impl Joint {
         }
     }
 
-    /// Its motor, with the coordinate that it prescribes.
+    /// The motor of the joint, with the coordinate that it prescribes.
     pub(super) fn motor(&self) -> Option<(FreeCoordinate, Motor)> {
         match self.drive {
             Some(Drive::Motor(on, motor)) => Some((on, motor)),
@@ -65,7 +65,7 @@ impl Joint {
         }
     }
 
-    /// Its spring and damper, with the coordinate that they act on.
+    /// The spring and the damper of the joint, with the coordinate that they act on.
     pub(super) fn spring(&self) -> Option<(FreeCoordinate, SpringDamper)> {
         match self.drive {
             Some(Drive::Spring(on, spring)) => Some((on, spring)),
@@ -73,7 +73,7 @@ impl Joint {
         }
     }
 
-    /// True if it has a damper.
+    /// True if the joint has a damper.
     pub(super) fn damps(&self) -> bool {
         self.spring().is_some_and(|(_, spring)| spring.damping != 0.0)
     }
@@ -105,7 +105,7 @@ impl Joint {
         coordinate.gradient.map(|gradient| gradient * (spring.damping * rate))
     }
 
-    /// The strain energy of its spring.
+    /// The strain energy of the spring of the joint.
     pub(super) fn strain_energy(&self, at: &State) -> f64 {
         let Some((on, SpringDamper { stiffness, .. })) = self.spring() else { return 0.0 };
         if stiffness == 0.0 {

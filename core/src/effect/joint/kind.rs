@@ -39,7 +39,7 @@ pub struct GroundHold {
 /// A kind of joint. Its axes are e_1, e_2, e_3, of which the deck gives none, e_1, or e_1 and e_2.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct JointKind {
-    /// Its word in the deck
+    /// The word of the kind in the deck
     pub word: &'static str,
     /// The number of axes that the deck gives
     pub axes: usize,

@@ -156,7 +156,7 @@ impl GroundSpring {
         let spin = at.spin(self.node.p);
         let rotation = &spin.rotation;
         let moment = self.rotation_damping * (rotation.r * spin.omega);
-        // For total vectors T^T R^T = T; for an increment after a base rotation it is not.
+        // For total vectors T^T R^T = T, but not for an increment after a base rotation.
         let back = rotation.t.transpose() * rotation.r.transpose();
         let material = rotation.r.transpose_mul(moment);
         let turned = Mat3::skew_mul(spin.omega, rotation.t) * -weights.stiffness;
