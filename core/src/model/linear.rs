@@ -1,4 +1,4 @@
-//! LinearisedSystem stages: forces are linearised about the state at the start of the stage,
+//! Linear stages: forces are linearised about the state at the start of the stage,
 //! without displacements and rates.
 //!
 //! ```text
