@@ -21,9 +21,7 @@ use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 use std::iter::repeat_with;
 
-/// The coefficients of a generalised-alpha method.
-///
-/// See the [module](self) for their equations.
+/// The coefficients of a generalised-alpha method (Chung & Hulbert 1993, doi:10.1115/1.2900803).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scheme {
     /// beta
