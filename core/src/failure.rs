@@ -1,11 +1,11 @@
-//! What a run can end with: names that are part of the contract with users, each said once.
+//! Kinds of failures that end a run. Their names are part of the interface to users.
 
-/// Who is to act after a failure; exit statuses follow it.
+/// The cause of a failure, which determines the exit status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The deck asks for what cannot be.
+    /// The deck asks for something impossible.
     Deck,
-    /// The numerics gave up.
+    /// The numerical methods found no solution.
     Numerics,
     /// A file could not be read or written.
     File,
@@ -13,7 +13,7 @@ pub enum Cause {
     Signal,
 }
 
-/// The enum of kinds from a table: what each means, its variant, its name, its cause.
+/// Defines the enum of kinds from a table with meaning, variant, name and cause of each.
 macro_rules! failure_kinds {
     ($($(#[doc = $meaning:literal])+ $kind:ident: $name:literal, $cause:ident;)+) => {
         /// Kinds of failures.
@@ -23,17 +23,17 @@ macro_rules! failure_kinds {
         }
 
         impl FailureKind {
-            /// All of them.
+            /// All kinds of failures.
             pub const ALL: &'static [Self] = &[$(Self::$kind),+];
 
-            /// Its name in run.json, in decks and on the terminal.
+            /// The name of the kind in run.json, in decks and on the terminal.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$kind => $name,)+
                 }
             }
 
-            /// Its cause.
+            /// The cause of failures of this kind.
             pub const fn cause(self) -> Cause {
                 match self {
                     $(Self::$kind => Cause::$cause,)+
@@ -46,7 +46,7 @@ macro_rules! failure_kinds {
 failure_kinds! {
     /// The deck is wrong, or asks for a stage that cannot begin.
     Deck: "deck", Deck;
-    /// Neighbouring nodes turn too far against each other.
+    /// Neighbouring nodes turn too far against each other for their element.
     MeshTooCoarse: "mesh_too_coarse", Numerics;
     /// No balance was found, or no step that is short enough.
     NotConverged: "not_converged", Numerics;
@@ -54,9 +54,9 @@ failure_kinds! {
     Singular: "singular", Numerics;
     /// A force, a motion or a result is not finite.
     NonFinite: "non_finite", Numerics;
-    /// The total energy grows where nothing brings any.
+    /// The total energy grows without work of loads or drives.
     EnergyGrowth: "energy_growth", Numerics;
-    /// Larger than the stated bounds.
+    /// A size exceeds the stated bounds.
     Limit: "limit", Deck;
     /// A file could not be read or written.
     Io: "io", File;
@@ -65,7 +65,7 @@ failure_kinds! {
 }
 
 impl FailureKind {
-    /// The kind of this name.
+    /// The kind with this name; `None` if there is none.
     pub fn of(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|kind| kind.name() == name)
     }

@@ -113,7 +113,7 @@ impl Vec3<f64> {
         }
     }
 
-    /// Whether every component is finite.
+    /// True if every component is finite.
     pub fn is_finite(self) -> bool {
         self.0.iter().all(|c| c.is_finite())
     }
@@ -185,7 +185,7 @@ impl Mat3<f64> {
     /// The identity.
     pub const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
 
-    /// Whether every component is finite.
+    /// True if every component is finite.
     pub fn is_finite(self) -> bool {
         self.0.iter().flatten().all(|c| c.is_finite())
     }

@@ -1,23 +1,22 @@
-//! What decks and runs can be warned of: names that are part of the contract with users, each said
-//! once.
+//! Kinds of warnings of decks and runs. Their names are part of the interface to users.
 
-/// What a warning puts in doubt.
+/// The subject of a warning: the aspect of an answer that it puts in doubt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum About {
-    /// Which equilibrium was reached, and whether it is stable
+    /// The equilibrium path and the stability of equilibria
     Path,
-    /// Time steps: whether they resolve the motion
+    /// The resolution of the motion by time steps
     Time,
-    /// Elements: whether they resolve the shape
+    /// The resolution of the shape by elements
     Mesh,
     /// Digits lost in floating-point arithmetic
     RoundOff,
-    /// How the deck is written, or what acts in it; no answer is in doubt.
+    /// The deck and the effects in it; no answer is in doubt
     Deck,
 }
 
 impl About {
-    /// Its name in run.json.
+    /// The name of the subject in run.json.
     pub fn name(self) -> &'static str {
         match self {
             Self::Path => "path",
@@ -29,7 +28,7 @@ impl About {
     }
 }
 
-/// The enum of kinds from a table: what each means, its variant, its name, what it is about.
+/// Defines the enum of kinds from a table with meaning, variant, name and subject of each.
 macro_rules! warning_kinds {
     ($($(#[doc = $meaning:literal])+ $kind:ident: $name:literal, $about:ident;)+) => {
         /// Kinds of warnings.
@@ -39,17 +38,17 @@ macro_rules! warning_kinds {
         }
 
         impl WarningKind {
-            /// All of them.
+            /// All kinds of warnings.
             pub const ALL: &'static [Self] = &[$(Self::$kind),+];
 
-            /// Its name in run.json, in decks and on the terminal.
+            /// The name of the kind in run.json, in decks and on the terminal.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$kind => $name,)+
                 }
             }
 
-            /// What it puts in doubt.
+            /// The subject of the warning.
             pub fn about(self) -> About {
                 match self {
                     $(Self::$kind => About::$about,)+
@@ -66,7 +65,7 @@ warning_kinds! {
     TurningPoint: "turning_point", Path;
     /// The number of negative pivots changed: a bifurcation, or a limit point under load control.
     BranchPoint: "branch_point", Path;
-    /// More of these points follow, which are listed as events only.
+    /// More points of a kind follow, which are listed as events only.
     MorePoints: "more_points", Path;
     /// A static stage ended in an unstable equilibrium.
     Unstable: "unstable", Path;
@@ -91,9 +90,9 @@ warning_kinds! {
     LostAxis: "lost_axis", Deck;
     /// The scheme dissipated a notable part of the energy.
     EnergyLoss: "energy_loss", Time;
-    /// The total energy rose from nothing.
+    /// The total energy rose without work of loads or drives.
     EnergyGain: "energy_gain", Time;
-    /// The energy account is off by what static stages leave out of it.
+    /// The energy balance has an error by energies that static stages leave out.
     EnergyBalance: "energy_balance", Time;
     /// The estimated error of fixed time steps is large.
     LongSteps: "long_steps", Time;
@@ -115,7 +114,7 @@ warning_kinds! {
     LostDigits: "lost_digits", RoundOff;
     /// Round-off takes the stiffness of the softest motion.
     LostStiffness: "lost_stiffness", RoundOff;
-    /// Only stress holds a motion at the start of a stage.
+    /// Only stress resists a motion at the start of a stage.
     HeldByStress: "held_by_stress", Deck;
     /// A stage of a planar scene is simulated in space.
     SimulatedInSpace: "simulated_in_space", Deck;
@@ -123,16 +122,16 @@ warning_kinds! {
     UndampedMultipliers: "undamped_multipliers", Deck;
     /// Two points at one place are not joined.
     EqualPlaces: "equal_places", Deck;
-    /// Beams of a section have no mass where only bodies have.
+    /// Beams of a section have no mass, while bodies have.
     MasslessSection: "massless_section", Deck;
-    /// `step_tolerance` stands in a stage of fixed steps.
+    /// A stage of fixed steps has a `step_tolerance`.
     IdleStepTolerance: "idle_step_tolerance", Deck;
-    /// A key of `[cost]` varies what the deck has nothing of.
+    /// A key of `[cost]` varies something that the deck does not have.
     IdleCostKey: "idle_cost_key", Deck;
 }
 
 impl WarningKind {
-    /// The kind of this name.
+    /// The kind with this name; `None` if there is none.
     pub fn of(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|kind| kind.name() == name)
     }

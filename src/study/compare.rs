@@ -104,7 +104,7 @@ mod tests {
         let mut c = history(&[[0.0, 1.0]]);
         c.names[1] = "v".into();
         c.names[1] = "v".into();
-        assert_eq!(compare(&a, &c, 1.0, 1.0), Err(ComparisonError::MissingColumn("u".into())));
+        assert_eq!(compare(&a, &c, 1.0, 1.0), Err(ComparisonError::MissingColumn("v".into())));
     }
 
     #[test]

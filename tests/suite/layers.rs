@@ -49,6 +49,7 @@ const CRATES: [(&str, &[&str]); 17] = [
         &[
             "src/deck/",
             "src/scene/mod.rs",
+            "src/scene/output.rs",
             "src/output/",
             "src/study/sweep/store.rs",
             "src/study/cost/journal.rs",
@@ -76,7 +77,6 @@ const ONE_THING: &[(&str, &[&str])] = &[
     ("names are those of the mesh and its sections", &[
         "src/scene/mesh.rs", "src/scene/names.rs", "src/scene/section.rs",
     ]),
-    ("a plot and its drawing", &["src/output/plot/layout.rs", "src/output/plot/mod.rs", "src/output/plot/ticks.rs"]),
     ("one search: the points that it tries, and its rounds", &[
         "src/study/accuracy/candidates.rs", "src/study/accuracy/mod.rs", "src/study/accuracy/round.rs",
         "src/study/accuracy/search.rs",

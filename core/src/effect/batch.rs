@@ -1,5 +1,5 @@
-//! Elements side by side: their nodes, batches by order, the rows that a thread takes, and the
-//! macro that walks through batches.
+//! Batches of elements: the nodes of an element, elements side by side in lanes, batches by order,
+//! ranges of instances, and the macro that walks through batches.
 
 use crate::kernel::seam::Converted;
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
@@ -9,13 +9,13 @@ use crate::tensor::{Mat3, Vec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The number of a beam element in the scene, and its nodes.
+/// A beam element of the scene with its nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection<const N: usize> {
     /// The number of the element in the scene, an index of [`State::mixed`]
-    pub element: u32,
-    /// Its nodes
-    pub nodes: [Node; N],
+    pub(crate) element: u32,
+    /// The nodes of the element
+    pub(crate) nodes: [Node; N],
 }
 
 impl<const N: usize> Connection<N> {
@@ -25,7 +25,7 @@ impl<const N: usize> Connection<N> {
         self.nodes.map(|node| at.motion(node))
     }
 
-    /// The motions of the nodes, all in the chart of the first.
+    /// The motions of the nodes, all in the chart of the first node.
     pub fn motions_in_one_chart(&self, at: &State) -> [NodeMotion; N] {
         let motions = self.motions(at);
         match at.mixed[self.element as usize] {
@@ -37,8 +37,8 @@ impl<const N: usize> Connection<N> {
         }
     }
 
-    /// Increments of displacements and rotation vectors at the nodes, in the chart of the first,
-    /// from increments of the unknowns.
+    /// Increments of displacements and of rotation vectors at the nodes, in the chart of the first
+    /// node, from increments `dq` of the unknowns.
     pub fn variations_in_one_chart(&self, at: &State, dq: &[Vec3]) -> ([Vec3; N], [Vec3; N]) {
         let du = self.nodes.map(|node| dq[node.u as usize]);
         let dp = self.nodes.map(|node| dq[node.p as usize]);
@@ -56,8 +56,9 @@ impl<const N: usize> Connection<N> {
         self.nodes.into_iter().flat_map(|node| [node.u, node.p])
     }
 
-    /// Evaluates the element in one chart, and where its nodes sit in different ones pulls the
-    /// result back.
+    /// Evaluates the element in the chart of its first node, and pulls the result back to the
+    /// charts of the others. `rates` is true if forces depend on rates of rotation vectors;
+    /// `kernel` adds to a cleared system.
     pub(super) fn evaluate(
         &self,
         at: &State,
@@ -82,17 +83,17 @@ impl<const N: usize> Connection<N> {
     }
 }
 
-/// The rows of [`LANES`] elements that an assembler takes of a batch of this length, before which
-/// there are `before` instances: it takes whole rows.
+/// The rows of [`LANES`] elements that an assembler takes of a batch of `length` elements, before
+/// which the effect has `before` instances. Assemblers take whole rows.
 pub(super) fn own_blocks(before: usize, length: usize, out: &Assembler) -> Range<usize> {
     let own = own_part(before, length, &out.instances());
     own.start.div_ceil(LANES)..own.end.div_ceil(LANES)
 }
 
-/// Elements of a batch that one thread takes at a time: whole rows.
-pub(super) const AT_ONCE: usize = 256 * LANES;
+/// The number of elements of a batch that a thread takes at a time, a multiple of [`LANES`].
+pub(super) const ELEMENTS_PER_TASK: usize = 256 * LANES;
 
-/// The elements from `start` on that stand side by side; the last one of a batch fills up its row.
+/// The row of elements from `start` on; the last element of the batch fills up an incomplete row.
 #[inline(always)]
 pub(super) fn side_by_side<E>(batch: &[E], start: usize) -> [&E; LANES] {
     let element = |k: usize| &batch[(start + k).min(batch.len() - 1)];
@@ -109,7 +110,7 @@ pub(super) fn motions<const N: usize>(connections: [&Connection<N>; LANES], at: 
     out
 }
 
-/// The motions of the nodes with number `i` in their elements.
+/// The motions of the nodes with number `i` in their elements, each in its own chart.
 #[inline(always)]
 pub(super) fn motions_of<const N: usize>(
     connections: [&Connection<N>; LANES],
@@ -119,7 +120,7 @@ pub(super) fn motions_of<const N: usize>(
     motion_of(each_lane!(|k| connections[k].nodes[i]), at)
 }
 
-/// The motions of nodes side by side.
+/// The motions of nodes side by side, each in its own chart.
 #[inline(always)]
 pub(super) fn motion_of(nodes: [Node; LANES], at: &State) -> NodeMotion<Lanes> {
     let [u, p]: [[Slot; LANES]; 2] = [each_lane!(|k| nodes[k].u), each_lane!(|k| nodes[k].p)];
@@ -139,7 +140,7 @@ pub(super) fn at_slots(field: &[Vec3], slots: [Slot; LANES]) -> Vec3<Lanes> {
     Vec3::pack(each_lane!(|k| &field[slots[k] as usize]))
 }
 
-/// The block of node j's rotation in elements with displacements and rotations.
+/// The block of the rotation of node j in elements with displacements and rotations.
 pub(super) fn after_displacement(j: usize) -> usize {
     2 * j + 1
 }
@@ -147,11 +148,11 @@ pub(super) fn after_displacement(j: usize) -> usize {
 /// Batches of elements of two, three and four nodes.
 #[derive(Clone, Debug)]
 pub struct ByOrder<A, B, C> {
-    /// Two nodes
+    /// Elements of two nodes
     pub two: Vec<A>,
-    /// Three nodes
+    /// Elements of three nodes
     pub three: Vec<B>,
-    /// Four nodes
+    /// Elements of four nodes
     pub four: Vec<C>,
 }
 
@@ -162,12 +163,12 @@ impl<A, B, C> Default for ByOrder<A, B, C> {
 }
 
 impl<A, B, C> ByOrder<A, B, C> {
-    /// No element is in any batch.
+    /// True if no batch has an element.
     pub fn is_empty(&self) -> bool {
         self.two.is_empty() && self.three.is_empty() && self.four.is_empty()
     }
 
-    /// Gives back what lists have grown to beyond their ends.
+    /// Releases unused memory at the ends of lists.
     pub fn shrink_to_fit(&mut self) {
         self.two.shrink_to_fit();
         self.three.shrink_to_fit();
@@ -175,13 +176,14 @@ impl<A, B, C> ByOrder<A, B, C> {
     }
 }
 
-/// Data behind a pointer: that of a neighbour where it is equal, else the element's own.
+/// A pointer to data: that of a neighbour if its data are equal, otherwise a new one.
 pub(super) fn shared<T: PartialEq>(own: T, neighbours: Option<&Arc<T>>) -> Arc<T> {
     neighbours.filter(|known| ***known == own).cloned().unwrap_or_else(|| Arc::new(own))
 }
 
-/// Walks through batches in the order two, three, four: the number of the first instance of each,
-/// and its elements. With a range of instances, the part of each batch that is in it.
+/// Runs a body for each batch in the order two, three, four, with the number of the batch's first
+/// instance and its elements; with a range of instances, for the part of each batch that is in the
+/// range. Empty batches are skipped.
 macro_rules! for_each_batch {
     ($batches:expr, |$first:ident, $batch:ident| $body:expr) => {
         crate::effect::batch::for_each_batch!($batches, 0..usize::MAX, |$first, $batch| $body)
@@ -195,7 +197,7 @@ macro_rules! for_each_batch {
         crate::effect::batch::for_each_batch!(@one batches.four, instances, before, $first, $batch, $body);
         let _ = before;
     }};
-    // Room to work in is not made for nothing.
+    // Bodies may allocate memory, which is not done for empty batches.
     (@one $own:expr, $instances:ident, $before:ident, $first:ident, $batch:ident, $body:expr) => {
         let own = crate::effect::batch::own_part($before, $own.len(), &$instances);
         let $first = $before + own.start;
@@ -208,22 +210,22 @@ macro_rules! for_each_batch {
 }
 pub(super) use for_each_batch;
 
-/// The elements of a batch of this length, before which there are `before` instances, that are
-/// among `instances`.
+/// The indices of the elements of a batch that are among `instances`. The batch has `length`
+/// elements, and the effect `before` instances before it.
 #[inline]
 pub(super) fn own_part(before: usize, length: usize, instances: &Range<usize>) -> Range<usize> {
     let place = |instance: usize| instance.clamp(before, before + length) - before;
     place(instances.start)..place(instances.end)
 }
 
-/// Instances at one slot each.
+/// The connectivity of instances with one slot each.
 pub(super) fn one_by_one(slots: &[(Slot, bool)]) -> Connectivity {
     let mut connectivity = Connectivity::divisible();
     slots.iter().for_each(|&(slot, _)| connectivity.push([slot]));
     connectivity
 }
 
-/// v . J v / 2
+/// The quadratic form v . J v / 2.
 #[inline(always)]
 pub(super) fn quadratic<T: Real>(j: Mat3<T>, v: Vec3<T>) -> T {
     v.dot(j * v) * 0.5

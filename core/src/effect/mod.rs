@@ -1,9 +1,9 @@
-//! Physical effects: one file an effect, one value a kind, holding every instance of that kind in
-//! the scene.
+//! Physical effects: one type for each kind of effect, in a file of its own, whose value holds all
+//! instances in the scene.
 //!
-//! An effect exists in a run only because the deck calls for it; see `scene::compose`. [`Effect`]
-//! is what each of them does. What only some do are [`Roles`]: constraints, stresses, masses,
-//! coordinates driven from outside, spins that nothing resists.
+//! A model holds an effect only if the scene needs it. [`Effect`] is the interface of all effects;
+//! [`Roles`] are interfaces of some: constraints, stresses, masses, coordinates driven from
+//! outside, and free spins.
 
 mod batch;
 pub mod elasticity;
@@ -23,26 +23,26 @@ use crate::kernel::inertia::Inertia;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Plane, Slot, StageContext, State};
 use crate::tensor::Vec3;
 use batch::{
-    AT_ONCE, after_displacement, at_slots, for_each_batch, motion_of, motions, one_by_one, own_blocks, own_part,
-    quadratic, shared, side_by_side,
+    ELEMENTS_PER_TASK, after_displacement, at_slots, for_each_batch, motion_of, motions, one_by_one, own_blocks,
+    own_part, quadratic, shared, side_by_side,
 };
 use std::sync::Arc;
 
-/// Stored energy of one state.
+/// The stored energy of a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of motion
+    /// Kinetic energy
     pub kinetic: f64,
-    /// Of beams and springs
+    /// Strain energy of beams and springs
     pub strain: f64,
 }
 
-/// Mass and momenta of one state, global components, about the origin.
+/// Mass and momenta of a state, in global components, about the origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Momentum {
     /// Total mass
     pub mass: f64,
-    /// First moment of mass: mass times the place of the centre
+    /// First moment of mass: mass times the place of the mass centre
     pub moment: Vec3,
     /// Linear momentum
     pub linear: Vec3,
@@ -51,7 +51,7 @@ pub struct Momentum {
 }
 
 impl Momentum {
-    /// Adds another part.
+    /// Adds mass and momenta of another part.
     pub fn add(&mut self, other: Self) {
         self.mass += other.mass;
         self.moment += other.moment;
@@ -60,88 +60,88 @@ impl Momentum {
     }
 }
 
-/// Round-off that an exact zero of the force may show, in force and moment.
+/// The largest round-off of forces and moments that are zero in exact arithmetic.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RoundOff {
-    /// Force
+    /// Round-off of a force
     pub force: f64,
-    /// Moment
+    /// Round-off of a moment
     pub moment: f64,
 }
 
 impl RoundOff {
-    /// The larger of both.
+    /// The larger round-off of both, for force and moment.
     pub fn or(self, other: Self) -> Self {
         Self { force: self.force.max(other.force), moment: self.moment.max(other.moment) }
     }
 }
 
-/// Increments of some unknowns, each with its slot.
+/// Increments of some unknowns, with their slots.
 pub type SomeIncrements = [(Slot, Vec3)];
 
-/// A motor of a joint in some state.
+/// A motor of a joint in a state.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorState {
     /// The slot of its multiplier
     pub slot: Slot,
-    /// The angle or displacement that its amplitude multiplies
+    /// The angle in radians, or displacement, at an amplitude of one
     pub value: f64,
-    /// The number of its amplitude
+    /// The index of its amplitude
     pub amplitude: usize,
-    /// It turns; else it slides
+    /// True for a motor on an angle, false for one on a slide
     pub turns: bool,
-    /// How fast the joint turns or slides, as its nodes move
+    /// The rate of angle or slide by the motion of its nodes
     pub speed: f64,
 }
 
-/// The form of a tangent, whatever the weights.
+/// The form of a tangent for all weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TangentForm {
-    /// Forces do not depend on the state
+    /// No tangent: forces do not depend on the state
     None,
-    /// A potential, or constant symmetric matrices
+    /// A symmetric tangent: that of a potential, or constant symmetric matrices
     Symmetric,
-    /// Any other
+    /// A tangent without symmetry
     General,
 }
 
 impl TangentForm {
-    /// There is one.
+    /// True if there is a tangent.
     pub fn exists(self) -> bool {
         self != Self::None
     }
 
-    /// A tangent that is symmetric, or not.
+    /// A symmetric tangent, or one without symmetry.
     pub fn symmetric(is_symmetric: bool) -> Self {
         if is_symmetric { Self::Symmetric } else { Self::General }
     }
 }
 
-/// One kind of physical effect with all its instances.
+/// A kind of physical effect with all its instances.
 ///
-/// A method without a default is one that each effect must think about.
+/// Methods without a default have no value that is safe for all effects.
 pub trait Effect: Send + Sync {
-    /// Its name in `check` and run.json.
+    /// The name of the effect in `check` and run.json.
     fn name(&self) -> &'static str;
 
     /// The category of its forces.
     fn category(&self) -> Category;
 
-    /// It adds damping forces beside those of its category.
+    /// True if it adds damping forces beside the forces of its category.
     fn damps(&self) -> bool {
         false
     }
 
-    /// The slots that meet in each instance; [divisible](Connectivity::divisible) where many
-    /// instances make it worth while.
+    /// The slots of each instance; [divisible](Connectivity::divisible) if instances may be
+    /// assembled in parallel.
     fn connectivity(&self) -> Connectivity;
 
-    /// The form of its tangent: a general one makes the whole tangent unsymmetric, and costs twice
-    /// the factorisation.
+    /// The form of its tangent. A general one makes the whole tangent unsymmetric, with twice the
+    /// cost of factorisation.
     fn tangent(&self) -> TangentForm;
 
-    /// It acts in a stage: inertia and damping do where something moves, inertia not where a
-    /// rotating frame holds it.
+    /// True if it acts in a stage. Inertia and damping act in stages with motions, inertia not in a
+    /// rotating frame, which replaces it.
     fn acts(&self, stage: &StageContext) -> bool {
         let moves = stage.kind.needs_inertia();
         match self.category() {
@@ -151,128 +151,127 @@ pub trait Effect: Send + Sync {
         }
     }
 
-    /// Shows the data of which a mirror decides whether the scene lies in a plane.
-    /// [`MirrorData::Spatial`]: the scene is never treated in one.
+    /// Shows data that a reflection in the plane of a planar scene must leave unchanged.
+    /// [`MirrorData::Spatial`] makes the scene a spatial one.
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData));
 
-    /// A kernel of its own for a plane that it lies in, where that is less work than the one in
-    /// space.
+    /// The planar form of the effect, which lies in `plane`; `None` if it has none.
     fn in_plane(self: Arc<Self>, _plane: &Plane) -> Option<Box<dyn PlanarForm>> {
         None
     }
 
-    /// Adds forces, and the tangent of the weights that are not zero.
+    /// Adds forces, and the tangent of the weights; a weight of zero asks for no computation.
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler);
 
-    /// Stored energy.
+    /// The stored energy of a state.
     fn energy(&self, _at: &State) -> Energy {
         Energy::default()
     }
 
-    /// The largest strain that a field of small increments of the unknowns makes, curvatures and
-    /// springs' displacements measured by `length`: a number without units, of the size of the
-    /// field itself where the effect stands in its way, zero where not. Strains tell soft from
-    /// loose where the tangent has lost a stiffness to round-off.
+    /// The largest strain of a field of small increments of the unknowns, without unit: curvatures
+    /// are multiplied by `length`, displacements of springs divided by it. It is of the size of the
+    /// field if the effect resists it, and zero if it does not. Strains distinguish soft structures
+    /// from mechanisms where round-off hides a stiffness in the tangent.
     fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64;
 
-    /// The roles that it has beside adding forces.
+    /// The roles of the effect beside its forces.
     fn roles(&self) -> Roles<'_>;
 }
 
-/// The roles of an effect.
+/// The roles of an effect beside its forces; `None` for those that it does not have.
 #[derive(Clone, Copy, Default)]
 pub struct Roles<'a> {
-    /// It keeps gaps closed by multipliers.
+    /// Gaps that multipliers close
     pub constraint: Option<&'a dyn Constraint>,
-    /// It has stresses at integration points.
+    /// Stresses at integration points
     pub stresses: Option<&'a dyn StressPoints>,
-    /// It has mass.
+    /// Mass
     pub masses: Option<&'a dyn Masses>,
-    /// Something in it is driven from outside.
-    pub driven: Option<&'a dyn Driven>,
-    /// Spins in it may be free.
+    /// Coordinates driven from outside
+    pub driven: Option<&'a dyn DrivenCoordinates>,
+    /// Spins without resistance
     pub spins: Option<&'a dyn FreeSpins>,
 }
 
 impl Roles<'_> {
-    /// Nothing but forces.
+    /// No role beside forces.
     pub const NONE: Self = Self { constraint: None, stresses: None, masses: None, driven: None, spins: None };
 }
 
-/// Constraints: gaps that multipliers keep closed, and the motors that open them as prescribed.
+/// The role of constraints: gaps that multipliers close, and motors that prescribe them.
 pub trait Constraint {
-    /// First and second derivatives over time of the gaps, for a motion without accelerations; by
-    /// slot of the multipliers. A dynamic stage begins with velocities and accelerations that keep
-    /// the gaps closed.
+    /// Writes first and second derivatives over time of the gaps, for a motion without
+    /// accelerations, by slot of the multipliers. A dynamic stage begins with velocities and
+    /// accelerations that keep the gaps closed.
     fn drift(&self, at: &State, rates: &mut [Vec3], rates2: &mut [Vec3]);
 
-    /// After each converged state: continues angles that the state remembers.
+    /// Updates the angles in the memory of a converged state.
     fn remember(&self, at: &mut State);
 
-    /// Shows its motors.
+    /// Shows the motors in a state.
     fn motors(&self, at: &State, show: &mut dyn FnMut(MotorState));
 
-    /// How far motors turn their nodes at once when amplitudes change: the slot that turns most,
-    /// and radians.
+    /// The largest rotation of a node by a motor when amplitudes change from `from` to `to`: its
+    /// slot, and radians.
     fn turned(&self, from: &[f64], to: &[f64]) -> Option<(Slot, f64)>;
 
-    /// The forces on a node of joints to ground that multipliers hold, in this sign of forces:
-    /// force, and moment conjugate to its rotation vector.
+    /// The forces on a node of joints to ground with multipliers, in the sign of internal forces:
+    /// force (spatial), and moment conjugate to the rotation vector.
     fn held_by_ground(&self, at: &State, node: Node) -> (Vec3, Vec3);
 }
 
-/// Stresses at integration points.
+/// The role of effects with stresses at integration points.
 pub trait StressPoints {
-    /// The number of points whose stresses the robust tangent remembers.
+    /// The number of points with extrapolated stresses in the memory of the effect.
     fn memory_points(&self) -> usize;
 
-    /// Remembers the stresses of the next tangent, extrapolated from unknowns and charts before
-    /// they were corrected by `dq`. Rates of `at` may be those after it.
+    /// Writes the stresses of the next tangent to the memory, extrapolated over the correction `dq`
+    /// from the state before it (mixed-integration-point method). Rates of `at` may be those after
+    /// the correction.
     fn extrapolate(&self, at: &State, dq: &[Vec3], memory: &mut Memory);
 
-    /// x.K x of a field of increments, from the strains that it makes: no digits are lost between
-    /// nodes that move alike. `None` where the tangent alone tells, as under stress.
+    /// The quadratic form x.K x of a field of increments, from its strains: no digits are lost
+    /// between nodes with nearly equal increments. `None` if it needs the tangent, as under stress.
     fn stiffness_along(&self, at: &State, field: &[Vec3]) -> Option<f64>;
 
-    /// The round-off of its forces.
+    /// The largest round-off of forces and moments in a state.
     fn round_off(&self, at: &State) -> RoundOff;
 }
 
-/// Mass.
+/// The role of effects with mass.
 pub trait Masses {
-    /// Mass and momenta.
+    /// Mass and momenta of a state.
     fn momentum(&self, at: &State) -> Momentum;
 
-    /// Shows mass properties that sit at nodes: increments of rotation carry their momentum.
+    /// Shows mass properties at nodes, whose angular momentum increments of rotation carry.
     fn bodies(&self, _show: &mut dyn FnMut(Node, &Inertia)) {}
 }
 
-/// Coordinates that are driven from outside: motors, free strains.
-pub trait Driven {
-    /// Shows each coordinate with the derivative of the stored energy over it, for the energy
-    /// account.
+/// The role of effects with coordinates driven from outside: motors, free strains.
+pub trait DrivenCoordinates {
+    /// Shows each driven coordinate with the derivative of the stored energy over it, for the
+    /// energy balance.
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64));
 }
 
-/// Spins that nothing resists.
+/// The role of effects with spins that no force resists.
 pub trait FreeSpins {
-    /// Shows motions against which nothing acts, each by the increments of some unknowns.
+    /// Shows free motions, each by increments of some unknowns.
     fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements));
 
-    /// Before a step is predicted from the velocities: takes the round-off of free spins out of
-    /// them.
+    /// Removes free spins, which are round-off, from the rates before a step is predicted.
     fn steady(&self, at: &mut State);
 }
 
-/// An effect's kernel of its own for a plane: what it adds to the system there. All else the effect
-/// itself tells.
+/// The planar form of an effect: it takes the place of the effect in the assembly of a planar
+/// scene.
 pub trait PlanarForm: Send + Sync {
-    /// Its tangent is symmetric, whatever the weights.
+    /// True if its tangent is symmetric for all weights.
     fn is_symmetric(&self) -> bool;
 
-    /// As [`Effect::add`].
+    /// Adds forces and tangent, see [`Effect::add`].
     fn add(&self, at: &State, memory: &Memory, weights: Weights, out: &mut Assembler);
 
-    /// As [`StressPoints::extrapolate`].
+    /// Extrapolates stresses, see [`StressPoints::extrapolate`].
     fn extrapolate(&self, _at: &State, _dq: &[Vec3], _memory: &mut Memory) {}
 }

@@ -1,7 +1,8 @@
-//! An artificial resistance against motion, by which a static stage finds the state of rest of what
-//! only its loads hold.
+//! An artificial resistance against motion, with which a static stage finds the state of rest of
+//! structures that only their loads hold.
 //!
-//! Each node is pulled back to where an anchor saw it, by the potential
+//! Each node is pulled back to its place and rotation (index n) in an anchored state, by the
+//! potential
 //!
 //! ```text
 //! c/2 (|u - u_n|^2 + l^2 |theta|^2),   theta = log(R_n^T R)
@@ -9,9 +10,8 @@
 //!
 //! with the resistance c, a force per displacement, and an arm l. Balance against it is a step of
 //! an implicit Euler scheme for a motion along the forces, c dq/dt = -g (proximal point method:
-//! Rockafellar 1976, doi:10.1137/0314056). No scene is composed with it: it stands beside the
-//! effects of a stage only while that looks for rest, and nothing is left of it in the balance that
-//! is found.
+//! Rockafellar 1976, doi:10.1137/0314056). It belongs to no scene: a stage adds it while it looks
+//! for rest, and it vanishes at the balance that is found.
 
 use super::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::{ElementSystem, Weights};
@@ -19,13 +19,13 @@ use crate::rotation::{Rotation, log};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, StageContext, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// At all slots of nodes; nothing without an anchor in the state.
+/// Artificial resistance at all slots of nodes. It acts only in states with an anchor.
 #[derive(Clone, Debug)]
 pub struct Resistance {
-    /// The slots, each with whether it is one of a rotation
-    pub slots: Vec<(Slot, bool)>,
-    /// The arm l by which rotations compare with displacements
-    pub arm: f64,
+    /// The slots of nodes; true for those of rotations
+    pub(crate) slots: Vec<(Slot, bool)>,
+    /// The arm l, a length, by which rotations compare with displacements
+    pub(crate) arm: f64,
 }
 
 impl Effect for Resistance {
@@ -33,7 +33,7 @@ impl Effect for Resistance {
         "artificial resistance"
     }
 
-    /// The work that it takes is booked as damped.
+    /// Damping: the energy balance books its work as damped.
     fn category(&self) -> Category {
         Category::Damping
     }
@@ -50,10 +50,11 @@ impl Effect for Resistance {
         true
     }
 
-    /// It pulls back within the plane that a state moves in.
+    /// Forces of resistance lie in the plane of a planar motion: there are no data to show.
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
 
-    /// The tangent of rotations leaves out what falls with theta.
+    /// Adds force and tangent; the tangent of rotations is that at theta = 0, up to terms of order
+    /// theta.
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let Some(anchor) = &at.anchor else { return };
         let mut system = ElementSystem::new(1);
@@ -92,7 +93,7 @@ mod tests {
     use super::*;
     use crate::rotation::complement;
 
-    /// The moment over an increment of the rotation vector.
+    /// The moment of a unit resistance, conjugate to the rotation vector.
     fn moment(p: Vec3, base: Vec3) -> Vec3 {
         let rotation = Rotation::new(p);
         let base = Rotation::new(base);

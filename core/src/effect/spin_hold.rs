@@ -1,46 +1,48 @@
-//! Holds spins that nothing resists: a straight part between ball joints may spin about its own
-//! axis without any force, in statics always and in a dynamic stage without rotary inertia; then
-//! round-off alone would tell by how much.
+//! Holds of free spins: a straight part between ball joints may spin about its own axis without any
+//! force, in statics and in dynamic stages without rotary inertia, so that its angle would be
+//! round-off.
 
 use super::{Effect, FreeSpins, Roles, SomeIncrements, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, StageContext, State};
 use crate::tensor::Vec3;
 
-/// A straight part that may spin: beams that are joined rigidly along a line.
+/// A straight part that may spin freely: beams joined rigidly along a line.
 #[derive(Clone, Debug)]
 pub struct SpinningPart {
     /// A node in the middle of a beam
     pub node: Node,
-    /// All its nodes
+    /// All nodes of the part
     pub nodes: Vec<Node>,
-    /// The axis at the start, a unit vector
+    /// The axis of the part in the initial placement, a unit vector
     pub axis: Vec3,
-    /// GJ/L, moment per angle
+    /// GJ/L, a moment per radian
     pub stiffness: f64,
 }
 
-/// The hold in load levels and time steps, as part of GJ/L: residuals that Newton tolerates may not
-/// turn the beam by much, and the swing of a beam that sags must not notice.
-const HOLD: f64 = 1e-3;
+/// The stiffness of the hold in load levels and time steps, over GJ/L: large enough that tolerated
+/// residuals of Newton's method hardly turn the part, small enough that it does not change the
+/// swing of a sagging beam.
+const HOLD_RATIO: f64 = 1e-3;
 
-/// The hold where no mass stands beside it, as part of GJ/L: modes must not notice at all.
-const HOLD_IN_MODES: f64 = 1e-8;
+/// The stiffness of the hold in tangents without mass, over GJ/L: small enough that modes do not
+/// change.
+const HOLD_RATIO_IN_MODES: f64 = 1e-8;
 
 /// The stages in which spins are held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeldIn {
-    /// Dynamic and modal ones
+    /// Dynamic and modal stages
     Motion,
-    /// Static ones, and searches for critical loads
+    /// Static stages and searches for critical loads
     Statics,
 }
 
-/// The hold of all parts that may spin.
+/// The hold of all parts that may spin freely.
 ///
-/// It exerts no force, so that balance is what it was; it only stands in the tangent, as stiffness
-/// against corrections t.T dP about the axis t, and keeps predictions from carrying spins on, so
-/// that what no force asks for does not happen.
+/// It has no force and does not change balance. It adds to the tangent a stiffness against
+/// corrections t.T dP about the axis t, and removes spins from predictions, so that parts spin only
+/// if forces turn them.
 #[derive(Clone, Debug)]
 pub struct SpinHold {
     /// The parts
@@ -81,12 +83,12 @@ impl Effect for SpinHold {
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
-        // An artificial resistance holds spins by itself, with a force that tells by how much.
+        // An artificial resistance holds spins by a force.
         if at.anchor.is_some() {
             return;
         }
         let among_modes = self.held_in == HeldIn::Motion && weights.mass == 0.0;
-        let hold = weights.stiffness * if among_modes { HOLD_IN_MODES } else { HOLD };
+        let hold = weights.stiffness * if among_modes { HOLD_RATIO_IN_MODES } else { HOLD_RATIO };
         let mut system = ElementSystem::new(1);
         for (k, part) in self.parts.iter().enumerate() {
             system.clear();
@@ -107,7 +109,8 @@ impl Effect for SpinHold {
 
 impl FreeSpins for SpinHold {
     fn free_motions(&self, at: &State, show: &mut dyn FnMut(&SomeIncrements)) {
-        // A material spin about the axis of each node of a part: what has no inertia is no mode.
+        // A free motion is a material spin of all nodes of a part about its axis. Without inertia
+        // it is no mode.
         let parts = if self.held_in == HeldIn::Statics { &self.parts[..] } else { &[] };
         for part in parts {
             let spin = |node: &Node| (node.p, at.rotation(node.p).t_inverse() * part.axis);
@@ -116,7 +119,7 @@ impl FreeSpins for SpinHold {
     }
 
     fn steady(&self, at: &mut State) {
-        // Parts that are held in statics may spin by their inertia.
+        // Parts that are held only in statics may spin by their inertia.
         let parts = if self.held_in == HeldIn::Motion { &self.parts[..] } else { &[] };
         for part in parts {
             for node in &part.nodes {

@@ -1,7 +1,7 @@
-//! Elements over which something per length is integrated: shared by the effects of rotary and
-//! eccentric inertia, weight and line loads.
+//! Elements with forces per length: common to the effects of rotary and eccentric inertia, damping
+//! by mass, weight and line loads.
 
-use super::{AT_ONCE, ByOrder, Connection, for_each_batch, motions, shared, side_by_side};
+use super::{ByOrder, Connection, ELEMENTS_PER_TASK, for_each_batch, motions, shared, side_by_side};
 use crate::kernel::volume::{Blocks, VolumeKernel, VolumePoint};
 use crate::kernel::{ElementSystem, NodeMotion, Weights, beam};
 use crate::scalar::{Instructions, LANES, Lanes, Pack, each_lane};
@@ -10,27 +10,28 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// An element of N nodes and as many points.
+/// An element of N nodes and N integration points with the quantities `Q`.
 #[derive(Clone, Debug)]
 pub struct VolumeElement<const N: usize, Q> {
-    /// Its place in the scene
-    pub connection: Connection<N>,
+    /// The number and the nodes of the element
+    pub(crate) connection: Connection<N>,
     /// The initial place of its first node
     place: Vec3,
-    /// All else, for it and neighbours that have the same
-    common: Arc<Common<N, Q>>,
+    /// Data shared with equal neighbours
+    common: Arc<SharedVolumeData<N, Q>>,
 }
 
-/// The data that neighbours share.
+/// The data that neighbouring elements share.
 #[derive(Debug, PartialEq)]
-struct Common<const N: usize, Q> {
-    /// The initial places of the nodes as seen from the first
+struct SharedVolumeData<const N: usize, Q> {
+    /// The initial places of the nodes from the first node
     arms: [Vec3; N],
     points: [VolumePoint<N, Q>; N],
 }
 
 impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
-    /// From its first node at `place` on; it shares with a neighbour what both have in common.
+    /// An element whose first node is at `place`, with the other nodes at `arms` from there. Data
+    /// that equal those of the `neighbour` are shared.
     pub fn new(
         connection: Connection<N>,
         place: Vec3,
@@ -41,7 +42,7 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
     where
         Q: PartialEq,
     {
-        let common = shared(Common { arms, points }, neighbour.map(|neighbour| &neighbour.common));
+        let common = shared(SharedVolumeData { arms, points }, neighbour.map(|neighbour| &neighbour.common));
         Self { connection, place, common }
     }
 
@@ -50,18 +51,18 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
         self.place
     }
 
-    /// The initial places of its nodes as seen from the first.
+    /// The initial places of its nodes from the first node.
     pub fn arms(&self) -> &[Vec3; N] {
         &self.common.arms
     }
 
-    /// Its integration points.
+    /// The integration points of the element.
     #[inline(always)]
     pub fn points(&self) -> &[VolumePoint<N, Q>; N] {
         &self.common.points
     }
 
-    /// Shows each point's quantity, its weight, its initial place and its motion.
+    /// Calls `show` with the quantity of each point, its weight, its initial place and its motion.
     fn each_point(&self, at: &State, mut show: impl FnMut(&Q, f64, Vec3, &NodeMotion)) {
         let nodes = self.connection.motions_in_one_chart(at);
         for point in self.points() {
@@ -70,13 +71,14 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
         }
     }
 
-    /// All elements share their points.
+    /// True if all elements share their points.
     #[inline(always)]
     fn share(elements: [&Self; LANES]) -> bool {
         elements[1..].iter().all(|element| Arc::ptr_eq(&element.common, &elements[0].common))
     }
 
-    /// Point g of elements side by side, which may share it, as a kernel takes it.
+    /// Point g of elements side by side, with the present data of a kernel; `share` is true if they
+    /// share their points.
     #[inline(always)]
     fn side_by_side<K>(
         elements: [&Self; LANES],
@@ -96,12 +98,12 @@ impl<const N: usize, Q: Copy> VolumeElement<N, Q> {
     }
 }
 
-/// Elements of all orders.
+/// Elements of two, three and four nodes, with quantities `Q` at their points.
 pub type VolumeElements<Q> = ByOrder<VolumeElement<2, Q>, VolumeElement<3, Q>, VolumeElement<4, Q>>;
 
 impl<Q: Copy> VolumeElements<Q> {
-    /// The slots that meet in each element; effects add no others than those that an assembler
-    /// takes.
+    /// The slots of each element for kernels with these blocks; divisible, since effects add only
+    /// the instances of an assembler.
     pub fn connectivity(&self, blocks: Blocks) -> Connectivity {
         let mut connectivity = Connectivity::divisible();
         for_each_batch!(self, |_first, batch| for element in batch {
@@ -132,9 +134,9 @@ impl<Q: Copy> VolumeElements<Q> {
         });
     }
 
-    /// Sums over points: `add` is shown each one's quantity, its weight, its initial place and its
-    /// motion, and `take` the sums of parts in their order, which are the same for any number of
-    /// threads.
+    /// Sums over points: calls `add` with the sum of a part and the quantity, weight, initial place
+    /// and motion of each point, and `take` with the sums of parts in their order. Parts do not
+    /// depend on the number of threads.
     pub fn sum<S: Default + Send>(
         &self,
         at: &State,
@@ -150,18 +152,18 @@ impl<Q: Copy> VolumeElements<Q> {
                     .for_each(|element| element.each_point(at, |q, w, x, motion| add(&mut sum, q, w, x, motion)));
                 sum
             };
-            threads::in_order(batch.chunks(AT_ONCE), sum_of, &mut take);
+            threads::in_order(batch.chunks(ELEMENTS_PER_TASK), sum_of, &mut take);
         });
     }
 
-    /// Shows the quantity of each point.
+    /// Calls `show` with the quantity of each point.
     pub fn each_quantity(&self, mut show: impl FnMut(&Q)) {
         for_each_batch!(self, |_first, batch| {
             batch.iter().flat_map(|element| element.points()).for_each(|point| show(&point.quantity));
         });
     }
 
-    /// Some point has a quantity of this kind.
+    /// True if `is` holds for the quantity of some point.
     pub fn any(&self, is: impl Fn(&Q) -> bool) -> bool {
         let mut found = false;
         for_each_batch!(self, |_first, batch| {
@@ -171,7 +173,7 @@ impl<Q: Copy> VolumeElements<Q> {
     }
 }
 
-/// Adds the elements of one order, `first` instances after the first one of the effect.
+/// Adds a batch of elements in lanes; `first` is the number of its first instance.
 #[inline(always)]
 fn add_batch<K, const N: usize>(
     kernel: &K,
@@ -201,7 +203,8 @@ fn add_batch<K, const N: usize>(
     out.take_back(systems);
 }
 
-/// Adds force and tangent of one element, whose nodes may sit in different charts.
+/// Adds force and tangent of one element, whose nodes may have rotation vectors in different
+/// charts.
 #[inline(never)]
 fn add_alone<K: VolumeKernel, const N: usize>(
     kernel: &K,

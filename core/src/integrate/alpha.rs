@@ -27,13 +27,13 @@ use std::iter::repeat_with;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scheme {
     /// beta
-    pub beta: f64,
+    pub(crate) beta: f64,
     /// gamma
-    pub gamma: f64,
+    pub(crate) gamma: f64,
     /// alpha_m
-    pub alpha_m: f64,
+    pub(crate) alpha_m: f64,
     /// alpha_f
-    pub alpha_f: f64,
+    pub(crate) alpha_f: f64,
     /// The unknowns of rotations in a step
     pub rotations: Rotations,
 }

@@ -1,9 +1,9 @@
-//! The error that fixed steps make, followed through a stage beside the motion itself.
+//! The error of fixed time steps, integrated through a stage beside the motion itself.
 //!
-//! What a step leaves out of the motion is known to first order from accelerations (the local
-//! error, by which adaptive steps are chosen). What becomes of it is decided by the linearised
-//! equations of motion: the scheme itself carries the error e of the unknowns from step to step,
-//! with the tangent that Newton's method has anyway.
+//! The local error of a step is known to first order from accelerations (adaptive steps are chosen
+//! by it). Its growth and decay follow the linearised equations of motion: the scheme itself
+//! carries the error e of the unknowns from step to step, with the tangent that Newton's method has
+//! factorised already.
 //!
 //! ```text
 //! e1  = e0 + h e0' + h^2 [(1/2 - beta) E0 + beta E1]
@@ -13,7 +13,7 @@
 //! ```
 //!
 //! With e^ for e1 where e1'' = 0, and J = K + c1 C + c2 M, balance is J e1 = M c2 e^ + C (c1 e^ -
-//! e^'). So a step costs one evaluation of inertia and damping and one substitution. At its end it
+//! e^'). A step costs one evaluation of inertia and damping and one substitution. At its end it
 //! adds its own local errors, with d = alpha_m - alpha_f:
 //!
 //! ```text
@@ -21,11 +21,11 @@
 //! tau' = (1/2 - gamma - d) h^2 q''' + [1/6 - d (alpha_m - 1/2) - gamma (1/2 + d)] h^3 q''''
 //! ```
 //!
-//! The derivatives are slopes of accelerations over several steps. A motion that steps do not
-//! resolve errs by its own size and no more, which a linear equation does not know; over several
-//! steps nothing is seen of it.
+//! The derivatives are slopes of accelerations over several steps. The error of a motion that steps
+//! do not resolve is bounded by the size of the motion, which a linear equation does not know;
+//! slopes over several steps do not see it.
 
-use super::time_error::{Correct, Largest, Scene, is_to_switch};
+use super::time_error::{Correct, Largest, Scene, StepEnds, is_to_switch};
 use super::{Increments, Method, Scheme, Step};
 use crate::kernel::Weights;
 use crate::kernel::turn::{StartChange, Turn};
@@ -36,85 +36,92 @@ use crate::tensor::Vec3;
 use crate::threads::{self, PART};
 use std::sync::Arc;
 
-/// Steps over which slopes of accelerations are taken.
-pub(super) const WIDTH: usize = 4;
+/// The number of steps over which slopes of accelerations are taken.
+pub(super) const SLOPE_STEPS: usize = 4;
 
-/// The part of h^4 w^2 times the change of the acceleration of a free spin that a step of
-/// increments errs by, measured on bodies that turn about their middle axes.
-pub(super) const FREE_SPIN: f64 = 1.0 / 8.0;
+/// The local error of a step of increments over h^4 w^2 times the change of the acceleration of a
+/// free spin; without unit, measured on bodies that turn about their intermediate principal axes.
+pub(super) const FREE_SPIN_ERROR: f64 = 1.0 / 8.0;
 
-/// The change of rates that shows how forces follow them: that of an error of this size, in radians
-/// or over the length of the scene.
-const NUDGE: f64 = 1e-6;
+/// The size of the error, in radians or over the length of the scene, to which the carried error is
+/// scaled for a difference quotient of the forces of rates.
+const SCALED_ERROR: f64 = 1e-6;
 
-/// The most that an error is taken to grow to, over the sum of the sizes of local errors. What is
-/// carried along beyond that has grown from roundoff or second-order terms in an unstable motion (a
-/// body about its middle axis), which the motion itself has not.
-const MOST_GROWTH: f64 = 800.0;
-/// The same where accelerations ring from step to step: frequencies far above those that steps
-/// resolve let the carried error grow by itself in a frame that turns.
-const MOST_GROWTH_RINGING: f64 = 8.0;
-/// The part of the local errors from which on that is so.
-const RUNG: f64 = 0.05;
+/// The bound of a carried error, over the sum of the sizes of local errors. A larger one has grown
+/// from round-off or second-order terms in an unstable motion (a body about its intermediate axis),
+/// not from errors of the motion.
+const MAX_GROWTH: f64 = 800.0;
+/// The bound of a carried error, over the sum of the sizes of local errors, where accelerations
+/// change sign from step to step: in a turning frame, frequencies far above those that steps
+/// resolve let the carried error grow by itself.
+const MAX_GROWTH_RINGING: f64 = 8.0;
+/// The share of ringing accelerations in the sum of local errors from which on
+/// [`MAX_GROWTH_RINGING`] holds.
+const RINGING_SHARE: f64 = 0.05;
 
-/// The error of the steps of a stage, since it is carried along.
+/// The error of the steps of a stage, from the step on after which it is carried.
 pub(super) struct CarriedError {
     kinds: Arc<Vec<SlotKind>>,
     length: f64,
-    slots: Vec<OfSlot>,
+    slots: Vec<SlotError>,
     step: Step,
-    /// By how much the step is longer than the one before
+    /// The ratio of the length of the present step to that of the step before
     stretch: f64,
-    /// Rates with the change that the error makes
+    /// Velocities and accelerations, changed by the scaled error
     rates: [Field; 2],
-    /// Their forces, then what the error meets; by category and slot
+    /// Forces of the changed rates, then the forces of inertia and damping on the error; by
+    /// category and slot
     force: [Vec<Vec3>; 4],
-    /// The errors at the end of the present step of rotations whose unknowns are increments, as
-    /// they stand in [`OfSlot`]
+    /// Errors at the end of the present step of rotations whose unknowns are increments: error,
+    /// rate, rate2 and algorithmic of [`SlotError`]
     turned: Vec<(Slot, [Vec3; 4])>,
-    /// What the error is multiplied by to show; zero where there is none yet
-    nudge: f64,
+    /// The factor that scales the error to [`SCALED_ERROR`]; zero while there is no error
+    scaling: f64,
     known: Known,
-    /// How many steps there were, and the lengths of the last of them, each at the place of its
-    /// number
+    /// The number of steps
     steps: usize,
-    lengths: [f64; WIDTH],
+    /// The lengths of the last steps, each at the index of its number modulo [`SLOPE_STEPS`]
+    lengths: [f64; SLOPE_STEPS],
     largest: Largest,
-    /// The sizes of local errors, summed over the steps, and of those among them that come from
-    /// ringing
+    /// The sizes of local errors summed over the steps: of all, and of those of ringing
+    /// accelerations
     sums: [Largest; 2],
 }
 
-/// What is known of the error at the end of the present step.
+/// The quantities of the present step that have been computed.
 #[derive(Clone, Copy, PartialEq)]
 enum Known {
-    /// Nothing
+    /// No quantity
     Nothing,
-    /// What it meets of inertia and damping
+    /// The forces of inertia and damping on the error
     Forces,
-    /// The error
+    /// The error at the end of the step
     Error,
 }
 
-/// What is known of a slot. The error of a rotation whose unknown is an increment is a material
-/// turn, with the material errors of the spin and its rate, and the spatial one of the rate of the
-/// momentum that it carries.
+/// The error of a slot. That of a rotation whose unknown is an increment is a material rotation
+/// vector, with the material errors of the spin and its rate, and the spatial error of the rate of
+/// the momentum that it carries.
 #[derive(Clone, Copy, Default)]
-struct OfSlot {
-    /// e, e', e'' and E at the end of the last step
+struct SlotError {
+    /// e at the end of the last step
     error: Vec3,
+    /// e' at the end of the last step
     rate: Vec3,
+    /// e'' at the end of the last step
     rate2: Vec3,
+    /// E at the end of the last step
     algorithmic: Vec3,
-    /// Accelerations at the ends of the last steps, each at the place of its number
-    past: [Vec3; WIDTH],
-    /// The slope that was found last
+    /// Accelerations at the ends of the last steps, each at the index of its number modulo
+    /// [`SLOPE_STEPS`]
+    past: [Vec3; SLOPE_STEPS],
+    /// The last slope of accelerations, q'''
     jerk: Vec3,
-    /// q where the stage began
+    /// q at the start of the stage
     start: Vec3,
-    /// Whether its accelerations mean something
+    /// True if accelerations of the slot are determined by mass
     moves: bool,
-    /// Of how many steps it has accelerations, as far as that matters
+    /// The number of steps whose accelerations are known, up to [`SLOPE_STEPS`]
     age: u8,
 }
 
@@ -125,7 +132,7 @@ struct Predicted {
     algorithmic: Vec3,
 }
 
-impl OfSlot {
+impl SlotError {
     #[inline(always)]
     fn predicted(&self, step: &Step, stretch: f64) -> Predicted {
         let Scheme { beta, gamma, alpha_m, alpha_f, .. } = step.scheme;
@@ -140,8 +147,8 @@ impl OfSlot {
         }
     }
 
-    /// The turn of a rotation that begins with a part of the error, and the increment with which it
-    /// ends where the other one ends.
+    /// A step of a rotation that starts with `part` times the error, and the increment with which
+    /// it ends at the end of the step without error, whose increment is `x`.
     fn changed(&self, turn: &Turn, x: Vec3, stretch: f64, part: f64) -> (Turn, Vec3) {
         let by = StartChange {
             turned: self.error * part,
@@ -154,11 +161,10 @@ impl OfSlot {
 }
 
 impl CarriedError {
-    /// From a state on, in which a step has ended that was as long as the next ones will be;
-    /// `start` is q where the stage began. `moves` tells for each slot whether its accelerations
-    /// mean something.
+    /// Begins with an error of zero in a state at the end of `step`; `start` is q at the start of
+    /// the stage, and `force` gives the sizes of lists of forces by category.
     pub fn new(scene: &Scene, force: [Vec<Vec3>; 4], state: &State, start: &[Vec3], step: Step) -> Self {
-        let of_slot = |slot: usize| OfSlot { moves: scene.moves(slot), start: start[slot], ..OfSlot::default() };
+        let of_slot = |slot: usize| SlotError { moves: scene.moves(slot), start: start[slot], ..SlotError::default() };
         Self {
             kinds: scene.kinds.clone(),
             length: scene.length,
@@ -167,32 +173,33 @@ impl CarriedError {
             rates: [state.v.clone(), state.a.clone()],
             force,
             turned: Vec::new(),
-            nudge: 0.0,
+            scaling: 0.0,
             known: Known::Nothing,
             steps: 0,
-            lengths: [step.length; WIDTH],
+            lengths: [step.length; SLOPE_STEPS],
             largest: Largest::default(),
             sums: [Largest::default(); 2],
             step,
         }
     }
 
-    /// An attempt at a step begins; the one before was as long as `before`.
+    /// Begins an attempt at a step; `before` is the length of the step before.
     pub fn begin(&mut self, step: &Step, before: f64) {
         self.step = *step;
         self.stretch = step.length / before;
         self.known = Known::Nothing;
     }
 
-    /// Whether what the error meets in the present step is not known yet.
+    /// True if [`Self::look`] has not been called in the present step.
     pub fn knows_no_forces(&self) -> bool {
         self.known == Known::Nothing
     }
 
-    /// Looks at what the error meets of inertia and damping in the state that the tangent of the
-    /// step belongs to. The forces of the system are those of that state, and stay.
+    /// Computes the forces of inertia and damping on the error by difference quotients, at the
+    /// state of the present tangent. The forces of the system must be those of that state; they are
+    /// kept.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {
-        if self.nudge == 0.0 {
+        if self.scaling == 0.0 {
             return;
         }
         self.known = Known::Forces;
@@ -201,7 +208,7 @@ impl CarriedError {
         assembly.evaluate_rates(state, &mut self.force);
         self.swap_rates(state);
         let system = &assembly.system;
-        let factor = 1.0 / self.nudge;
+        let factor = 1.0 / self.scaling;
         let [_, inertia, _, damping] = &mut self.force;
         threads::each_part(inertia, |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -217,14 +224,14 @@ impl CarriedError {
         }
     }
 
-    /// Rates that differ from those of the state by as much as those of an error that is zero at
-    /// the end of the step, the other way.
+    /// Sets the changed rates: those of the state less those of the scaled error that is zero at
+    /// the end of the step.
     fn change_rates(&mut self, state: &State, weights: Weights) {
-        let Self { slots, rates: [v, a], nudge, step, stretch, .. } = self;
+        let Self { slots, rates: [v, a], scaling, step, stretch, .. } = self;
         let slots = &slots[..];
         let step = &*step;
         let stretch = *stretch;
-        let nudge = *nudge;
+        let scaling = *scaling;
         v.copy_from(&state.v);
         a.copy_from(&state.a);
         let v = &mut v[..];
@@ -233,12 +240,12 @@ impl CarriedError {
             let of_part = v.iter_mut().zip(a).zip(&slots[PART * number..]);
             for ((v, a), slot) in of_part.filter(|(_, slot)| slot.moves) {
                 let Predicted { error, rate, .. } = slot.predicted(step, stretch);
-                *v += (error * weights.damping - rate) * nudge;
-                *a += error * (weights.mass * nudge);
+                *v += (error * weights.damping - rate) * scaling;
+                *a += error * (weights.mass * scaling);
             }
         });
         for (k, turn) in turns(state) {
-            let (turn, x) = slots[k].changed(turn, state.q[k], stretch, nudge);
+            let (turn, x) = slots[k].changed(turn, state.q[k], stretch, scaling);
             let (omega, acceleration) = turn.rates(x);
             v[k] = state.v[k] * 2.0 - omega;
             a[k] = state.a[k] * 2.0 - acceleration;
@@ -251,13 +258,14 @@ impl CarriedError {
         std::mem::swap(&mut state.a, a);
     }
 
-    /// The step is in balance: its tangent tells the error at its end, unless it has been given up.
+    /// Solves for the error at the end of a step in balance, with the factors of its tangent, and
+    /// writes it to `error`. Without usable factors nothing is found.
     pub fn solve(&mut self, correct: &mut Correct, system: &mut System, state: &State, error: &mut [Vec3]) {
         if self.known != Known::Forces {
             return;
         }
-        // The solver takes the sum of all forces: what the others have of it is taken away from
-        // what it shall see.
+        // The solver sums the forces of all categories: those of the others are subtracted from the
+        // forces on the error.
         const INERTIA: usize = Category::Inertia as usize;
         threads::each_part(&mut self.force[INERTIA], |start, part| {
             for (slot, force) in (start..).zip(part) {
@@ -274,50 +282,45 @@ impl CarriedError {
         }
     }
 
-    /// The errors of rotations whose unknowns are increments, of which `error` has those of the
-    /// increments.
+    /// Converts the errors of increments of rotation in `error` to errors of rotations and their
+    /// rates.
     fn find_turned(&mut self, state: &State, error: &[Vec3]) {
-        let Self { slots, turned, nudge, stretch, .. } = self;
+        let Self { slots, turned, scaling, stretch, .. } = self;
         turned.clear();
         for (k, turn) in turns(state) {
             let x = state.q[k];
             let omega = state.v[k];
             let acceleration = state.a[k];
-            let (changed, same) = slots[k].changed(turn, x, *stretch, *nudge);
-            let other = same + error[k] * *nudge;
+            let (changed, same) = slots[k].changed(turn, x, *stretch, *scaling);
+            let other = same + error[k] * *scaling;
             let (other_omega, other_acceleration) = changed.rates(other);
-            let ahead = Rotation::new(slots[k].error * *nudge).r * Rotation::new(other).r;
+            let ahead = Rotation::new(slots[k].error * *scaling).r * Rotation::new(other).r;
             let changes = [
                 log(Rotation::new(x).r.transpose() * ahead),
                 other_omega - omega,
                 other_acceleration - acceleration,
                 changed.algorithmic(other, other_omega) - turn.algorithmic(x, omega),
             ];
-            turned.push((k as Slot, changes.map(|change| change * (1.0 / *nudge))));
+            turned.push((k as Slot, changes.map(|change| change * (1.0 / *scaling))));
         }
     }
 
-    /// The step is taken from one state to another, both in one chart, with the error that was
-    /// found at its end.
-    pub fn end(
-        &mut self,
-        dof_map: &DofMap,
-        error: &[Vec3],
-        (from, to): (&State, &State),
-        increments: Option<&Increments>,
-    ) {
+    /// Ends a step between two states in one chart, with the `error` that [`Self::solve`] has
+    /// found, and adds the local errors.
+    pub fn end(&mut self, dof_map: &DofMap, error: &[Vec3], step_ends: StepEnds, increments: Option<&Increments>) {
+        let StepEnds { from, to } = step_ends;
         let Step { scheme, length: h } = self.step;
         let stretch = self.stretch;
         let weights = self.step.weights();
         self.steps += 1;
-        let own = self.steps % WIDTH;
+        let own = self.steps % SLOPE_STEPS;
         self.lengths[own] = h;
-        let local = Local::new(&scheme, h, own, self.lengths.iter().sum());
-        // Where nothing is found an error stays as it was: to go on freely would be much for what
-        // is stiff.
+        let local = LocalErrors::new(&scheme, h, own, self.lengths.iter().sum());
+        // Without a solution the error is kept: a free continuation would exaggerate errors of
+        // stiff motions.
         let found = self.known == Known::Error;
         let Self { kinds, slots, step, .. } = self;
-        let work = |(number, part): (usize, &mut [OfSlot])| {
+        let work = |(number, part): (usize, &mut [SlotError])| {
             let mut largest = Largest::default();
             let mut sizes = [Largest::default(); 2];
             for (k, slot) in (PART * number..).zip(part) {
@@ -343,7 +346,7 @@ impl CarriedError {
                         of_place -= dof_map.held_part(k as Slot, of_place);
                         of_rate -= dof_map.held_part(k as Slot, of_rate);
                     }
-                    // The error of a rate is not felt before the next step has ended.
+                    // The error of a rate has no effect on places before the end of the next step.
                     now += of_place;
                     take_size(&mut sizes, kind, of_place, rings);
                     slot.error += of_place - of_rate * h;
@@ -356,13 +359,13 @@ impl CarriedError {
         };
         let mut now = Largest::default();
         let mut sizes = [Largest::default(); 2];
-        let gather = |(largest, [all, rung]): (Largest, [Largest; 2])| {
+        let gather = |(largest, [all, ringing]): (Largest, [Largest; 2])| {
             now = now.or(largest);
-            sizes = [sizes[0].or(all), sizes[1].or(rung)];
+            sizes = [sizes[0].or(all), sizes[1].or(ringing)];
         };
         threads::in_order(slots.chunks_mut(PART).enumerate(), work, gather);
         if let Some(increments) = increments {
-            self.end_turns(increments, (from, to), &local, (&mut now, &mut sizes));
+            self.end_turns(increments, step_ends, &local, &mut now, &mut sizes);
         }
         let now = now.root();
         for (sum, size) in self.sums.iter_mut().zip(sizes) {
@@ -372,16 +375,18 @@ impl CarriedError {
         }
         self.largest = self.largest.or(now);
         let size = (now.displacement / self.length).max(now.rotation);
-        self.nudge = if size > 0.0 { NUDGE / size } else { 0.0 };
+        self.scaling = if size > 0.0 { SCALED_ERROR / size } else { 0.0 };
     }
 
-    /// The same for rotations whose unknowns are increments.
+    /// Ends a step of the rotations whose unknowns are increments: takes the largest error and the
+    /// sizes of local errors.
     fn end_turns(
         &mut self,
         increments: &Increments,
-        (from, to): (&State, &State),
-        local: &Local,
-        (largest, sizes): (&mut Largest, &mut [Largest; 2]),
+        StepEnds { from, to }: StepEnds,
+        local: &LocalErrors,
+        largest: &mut Largest,
+        sizes: &mut [Largest; 2],
     ) {
         let found = self.known == Known::Error;
         let h = self.step.length;
@@ -394,7 +399,7 @@ impl CarriedError {
             if slot.moves {
                 let rings = local.rings(slot, before.driven, after.driven);
                 let [of_place, of_rate] = local.of(slot, before.driven, after.driven);
-                let of_spin = (after.free - before.free) * (h.powi(4) * after.spin.squared() * FREE_SPIN);
+                let of_spin = (after.free - before.free) * (h.powi(4) * after.spin.squared() * FREE_SPIN_ERROR);
                 let back = Rotation::new(to.q[after.slot as usize]).r.transpose();
                 take_size(sizes, SlotKind::Rotation, of_place + of_spin, rings);
                 slot.error += back * (of_place + of_spin);
@@ -404,8 +409,8 @@ impl CarriedError {
         }
     }
 
-    /// Total rotation vectors are about to change their charts in a state: their errors go with
-    /// them.
+    /// Carries errors into the complement chart for the total rotation vectors of a state that are
+    /// about to change theirs.
     pub fn change_charts(&mut self, state: &State, rotations: &[Slot]) {
         for &slot in rotations {
             let k = slot as usize;
@@ -424,16 +429,19 @@ impl CarriedError {
         }
     }
 
-    /// The largest errors so far.
+    /// The largest errors so far, bounded by multiples of the sum of local errors.
     pub fn largest(&self) -> Largest {
-        let [all, rung] = self.sums;
-        let rings = rung.displacement > RUNG * all.displacement || rung.rotation > RUNG * all.rotation;
-        let most = match self.step.scheme {
-            scheme if !is_told_by_places(&scheme) => f64::INFINITY,
-            _ if rings => MOST_GROWTH_RINGING,
-            _ => MOST_GROWTH,
+        let [all, ringing] = self.sums;
+        let rings =
+            ringing.displacement > RINGING_SHARE * all.displacement || ringing.rotation > RINGING_SHARE * all.rotation;
+        let most = if !places_bound_rates(&self.step.scheme) {
+            f64::INFINITY
+        } else if rings {
+            MAX_GROWTH_RINGING
+        } else {
+            MAX_GROWTH
         };
-        // What has no mass has no local errors of its own.
+        // Slots without mass have no local errors of their own.
         let bounded = |error: f64, sum: f64| if sum > 0.0 { error.min(most * sum) } else { error };
         Largest {
             displacement: bounded(self.largest.displacement, all.displacement),
@@ -443,37 +451,39 @@ impl CarriedError {
     }
 }
 
-/// Whether local errors of places tell how large those of rates are: those of a scheme of first
-/// order, or with a beta near 1/6, do not.
-fn is_told_by_places(scheme: &Scheme) -> bool {
+/// True if local errors of places bound those of rates: not in a scheme of first order, nor with a
+/// beta near 1/6.
+fn places_bound_rates(scheme: &Scheme) -> bool {
     let lag = scheme.lag();
     (0.5 - scheme.gamma - lag).abs() < 1e-9 && (1.0 / 6.0 - scheme.beta - 0.5 * lag).abs() > 0.04
 }
 
-/// Takes the size of a local error into those of a step.
+/// Updates the largest local errors of a step, all and those of ringing accelerations, with one of
+/// size `size`.
 #[inline(always)]
-fn take_size([all, rung]: &mut [Largest; 2], kind: SlotKind, size: Vec3, rings: bool) {
+fn take_size([all, ringing]: &mut [Largest; 2], kind: SlotKind, size: Vec3, rings: bool) {
     all.take(kind, size, Vec3::ZERO);
     if rings {
-        rung.take(kind, size, Vec3::ZERO);
+        ringing.take(kind, size, Vec3::ZERO);
     }
 }
 
-/// The steps that rotations are in whose unknowns are increments.
+/// The steps of the rotations whose unknowns are increments, with their slots.
 fn turns(state: &State) -> impl Iterator<Item = (usize, &Turn)> {
     state.turns.iter().enumerate().filter_map(|(k, turn)| Some((k, turn.as_ref()?)))
 }
 
-/// What the local errors of a step come from.
-struct Local {
-    /// Of q''' in tau and in tau', and of the change of q''' in tau'
+/// The coefficients of the local errors of a step.
+struct LocalErrors {
+    /// The factors of q''' in tau and in tau', and of the change of q''' in tau'
     factors: [f64; 3],
-    /// The place of the step among the last ones, and one over the sum of their lengths
+    /// The index of the step in lists of the last steps
     place: usize,
+    /// One over the sum of the lengths of the last steps, 1/time
     per_span: f64,
 }
 
-impl Local {
+impl LocalErrors {
     fn new(scheme: &Scheme, h: f64, place: usize, span: f64) -> Self {
         let Scheme { beta, gamma, alpha_m, .. } = *scheme;
         let lag = scheme.lag();
@@ -482,24 +492,24 @@ impl Local {
         Self { factors: [of_slope[0] * h * h * h, of_slope[1] * h * h, of_change * h * h], place, per_span: 1.0 / span }
     }
 
-    /// Whether an acceleration goes up and down from step to step.
+    /// True if the change of an acceleration reverses from step to step.
     #[inline(always)]
-    fn rings(&self, slot: &OfSlot, before: Vec3, after: Vec3) -> bool {
-        let earlier = slot.past[(self.place + WIDTH - 2) % WIDTH];
+    fn rings(&self, slot: &SlotError, before: Vec3, after: Vec3) -> bool {
+        let earlier = slot.past[(self.place + SLOPE_STEPS - 2) % SLOPE_STEPS];
         slot.age > 1 && (after - before).dot(before - earlier) < 0.0
     }
 
-    /// tau and tau', from the accelerations at both ends.
+    /// The local errors tau and tau', from the accelerations at both ends of the step.
     #[inline(always)]
-    fn of(&self, slot: &mut OfSlot, before: Vec3, after: Vec3) -> [Vec3; 2] {
+    fn of(&self, slot: &mut SlotError, before: Vec3, after: Vec3) -> [Vec3; 2] {
         if slot.age == 0 {
-            // Before it began, a motion is taken to have been as it was then.
-            slot.past = [before; WIDTH];
+            // Accelerations before the first step are taken to be those at its start.
+            slot.past = [before; SLOPE_STEPS];
         }
         let jerk = (after - slot.past[self.place]) * self.per_span;
-        // While a slope becomes known its change is none of the motion's.
-        let change = if usize::from(slot.age) < WIDTH { Vec3::ZERO } else { jerk - slot.jerk };
-        slot.age = (WIDTH as u8).min(slot.age + 1);
+        // A slope over fewer steps changes by its own completion, not with the motion.
+        let change = if usize::from(slot.age) < SLOPE_STEPS { Vec3::ZERO } else { jerk - slot.jerk };
+        slot.age = (SLOPE_STEPS as u8).min(slot.age + 1);
         slot.past[self.place] = after;
         slot.jerk = jerk;
         let [of_place, of_rate, of_change] = self.factors;

@@ -1,8 +1,8 @@
 //! Steps whose rotational unknowns are increments.
 //!
-//! Between steps a state holds total rotation vectors, as everywhere. While a step is iterated it
-//! holds, for each rotation, the increment X with R = R_n exp(X), and the spin that belongs to it
-//! (see [`crate::kernel::turn`]); nothing then depends on where the total vector happens to be.
+//! Between steps a state holds total rotation vectors. During the iteration of a step it holds, for
+//! each rotation, the increment X with R = R_n exp(X), and its spin (see [`crate::kernel::turn`]);
+//! results then do not depend on the length of the total vector.
 
 use super::Step;
 use crate::kernel::inertia::Inertia;
@@ -16,15 +16,15 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Principal values of a carrier are at least the largest over this: the smaller they are, the more
-/// they make of the error of a momentum.
-const LARGEST_RATIO: f64 = 10.0;
+/// The largest ratio of principal values of a carrier; smaller values are raised. The spins of
+/// small ones amplify errors of the momentum.
+const MAX_PRINCIPAL_RATIO: f64 = 10.0;
 
-/// What h^4 w^2 times a change of phi is divided by to be the error of a rotation.
-const FREE: f64 = 240.0;
+/// The divisor of h^4 w^2 times a change of phi in the local error of a rotation, without unit.
+const FREE_SPIN_DIVISOR: f64 = 240.0;
 
-/// Part of the largest principal value below which there is no inertia.
-const MASSLESS: f64 = 1e-12;
+/// The share of the largest principal value below which an inertia counts as none.
+const MIN_INERTIA_SHARE: f64 = 1e-12;
 
 /// The rotations of a scene, and the momentum that each carries from step to step.
 pub struct Increments {
@@ -32,7 +32,7 @@ pub struct Increments {
 }
 
 impl Increments {
-    /// For a stage of this kind with these equations.
+    /// The rotations of a stage of a kind, with its degrees of freedom.
     pub fn new(model: &Model, kind: StageKind, dof_map: &DofMap) -> Self {
         let bodies = bodies_by_rotation(model);
         let carrier = |&slot: &Slot| {
@@ -47,7 +47,8 @@ impl Increments {
         Self { carriers: model.charted(kind).rotations.iter().map(carrier).collect() }
     }
 
-    /// At the start of a stage, after [`super::Scheme::start`]: the same of momenta.
+    /// Starts a stage, after [`super::Scheme::start`]: the algorithmic rates of momenta begin as
+    /// the true ones.
     pub fn start(&self, state: &mut State) {
         for &(slot, carrier) in &self.carriers {
             let spin = state.spin(slot);
@@ -55,7 +56,8 @@ impl Increments {
         }
     }
 
-    /// From total vectors to increments. `before` is the length of the step before.
+    /// Begins a step: replaces total vectors by increments. `before` is the length of the step
+    /// before.
     pub fn begin(&self, state: &mut State, step: &Step, before: f64) {
         state.wound_apart();
         let mut turns = std::mem::take(&mut state.turns);
@@ -78,8 +80,8 @@ impl Increments {
         state.turns = turns;
     }
 
-    /// From increments to total vectors, each in the chart of `before` unless that has been left;
-    /// returns how many have.
+    /// Ends a step: replaces increments by total vectors, each in the chart of `before` as long as
+    /// it is within the band. Returns the number of rotations that have changed their chart.
     pub fn end(&self, state: &mut State, before: &State) -> usize {
         let mut switched = 0;
         let mut turns = std::mem::take(&mut state.turns);
@@ -97,16 +99,19 @@ impl Increments {
             state.v[k] = velocity;
             state.a[k] = acceleration;
         }
-        // The room is kept for the next step.
+        // The memory is kept for the next step.
         state.turns = turns;
         switched
     }
 
-    /// The local errors of rotations over a step between two states with total vectors, with their
-    /// slots. What moments give, mu = E J^-1 E^T b, is integrated to second order, with the error
-    /// factor h^2 (mu1 - mu0). The rest of the acceleration, phi, is integrated to fourth order:
-    /// h^5/720 of the fourth derivative of the spin, which is about |w|^2 times the second, (phi1 -
-    /// phi0)/h, and as much again from each of the two next terms of Magnus' series.
+    /// The local errors of rotations, in radians, over a step between two states with total
+    /// vectors, with their slots.
+    ///
+    /// The acceleration by moments, mu = E J^-1 E^T b, is integrated to second order, with the
+    /// error factor h^2 (mu1 - mu0). The rest of the acceleration, phi, is integrated to fourth
+    /// order: h^5/720 of the fourth derivative of the spin, which is about |w|^2 times the second,
+    /// (phi1 - phi0)/h, and as much again from each of the two next terms of Magnus' series (Magnus
+    /// 1954, doi:10.1002/cpa.3160070404).
     pub fn errors<'a>(
         &'a self,
         start: &'a State,
@@ -117,12 +122,12 @@ impl Increments {
         let h2 = length * length;
         self.accelerations(start).zip(self.accelerations(end)).map(move |(before, after)| {
             let driven = (after.driven - before.driven).norm() * (factor * h2);
-            let free = (after.free - before.free).norm() * (h2 * h2 * after.spin.squared() / FREE);
+            let free = (after.free - before.free).norm() * (h2 * h2 * after.spin.squared() / FREE_SPIN_DIVISOR);
             (driven + free, after.slot as usize)
         })
     }
 
-    /// The accelerations of all rotations in a state with total vectors.
+    /// The angular accelerations of all rotations in a state with total vectors.
     pub fn accelerations<'a>(&'a self, state: &'a State) -> impl Iterator<Item = Accelerations> + 'a {
         self.carriers.iter().map(|&(slot, carrier)| {
             let spin = state.spin(slot);
@@ -133,19 +138,19 @@ impl Increments {
     }
 }
 
-/// What the acceleration of a rotation comes from, spatial.
+/// The angular acceleration of a rotation by its causes, spatial.
 pub struct Accelerations {
-    /// The rotation
-    pub slot: Slot,
-    /// mu: moments
-    pub driven: Vec3,
-    /// phi: its own spin
-    pub free: Vec3,
-    /// Its spin, material
-    pub spin: Vec3,
+    /// The slot of the rotation
+    pub(crate) slot: Slot,
+    /// mu: the part by moments
+    pub(crate) driven: Vec3,
+    /// phi: the part by the spin itself, without moments
+    pub(crate) free: Vec3,
+    /// The spin, material
+    pub(crate) spin: Vec3,
 }
 
-/// What sits at each rotation, taken together, with the slot of its displacement.
+/// The mass properties at each rotation, summed up, with the slot of the displacement of its node.
 fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     let mut sums: BTreeMap<Slot, (Slot, Inertia)> = BTreeMap::new();
     for masses in model.effects.iter().filter_map(|effect| effect.roles().masses) {
@@ -157,25 +162,25 @@ fn bodies_by_rotation(model: &Model) -> BTreeMap<Slot, (Slot, Inertia)> {
     sums
 }
 
-/// The carrier of an angular momentum; `None` without inertia about some axis. Of slender inertias
-/// the small principal values are raised.
+/// The carrier of an angular momentum, whose small principal values are raised to the largest over
+/// [`MAX_PRINCIPAL_RATIO`]. `None` without inertia about some axis.
 fn momentum(inertia: Mat3) -> Option<Carrier> {
     let SymmetricEigen { eigenvectors, eigenvalues } =
         SymmetricEigen::new(Matrix3::from_fn(|i, j| 0.5 * (inertia.0[i][j] + inertia.0[j][i])));
     let largest = eigenvalues.max();
-    // Nothing resists a turn about this axis: its momentum says nothing of its spin.
-    if eigenvalues.min() <= MASSLESS * largest {
+    // Without inertia about an axis the momentum does not determine the spin about it.
+    if eigenvalues.min() <= MIN_INERTIA_SHARE * largest {
         return None;
     }
     let with = |f: &dyn Fn(f64) -> f64| {
-        let diagonal = Matrix3::from_diagonal(&eigenvalues.map(|value| f(value.max(largest / LARGEST_RATIO))));
+        let diagonal = Matrix3::from_diagonal(&eigenvalues.map(|value| f(value.max(largest / MAX_PRINCIPAL_RATIO))));
         let whole = eigenvectors * diagonal * eigenvectors.transpose();
         Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| whole[(i, j)])))
     };
     Some(Carrier { tensor: with(&|value| value), inverse: with(&|value| 1.0 / value) })
 }
 
-/// Pd = T^-1 Omega, Pdd = T^-1 (Acc - Td Pd)
+/// Rates of a total rotation vector from material spins: Pd = T^-1 Omega, Pdd = T^-1 (Acc - Td Pd).
 fn rates(p: Vec3, omega: Vec3, acceleration: Vec3) -> (Vec3, Vec3) {
     let rotation = Rotation::new(p);
     let inverse = rotation.t_inverse();

@@ -1,5 +1,5 @@
-//! Time integration as coefficients: how a correction of the unknowns changes velocities and
-//! accelerations, and with which weights stiffness, damping and mass enter the tangent.
+//! Time integration as coefficients: the changes of velocities and accelerations with a correction
+//! of the unknowns, and the weights of stiffness, damping and mass in the tangent.
 
 mod alpha;
 mod carried_error;
@@ -10,28 +10,28 @@ mod time_error;
 pub use alpha::{Rotations, Scheme, Step};
 pub use increments::Increments;
 pub use predictor::Predictor;
-pub use time_error::{Largest, TimeError};
+pub use time_error::{Largest, StepEnds, TimeError};
 
 use crate::kernel::Weights;
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads;
 
-/// What Newton needs to know of a step.
+/// The interface of a step to Newton's method.
 pub trait Method {
-    /// The weights of the tangent of a step.
+    /// The weights of stiffness, damping and mass in the tangent of the step.
     fn weights(&self) -> Weights;
 
-    /// Adds a correction of the unknowns.
+    /// Adds a correction of the unknowns, and the changes of their rates that follow from it.
     fn correct(&self, state: &mut State, dq: &[Vec3]);
 
-    /// Whether nodes change their charts while the step is iterated; else between steps.
+    /// True if nodes change their charts during the iteration; otherwise they do between steps.
     fn changes_charts(&self) -> bool {
         false
     }
 }
 
-/// Statics: the unknowns alone.
+/// Statics: a correction changes the unknowns alone.
 #[derive(Clone, Copy, Debug)]
 pub struct Equilibrium;
 

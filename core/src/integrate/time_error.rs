@@ -1,13 +1,13 @@
-//! The estimated error of the fixed steps of a stage.
+//! The estimated error of the fixed time steps of a stage.
 //!
-//! A step leaves tau = (1/6 - beta - d/2) h^3 q''' out of a motion, d = alpha_m - alpha_f. In all
-//! steps the sizes of these sum up to
-//! |1/6 - beta - d/2| h^2 times the way that accelerations take, which is 2/pi of the error of an oscillation: errors of its phase add up,
-//! one quarter period like the other. Where that sum stays far below what is worth a warning
-//! nothing else is done; where it will not, and in small scenes, where errors may grow by
-//! themselves, the error is carried along with the motion (`carried_error`).
+//! The local error of a step is tau = (1/6 - beta - d/2) h^3 q''', with d = alpha_m - alpha_f. The
+//! sum of the sizes of local errors is |1/6 - beta - d/2| h^2 times the total variation of
+//! accelerations, which is 2/pi of the error of an oscillation, whose phase errors add up over
+//! quarter periods. While that sum stays far below the size of a warning nothing else is done;
+//! where it will not, and in small scenes, where errors may grow by themselves, the error is
+//! integrated beside the motion (`carried_error`).
 
-use super::carried_error::{CarriedError, FREE_SPIN, WIDTH};
+use super::carried_error::{CarriedError, FREE_SPIN_ERROR, SLOPE_STEPS};
 use super::{Increments, Scheme, Step};
 use crate::kernel::Weights;
 use crate::model::charts::DYNAMIC_BAND;
@@ -18,36 +18,40 @@ use crate::threads::{self, PART};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Errors of scenes with no more slots are carried along from the start of a stage.
-const FEW_SLOTS: usize = 100;
+/// The number of slots up to which the error of a scene is carried from the start of a stage.
+const SLOTS_CARRIED_AT_ONCE: usize = 100;
 
-/// Errors of larger scenes are not carried along, which would take a quarter of their memory.
-const MOST_SLOTS: usize = 200_000;
+/// The number of slots above which the error of a scene is not carried, which would take a quarter
+/// of its memory.
+const MAX_SLOTS_CARRIED: usize = 200_000;
 
-/// The sum of local errors, over the largest motion, for which errors are carried along where a
-/// stage would come to it at its present rate.
-const WORTH_CARRYING: f64 = 0.02;
-/// The sum of local errors of rotations, in radians, for which errors are carried along, likewise.
-const WORTH_CARRYING_TURNS: f64 = 0.1;
+/// The sum of local errors of displacements, over the largest displacement and extrapolated to the
+/// end of the stage, from which on the error is carried.
+const MIN_RELATIVE_ERROR: f64 = 0.02;
+/// The sum of local errors of rotations, in radians and extrapolated to the end of the stage, from
+/// which on the error is carried.
+const MIN_ROTATION_ERROR: f64 = 0.1;
 
-/// Steps, and the part of a stage, after which that rate is believed: at first little has moved
-/// yet.
-const FIRST_STEPS: usize = 4 * WIDTH;
-const FIRST_PART: f64 = 0.125;
+/// The number of steps before sums of local errors are extrapolated to the end of the stage: little
+/// has moved at first.
+const MIN_STEPS: usize = 4 * SLOPE_STEPS;
 
-/// The largest errors so far, and what they are compared with.
+/// The share of the stage before sums of local errors are extrapolated to its end.
+const MIN_STAGE_SHARE: f64 = 0.125;
+
+/// The largest errors of a stage, and the largest displacement to compare them with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Largest {
-    /// Error of a displacement
+    /// Largest error of a displacement, a length
     pub displacement: f64,
-    /// Error of a rotation, in radians
+    /// Largest error of a rotation, in radians
     pub rotation: f64,
-    /// How far a node has gone since the stage began
+    /// Largest displacement of a node since the start of the stage, a length
     pub moved: f64,
 }
 
 impl Largest {
-    /// Takes a slot into squares of these.
+    /// Updates squares of these quantities with those of a slot.
     #[inline(always)]
     pub(super) fn take(&mut self, kind: SlotKind, error: Vec3, moved: Vec3) {
         let of_kind = if kind == SlotKind::Displacement { &mut self.displacement } else { &mut self.rotation };
@@ -55,7 +59,7 @@ impl Largest {
         self.moved = self.moved.max(moved.squared());
     }
 
-    /// Takes the roots of squares.
+    /// The roots, where these quantities are squares.
     pub(super) fn root(self) -> Self {
         Self { displacement: self.displacement.sqrt(), rotation: self.rotation.sqrt(), moved: self.moved.sqrt() }
     }
@@ -69,55 +73,68 @@ impl Largest {
     }
 }
 
-/// Finds the correction that the forces of a system ask for with the factors of its tangent;
-/// `false` where there are none.
+/// Solves for the correction of the forces of a system, with the factors of its tangent; `false`
+/// without factors.
 pub type Correct<'a> = dyn FnMut(&System, &mut [Vec3]) -> bool + 'a;
 
-/// What is needed to know of a scene.
+/// Data of the scene that errors depend on.
 pub(super) struct Scene {
+    /// The kind of each slot
     pub kinds: Arc<Vec<SlotKind>>,
+    /// The length of the scene
     pub length: f64,
-    /// For each slot whether its accelerations mean something
+    /// True for each slot whose accelerations are determined by mass
     massive: Vec<bool>,
 }
 
 impl Scene {
-    /// Whether the accelerations of a slot mean something.
+    /// True if the accelerations of a slot are determined by mass and it is no multiplier.
     pub fn moves(&self, slot: usize) -> bool {
         self.massive[slot] && !self.kinds[slot].is_multiplier()
     }
 }
 
+/// The states at both ends of a time step, in one chart.
+#[derive(Clone, Copy)]
+pub struct StepEnds<'a> {
+    /// The state at the start of the step
+    pub from: &'a State,
+    /// The state at the end of the step
+    pub to: &'a State,
+}
+
 /// The error of the steps of a stage.
 pub struct TimeError {
     scene: Scene,
-    /// q where the stage began
+    /// q at the start of the stage
     start: Vec<Vec3>,
-    /// Accelerations where the sum was taken last; not a number where they are those of another
-    /// chart
+    /// Accelerations at the last update of the sum; NaN where they are those of another chart
     past: Field,
-    /// Of rotations whose unknowns are increments those from moments and from their own spin,
-    /// spatial
+    /// Accelerations, by moments and by the spin itself (spatial), of rotations whose unknowns are
+    /// increments, at the last update of the sum
     past_turns: Vec<[Vec3; 2]>,
-    /// How many steps there were, of how many
+    /// The number of steps so far
     steps: usize,
+    /// The number of steps of the whole stage
     of_steps: f64,
-    /// The longest step since the sum was taken last, once there is one
+    /// The longest step since the last update of the sum
     longest: Option<Step>,
-    /// The sizes of local errors, summed over the steps before the error was carried along
+    /// The sizes of local errors, summed over the steps before the error was carried
     sum: Largest,
     carried: Option<Box<CarriedError>>,
 }
 
 impl TimeError {
-    /// For a stage that begins in a state, with a first step, and lasts for `duration`; `massive`
-    /// tells for each slot whether its accelerations mean something.
+    /// The error of a stage that begins in `state` with the step `first`, and lasts for `duration`.
+    /// `massive` is true for each slot whose accelerations are determined by mass.
     pub fn new(
         model: &Model,
         assembly: &Assembly,
-        (state, increments): (&State, Option<&Increments>),
+        state: &State,
+        increments: Option<&Increments>,
         massive: &[bool],
-        (first, duration): (Step, f64),
+        first: Step,
+        duration: f64,
     ) -> Self {
         let scene = Scene { kinds: model.kinds.clone(), length: model.length, massive: massive.to_vec() };
         let mut error = Self {
@@ -135,7 +152,7 @@ impl TimeError {
             sum: Largest::default(),
             carried: None,
         };
-        if model.slots() <= FEW_SLOTS {
+        if model.slots() <= SLOTS_CARRIED_AT_ONCE {
             error.carry(&assembly.system, state, first);
         }
         error
@@ -145,58 +162,58 @@ impl TimeError {
         self.carried = Some(Box::new(CarriedError::new(&self.scene, system.force.clone(), state, &self.start, step)));
     }
 
-    /// An attempt at a step begins; the one before was as long as `before`.
+    /// Begins an attempt at a step; `before` is the length of the step before.
     pub fn begin(&mut self, step: &Step, before: f64) {
         if let Some(carried) = &mut self.carried {
             carried.begin(step, before);
         }
     }
 
-    /// Whether an error is carried along that has not seen yet what it meets in the present step.
+    /// True if an error is carried and [`Self::look`] has not been called in the present step.
     pub fn knows_no_forces(&self) -> bool {
         self.carried.as_ref().is_some_and(|carried| carried.knows_no_forces())
     }
 
-    /// Looks at what the error meets of inertia and damping in the state that the tangent of the
-    /// step belongs to. The forces of the system are those of that state, and stay.
+    /// Computes the forces of inertia and damping on a carried error, at the state of the present
+    /// tangent. The forces of the system must be those of that state; they are kept.
     pub fn look(&mut self, assembly: &mut Assembly, state: &mut State, weights: Weights) {
         if let Some(carried) = &mut self.carried {
             carried.look(assembly, state, weights);
         }
     }
 
-    /// The step is in balance: its tangent tells the error at its end, unless it has been given up.
+    /// Solves for a carried error at the end of a step in balance, and writes it to `error`.
     pub fn solve(&mut self, correct: &mut Correct, system: &mut System, state: &State, error: &mut [Vec3]) {
         if let Some(carried) = &mut self.carried {
             carried.solve(correct, system, state, error);
         }
     }
 
-    /// A step is taken from one state to another, both in one chart, with the error that was found
-    /// at its end.
+    /// Ends a step between two states in one chart, with the `error` that [`Self::solve`] has
+    /// found.
     pub fn end(
         &mut self,
         system: &System,
         error: &[Vec3],
-        states: (&State, &State),
+        step_ends: StepEnds,
         step: &Step,
         increments: Option<&Increments>,
     ) {
         if let Some(carried) = &mut self.carried {
-            return carried.end(&system.pattern.dof_map, error, states, increments);
+            return carried.end(&system.pattern.dof_map, error, step_ends, increments);
         }
         self.steps += 1;
         self.longest = self.longest.filter(|longest| longest.length >= step.length).or(Some(*step));
-        if self.steps.is_multiple_of(WIDTH) {
-            self.sum_up(&system.pattern.dof_map, states.1, increments);
+        if self.steps.is_multiple_of(SLOPE_STEPS) {
+            self.sum_up(&system.pattern.dof_map, step_ends.to, increments);
             if self.is_worth_carrying() {
-                self.carry(system, states.1, *step);
+                self.carry(system, step_ends.to, *step);
             }
         }
     }
 
-    /// Adds the local errors of the steps since the sum was taken last, up to this state: after
-    /// some steps, and where the stage is over.
+    /// Adds the local errors of the steps since the last update of the sum, up to this state.
+    /// Called every few steps, and at the end of the stage.
     pub fn sum_up(&mut self, dof_map: &DofMap, state: &State, increments: Option<&Increments>) {
         let Some(step) = self.longest.take() else { return };
         let Scheme { beta, .. } = step.scheme;
@@ -226,7 +243,7 @@ impl TimeError {
         let turns = increments.into_iter().flat_map(|increments| increments.accelerations(state));
         for (past, turn) in self.past_turns.iter_mut().zip(turns) {
             let [driven, free] = std::mem::replace(past, [turn.driven, turn.free]);
-            let of_spin = (turn.free - free) * (h2 * h2 * turn.spin.squared() * FREE_SPIN);
+            let of_spin = (turn.free - free) * (h2 * h2 * turn.spin.squared() * FREE_SPIN_ERROR);
             if self.scene.moves(turn.slot as usize) {
                 now.take(SlotKind::Rotation, (turn.driven - driven) * factor + of_spin, Vec3::ZERO);
             }
@@ -237,17 +254,18 @@ impl TimeError {
         self.sum.moved = self.sum.moved.max(now.moved);
     }
 
-    /// Whether the sum of local errors comes to something by the end of the stage.
+    /// True if the sum of local errors, extrapolated to the end of the stage, is large enough to
+    /// carry the error.
     fn is_worth_carrying(&self) -> bool {
         let Largest { displacement, rotation, moved } = self.sum;
         let done = self.steps as f64 / self.of_steps;
         let ahead = 1.0 / done.min(1.0);
-        let is_large = displacement * ahead > WORTH_CARRYING * moved || rotation * ahead > WORTH_CARRYING_TURNS;
-        is_large && self.steps >= FIRST_STEPS && done >= FIRST_PART && self.scene.kinds.len() <= MOST_SLOTS
+        let is_large = displacement * ahead > MIN_RELATIVE_ERROR * moved || rotation * ahead > MIN_ROTATION_ERROR;
+        is_large && self.steps >= MIN_STEPS && done >= MIN_STAGE_SHARE && self.scene.kinds.len() <= MAX_SLOTS_CARRIED
     }
 
-    /// Total rotation vectors are about to change their charts in a state: their errors go with
-    /// them.
+    /// Carries errors into the complement chart for the total rotation vectors of a state that are
+    /// about to change theirs.
     pub fn change_charts(&mut self, state: &State, rotations: &[Slot]) {
         match &mut self.carried {
             Some(carried) => carried.change_charts(state, rotations),
@@ -270,7 +288,7 @@ impl TimeError {
     }
 }
 
-/// Whether a total rotation vector is about to change its chart.
+/// True if a total rotation vector is beyond the band in which it keeps its chart.
 pub(super) fn is_to_switch(p: Vec3) -> bool {
     p.squared() > (PI + DYNAMIC_BAND) * (PI + DYNAMIC_BAND)
 }

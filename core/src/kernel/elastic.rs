@@ -13,11 +13,11 @@ use crate::tensor::{Mat3, Vec3};
 #[derive(Clone, Copy, Debug)]
 pub struct Point<T = f64> {
     /// R, T and the derivative tensors of the interpolated rotation vector
-    pub rotation: Rotation<T>,
+    pub(crate) rotation: Rotation<T>,
     /// y = R^T x'
-    pub y: Vec3<T>,
+    pub(crate) y: Vec3<T>,
     /// P'
-    pub p_slope: Vec3<T>,
+    pub(crate) p_slope: Vec3<T>,
     /// C1(P')
     c1: Mat3<T>,
 }
@@ -26,29 +26,29 @@ pub struct Point<T = f64> {
 #[derive(Clone, Copy, Debug)]
 pub struct PointForce<T = f64> {
     /// f_x' = R N
-    pub x_slope: Vec3<T>,
+    pub(crate) x_slope: Vec3<T>,
     /// f_P' = T^T M
-    pub p_slope: Vec3<T>,
+    pub(crate) p_slope: Vec3<T>,
     /// f_P = T^T (N x y) + C1^T M
-    pub p: Vec3<T>,
+    pub(crate) p: Vec3<T>,
 }
 
 /// The stiffness at a point: second derivatives over (x', P', P).
 #[derive(Clone, Copy, Debug)]
 pub struct PointTangent<T = f64> {
     /// K_xx = R Cn R^T
-    pub xx: Mat3<T>,
+    pub(crate) xx: Mat3<T>,
     /// K_xP = R (Cn A - N~ T) [+ R Cc C1], A = y~ T
-    pub xp: Mat3<T>,
+    pub(crate) xp: Mat3<T>,
     /// K_xP' = R Cc T, where the section couples
-    pub xs: Option<Mat3<T>>,
+    pub(crate) xs: Option<Mat3<T>>,
     /// K_P'P' = T^T Cm T
-    pub ss: Mat3<T>,
+    pub(crate) ss: Mat3<T>,
     /// K_P'P = T^T Cm C1 + C2(M) [+ T^T Cc^T A]
-    pub sp: Mat3<T>,
+    pub(crate) sp: Mat3<T>,
     /// K_PP = A^T Cn A + C1^T Cm C1 + C3(M, P') + C2(N x y) + T^T N~ y~ T [+ A^T Cc C1 + C1^T Cc^T
     /// A]
-    pub pp: Mat3<T>,
+    pub(crate) pp: Mat3<T>,
 }
 
 impl<T: Real> Point<T> {

@@ -85,7 +85,7 @@ impl<T: Copy> Placed<T> for NodeMotion<T> {
 }
 
 impl<T: Real> NodeMotion<T> {
-    /// At rest in the initial placement.
+    /// The motion of a node at rest in the initial placement.
     pub fn rest() -> Self {
         let o = Vec3::zero();
         Self { u: o, u_rate: o, u_rate2: o, p: o, p_rate: o, p_rate2: o }
@@ -96,7 +96,7 @@ impl<T: Real> NodeMotion<T> {
 ///
 /// Elements with displacements and rotations order their blocks node by node: u1, P1, u2, P2, …;
 /// elements with one kind of unknown: u1, u2, … or P1, P2, …. The tangent is kept in tiles of two
-/// blocks by two, which are those of nodes.
+/// blocks by two, as nodes have them.
 #[derive(Clone, Debug)]
 pub struct ElementSystem<T = f64> {
     blocks: usize,

@@ -402,7 +402,7 @@ impl VolumeKernel for SteadilyTurned {
 
 /// Rotary inertia of a beam per initial length, see [`rotary`].
 pub struct Rotary {
-    /// Whether forces that spins have without accelerations count
+    /// True if gyroscopic and centrifugal forces count
     pub gyroscopic: bool,
 }
 
@@ -426,7 +426,7 @@ impl VolumeKernel for Rotary {
 
 /// Inertia of a beam with an eccentric mass per initial length, see [`body`].
 pub struct Eccentric {
-    /// Whether forces that spins have without accelerations count
+    /// True if gyroscopic and centrifugal forces count
     pub gyroscopic: bool,
 }
 

@@ -68,13 +68,13 @@ impl Intensity {
     }
 }
 
-/// Line loads: fixed in space, or turning with the section where they follow it.
-pub struct Line<'a, const FOLLOWS: bool> {
+/// Line loads: fixed in space, or turning with the section if `FOLLOWS`.
+pub struct DistributedLoad<'a, const FOLLOWS: bool> {
     /// The amplitudes of the loads at the present time
     pub amplitudes: &'a [f64],
 }
 
-impl<const FOLLOWS: bool> VolumeKernel for Line<'_, FOLLOWS> {
+impl<const FOLLOWS: bool> VolumeKernel for DistributedLoad<'_, FOLLOWS> {
     type Quantity = Intensity;
     type Present<T: Real> = (Vec3<T>, Option<Vec3<T>>);
     const BLOCKS: Blocks = Blocks::Both;

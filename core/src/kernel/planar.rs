@@ -229,7 +229,7 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
     /// ```text
     /// K_xx = R Cn R^T,   K_x theta = R (Cn A - N x e)
     /// K_theta theta = A.Cn A - N.y,   K_theta' theta' = cm
-    /// K_x theta' = R cc,   K_theta' theta = cc.A    (where the section couples strain and curvature)
+    /// K_x theta' = R cc,   K_theta' theta = cc.A    (where the section couples)
     /// ```
     #[inline(always)]
     fn add_stiffness(
@@ -304,11 +304,11 @@ impl<const N: usize, T: Real, P: PlanarLaw<T>> PlanarPoint<N, T, P> {
 #[derive(Clone, Copy, Debug)]
 pub struct PlanarBody<T = f64> {
     /// Mass
-    pub mass: T,
+    pub(crate) mass: T,
     /// The vector from the node to the mass centre in the initial placement
-    pub offset: [T; 2],
+    pub(crate) offset: [T; 2],
     /// J0: moment of inertia about the normal of the plane through the node
-    pub about_node: T,
+    pub(crate) about_node: T,
 }
 
 impl PlanarBody {

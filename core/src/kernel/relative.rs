@@ -295,7 +295,8 @@ impl<const N: usize, T: Real> Relative<N, T> {
     /// frame over it,
     ///
     /// ```text
-    /// Z_xi = sum K_xi_x ij xi_j~ - K_xi_Theta ij A_j^T,   Z_Theta likewise
+    /// Z_xi = sum K_xi_x ij xi_j~ - K_xi_Theta ij A_j^T
+    /// Z_Theta = sum K_Theta_x ij xi_j~ - K_Theta_Theta ij A_j^T
     /// x_i,t: R_r (Z_xi - f_xi~)
     /// t_i,t: A_i^T (Z_Theta + C2(m_i) A_i^T)
     /// t,t_j: Z_Theta^T A_j + A_j C1(A_j f) A_j

@@ -130,7 +130,7 @@ impl Turn {
         }
     }
 
-    /// This step from a start that is changed by `by`; `stretch` is that of its [start](Start).
+    /// The step from a start that differs by `by`. `stretch` is [`Start::stretch`] of this step.
     pub fn changed(&self, by: &StartChange, stretch: f64) -> Self {
         let Self { base, carrier, step, .. } = *self;
         let own = carrier.inverse * (self.rate - self.omega.cross(self.momentum));

@@ -1,6 +1,6 @@
-//! The effects of one stage, and the system that they add to.
+//! The assembly of forces and tangents: the effects of one stage, and the system that they add to.
 
-use super::linear::Linear;
+use super::linear::LinearisedSystem;
 use super::{Model, StageContext};
 use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
 use crate::kernel::Weights;
@@ -11,23 +11,23 @@ use crate::tensor::{Vec3, zeros};
 use crate::threads;
 use std::sync::Arc;
 
-/// The effects of one stage with their scratch, and the system they add to.
+/// The effects of one stage with their memory, and the system that they add to.
 pub struct Assembly {
-    /// The stage
-    pub stage: StageContext,
+    /// The stage that the effects act in
+    pub(crate) stage: StageContext,
     effects: Vec<Acting>,
     /// Forces and tangent
     pub system: System,
-    /// Evaluations of each effect's instances so far, by name
-    pub evaluations: Vec<(&'static str, u64)>,
-    /// In linear stages
-    linear: Option<Box<Linear>>,
+    /// The number of evaluated instances of each effect so far, by name
+    pub(crate) evaluations: Vec<(&'static str, u64)>,
+    /// The matrices of a linear stage; `None` in other stages
+    linear: Option<Box<LinearisedSystem>>,
 }
 
 /// An effect in a stage.
 struct Acting {
     effect: Arc<dyn Effect>,
-    /// The form that adds in its place, where the stage is treated in a plane
+    /// The planar form that takes the place of the effect in a planar stage
     planar: Option<Box<dyn PlanarForm>>,
     memory: Memory,
     instances: u64,
@@ -73,7 +73,7 @@ impl Acting {
     }
 }
 
-/// Adds the instances that belong to a part of the system.
+/// Adds forces and tangents of the instances that belong to a part of the system.
 fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part) {
     for (number, acting) in effects.iter().enumerate() {
         let with_tangent = weights != Weights::NONE && acting.has_tangent;
@@ -85,7 +85,7 @@ fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part
     }
 }
 
-/// Adds the forces of effects that inertia or damping come from, without a tangent.
+/// Adds the forces of effects with inertia or damping, without a tangent.
 fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
     for (number, acting) in effects.iter().enumerate() {
         if !acting.categories().any(|category| matches!(category, Category::Inertia | Category::Damping)) {
@@ -99,17 +99,17 @@ fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
 }
 
 impl Assembly {
-    /// The system of what acts in a stage on these equations.
+    /// The assembly of all effects that act in a stage, on the degrees of freedom `dof_map`.
     pub fn new(stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
         Self::of(model.acting(stage), stage, dof_map, model)
     }
 
-    /// The system of these effects in a stage on these equations.
+    /// The assembly of chosen effects in a stage, on the degrees of freedom `dof_map`.
     pub fn of(acting: Vec<Arc<dyn Effect>>, stage: &StageContext, dof_map: DofMap, model: &Model) -> Self {
         let connectivity = threads::map(acting.iter(), |effect| effect.connectivity());
         let acts = |(effect, own): (Arc<dyn Effect>, &Connectivity)| Acting::new(effect, dof_map.plane(), own.len());
         let effects: Vec<Acting> = acting.into_iter().zip(&connectivity).map(acts).collect();
-        // Linear stages add their forces by themselves.
+        // Linear stages add forces of all categories at any slot.
         let everywhere: &[Category] = if model.is_linear(stage.kind) { &Category::ALL } else { &[] };
         let categories: Vec<Vec<Category>> = effects.iter().map(|acting| acting.categories().collect()).collect();
         let node_blocks = model.node_blocks(dof_map.layout());
@@ -128,14 +128,15 @@ impl Assembly {
         }
     }
 
-    /// From here on everything is linear about a state.
+    /// Makes the stage linear: forces and tangent are from now on linearised about a state.
     pub fn linearise(&mut self, model: &Model, about: &State) -> Result<(), FrameConflict> {
-        self.linear = Some(Box::new(Linear::new(self.effects.iter().map(|acting| &*acting.effect), model, about)?));
+        self.linear =
+            Some(Box::new(LinearisedSystem::new(self.effects.iter().map(|acting| &*acting.effect), model, about)?));
         Ok(())
     }
 
-    /// Forces of the state, and the tangent of the weights; `prescribed_increment`: see
-    /// [`System::clear`]. Without weights the tangent is left as it is.
+    /// Forms the forces of the state and the tangent of the weights; `prescribed_increment`: see
+    /// [`System::clear`]. With [`Weights::NONE`] the tangent is left as it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, prescribed_increment: Option<&[Vec3]>) {
         match self.linear.take() {
             None => self.evaluate_effects(state, weights, prescribed_increment),
@@ -146,8 +147,8 @@ impl Assembly {
         }
     }
 
-    /// Forces and tangent as [`Self::evaluate`] forms them, also where factors have taken the place
-    /// of a tangent that was formed already.
+    /// Forms forces and tangent again as [`Self::evaluate`] does, also where factors have
+    /// overwritten a tangent.
     pub fn form_again(&mut self, state: &State, weights: Weights) {
         if let Some(linear) = &mut self.linear {
             linear.formed = None;
@@ -156,11 +157,11 @@ impl Assembly {
         self.evaluate(state, weights, prescribed_increment.as_deref());
     }
 
-    /// The tangent is formed where its weights change; and where increments are prescribed, which
-    /// act through it.
+    /// Forms forces of a linear stage, and its tangent if the weights have changed or increments
+    /// are prescribed, which act through the tangent.
     fn evaluate_linear(
         &mut self,
-        linear: &mut Linear,
+        linear: &mut LinearisedSystem,
         state: &State,
         weights: Weights,
         prescribed_increment: Option<&[Vec3]>,
@@ -188,7 +189,8 @@ impl Assembly {
         self.add_effects(state, weights, |part| part.clear(with_tangent));
     }
 
-    /// Regions of a large scene at once, each after it was made ready, then what lies in none.
+    /// Adds forces and tangents, in parallel over the regions of a large scene, each after
+    /// `make_ready`; then those of the instances that lie in no region.
     fn add_effects(&mut self, state: &State, weights: Weights, make_ready: impl Fn(&mut Part) + Send + Sync) {
         let Self { effects, system, evaluations, .. } = self;
         system.each_part(|part| {
@@ -201,8 +203,9 @@ impl Assembly {
         evaluations.iter_mut().zip(effects).for_each(|((_, count), acting)| *count += acting.instances);
     }
 
-    /// Inertia and damping of a state alone, into other forces than those of the system, which
-    /// stay; what else stands there is nobody's. In linear stages those of its rates.
+    /// Writes the forces of inertia and damping of a state into `force`, whose other categories are
+    /// left undefined; the forces of the system are kept. In a linear stage these are the forces of
+    /// the rates of the state.
     pub fn evaluate_rates(&mut self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         if let Some(linear) = &self.linear {
             force.iter_mut().for_each(|force| force.fill(Vec3::ZERO));
@@ -220,12 +223,12 @@ impl Assembly {
         std::mem::swap(&mut self.system.force, force);
     }
 
-    /// Tells whether any effect forms tangents with stresses that it foresees.
+    /// True if an effect forms its tangent with extrapolated stresses.
     pub fn foresees(&self) -> bool {
         self.linear.is_none() && self.effects.iter().any(|acting| !acting.memory.points.is_empty())
     }
 
-    /// Lets effects remember what the next tangent is formed with, see
+    /// Extrapolates the stresses of the next tangent, see
     /// [`StressPoints::extrapolate`](crate::effect::StressPoints::extrapolate).
     pub fn extrapolate(&mut self, state: &State, dq: &[Vec3]) {
         if !self.foresees() {
@@ -236,7 +239,7 @@ impl Assembly {
         }
     }
 
-    /// Forgets what was remembered: a new step begins.
+    /// Discards extrapolated stresses at the start of a step.
     pub fn forget(&mut self) {
         self.effects.iter_mut().for_each(|acting| acting.memory.valid = false);
     }
@@ -250,19 +253,20 @@ impl Assembly {
         [rates, rates2]
     }
 
-    /// The largest round-off among the effects.
+    /// The largest round-off of forces and moments among the effects.
     pub fn round_off(&self, state: &State) -> RoundOff {
         let stresses = self.effects.iter().filter_map(|acting| acting.effect.roles().stresses);
         stresses.map(|stresses| stresses.round_off(state)).fold(RoundOff::default(), RoundOff::or)
     }
 
-    /// The largest strain that a field makes, see [`Effect::strain_of`].
+    /// The largest strain that a field of increments makes, see [`Effect::strain_of`].
     pub fn strain_of(&self, state: &State, field: &[Vec3], length: f64) -> f64 {
         self.effects.iter().map(|acting| acting.effect.strain_of(state, field, length)).fold(0.0, f64::max)
     }
 
-    /// x.K x of a field at a state, from strains where an effect tells them, and from tangents of
-    /// the others; `None` where no effect does. The tangent is used up.
+    /// The quadratic form x.K x of a field at a state: from the strains of effects that have them,
+    /// and from the tangents of the others. `None` if no effect gives it by strains. The tangent of
+    /// the system is overwritten.
     pub fn stiffness_along(&mut self, state: &State, field: &[Vec3]) -> Option<f64> {
         let told_by = |acting: &Acting| acting.effect.roles().stresses?.stiffness_along(state, field);
         let told: Vec<Option<f64>> = self.effects.iter().map(told_by).collect();
@@ -282,7 +286,7 @@ impl Assembly {
         Some(told.iter().flatten().sum::<f64>() + others)
     }
 
-    /// The name of the first effect whose forces are not finite, and the slot.
+    /// The name of the first effect whose forces are not finite, with the slot.
     pub fn culprit(&mut self, state: &State) -> Option<(&'static str, usize)> {
         for (number, acting) in self.effects.iter().enumerate() {
             self.system.clear(None);

@@ -1,4 +1,4 @@
-//! Changes of chart at nodes, and the choice of charts in elements.
+//! Changes of the charts of rotation vectors at nodes, and the choice of charts in elements.
 
 use super::{Charted, ElementInfo};
 use crate::kernel::seam;
@@ -10,45 +10,51 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// The band beyond pi in which a node keeps its chart in dynamics, so that it cannot chatter.
+/// The band beyond pi, in radians, in which a node keeps its chart in dynamics, so that it cannot
+/// change at every step.
 pub const DYNAMIC_BAND: f64 = 1e-3;
 
-/// The band beyond pi in which a node keeps its chart in statics: nodes that are held at pi itself
-/// must not change at every iterate.
+/// The band beyond pi, in radians, in which a node keeps its chart in statics: nodes that are held
+/// at pi itself must not change at every iterate.
 pub const STATIC_BAND: f64 = 1e-9;
 
-/// Most complements taken of one node at once: a node that turned further has no honest direction
-/// left.
-const MOST_CHANGES: usize = 10_000;
+/// The largest number of complements taken of one node at once: after more turns no digits of the
+/// direction are left.
+const MAX_COMPLEMENTS: usize = 10_000;
 
-/// Neighbours that turn more than this against each other are too far apart for the element between
-/// them.
+/// The largest relative rotation of neighbouring nodes, in radians, that an element can represent.
 pub const COARSE: f64 = 2.8;
 
-/// From here on a warning.
+/// The relative rotation of neighbouring nodes, in radians, from which on a mesh is warned of as
+/// coarse.
 pub const COARSE_WARNING: f64 = PI / 2.0;
 
-/// A representative that lies farther than this from where it should be is not the right one.
-const FAR: f64 = PI / 2.0;
+/// The largest distance, in radians, between the representative of a rotation and the carried
+/// vector that it continues.
+const MAX_DISTANCE: f64 = PI / 2.0;
 
-/// From here on a rotation may have gone the long way round.
+/// The rotation, in radians, from which on its direction of turning is ambiguous.
 pub const HALF_TURN: f64 = 3.0;
 
-/// Corrections that lead round and round do not end so near to where they began but by chance.
-const LITTLE: f64 = 1.0;
+/// The change of an unwrapped vector, in radians, up to which its whole turns are taken to be
+/// right: corrections that lead through spurious turns hardly end so near to their start.
+const SETTLED_CHANGE: f64 = 1.0;
 
-/// Within this angle of a whole turn the direction of P tells nothing of the axis.
-const NEAR_TURN: f64 = 0.5;
+/// The distance from a whole turn, in radians, within which the direction of P does not determine
+/// the axis.
+const NEAR_WHOLE_TURN: f64 = 0.5;
 
 /// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until
-/// none is left. `lag` is the time by which the algorithmic acceleration lies ahead of the state;
-/// `None` where it is the rate of a momentum, to which charts do not matter.
+/// none is left. Returns the number of changes.
+///
+/// `lag` is the time by which the algorithmic acceleration lies ahead of the state; `None` if it is
+/// the rate of a momentum, which does not depend on charts.
 pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
     let Some(first) = first_beyond(state, rotations, band) else { return 0 };
     state.wound_apart();
     let mut switched = 0;
     for slot in rotations.iter().skip_while(|slot| **slot != first).map(|&slot| slot as usize) {
-        for _ in 0..MOST_CHANGES {
+        for _ in 0..MAX_COMPLEMENTS {
             let p = state.q[slot];
             if !is_beyond(p, band) {
                 break;
@@ -76,13 +82,14 @@ pub fn first_beyond(state: &State, rotations: &[Slot], band: f64) -> Option<Slot
     threads::first(rotations.len(), in_part)
 }
 
-/// NaN is never beyond: what is not finite is named by the assembly, not turned for ever.
+/// True if a rotation vector is finite and longer than pi + `band`. Vectors that are not finite are
+/// reported by the assembly.
 fn is_beyond(p: Vec3, band: f64) -> bool {
     p.squared() > (PI + band) * (PI + band) && p.is_finite()
 }
 
-/// Chooses for each element the nodes that are converted into the chart of its first, and counts
-/// the mixed elements.
+/// Chooses for each element the nodes that are converted into the chart of its first node, and
+/// returns the number of elements with such nodes.
 pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
     let mut mixed = 0;
     for (element, info) in elements.iter().enumerate().filter(|(_, e)| e.in_one_chart) {
@@ -99,8 +106,8 @@ pub fn freeze(state: &mut State, elements: &[ElementInfo]) -> usize {
 }
 
 /// Carries the unwrapped rotation vectors along with a correction that the state is about to take.
-/// A node may turn further than half a turn in a load step; how far, only its corrections tell.
-/// What is not kept apart goes with the unknowns.
+/// A node may turn by more than half a turn in a load step, which only its corrections show.
+/// Unwrapped vectors that equal the unknowns need no work.
 pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
     if state.unwrapped.is_empty() {
         return;
@@ -110,17 +117,21 @@ pub fn carry(state: &mut State, dq: &[Vec3], rotations: &[Slot]) {
         let old = q[k];
         let increment = dq[k];
         let p = old + increment;
-        *unwrapped = match () {
-            () if increment == Vec3::ZERO => *unwrapped,
-            () if *unwrapped == old => p,
-            () if increment.squared() < 1.0 => continued(p, *unwrapped, rotated(old, p)),
-            () => continued(p, *unwrapped, Rotation::new(old).t.transpose_mul(increment)),
+        if increment == Vec3::ZERO {
+            return;
+        }
+        *unwrapped = if *unwrapped == old {
+            p
+        } else if increment.squared() < 1.0 {
+            continued(p, *unwrapped, rotated(old, p))
+        } else {
+            continued(p, *unwrapped, Rotation::new(old).t.transpose_mul(increment))
         };
     });
 }
 
-/// Shows a state as it was before a correction of its unknowns alone; unwrapped rotation vectors
-/// that are the unknowns stay so.
+/// Calls `look` with the state before a correction `dq` of its unknowns, then restores it.
+/// Unwrapped rotation vectors that equal the unknowns do so afterwards.
 pub fn there_and_back(state: &mut State, dq: &[Vec3], look: impl FnOnce(&State)) {
     let unwrapped = state.unwrapped.iter().zip(&state.q).enumerate();
     let unwound: Vec<usize> = unwrapped.filter(|(_, (unwrapped, q))| unwrapped == q).map(|(slot, _)| slot).collect();
@@ -134,7 +145,8 @@ fn shift(state: &mut State, dq: &[Vec3], times: f64) {
     threads::each_part(&mut state.q, |start, q| q.iter_mut().zip(&dq[start..]).for_each(|(q, &dq)| *q += dq * times));
 }
 
-/// Does something with what a list holds at each of some slots, which come in their order.
+/// Calls `work` with the entry of a list at each of some slots, given in ascending order; in
+/// parallel.
 fn each_rotation<T: Send>(list: &mut [T], rotations: &[Slot], work: impl Fn(usize, &mut T) + Send + Sync) {
     debug_assert!(rotations.is_sorted(), "rotations out of order");
     threads::each_part(list, |start, part| {
@@ -145,29 +157,30 @@ fn each_rotation<T: Send>(list: &mut [T], rotations: &[Slot], work: impl Fn(usiz
     });
 }
 
-/// The spatial rotation vector that leads from one to the other.
+/// The spatial rotation vector from the rotation of `old` to that of `p`.
 fn rotated(old: Vec3, p: Vec3) -> Vec3 {
     log(Rotation::new(p).r * Rotation::new(old).r.transpose())
 }
 
-/// The representative of `p` next to where `turned` carries a unwrapped vector; the carried vector
-/// itself near whole turns, where there is none. See [`wind`].
+/// The representative of `p` nearest to an unwrapped vector carried on by `turned`; the carried
+/// vector itself near whole turns, where no representative is near. See [`wind`].
 fn continued(p: Vec3, unwrapped: Vec3, turned: Vec3) -> Vec3 {
     let carried = unwrapped + turned;
     let candidate = unwound(p, carried);
-    let together = (candidate - carried).norm() < FAR;
-    let near_whole_turn = p.norm() < NEAR_TURN && carried.norm() > PI;
+    let together = (candidate - carried).norm() < MAX_DISTANCE;
+    let near_whole_turn = p.norm() < NEAR_WHOLE_TURN && carried.norm() > PI;
     if together && !near_whole_turn { candidate } else { carried }
 }
 
 /// Continues the unwrapped rotation vectors from the state `before`, and returns the slots where
-/// that is ambiguous.
+/// the continuation is ambiguous.
 ///
-/// The way that corrections have carried them tells the turns; without any it is less than half a
-/// turn. The unwrapped vector is the one of P + 2 pi k n that lies nearest to the old one carried
-/// on by the rotation since. Close to a whole turn n is no guide: a node that passes it a little
-/// aside sees n swing to the other side, and P + 2 pi k n with it. There the carried one is kept
-/// until both come together again; it is ambiguous where they lie far apart.
+/// The number of turns comes from the corrections that have carried the vectors; without
+/// corrections a node has turned by less than half a turn. The unwrapped vector is the one of P + 2
+/// pi k n nearest to the old one carried on by the rotation since. Close to a whole turn the axis n
+/// is undetermined: for a node that passes it a little aside, n reverses, and P + 2 pi k n with it.
+/// There the carried vector is kept until both agree again; it is ambiguous while they lie far
+/// apart.
 pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> {
     if state.unwrapped.is_empty() {
         return Vec::new();
@@ -177,9 +190,9 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
         let p = q[k];
         let old = before.q[k];
         let unwrapped = before.unwrapped_at(k as Slot);
-        // Then all that follows comes to P itself: the carried vector is at most 2 |P - P_old| away
-        // from it.
-        let is_near = unwrapped == old && (p - old).norm() < 0.4 * FAR;
+        // Near vectors need no logarithm: the carried vector is at most 2 |P - P_old| away from P,
+        // and the result is P itself.
+        let is_near = unwrapped == old && (p - old).norm() < 0.4 * MAX_DISTANCE;
         if is_near && (*carried == old || *carried == p) {
             *carried = p;
             return;
@@ -192,7 +205,7 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     let is_ambiguous = |&slot: &Slot| {
         let p = q[slot as usize];
         let unwrapped = carried[slot as usize];
-        p != unwrapped && (unwound(p, unwrapped) - unwrapped).norm() >= FAR
+        p != unwrapped && (unwound(p, unwrapped) - unwrapped).norm() >= MAX_DISTANCE
     };
     let mut ambiguous = Vec::new();
     let in_part = |part: &[Slot]| part.iter().copied().filter(is_ambiguous).collect::<Vec<_>>();
@@ -200,11 +213,13 @@ pub fn wind(state: &mut State, before: &State, rotations: &[Slot]) -> Vec<Slot> 
     ambiguous
 }
 
-/// Takes away turns that only the corrections of an iteration made: they may lead round and round
-/// before they find a balance. Where a node seems to have turned by more than pi since the state
-/// `before`, those that have turned by little, or as is `prescribed`, tell the others: along an
-/// element the rotations of neighbours differ by less than pi, and so do their unwrapped vectors.
-/// What no such node leads to stays.
+/// Removes spurious whole turns of unwrapped vectors, through which the corrections of an iteration
+/// may lead before they find a balance.
+///
+/// Where a node seems to have turned by more than pi since the state `before`, nodes that have
+/// turned by little, or as `prescribed`, determine the turns of their neighbours: along an element
+/// the unwrapped vectors of neighbours differ by less than pi. Nodes without a connection to such a
+/// node are not changed.
 pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: impl Fn(Slot) -> bool) {
     let Charted { elements, rotations } = charted;
     if state.unwrapped.is_empty() {
@@ -215,9 +230,10 @@ pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: 
     if threads::first(rotations.len(), far).is_none() {
         return;
     }
-    let is_unsettled = |&slot: &Slot| turned(slot) > LITTLE && !prescribed(slot);
+    let is_unsettled = |&slot: &Slot| turned(slot) > SETTLED_CHANGE && !prescribed(slot);
     let mut unsettled: BTreeSet<Slot> = rotations.iter().copied().filter(is_unsettled).collect();
-    // Along a beam one pass settles all that follows, and the next one all that comes before.
+    // Along a beam the pass forwards settles all nodes after a settled one, the pass backwards all
+    // before it.
     let mut left = usize::MAX;
     while !unsettled.is_empty() && unsettled.len() < left {
         left = unsettled.len();
@@ -228,7 +244,8 @@ pub fn unwind(state: &mut State, before: &State, charted: &Charted, prescribed: 
     }
 }
 
-/// The turns of a node from those of a neighbour, where these are known and its own are not.
+/// Takes the whole turns of node `to` from those of its neighbour `from`, if these are settled and
+/// its own are not.
 fn settle(state: &mut State, unsettled: &mut BTreeSet<Slot>, from: Slot, to: Slot) {
     if !unsettled.contains(&from) && unsettled.remove(&to) {
         let [own, p] = [from, to].map(|slot| state.q[slot as usize]);
@@ -236,8 +253,8 @@ fn settle(state: &mut State, unsettled: &mut BTreeSet<Slot>, from: Slot, to: Slo
     }
 }
 
-/// The largest relative rotation between neighbouring nodes of elements that interpolate total
-/// vectors.
+/// The largest relative rotation, in radians, between neighbouring nodes of elements that
+/// interpolate total vectors.
 pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
     let pairs =
         elements.iter().filter(|element| element.in_one_chart).flat_map(|element| element.rotations().windows(2));
@@ -248,13 +265,13 @@ pub fn widest_in_one_chart(state: &State, elements: &[ElementInfo]) -> f64 {
     pairs.map(angle).fold(0.0, f64::max)
 }
 
-/// Neighbours that turned from more than a right angle one way to more than that the other way have
-/// leapt over pi: their relative rotation (element, angle) is what it was and what it has changed
-/// by since the state `before`.
+/// Finds neighbouring nodes whose relative rotation has jumped over pi since the state `before`:
+/// from more than a right angle one way to more than a right angle the other way. Returns the
+/// element, and 2 pi less the present angle.
 pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<(usize, f64)> {
     let relative = |state: &State, pair: &[Slot]| {
         let [a, b] = [pair[0], pair[1]].map(|slot| state.q[slot as usize]);
-        // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
+        // |T| <= 1: the angle between two rotations is at most the distance of their vectors.
         ((a - b).squared() > 1.0).then(|| log(Rotation::new(a).r.transpose() * Rotation::new(b).r))
     };
     let leap = |element: usize, pair: &[Slot]| {
@@ -266,15 +283,18 @@ pub fn leapt(state: &State, before: &State, elements: &[ElementInfo]) -> Option<
     threads::first(elements.len(), |mut part| part.find_map(leap_in))
 }
 
-/// The largest relative rotation between neighbouring nodes of an element beyond `limit`: (element,
-/// angle). Of elements that take all their nodes in the chart of the first it is the sum from the
-/// first node to the last: beyond pi that chart may be the wrong one.
+/// The element with the largest relative rotation between neighbouring nodes, and the angle in
+/// radians, if it exceeds `limit`. For elements that convert all nodes into the chart of the first
+/// the angle is the sum over the element: beyond pi that chart may be the wrong one.
 pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(usize, f64)> {
-    let vectors = |pair: &[Slot]| (state.q[pair[0] as usize], state.q[pair[1] as usize]);
-    // |T| <= 1, so vectors that lie close belong to rotations that lie at least as close.
-    let bound = |pair: &[Slot]| (vectors(pair).0 - vectors(pair).1).norm();
+    let vectors = |pair: &[Slot]| [pair[0], pair[1]].map(|slot| state.q[slot as usize]);
+    // |T| <= 1: the angle between two rotations is at most the distance of their vectors.
+    let bound = |pair: &[Slot]| {
+        let [a, b] = vectors(pair);
+        (a - b).norm()
+    };
     let angle = |pair: &[Slot]| {
-        let (a, b) = vectors(pair);
+        let [a, b] = vectors(pair);
         relative_angle(Rotation::new(a).r, Rotation::new(b).r)
     };
     let angle_in = |element: &ElementInfo| {
@@ -285,11 +305,10 @@ pub fn coarsest(state: &State, elements: &[ElementInfo], limit: f64) -> Option<(
             false => pairs.filter(|pair| bound(pair) >= limit).map(angle).fold(0.0, f64::max),
         }
     };
-    // The first of equal ones.
-    let worse = |worst: Option<(usize, f64)>, (element, angle): (usize, f64)| match worst {
-        Some((_, other)) if angle <= other => worst,
-        _ if angle > limit => Some((element, angle)),
-        _ => worst,
+    // Of equal angles the first one is kept.
+    let worse = |worst: Option<(usize, f64)>, (element, angle): (usize, f64)| {
+        let is_smaller = worst.is_some_and(|(_, other)| angle <= other);
+        if !is_smaller && angle > limit { Some((element, angle)) } else { worst }
     };
     let in_part = |part: Range<usize>| part.map(|element| (element, angle_in(&elements[element]))).fold(None, worse);
     let mut worst = None;

@@ -1,22 +1,21 @@
-//! What acts on the state instead of the forces: supports and prescribed motions.
+//! Constraints on the unknowns of a state: supports and prescribed motions.
 
 use super::course::Amplitude;
 use crate::system::{Direction, MirrorData, Slot, StageSet, State};
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
-/// Directions of a node that are held where a stage finds them.
+/// Directions of a node that are held at their values at the start of a stage.
 #[derive(Clone, Debug)]
 pub struct Support {
     /// The held directions
     pub directions: Vec<Direction>,
-    /// When it is there
+    /// The stages in which it acts
     pub stages: StageSet,
 }
 
 impl Support {
-    /// Shows the directions that it holds at each slot, which decide whether the scene lies in a
-    /// plane.
+    /// Shows the tensor of held directions at each slot, by which the scene may lie in a plane.
     pub fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         for at_slot in self.directions.chunk_by(|a, b| a.slot == b.slot) {
             let held = at_slot.iter().fold(Mat3::ZERO, |sum, direction| sum + direction.axis.outer(direction.axis));
@@ -25,30 +24,34 @@ impl Support {
     }
 }
 
-/// The unknowns that a motion prescribes.
+/// The tolerance of equal positions: in radians, or over the length of the scene.
+const EQUAL_POSITIONS: f64 = 1e-9;
+
+/// The kinds of prescribed motions, by their unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionKind {
     /// The displacement along an axis
     Translation,
-    /// The whole rotation, about a fixed axis
+    /// The whole rotation vector, along a fixed axis
     Rotation,
 }
 
-/// A prescribed motion.
+/// A prescribed motion of a node.
 #[derive(Clone)]
 pub struct Motion {
     /// The unknowns that it prescribes
     pub kind: MotionKind,
-    /// The slot it moves
+    /// The slot of the prescribed unknowns
     pub slot: Slot,
-    /// Unit vector: direction or axis of rotation
+    /// Direction or axis of rotation, a unit vector
     pub axis: Vec3,
-    /// Displacement or angle over the stages
+    /// The displacement or the angle, over the stages
     pub amplitude: Amplitude,
 }
 
 impl Motion {
-    /// Where the node is along the axis, and how far its rotation is off the axis.
+    /// The present displacement or angle along the axis, and the distance of a rotation vector from
+    /// the axis.
     pub fn reached(&self, state: &State) -> (f64, f64) {
         let slot = self.slot as usize;
         match self.kind {
@@ -61,13 +64,14 @@ impl Motion {
         }
     }
 
-    /// Tells whether two positions differ, on the scale of a scene of this `length`.
+    /// True if two displacements or angles differ by more than round-off, in a scene of this
+    /// `length`.
     pub fn is_apart(&self, from: f64, to: f64, length: f64) -> bool {
         let scale = if self.kind == MotionKind::Translation { length } else { 1.0 };
-        (to - from).abs() > 1e-9 * scale
+        (to - from).abs() > EQUAL_POSITIONS * scale
     }
 
-    /// The vector that decides whether the scene lies in a plane.
+    /// The mirror data of the motion, by which the scene may lie in a plane.
     pub fn aspect(&self) -> MirrorData {
         let full = self.amplitude.full();
         match self.kind {
@@ -77,7 +81,7 @@ impl Motion {
         }
     }
 
-    /// The directions that it prescribes.
+    /// The prescribed directions.
     pub fn directions(&self) -> Vec<Direction> {
         match self.kind {
             MotionKind::Translation => vec![Direction { slot: self.slot, axis: self.axis }],
@@ -87,11 +91,11 @@ impl Motion {
 
     /// Sets position, velocity and acceleration in a state, from the value and its two derivatives
     /// over time. A rotation about n is P = theta n, Pd = theta' n, Pdd = theta'' n, with theta at
-    /// the representative nearest to the present chart; an increment is what theta has grown by,
-    /// and the spin theta' n.
+    /// the representative nearest to the present chart; where the unknown is an increment, it is
+    /// the change of theta times n, and the spin is theta' n.
     ///
-    /// Returns how far it turns the node from the last converged state: beyond half a turn nobody
-    /// could tell in which direction it went.
+    /// Returns the angle by which it turns the node from the last converged state, in radians:
+    /// beyond half a turn the direction is ambiguous.
     pub(super) fn impose(&self, [value, rate, rate2]: [f64; 3], state: &mut State) -> f64 {
         let slot = self.slot as usize;
         let n = self.axis;

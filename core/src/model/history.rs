@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 /// A function of one variable.
 pub trait History: Send + Sync {
-    /// Value, first and second derivative at `x`; where the first jumps, those behind `x`.
+    /// Value, first and second derivative at `x`; where the first derivative jumps, the derivatives
+    /// after `x`.
     fn at(&self, x: f64) -> [f64; 3];
 
     /// The first derivative just before `x`.
@@ -13,72 +14,74 @@ pub trait History: Send + Sync {
         self.at(x)[1]
     }
 
-    /// The first place behind `x` where it takes another course, if it knows of one.
+    /// The first abscissa after `x` where the function is not smooth, or changes its formula;
+    /// `None` if there is none.
     fn next_corner(&self, _x: f64) -> Option<f64> {
         None
     }
 
-    /// The first place behind `x` where its first derivative jumps noticeably, if it knows of one.
+    /// The first abscissa after `x` where the first derivative jumps noticeably; `None` if there is
+    /// none.
     fn next_kink(&self, _x: f64) -> Option<f64> {
         None
     }
 
-    /// The largest first derivative, if it is known.
+    /// The largest magnitude of the first derivative, if it is known.
     fn fastest(&self) -> Option<f64> {
         None
     }
 }
 
-/// A history as a load or a motion reads it: in all stages, or in those that it belongs to.
+/// A history read by a load or a motion: in all stages, or in chosen ones.
 ///
-/// Static stages read it over the load factor, dynamic ones over the clock. A history that belongs
-/// to stages reads the time that has passed in its dynamic stages instead, so that it begins where
-/// the first of them does.
+/// Static stages read it over the load factor, dynamic ones over the time of the run. A history of
+/// chosen stages is read over the time spent in its dynamic stages instead, so that it begins with
+/// the first of them.
 #[derive(Clone)]
 pub struct Reading {
     function: Arc<dyn History>,
     stages: StageSet,
 }
 
-/// The clock of a history that belongs to stages.
+/// The clock of a history of chosen stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HistoryClock {
     /// The time spent in earlier stages of the history
     passed: f64,
-    /// The run's clock at the history's time 0, while it goes on in a dynamic stage of its own
+    /// The time of the run at the history's time 0, during one of its dynamic stages
     origin: Option<f64>,
 }
 
 impl HistoryClock {
-    /// The time 0 of the history on the run's clock: that of the run for a history of all stages.
+    /// The time of the run at the history's time 0; zero for a history of all stages.
     fn origin(&self) -> f64 {
         self.origin.unwrap_or(0.0)
     }
 }
 
-/// Where a stage lies as seen from a history.
+/// The position of a stage relative to the stages of a history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// The history has not begun.
     Before,
-    /// It goes on.
+    /// The stage belongs to the history.
     In,
-    /// It stands where an earlier stage has left it.
+    /// An earlier stage belongs to the history, which keeps its last value.
     Behind,
 }
 
 impl Reading {
-    /// In these stages.
+    /// A reading of `function` in `stages`.
     pub fn new(function: Arc<dyn History>, stages: StageSet) -> Self {
         Self { function, stages }
     }
 
-    /// Whether it belongs to some stages only.
+    /// True if the history belongs to chosen stages only.
     pub fn has_own_stages(&self) -> bool {
         self.stages.0.is_some()
     }
 
-    /// Where stage number `stage` (from 0) lies.
+    /// The phase of stage number `stage`, from 0.
     pub fn phase(&self, stage: usize) -> Phase {
         let has_begun = self.stages.0.iter().flatten().any(|&own| own < stage);
         match self.stages.contains(stage) {
@@ -88,7 +91,7 @@ impl Reading {
         }
     }
 
-    /// The value that holds before it begins.
+    /// The value before the history begins.
     pub fn first(&self) -> f64 {
         self.function.at(0.0)[0]
     }
@@ -106,8 +109,8 @@ impl Reading {
         }
     }
 
-    /// The value in a stage, and its derivatives over time. In statics the load takes the place of
-    /// the time, and nothing moves.
+    /// The value in a stage, and its derivatives over time. In statics the load factor takes the
+    /// place of the time, and derivatives over time are zero.
     pub fn at(&self, clock: &HistoryClock, kind: StageKind, time: f64, load: f64) -> [f64; 3] {
         match kind {
             StageKind::Static => [self.function.at(load)[0], 0.0, 0.0],
@@ -120,42 +123,46 @@ impl Reading {
         self.function.slope_before(time - clock.origin())
     }
 
-    /// The first time behind `time` in a dynamic stage where it takes another course.
+    /// The first time after `time` in a dynamic stage at which the function is not smooth or
+    /// changes its formula.
     pub fn next_corner(&self, clock: &HistoryClock, time: f64) -> Option<f64> {
         next_on_clock(clock, time, |x| self.function.next_corner(x))
     }
 
-    /// The first time behind `time` in a dynamic stage where its first derivative jumps.
+    /// The first time after `time` in a dynamic stage at which the first derivative jumps
+    /// noticeably.
     pub fn next_kink(&self, clock: &HistoryClock, time: f64) -> Option<f64> {
         next_on_clock(clock, time, |x| self.function.next_kink(x))
     }
 
-    /// The largest first derivative, if it is known.
+    /// The largest magnitude of the first derivative, if it is known.
     pub fn fastest(&self) -> Option<f64> {
         self.function.fastest()
     }
 }
 
-/// The first time behind `time` on the run's clock that `next` finds on the clock of a history.
+/// The first time after `time`, both on the clock of the run, that `next` finds on the clock of a
+/// history.
 fn next_on_clock(clock: &HistoryClock, time: f64, next: impl Fn(f64) -> Option<f64>) -> Option<f64> {
     let origin = clock.origin();
     let mut x = next(time - origin)?;
-    // On the run's clock the place is rounded: it may be where the clock stands.
+    // Rounding on the clock of the run may give `time` itself.
     while x + origin <= time {
         x = next(x)?;
     }
     Some(x + origin)
 }
 
-/// A table: linear between its points and constant outside; or smooth, each interval by s^3 (10 -
-/// 15 s + 6 s^2), whose first and second derivatives vanish at both ends.
+/// A function by a table, constant outside of its points. Between them it is linear, or smooth with
+/// s^3 (10 - 15 s + 6 s^2) over each interval, whose first and second derivatives vanish at both
+/// ends.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// Increasing abscissas
     pub times: Vec<f64>,
-    /// The values there
+    /// The values at the abscissas
     pub values: Vec<f64>,
-    /// Whether intervals are smooth
+    /// True if intervals are smooth, false if they are linear
     pub smooth: bool,
 }
 
@@ -212,12 +219,12 @@ impl History for Table {
     }
 }
 
-/// A velocity that jumps by less than this part of the largest one is that of a smooth motion as a
-/// table samples it.
+/// The smallest noticeable jump of a velocity, over the largest velocity: smaller ones are those of
+/// a smooth motion sampled in a table.
 pub const NOTICED: f64 = 0.05;
 
 impl Table {
-    /// The slope of an interval of a table that is not smooth.
+    /// The slope of interval `k` of a linear table.
     fn slope(&self, k: usize) -> f64 {
         (self.values[k + 1] - self.values[k]) / (self.times[k + 1] - self.times[k])
     }
@@ -261,7 +268,7 @@ mod tests {
         };
         assert_eq!(kinks(&table(false)), [0.0, 2.0]);
         assert!(kinks(&table(true)).is_empty());
-        // A sampled curve has none that anybody would notice.
+        // A sampled smooth curve has no noticeable kinks.
         let times: Vec<f64> = (0..=200).map(|k| f64::from(k) / 200.0).collect();
         let values = times.iter().map(|t| t * t * t * (10.0 - t * (15.0 - 6.0 * t))).collect();
         assert!(kinks(&Table { times, values, smooth: false }).is_empty());

@@ -1,5 +1,5 @@
-//! Stages that are linear in the displacements: forces and tangent of the state in which a stage
-//! begins, and no others.
+//! Linear stages: forces are linearised about the state at the start of the stage,
+//! without displacements and rates.
 //!
 //! ```text
 //! g(q, v, a, t) = g(q0, 0, 0, t) + K0 (q - q0) + C0 v + M0 a
@@ -13,25 +13,26 @@ use crate::system::{
 };
 use crate::tensor::Vec3;
 
-/// The matrices of a stage.
-pub struct Linear {
-    /// The state about which everything is linear, at rest, with the loads that it has there
-    pub origin: State,
-    /// The state about which everything is linear, with a clock that follows that of the run
-    pub about: State,
-    /// The slots of multipliers, which have no rates
+/// The matrices of a linear stage.
+pub struct LinearisedSystem {
+    /// The state of linearisation, at rest, with the clock and the loads of the start of the stage
+    pub(crate) origin: State,
+    /// The state of linearisation, at rest, with the present clock and loads
+    pub(crate) about: State,
+    /// The slots of multipliers, whose rates have no forces
     multipliers: Vec<Slot>,
-    /// All directions, the held ones too: they have forces, and motions that are prescribed
+    /// The system of all directions, held ones included, which have reactions and prescribed
+    /// motions
     whole: System,
     stiffness: Vec<f64>,
     damping: Vec<f64>,
     mass: Vec<f64>,
-    /// The weights that the tangent was last formed with, and its revision then
-    pub formed: Option<(Weights, u64)>,
+    /// The weights of the last tangent, and the revision of the system at that time
+    pub(crate) formed: Option<(Weights, u64)>,
 }
 
-impl Linear {
-    /// The matrices of these effects about a state. `Err` never happens without held directions.
+impl LinearisedSystem {
+    /// The matrices of effects about a state. `Err` cannot happen, since no directions are held.
     pub fn new<'e>(
         effects: impl Iterator<Item = &'e dyn Effect>,
         model: &Model,
@@ -61,7 +62,7 @@ impl Linear {
         Ok(Self { origin, about, multipliers, whole, stiffness, damping, mass, formed: None })
     }
 
-    /// Takes the clock, and the amplitudes that belong to it, from a state.
+    /// Takes the clock and the amplitudes of loads from a state.
     pub fn follow(&mut self, state: &State) {
         self.about.time = state.time;
         self.about.load = state.load;
@@ -69,7 +70,8 @@ impl Linear {
         self.about.amplitude_rates.copy_from_slice(&state.amplitude_rates);
     }
 
-    /// Adds what displacements, velocities and accelerations bring to the forces.
+    /// Adds the forces of displacements from the state of linearisation, of velocities and of
+    /// accelerations.
     pub fn add_forces(&self, state: &State, force: &mut [Vec<Vec3>; 4]) {
         let displaced: Vec<Vec3> = state.q.iter().zip(&self.about.q).map(|(q, q0)| *q - *q0).collect();
         self.add_part(&self.stiffness, &displaced, &mut force[Category::Internal as usize]);
@@ -82,7 +84,7 @@ impl Linear {
             [(&self.damping, &state.v[..], Category::Damping), (&self.mass, &state.a[..], Category::Inertia)]
         {
             let mut rates = field.to_vec();
-            // Joints show the mass matrix their conditions for accelerations, which are no forces.
+            // Rows of multipliers in the mass matrix are conditions on accelerations, not forces.
             self.multipliers.iter().for_each(|&slot| rates[slot as usize] = Vec3::ZERO);
             let force = &mut force[category as usize];
             let kept: Vec<Vec3> = self.multipliers.iter().map(|&slot| force[slot as usize]).collect();

@@ -1,45 +1,48 @@
-//! What nodes are called in messages: put together where somebody asks.
+//! Names of nodes for messages, composed on demand from compact tables.
 
 use crate::system::Slot;
 use std::sync::Arc;
 
-/// The names of the nodes that slots belong to, those along beams only by how they count.
+/// The names of the nodes of slots. Nodes along beams are stored as numbered runs.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    runs: Vec<Run>,
+    runs: Vec<NameRun>,
 }
 
-/// Slots up to the next run.
+/// Consecutive slots, up to the first slot of the next run, whose nodes share a name or are
+/// numbered along a beam.
 #[derive(Clone, Debug)]
-struct Run {
+struct NameRun {
+    /// The first slot
     first: Slot,
-    /// Of one node, or of the beam that nodes of two slots each lie on
+    /// The name of one node, or of the beam of numbered nodes, which have two slots each
     name: Arc<str>,
-    /// That of the first node on the beam
+    /// The number of the first node along the beam; `None` for a node with a name of its own
     number: Option<usize>,
 }
 
 impl Names {
-    /// The name of what begins at a slot; names are given in the order of slots.
+    /// Gives a name to the node whose slots begin at `first`. Names must be given in the order of
+    /// slots.
     pub fn give(&mut self, first: Slot, name: &str) {
-        self.runs.push(Run { first, name: name.into(), number: None });
+        self.runs.push(NameRun { first, name: name.into(), number: None });
     }
 
-    /// The next node on a beam, whose two slots begin here.
+    /// Gives number `number` along `beam` to the node whose two slots begin at `first`.
     pub fn count(&mut self, first: Slot, beam: &str, number: usize) {
-        let goes_on = |run: &Run| {
+        let goes_on = |run: &NameRun| {
             let next = run.number.map(|begin| begin + (first - run.first) as usize / 2);
             *run.name == *beam && next == Some(number)
         };
         if !self.runs.last().is_some_and(goes_on) {
-            self.runs.push(Run { first, name: beam.into(), number: Some(number) });
+            self.runs.push(NameRun { first, name: beam.into(), number: Some(number) });
         }
     }
 
-    /// The node of a slot: a point, `beam:3`, or a joint.
+    /// The name of the node of a slot: a point, `beam:3`, or a joint; `?` before the first name.
     pub fn of(&self, slot: Slot) -> String {
         let after = self.runs.partition_point(|run| run.first <= slot);
-        let Some(Run { first, name, number }) = self.runs[..after].last() else { return "?".into() };
+        let Some(NameRun { first, name, number }) = self.runs[..after].last() else { return "?".into() };
         match number {
             None => name.to_string(),
             Some(begin) => format!("{name}:{}", begin + (slot - first) as usize / 2),

@@ -11,7 +11,7 @@ use crate::tensor::{Mat3, Vec3};
 /// within 4e-16 of the angle for angles from 1e-9 to pi.
 #[inline(always)]
 pub fn log<T: Real>(r: Mat3<T>) -> Vec3<T> {
-    let (scalar, vector) = quaternion(r);
+    let Quaternion { scalar, vector } = quaternion(r);
     vector * angle_over_sine(vector.squared(), scalar)
 }
 
@@ -42,13 +42,22 @@ const ARCTANGENT_TERMS: usize = 12;
 
 /// The angle in [0, pi] that takes the rotation `a` into the rotation `b`.
 pub fn relative_angle(a: Mat3, b: Mat3) -> f64 {
-    let (scalar, vector) = quaternion(a.transpose_matmul(b));
+    let Quaternion { scalar, vector } = quaternion(a.transpose_matmul(b));
     2.0 * libm::atan2(vector.norm(), scalar)
+}
+
+/// A unit quaternion (q0, q).
+#[derive(Clone, Copy)]
+struct Quaternion<T> {
+    /// q0
+    scalar: T,
+    /// q
+    vector: Vec3<T>,
 }
 
 /// The unit quaternion of `r` with a scalar part that is not negative.
 #[inline(always)]
-fn quaternion<T: Real>(r: Mat3<T>) -> (T, Vec3<T>) {
+fn quaternion<T: Real>(r: Mat3<T>) -> Quaternion<T> {
     let m = r.0;
     let one = T::one();
     let trace = m[0][0] + m[1][1] + m[2][2];
@@ -56,14 +65,14 @@ fn quaternion<T: Real>(r: Mat3<T>) -> (T, Vec3<T>) {
     let excess = larger(larger(m[0][0], m[1][1]), m[2][2]) - trace;
     let scalar = (one + trace).sqrt() * 0.5;
     let axial = Vec3([m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]);
-    let by_trace = (scalar, axial * (T::constant(0.25) / scalar));
+    let by_trace = Quaternion { scalar, vector: axial * (T::constant(0.25) / scalar) };
     if excess.largest() > 0.0 { by_diagonal(r, trace, excess, by_trace) } else { by_trace }
 }
 
 /// The unit quaternion from the largest diagonal entry if that exceeds the trace, otherwise
 /// `by_trace`.
 #[inline(never)]
-fn by_diagonal<T: Real>(r: Mat3<T>, trace: T, excess: T, by_trace: (T, Vec3<T>)) -> (T, Vec3<T>) {
+fn by_diagonal<T: Real>(r: Mat3<T>, trace: T, excess: T, by_trace: Quaternion<T>) -> Quaternion<T> {
     let m = r.0;
     let one = T::one();
     let by = |i: usize| {
@@ -74,13 +83,17 @@ fn by_diagonal<T: Real>(r: Mat3<T>, trace: T, excess: T, by_trace: (T, Vec3<T>))
         let scale = T::constant(0.25) / vector[i];
         vector[j] = (m[j][i] + m[i][j]) * scale;
         vector[k] = (m[k][i] + m[i][k]) * scale;
-        ((m[k][j] - m[j][k]) * scale, Vec3(vector))
+        Quaternion { scalar: (m[k][j] - m[j][k]) * scale, vector: Vec3(vector) }
     };
-    let choose = |test: T, (a, v): (T, Vec3<T>), (b, w): (T, Vec3<T>)| {
-        (test.above(0.0, a, b), Vec3(std::array::from_fn(|i| test.above(0.0, v.0[i], w.0[i]))))
+    let choose = |test: T, then: Quaternion<T>, otherwise: Quaternion<T>| {
+        let component = |i: usize| test.above(0.0, then.vector.0[i], otherwise.vector.0[i]);
+        Quaternion {
+            scalar: test.above(0.0, then.scalar, otherwise.scalar),
+            vector: Vec3(std::array::from_fn(component)),
+        }
     };
     let first = choose(m[1][1] - m[0][0], by(1), by(0));
     let largest = (m[1][1] - m[0][0]).above(0.0, m[1][1], m[0][0]);
-    let (scalar, vector) = choose(excess, choose(m[2][2] - largest, by(2), first), by_trace);
-    choose(-scalar, (-scalar, -vector), (scalar, vector))
+    let either = choose(excess, choose(m[2][2] - largest, by(2), first), by_trace);
+    choose(-either.scalar, Quaternion { scalar: -either.scalar, vector: -either.vector }, either)
 }

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 /// The number of elements side by side: the numbers in an AVX2 register.
 pub const LANES: usize = 4;
 
-/// One number of each element.
+/// Lanes: a number of each of several elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 pub struct Lanes(pub [f64; LANES]);

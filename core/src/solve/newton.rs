@@ -12,7 +12,7 @@ use super::stress_predictor::StressPredictor;
 use super::tangent::Tangent;
 use super::work::{Work, timed};
 use crate::effect::RoundOff;
-use crate::integrate::{Increments, Method, Step, TimeError};
+use crate::integrate::{Increments, Method, Step, StepEnds, TimeError};
 use crate::kernel::Weights;
 use crate::model::{Assembly, Charted, Model, charts};
 use crate::scalar::CompressedField;
@@ -137,16 +137,10 @@ impl Newton {
         solution.find()
     }
 
-    /// Passes the last time step, from the first of `states` to the second, to the error estimator.
-    pub fn end_step(
-        &mut self,
-        system: &System,
-        states: (&State, &State),
-        step: &Step,
-        increments: Option<&Increments>,
-    ) {
+    /// Passes the last time step to the error estimator.
+    pub fn end_step(&mut self, system: &System, step_ends: StepEnds, step: &Step, increments: Option<&Increments>) {
         if let Some(time_error) = &mut self.time_error {
-            time_error.end(system, &self.dq, states, step, increments);
+            time_error.end(system, &self.dq, step_ends, step, increments);
         }
     }
 }

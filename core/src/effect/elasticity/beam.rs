@@ -1,11 +1,13 @@
-//! Elasticity of beams (sections 3.2–3.4), in each of the ways to interpolate rotations.
+//! Elasticity of beams (Makinen 2007, sections 3.2–3.4), for each interpolation of rotations.
 
 use super::element::{ElasticElement, ElasticPoint};
-use super::interpolation::{HalfWay, Interpolation, PointSum, Posture, Scratch, View, is_half_way};
+use super::interpolation::{
+    ElementConfiguration, HalfWayPoint, Interpolation, PointSum, Scratch, View, Workspace, is_half_way,
+};
 use super::planar::PlanarElasticity;
 use crate::effect::{
-    AT_ONCE, ByOrder, Driven, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints, TangentForm, at_slots,
-    for_each_batch, side_by_side,
+    ByOrder, DrivenCoordinates, ELEMENTS_PER_TASK, Effect, Energy, PlanarForm, Roles, RoundOff, StressPoints,
+    TangentForm, at_slots, for_each_batch, side_by_side,
 };
 use crate::kernel::law::{SectionLaw, StoredLaw, Strain, Stress};
 use crate::kernel::{ElementSystem, NodePlace, Weights};
@@ -19,37 +21,37 @@ use std::sync::Arc;
 /// Elastic elements of all orders.
 pub type ElasticElements = ByOrder<ElasticElement<2, 1>, ElasticElement<3, 2>, ElasticElement<4, 3>>;
 
-/// All beam elements that interpolate in one way.
+/// The elasticity of all beam elements with the interpolation `I`.
 #[derive(Clone, Debug)]
 pub struct BeamElasticity<I> {
     /// The elements
-    pub elements: ElasticElements,
-    /// The stress that geometric parts of the tangent are formed with, where that is not the
-    /// scene's: none
+    pub(crate) elements: ElasticElements,
+    /// Zero stresses at all points, which form the geometric part of the tangent if it is left out
     unstressed: Option<Vec<[f64; 6]>>,
     way: PhantomData<I>,
 }
 
 impl<I: Interpolation> BeamElasticity<I> {
-    /// Of these elements.
+    /// The elasticity of `elements`, with the geometric stiffness in the tangent.
     pub fn new(elements: ElasticElements) -> Self {
         Self { elements, unstressed: None, way: PhantomData }
     }
 
-    /// Leaves out of the tangent what stress brings to it.
+    /// Leaves the geometric stiffness, that of stresses, out of the tangent.
     pub fn without_geometric_stiffness(mut self) -> Self {
         self.unstressed = Some(vec![[0.0; 6]; self.memory_points()]);
         self
     }
 
-    /// The integration points of the elements before this one.
+    /// The number of integration points of the elements before number `element`.
     pub(super) fn points_before(&self, element: usize) -> usize {
         let two = self.elements.two.len();
         let three = self.elements.three.len();
         element + element.saturating_sub(two) + element.saturating_sub(two + three)
     }
 
-    /// The stresses of geometric parts; empty where they are the present ones.
+    /// The stresses that form the geometric parts of the tangent, by point; empty if these are the
+    /// present stresses.
     pub(super) fn remembered<'a>(&'a self, memory: &'a Memory) -> &'a [[f64; 6]] {
         match &self.unstressed {
             Some(none) => none,
@@ -59,10 +61,10 @@ impl<I: Interpolation> BeamElasticity<I> {
     }
 }
 
-/// Strain and stress in beam elements, however they interpolate.
+/// Strains and stresses in beam elements of any interpolation.
 pub trait StressField: Send + Sync {
-    /// Strain and stress (material, global components) at the integration points of an element;
-    /// `None` where it is not one of these.
+    /// Strain and stress (material, global components) at the integration points of an element of
+    /// the scene; `None` if it belongs to another effect.
     fn at_points(&self, element: u32, at: &State) -> Option<Vec<(Strain, Stress)>>;
 }
 
@@ -100,7 +102,7 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     }
 
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
-        // Where they are the mesh shows.
+        // The mesh shows the places of elements.
         for_each_batch!(self.elements, |_first, batch| for alike in batch.chunk_by(ElasticElement::is_like) {
             for point in alike[0].points() {
                 show(MirrorData::Vector(point.tangent));
@@ -144,7 +146,11 @@ impl<I: Interpolation> Effect for BeamElasticity<I> {
     fn energy(&self, at: &State) -> Energy {
         let mut strain = 0.0;
         for_each_batch!(self.elements, |_first, batch| {
-            threads::in_order(batch.chunks(AT_ONCE), |batch| energy_of::<I, _, _>(batch, at), |own| strain += own);
+            threads::in_order(
+                batch.chunks(ELEMENTS_PER_TASK),
+                |batch| energy_of::<I, _, _>(batch, at),
+                |own| strain += own,
+            );
         });
         Energy { kinetic: 0.0, strain }
     }
@@ -188,8 +194,8 @@ impl<I: Interpolation> StressPoints for BeamElasticity<I> {
         let mut largest = RoundOff::default();
         for_each_batch!(self.elements, |_first, batch| {
             threads::in_order(
-                batch.chunks(AT_ONCE),
-                |part| noise_of(part, at),
+                batch.chunks(ELEMENTS_PER_TASK),
+                |part| round_off_of(part, at),
                 |round_off| largest = largest.or(round_off),
             );
         });
@@ -197,7 +203,7 @@ impl<I: Interpolation> StressPoints for BeamElasticity<I> {
     }
 }
 
-impl<I: Interpolation> Driven for BeamElasticity<I> {
+impl<I: Interpolation> DrivenCoordinates for BeamElasticity<I> {
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for_each_batch!(self.elements, |_first, batch| for element in batch.iter().filter(|e| e.free().is_some()) {
             let pull: f64 = element
@@ -214,27 +220,27 @@ impl<I: Interpolation> Driven for BeamElasticity<I> {
     }
 }
 
-/// Strains below this are those of round-off: of a beam with EA = 1e8 EI/L^2 they change the
-/// stiffness against bending by 1e-7 of itself.
-const UNSTRAINED: f64 = 1e-14;
+/// The translational strain, without unit, up to which an element counts as unstressed: in a beam
+/// with EA = 1e8 EI/L^2 it changes the stiffness against bending by 1e-7 of itself.
+const MAX_UNSTRESSED_STRAIN: f64 = 1e-14;
 
-/// Radians by which stress may bend or twist an element without changing its stiffness: over 10,000
-/// elements they add up to 1e-8.
-const UNBENT: f64 = 1e-12;
+/// The bend or twist, in radians over an element, up to which it counts as unstressed: over 10,000
+/// elements it adds up to 1e-8.
+const MAX_UNSTRESSED_BEND: f64 = 1e-12;
 
-/// The largest round-off of the forces of some elements.
-fn noise_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> RoundOff {
+/// The largest round-off of the forces of the elements of a batch.
+fn round_off_of<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> RoundOff {
     let mut largest = RoundOff::default();
     for element in batch {
         let nodes = element.connection.nodes.iter();
         let u = nodes.map(|node| at.q[node.u as usize].max_abs()).fold(0.0, f64::max);
-        element.each_noise(u, |round_off| largest = largest.or(round_off));
+        element.each_round_off(u, |round_off| largest = largest.or(round_off));
     }
     largest
 }
 
-/// Adds the elements of one order, `first` instances after the first one of the effect;
-/// `remembered` are the stresses of geometric parts.
+/// Adds a batch of elements in lanes; `first` is the number of its first instance, and `remembered`
+/// holds the stresses of geometric parts by point, or is empty.
 #[inline(always)]
 fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
@@ -250,9 +256,9 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     let mut alone = None;
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
-        let sum = Sum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
-        let posture = Posture::side_by_side(each_lane!(|k| elements[k].member()), at);
-        I::View::new(&posture).fill(&sum, stiffness, &mut scratch, &mut systems);
+        let sum = ElasticSum::side_by_side(elements, remembered.get(start * G..).unwrap_or_default(), at);
+        let configuration = ElementConfiguration::side_by_side(each_lane!(|k| elements[k].member()), at);
+        I::View::new(&configuration).fill(&sum, stiffness, &mut scratch, &mut systems);
         let count = LANES.min(batch.len() - start);
         let is_mixed = |k: usize| at.mixed[elements[k].connection.element as usize] != 0;
         out.add_lanes(first + start, count, &systems, is_mixed, |k, out| {
@@ -264,26 +270,27 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     scratch.give_back(out);
 }
 
-/// Element systems to compute with, one element of the batch at a time.
-pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> (ElementSystem, Scratch) {
-    (ElementSystem::new(2 * N), Scratch::new(N))
+/// Memory for the computation of single elements of a batch.
+pub(super) fn workspace<const N: usize, const G: usize>(_batch: &[ElasticElement<N, G>]) -> Workspace {
+    Workspace::new(N)
 }
 
-/// The remembered stresses of the points of element k.
+/// The remembered stresses of the points of element k; `None` if there are none.
 pub(super) fn stresses_of<const G: usize>(remembered: &[[f64; 6]], k: usize) -> Option<[Stress; G]> {
     let own = remembered.get(k * G..(k + 1) * G)?;
     Some(std::array::from_fn(|g| unpack(&own[g])))
 }
 
-/// The points of an element, or of several side by side, with the stresses that geometric parts are
-/// formed with where these are not the present ones.
-struct Sum<const N: usize, const G: usize, T> {
+/// The sum over the points of an element, or of several side by side.
+struct ElasticSum<const N: usize, const G: usize, T> {
     points: [ElasticPoint<N, T>; G],
+    /// The stresses that form the geometric parts; `None` for the present ones
     stresses: Option<[Stress<T>; G]>,
+    /// The amplitude of the free strain
     free: T,
 }
 
-impl<const N: usize, const G: usize> Sum<N, G, Lanes> {
+impl<const N: usize, const G: usize> ElasticSum<N, G, Lanes> {
     #[inline(always)]
     fn side_by_side(elements: [&ElasticElement<N, G>; LANES], remembered: &[[f64; 6]], at: &State) -> Self {
         let points = ElasticElement::points_side_by_side(elements);
@@ -300,7 +307,7 @@ impl<const N: usize, const G: usize> Sum<N, G, Lanes> {
     }
 }
 
-impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
+impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for ElasticSum<N, G, T> {
     #[inline(always)]
     fn add(&self, nodes: &[NodePlace<T>; N], stiffness: f64, out: &mut ElementSystem<T>) {
         for g in 0..G {
@@ -320,9 +327,9 @@ impl<const N: usize, const G: usize, T: Real> PointSum<N, T> for Sum<N, G, T> {
     }
 
     #[inline(always)]
-    fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
+    fn half_way(&self) -> Option<HalfWayPoint<'_, N, T>> {
         let geometric = self.stresses.as_ref().map(|stresses| &stresses[0]);
-        is_half_way(N, G).then(|| HalfWay { point: &self.points[0], free: self.free, geometric })
+        is_half_way(N, G).then(|| HalfWayPoint { point: &self.points[0], free: self.free, geometric })
     }
 }
 
@@ -337,14 +344,14 @@ pub(super) fn packed<T: Real>(stress: &Stress<T>) -> [T; 6] {
     [n.0[0], n.0[1], n.0[2], m.0[0], m.0[1], m.0[2]]
 }
 
-/// The stresses that the points of a batch are expected to have after the correction `dq`.
+/// Writes the stresses at the points of a batch, extrapolated over the correction `dq`.
 fn extrapolate_batch<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
     at: &State,
     dq: &[Vec3],
     out: &mut [[f64; 6]],
 ) {
-    threads::each(batch.chunks(AT_ONCE).zip(out.chunks_mut(AT_ONCE * G)), |(batch, out)| {
+    threads::each(batch.chunks(ELEMENTS_PER_TASK).zip(out.chunks_mut(ELEMENTS_PER_TASK * G)), |(batch, out)| {
         let done = Instructions::here().run_side_by_side(
             #[inline(always)]
             || extrapolate_side_by_side::<I, _, _>(batch, at, dq, out),
@@ -365,8 +372,8 @@ fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
 ) {
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
-        let sum = Sum::side_by_side(elements, &[], at);
-        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| elements[k].member()), at));
+        let sum = ElasticSum::side_by_side(elements, &[], at);
+        let view = I::View::new(&ElementConfiguration::side_by_side(each_lane!(|k| elements[k].member()), at));
         let du: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].u)));
         let dp: [_; N] = std::array::from_fn(|i| at_slots(dq, each_lane!(|k| elements[k].connection.nodes[i].p)));
         let stresses = view.extrapolated(&sum.points, sum.free, &du, &dp);
@@ -384,7 +391,7 @@ fn extrapolate_side_by_side<I: Interpolation, const N: usize, const G: usize>(
     }
 }
 
-/// The strain energy of some elements.
+/// The strain energy of the elements of a batch.
 fn energy_of<I: Interpolation, const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], at: &State) -> f64 {
     let mut sum = 0.0;
     let mut add = |energy: f64| sum += energy;
@@ -398,7 +405,7 @@ fn energy_of<I: Interpolation, const N: usize, const G: usize>(batch: &[ElasticE
     sum
 }
 
-/// Shows the strain energy of each element, in their order.
+/// Calls `show` with the strain energy of each element of a batch, in their order.
 #[inline(always)]
 fn each_energy<I: Interpolation, const N: usize, const G: usize>(
     batch: &[ElasticElement<N, G>],
@@ -407,8 +414,8 @@ fn each_energy<I: Interpolation, const N: usize, const G: usize>(
 ) {
     for start in (0..batch.len()).step_by(LANES) {
         let elements = side_by_side(batch, start);
-        let sum = Sum::side_by_side(elements, &[], at);
-        let view = I::View::new(&Posture::side_by_side(each_lane!(|k| elements[k].member()), at));
+        let sum = ElasticSum::side_by_side(elements, &[], at);
+        let view = I::View::new(&ElementConfiguration::side_by_side(each_lane!(|k| elements[k].member()), at));
         let energies = strain_energy(&sum.points, view.nodes(), sum.free);
         for (k, element) in elements.iter().enumerate().take(batch.len() - start) {
             let mixed = at.mixed[element.connection.element as usize] != 0;
@@ -417,7 +424,7 @@ fn each_energy<I: Interpolation, const N: usize, const G: usize>(
     }
 }
 
-/// The strain energy of an element, by its points and the nodes that its kernel is shown.
+/// The strain energy of an element, from its points and the nodes in the frame of its kernel.
 #[inline(always)]
 fn strain_energy<const N: usize, const G: usize, T: Real>(
     points: &[ElasticPoint<N, T>; G],
@@ -448,7 +455,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         strain_energy(&self.points(), I::see(self.member(), at).nodes(), self.free_amplitude(at))
     }
 
-    /// The largest |dGamma| or |dK| length that increments of the unknowns make.
+    /// The largest |dGamma| or |dK| length at the points, for a field of increments of the
+    /// unknowns.
     fn strain_of<I: Interpolation>(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let view = I::see(self.member(), at);
         let change = I::variation(self.member(), at, field);
@@ -459,8 +467,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         self.points().iter().map(at_point).fold(0.0, f64::max)
     }
 
-    /// The sum of dS.dE, of the strains and stresses that increments of the unknowns make; `None`
-    /// where the element is stressed.
+    /// The quadratic form of the stiffness, the sum of dS.dE over the points for the strains and
+    /// stresses of a field of increments; `None` if the element is stressed.
     fn stiffness_along<I: Interpolation>(&self, at: &State, field: &[Vec3]) -> Option<f64> {
         let view = I::see(self.member(), at);
         let change = I::variation(self.member(), at, field);
@@ -468,7 +476,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         let length = self.points().iter().map(|point| point.weight).sum::<f64>();
         let at_point = |point: &ElasticPoint<N>| {
             let elastic = point.elastic_strain(view.nodes(), free);
-            if elastic.gamma.norm() > UNSTRAINED || elastic.kappa.norm() * length > UNBENT {
+            if elastic.gamma.norm() > MAX_UNSTRESSED_STRAIN || elastic.kappa.norm() * length > MAX_UNSTRESSED_BEND {
                 return None;
             }
             let strain = point.strain_variation(&point.configuration(view.nodes()), |i| change[i].0, |i| change[i].1);
@@ -478,7 +486,8 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         self.points().iter().map(at_point).sum()
     }
 
-    /// Adds the element alone as instance `number`; its nodes may sit in different charts.
+    /// Adds this element alone as instance `number`; its nodes may have rotation vectors in
+    /// different charts.
     #[inline(never)]
     pub(super) fn add<I: Interpolation>(
         &self,
@@ -486,15 +495,15 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         stresses: Option<[Stress; G]>,
         at: &State,
         stiffness: f64,
-        (system, scratch): &mut (ElementSystem, Scratch),
+        Workspace { system, scratch }: &mut Workspace,
         out: &mut Assembler,
     ) {
-        let sum = Sum { points: self.points(), stresses, free: self.free_amplitude(at) };
+        let sum = ElasticSum { points: self.points(), stresses, free: self.free_amplitude(at) };
         I::evaluate(self.member(), at, stiffness, scratch, system, &sum);
         out.add(number, system);
     }
 
-    /// The stress that each point is expected to have after the correction `dq`.
+    /// Writes the stress at each point, extrapolated over the correction `dq`.
     #[inline(never)]
     fn extrapolate<I: Interpolation>(&self, at: &State, dq: &[Vec3], out: &mut [[f64; 6]]) {
         let view = I::see(self.member(), at);

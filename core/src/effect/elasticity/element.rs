@@ -1,4 +1,4 @@
-//! Elastic elements as they are kept: what neighbours have in common stands once.
+//! Storage of elastic elements: neighbours with equal data share them.
 
 use crate::effect::{Connection, RoundOff, shared};
 use crate::kernel::beam::StiffnessPoint;
@@ -8,39 +8,39 @@ use crate::tensor::Vec3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The law of all sections. It is one type, so that elements of different sections stand side by
-/// side in lanes.
+/// The law of all sections. It is one type, so that elements of different sections can be packed
+/// into lanes.
 pub type BeamLaw<T = f64> = Linear<T>;
 
-/// An integration point of a beam.
+/// An integration point of a beam for internal forces.
 pub type ElasticPoint<const N: usize, T = f64> = StiffnessPoint<N, T, BeamLaw<T>>;
 
 /// An element of N nodes with G = N - 1 points for internal forces.
 #[derive(Clone, Debug)]
 pub struct ElasticElement<const N: usize, const G: usize> {
-    /// Its place in the scene
-    pub connection: Connection<N>,
-    /// The number of the amplitude of its free strain
+    /// The number and the nodes of the element
+    pub(crate) connection: Connection<N>,
+    /// The index of the amplitude of its free strain; `None` without free strain
     free: Option<u32>,
-    /// Its length over that of what it shares. Round-off makes all of them different, and had
-    /// better do so: what it leaves of stiffnesses that are none would add up otherwise, and pass
-    /// for one.
+    /// Its length over that of the shared data. Round-off makes lengths of equal elements differ,
+    /// which is kept: equal round-off in the stiffness of a mechanism would add up over elements,
+    /// and pass for a stiffness.
     length: f64,
-    /// All else, for it and neighbours of the same length with the same sections in the same axes
-    common: Arc<Common<N, G>>,
+    /// Data shared with neighbours of (nearly) equal length, with equal sections in equal axes
+    common: Arc<SharedElasticData<N, G>>,
 }
 
-/// The data that neighbours share.
+/// The data that neighbouring elastic elements share.
 #[derive(Debug, PartialEq)]
-struct Common<const N: usize, const G: usize> {
-    /// The initial places of the nodes as seen from the first
+struct SharedElasticData<const N: usize, const G: usize> {
+    /// The initial places of the nodes from the first node
     arms: [Vec3; N],
     points: [ElasticPoint<N>; G],
-    /// Round-off of the force of each point, and of its moment for slopes of one
+    /// Round-off of the force at each point, and of its moment for shape functions of slope one
     rounding: [RoundOff; G],
 }
 
-impl<const N: usize, const G: usize> Common<N, G> {
+impl<const N: usize, const G: usize> SharedElasticData<N, G> {
     fn new(arms: [Vec3; N], points: [ElasticPoint<N>; G]) -> Self {
         let of_point = |point: &ElasticPoint<N>| {
             let stiffness = point.law.stiffness_at_rest();
@@ -54,9 +54,9 @@ impl<const N: usize, const G: usize> Common<N, G> {
 }
 
 impl<const N: usize, const G: usize> ElasticElement<N, G> {
-    /// So much longer than these arms from its first node and these points tell, and with the
-    /// number of the amplitude of its free strain; it shares with a neighbour what both have in
-    /// common.
+    /// An element that is `length` times as long as `arms` (initial places from the first node) and
+    /// `points` say. `free` is the index of the amplitude of its free strain. Data that equal those
+    /// of the `neighbour` are shared.
     pub fn new(
         connection: Connection<N>,
         length: f64,
@@ -65,16 +65,16 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         free: Option<usize>,
         neighbour: Option<&Self>,
     ) -> Self {
-        let common = shared(Common::new(arms, points), neighbour.map(|neighbour| &neighbour.common));
+        let common = shared(SharedElasticData::new(arms, points), neighbour.map(|neighbour| &neighbour.common));
         Self { connection, free: free.map(|number| number as u32), length, common }
     }
 
-    /// It shares all data with another element.
+    /// True if it shares its data with another element.
     pub fn is_like(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.common, &other.common)
     }
 
-    /// Its integration points.
+    /// The integration points of the element.
     #[inline(always)]
     pub fn points(&self) -> [ElasticPoint<N>; G] {
         let mut points = self.common.points;
@@ -82,17 +82,17 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         points
     }
 
-    /// Its nodes, and where they began as seen from the first.
+    /// The nodes of the element with their initial places.
     #[inline(always)]
-    pub fn member(&self) -> Member<'_, N> {
-        Member { connection: &self.connection, arms: self.common.arms.map(|arm| arm * self.length) }
+    pub fn member(&self) -> ElementNodes<'_, N> {
+        ElementNodes { connection: &self.connection, arms: self.common.arms.map(|arm| arm * self.length) }
     }
 
-    /// Shows what round-off may leave of the force of each point, where displacements are at most
-    /// `u`: these and rotations carry a relative error of one unit in the last place; strains
-    /// divide it by the element's length, and stiff sections multiply it.
+    /// Calls `show` with the round-off of force and moment at each point, for displacements of at
+    /// most `u`. Displacements and rotations carry a relative error of one unit in the last place;
+    /// strains divide it by the element's length, and stiff sections multiply it.
     #[inline]
-    pub fn each_noise(&self, u: f64, mut show: impl FnMut(RoundOff)) {
+    pub fn each_round_off(&self, u: f64, mut show: impl FnMut(RoundOff)) {
         for (point, rounding) in self.common.points.iter().zip(&self.common.rounding) {
             let steepest = point.slope.iter().fold(0.0_f64, |s, d| s.max(d.abs()));
             let RoundOff { force: at_rest, moment } = *rounding;
@@ -101,7 +101,7 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
         }
     }
 
-    /// The number of the amplitude of its free strain.
+    /// The index of the amplitude of its free strain; `None` without free strain.
     #[inline(always)]
     pub fn free(&self) -> Option<usize> {
         self.free.map(|number| number as usize)
@@ -129,11 +129,11 @@ impl<const N: usize, const G: usize> ElasticElement<N, G> {
     }
 }
 
-/// An element as interpolations see it.
+/// The nodes of an element with their initial places.
 #[derive(Clone, Copy, Debug)]
-pub struct Member<'e, const N: usize> {
-    /// Its nodes
-    pub connection: &'e Connection<N>,
-    /// Where they began as seen from the first
-    pub arms: [Vec3; N],
+pub struct ElementNodes<'e, const N: usize> {
+    /// Number and nodes of the element
+    pub(crate) connection: &'e Connection<N>,
+    /// The initial places of the nodes from the first node
+    pub(crate) arms: [Vec3; N],
 }

@@ -1,7 +1,7 @@
-//! How beam elements interpolate rotations: each way shows the same element kernel other nodes, and
-//! carries what the kernel gives back to the nodes of the scene.
+//! Interpolations of rotations in beam elements: each gives the element kernel nodes in a frame of
+//! its own, and carries force and tangent of the kernel back to the nodes of the scene.
 
-use super::element::{ElasticPoint, Member};
+use super::element::{ElasticPoint, ElementNodes};
 use crate::effect::{Connection, after_displacement, at_slots};
 use crate::kernel::law::Stress;
 use crate::kernel::relative::Relative;
@@ -11,23 +11,23 @@ use crate::scalar::{LANES, Lanes, Pack, Real, each_lane, pack};
 use crate::system::{Assembler, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// Where the nodes of an element are, or those of several elements side by side; rotation vectors
-/// all in one chart.
-pub struct Posture<const N: usize, T = f64> {
-    /// Where they started, as seen from the first
-    pub arms: [Vec3<T>; N],
-    /// Their displacements
-    pub u: [Vec3<T>; N],
-    /// Their rotation vectors
-    pub p: [Vec3<T>; N],
-    /// The rotations that `p` are increments to, where they are no total ones
-    pub base: Option<[Mat3<T>; N]>,
+/// The configuration of an element, or of several elements side by side, with all rotation vectors
+/// in one chart.
+pub struct ElementConfiguration<const N: usize, T = f64> {
+    /// The initial places of the nodes from the first node
+    pub(crate) arms: [Vec3<T>; N],
+    /// The displacements of the nodes
+    pub(crate) u: [Vec3<T>; N],
+    /// The rotation vectors of the nodes
+    pub(crate) p: [Vec3<T>; N],
+    /// The rotations before the increments `p`; `None` if `p` are total rotation vectors
+    pub(crate) base: Option<[Mat3<T>; N]>,
 }
 
-impl<const N: usize> Posture<N> {
-    /// Of an element whose nodes move so.
+impl<const N: usize> ElementConfiguration<N> {
+    /// The configuration of an element with the motions `nodes`, all in one chart.
     #[inline(always)]
-    pub fn new(member: Member<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
+    pub fn new(member: ElementNodes<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
         let u = nodes.map(|node| node.u);
         let p = nodes.map(|node| node.p);
         let base = || std::array::from_fn(|i| base_of(member.connection, i, at));
@@ -35,10 +35,10 @@ impl<const N: usize> Posture<N> {
     }
 }
 
-impl<const N: usize> Posture<N, Lanes> {
-    /// Of elements side by side, each node in its own chart.
+impl<const N: usize> ElementConfiguration<N, Lanes> {
+    /// The configurations of elements side by side, each node in its own chart.
     #[inline(always)]
-    pub fn side_by_side(members: [Member<N>; LANES], at: &State) -> Self {
+    pub fn side_by_side(members: [ElementNodes<N>; LANES], at: &State) -> Self {
         let connections = each_lane!(|k| members[k].connection);
         let mut out = Self { arms: [Vec3::zero(); N], u: [Vec3::zero(); N], p: [Vec3::zero(); N], base: None };
         for i in 0..N {
@@ -53,7 +53,7 @@ impl<const N: usize> Posture<N, Lanes> {
     }
 }
 
-/// The rotation that the vector of node i is an increment to.
+/// The rotation before the increment of node i; the identity if its vector is a total one.
 fn base_of<const N: usize>(connection: &Connection<N>, i: usize, at: &State) -> Mat3 {
     at.turn(connection.nodes[i].p).map_or(Mat3::IDENTITY, |turn| turn.base())
 }
@@ -66,46 +66,61 @@ fn bases<const N: usize>(connections: [&Connection<N>; LANES], at: &State) -> [M
     })
 }
 
-/// A sum of forces and tangents over the points of an element.
+/// A sum of forces and tangents over the integration points of an element.
 pub trait PointSum<const N: usize, T: Real> {
-    /// Adds the force and `stiffness` times the tangent, for nodes that the kernel sees so.
+    /// Adds the force and `stiffness` times the tangent, for nodes in the frame of the kernel.
     fn add(&self, nodes: &[NodePlace<T>; N], stiffness: f64, out: &mut ElementSystem<T>);
 
-    /// Adds the forces that geometric parts are formed with; `false` where they are those of `add`.
+    /// Adds the forces that form the geometric parts of the tangent. Returns `false` if they are
+    /// those of [`Self::add`], which are then not added.
     fn add_geometric(&self, nodes: &[NodePlace<T>; N], out: &mut ElementSystem<T>) -> bool;
 
-    /// The elastic point half way between two nodes, where it is all there is: for it the way is
-    /// short.
-    fn half_way(&self) -> Option<HalfWay<'_, N, T>> {
+    /// The elastic point of an element of two nodes with a single point half way between them,
+    /// which has a shorter formula; `None` for other sums.
+    fn half_way(&self) -> Option<HalfWayPoint<'_, N, T>> {
         None
     }
 }
 
-/// An element of two nodes, with its only point half way between them.
+/// True for an element of two nodes with a single point, which lies half way between them.
 pub const fn is_half_way(nodes: usize, points: usize) -> bool {
     nodes == 2 && points == 1
 }
 
-/// An elastic point with the amplitude of its free strain, and the stress of its geometric part
-/// where that is not the present one.
-pub struct HalfWay<'a, const N: usize, T> {
+/// The single elastic point of an element of two nodes.
+pub struct HalfWayPoint<'a, const N: usize, T> {
     /// The point
-    pub point: &'a ElasticPoint<N, T>,
-    /// The amplitude
-    pub free: T,
-    /// The stress
-    pub geometric: Option<&'a Stress<T>>,
+    pub(crate) point: &'a ElasticPoint<N, T>,
+    /// The amplitude of its free strain
+    pub(crate) free: T,
+    /// The stress that forms the geometric part; `None` for the present one
+    pub(crate) geometric: Option<&'a Stress<T>>,
 }
 
-/// Two element systems to compute with where they are needed, kept between elements.
+/// Two element systems of scratch memory, allocated on demand and kept between elements.
 pub struct Scratch<T = f64> {
     nodes: usize,
-    /// Of the nodes that the kernel is shown, and of its geometric part
+    /// The system in the frame of the kernel, and the system of the forces of its geometric parts
     systems: Option<[ElementSystem<T>; 2]>,
 }
 
+/// An element system with its scratch memory, for elements that are computed one by one.
+pub struct Workspace<T = f64> {
+    /// The system of the element
+    pub system: ElementSystem<T>,
+    /// Scratch memory of the interpolation
+    pub scratch: Scratch<T>,
+}
+
+impl<T: Real> Workspace<T> {
+    /// Memory for elements of `nodes` nodes.
+    pub fn new(nodes: usize) -> Self {
+        Self { system: ElementSystem::new(2 * nodes), scratch: Scratch::new(nodes) }
+    }
+}
+
 impl<T: Real> Scratch<T> {
-    /// For elements of `nodes` nodes.
+    /// Scratch memory for elements of `nodes` nodes.
     pub fn new(nodes: usize) -> Self {
         Self { nodes, systems: None }
     }
@@ -116,33 +131,35 @@ impl<T: Real> Scratch<T> {
 }
 
 impl Scratch<Lanes> {
-    /// With systems of a sink, where they are `needed`.
-    pub fn lent(nodes: usize, needed: bool, sink: &mut Assembler) -> Self {
-        Self { nodes, systems: needed.then(|| [(); 2].map(|()| sink.lend(2 * nodes, true))) }
+    /// Scratch memory with systems lent by an assembler, if they are `needed`.
+    pub fn lent(nodes: usize, needed: bool, out: &mut Assembler) -> Self {
+        Self { nodes, systems: needed.then(|| [(); 2].map(|()| out.lend(2 * nodes, true))) }
     }
 
-    /// Gives them back.
-    pub fn give_back(self, sink: &mut Assembler) {
-        self.systems.into_iter().flatten().for_each(|system| sink.take_back(system));
+    /// Gives lent systems back to their assembler.
+    pub fn give_back(self, out: &mut Assembler) {
+        self.systems.into_iter().flatten().for_each(|system| out.take_back(system));
     }
 }
 
-/// An element as its interpolation sees it.
+/// An element in the frame of its kernel.
 pub trait View<const N: usize, T: Real> {
-    /// Sees the element.
-    fn new(posture: &Posture<N, T>) -> Self;
+    /// The element in a configuration.
+    fn new(configuration: &ElementConfiguration<N, T>) -> Self;
 
-    /// The nodes that the kernel is shown.
+    /// The nodes in the frame of the kernel.
     fn nodes(&self) -> &[NodePlace<T>; N];
 
-    /// How these vary with displacements and rotation vectors.
+    /// Variations of displacement and rotation vector at the nodes in the frame of the kernel, for
+    /// variations `du` and `dp` at the nodes of the scene.
     fn variation(&self, du: &[Vec3<T>; N], dp: &[Vec3<T>; N]) -> [(Vec3<T>, Vec3<T>); N];
 
-    /// Adds up the points, and puts what they give, carried back to the nodes of the scene, in the
-    /// place of what stands in `out`.
+    /// Overwrites `out` with force and `stiffness` times the tangent of a sum over points, carried
+    /// back to the nodes of the scene.
     fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>);
 
-    /// The stresses that variations of displacements and rotation vectors are expected to lead to.
+    /// The stresses at the points, extrapolated over variations of displacements and rotation
+    /// vectors. `free` is the amplitude of the free strain.
     #[inline(always)]
     fn extrapolated<const G: usize>(
         &self,
@@ -158,7 +175,7 @@ pub trait View<const N: usize, T: Real> {
     }
 }
 
-/// [`View::extrapolated`] of any elements.
+/// [`View::extrapolated`] by the general formula, for elements of any order.
 #[inline(always)]
 fn extrapolated<const N: usize, const G: usize, T: Real>(
     view: &impl View<N, T>,
@@ -176,37 +193,37 @@ fn extrapolated<const N: usize, const G: usize, T: Real>(
     out
 }
 
-/// A way to interpolate rotations.
+/// An interpolation of rotations.
 pub trait Interpolation: Send + Sync + 'static {
-    /// The name of their elasticity
+    /// The name of the effect of elasticity
     const NAME: &'static str;
-    /// The name of their damping by strain rates
+    /// The name of the effect of strain-rate damping
     const DAMPING_NAME: &'static str;
-    /// Forces and tangents of the kernel are carried back to other nodes, which takes systems to
-    /// work in
+    /// True if forces and tangents of the kernel are carried back from another frame, which needs
+    /// scratch memory
     const CARRIES_BACK: bool;
-    /// An element as its kernel sees it
+    /// An element in the frame of its kernel
     type View<const N: usize, T: Real>: View<N, T>;
 
-    /// An element, its nodes in one chart.
+    /// The view of an element in a state, with its nodes in one chart.
     #[inline(never)]
-    fn see<const N: usize>(member: Member<N>, at: &State) -> Self::View<N, f64> {
+    fn see<const N: usize>(member: ElementNodes<N>, at: &State) -> Self::View<N, f64> {
         let nodes = member.connection.motions_in_one_chart(at);
-        Self::View::new(&Posture::new(member, &nodes, at))
+        Self::View::new(&ElementConfiguration::new(member, &nodes, at))
     }
 
-    /// How the nodes that the kernel sees vary when the unknowns do by `dq`.
+    /// Variations at the nodes in the frame of the kernel for increments `dq` of the unknowns.
     #[inline(never)]
-    fn variation<const N: usize>(member: Member<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
+    fn variation<const N: usize>(member: ElementNodes<N>, at: &State, dq: &[Vec3]) -> [(Vec3, Vec3); N] {
         let (du, dp) = member.connection.variations_in_one_chart(at, dq);
         Self::see(member, at).variation(&du, &dp)
     }
 
-    /// The sum over an element's points, carried back to the nodes of the scene and to their
-    /// charts.
+    /// Overwrites `out` with a sum over the points of an element, carried back to the nodes of the
+    /// scene and to their charts.
     #[inline(never)]
     fn evaluate<const N: usize, K: PointSum<N, f64>>(
-        member: Member<N>,
+        member: ElementNodes<N>,
         at: &State,
         stiffness: f64,
         scratch: &mut Scratch,
@@ -216,13 +233,14 @@ pub trait Interpolation: Send + Sync + 'static {
         let weights = Weights { stiffness, ..Weights::NONE };
         let scratch = std::cell::RefCell::new(scratch);
         member.connection.evaluate(at, weights, false, after_displacement, out, &|nodes, weights, out| {
-            let view = Self::View::new(&Posture::new(member, nodes, at));
+            let view = Self::View::new(&ElementConfiguration::new(member, nodes, at));
             view.fill(sum, weights.stiffness, &mut scratch.borrow_mut(), out);
         });
     }
 }
 
-/// The paper's: total rotation vectors are interpolated, in the chart of the element's first node.
+/// Total rotation vectors are interpolated, in the chart of the element's first node (Makinen
+/// 2007).
 #[derive(Clone, Copy, Debug)]
 pub struct TotalVectors;
 
@@ -230,11 +248,12 @@ impl Interpolation for TotalVectors {
     const NAME: &'static str = "beam elasticity";
     const DAMPING_NAME: &'static str = "strain-rate damping";
     const CARRIES_BACK: bool = false;
-    type View<const N: usize, T: Real> = AsItIs<N, T>;
+    type View<const N: usize, T: Real> = TotalView<N, T>;
 }
 
-/// Rotations relative to a frame that turns with the element: strains do not notice rigid
-/// rotations, and charts do not matter.
+/// Rotation vectors relative to a frame that turns with the element are interpolated: strains do
+/// not depend on rigid rotations, nor on charts (Crisfield & Jelenic 1999,
+/// doi:10.1098/rspa.1999.0352).
 #[derive(Clone, Copy, Debug)]
 pub struct RelativeVectors;
 
@@ -242,21 +261,21 @@ impl Interpolation for RelativeVectors {
     const NAME: &'static str = "beam elasticity, relative";
     const DAMPING_NAME: &'static str = "strain-rate damping, relative";
     const CARRIES_BACK: bool = true;
-    type View<const N: usize, T: Real> = FromItsFrame<N, T>;
+    type View<const N: usize, T: Real> = RelativeView<N, T>;
 }
 
-/// An element with the nodes that it has.
-pub struct AsItIs<const N: usize, T> {
+/// An element with its own nodes: the view of [`TotalVectors`].
+pub struct TotalView<const N: usize, T> {
     nodes: [NodePlace<T>; N],
 }
 
-impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
+impl<const N: usize, T: Real> View<N, T> for TotalView<N, T> {
     #[inline(always)]
-    fn new(posture: &Posture<N, T>) -> Self {
+    fn new(configuration: &ElementConfiguration<N, T>) -> Self {
         let mut nodes = [NodePlace::rest(); N];
         for i in 0..N {
-            nodes[i].u = posture.u[i];
-            nodes[i].p = posture.p[i];
+            nodes[i].u = configuration.u[i];
+            nodes[i].p = configuration.p[i];
         }
         Self { nodes }
     }
@@ -282,25 +301,25 @@ impl<const N: usize, T: Real> View<N, T> for AsItIs<N, T> {
     }
 }
 
-/// An element seen from its own frame.
-pub struct FromItsFrame<const N: usize, T> {
+/// An element in the frame that turns with it: the view of [`RelativeVectors`].
+pub struct RelativeView<const N: usize, T> {
     seen: Relative<N, T>,
     rotations: [Rotation<T>; N],
 }
 
-impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
+impl<const N: usize, T: Real> View<N, T> for RelativeView<N, T> {
     #[inline(always)]
-    fn new(posture: &Posture<N, T>) -> Self {
-        let mut rotations = [Rotation::new(posture.p[0]); N];
+    fn new(configuration: &ElementConfiguration<N, T>) -> Self {
+        let mut rotations = [Rotation::new(configuration.p[0]); N];
         for i in 1..N {
-            rotations[i] = Rotation::new(posture.p[i]);
+            rotations[i] = Rotation::new(configuration.p[i]);
         }
-        if let Some(base) = &posture.base {
+        if let Some(base) = &configuration.base {
             for i in 0..N {
                 rotations[i] = rotations[i].after(base[i]);
             }
         }
-        Self { seen: Relative::new(&posture.arms, &posture.u, &rotations), rotations }
+        Self { seen: Relative::new(&configuration.arms, &configuration.u, &rotations), rotations }
     }
 
     #[inline(always)]
@@ -333,7 +352,7 @@ impl<const N: usize, T: Real> View<N, T> for FromItsFrame<N, T> {
 
     #[inline(always)]
     fn fill<K: PointSum<N, T>>(&self, sum: &K, stiffness: f64, scratch: &mut Scratch<T>, out: &mut ElementSystem<T>) {
-        if let Some(HalfWay { point, free, geometric }) = sum.half_way() {
+        if let Some(HalfWayPoint { point, free, geometric }) = sum.half_way() {
             return self.seen.fill_half_way(&self.rotations, point, free, geometric, stiffness, out);
         }
         let [local, geometric] = scratch.systems();

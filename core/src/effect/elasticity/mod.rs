@@ -1,5 +1,4 @@
-//! Beams as elastic bodies: their stresses, interpolated in two ways, and the damping of strain
-//! rates.
+//! Elasticity of beams, with two interpolations of rotations, and damping of strain rates.
 
 mod beam;
 mod element;

@@ -1,10 +1,9 @@
-//! Elasticity of beams in a scene that lies in a plane: the same elements with three unknowns a
-//! node.
+//! Elasticity of beams in a planar scene: elements with three unknowns at each node.
 
 use super::beam::{BeamElasticity, stresses_of, workspace};
 use super::element::{BeamLaw, ElasticElement};
 use super::interpolation::Interpolation;
-use crate::effect::{AT_ONCE, ByOrder, PlanarForm, at_slots, own_blocks};
+use crate::effect::{ByOrder, ELEMENTS_PER_TASK, PlanarForm, at_slots, own_blocks};
 use crate::kernel::law::{PlanarStress, StoredLaw, Stress};
 use crate::kernel::planar::{PlanarNode, PlanarPoint, flattened, in_one_turn, in_space};
 use crate::kernel::{PlanarSystem, Weights};
@@ -14,26 +13,28 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// The elements of an effect in space, side by side in their order. Where axes are turned in the
-/// plane, or nodes sit in different charts, the effect in space does the work.
+/// The planar form of [`BeamElasticity`], with its elements side by side in their order. Elements
+/// whose nodes have turned axes or different charts are added by the effect in space.
 pub struct PlanarElasticity<I> {
     plane: Plane,
     spatial: Arc<BeamElasticity<I>>,
-    blocks: ByOrder<Block<2, 1>, Block<3, 2>, Block<4, 3>>,
+    blocks: ByOrder<ElementBlock<2, 1>, ElementBlock<3, 2>, ElementBlock<4, 3>>,
 }
 
-/// An integration point of elements side by side.
+/// An integration point of elements side by side, in the plane.
 type PlanarPoints<const N: usize> = <PlanarPoint<N, f64, <BeamLaw as StoredLaw>::InPlane> as Pack>::Packed;
 
 /// Elements side by side.
-struct Block<const N: usize, const G: usize> {
+struct ElementBlock<const N: usize, const G: usize> {
+    /// Slots of displacements, by node
     u: [[Slot; LANES]; N],
+    /// Slots of rotations, by node
     p: [[Slot; LANES]; N],
     points: [PlanarPoints<N>; G],
 }
 
 impl<I: Interpolation> PlanarElasticity<I> {
-    /// The elements of `spatial`, which lie in this plane.
+    /// The planar form of the elements of `spatial`, which lie in `plane`.
     pub fn new(spatial: Arc<BeamElasticity<I>>, plane: Plane) -> Self {
         let elements = &spatial.elements;
         let blocks = ByOrder {
@@ -45,7 +46,7 @@ impl<I: Interpolation> PlanarElasticity<I> {
     }
 }
 
-fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane: &Plane) -> Vec<Block<N, G>> {
+fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane: &Plane) -> Vec<ElementBlock<N, G>> {
     let block = |number: usize| {
         let elements = &batch[number * LANES..batch.len().min((number + 1) * LANES)];
         let all: [&ElasticElement<N, G>; LANES] = each_lane!(|k| &elements[k.min(elements.len() - 1)]);
@@ -53,7 +54,7 @@ fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane:
             let points = all.map(|element| PlanarPoint::new(&element.points()[g], plane.axes()));
             PlanarPoint::pack(points.each_ref())
         };
-        Block {
+        ElementBlock {
             u: std::array::from_fn(|i| all.map(|element| element.connection.nodes[i].u)),
             p: std::array::from_fn(|i| all.map(|element| element.connection.nodes[i].p)),
             points: std::array::from_fn(point),
@@ -62,8 +63,8 @@ fn blocks<const N: usize, const G: usize>(batch: &[ElasticElement<N, G>], plane:
     threads::list(batch.len().div_ceil(LANES), block)
 }
 
-impl<const N: usize, const G: usize> Block<N, G> {
-    /// A field of slots at the nodes, in the plane.
+impl<const N: usize, const G: usize> ElementBlock<N, G> {
+    /// The components in the plane of a field, at the nodes.
     #[inline(always)]
     fn nodes(&self, field: &[Vec3], plane: &Plane) -> [PlanarNode<Lanes>; N] {
         let [a, b, e] = [0, 1, 2].map(|k| plane.axes().column(k));
@@ -84,8 +85,8 @@ fn free<const N: usize, const G: usize>(elements: &[ElasticElement<N, G>], at: &
     Lanes(each_lane!(|k| elements[k.min(elements.len() - 1)].free_amplitude(at)))
 }
 
-/// The stresses that geometric parts are formed with, of the point with this number in each
-/// element.
+/// The remembered stresses of point `g` of each element, which form the geometric parts of the
+/// tangent.
 #[inline(always)]
 fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> PlanarStress<Lanes> {
     let last = memory.len() / G - 1;
@@ -102,7 +103,7 @@ fn remembered<const G: usize>(memory: &[[f64; 6]], g: usize, plane: &Plane) -> P
 #[allow(clippy::too_many_arguments)]
 fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     plane: &Plane,
-    blocks: &[Block<N, G>],
+    blocks: &[ElementBlock<N, G>],
     batch: &[ElasticElement<N, G>],
     first: usize,
     memory: &[[f64; 6]],
@@ -136,13 +137,16 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
 
 fn extrapolate_batch<const N: usize, const G: usize>(
     plane: &Plane,
-    blocks: &[Block<N, G>],
+    blocks: &[ElementBlock<N, G>],
     batch: &[ElasticElement<N, G>],
     at: &State,
     dq: &[Vec3],
     out: &mut [[f64; 6]],
 ) {
-    let parts = blocks.chunks(AT_ONCE / LANES).zip(batch.chunks(AT_ONCE)).zip(out.chunks_mut(AT_ONCE * G));
+    let parts = blocks
+        .chunks(ELEMENTS_PER_TASK / LANES)
+        .zip(batch.chunks(ELEMENTS_PER_TASK))
+        .zip(out.chunks_mut(ELEMENTS_PER_TASK * G));
     threads::each(parts, |((blocks, batch), out)| {
         Instructions::here().run(
             #[inline(always)]
@@ -154,7 +158,7 @@ fn extrapolate_batch<const N: usize, const G: usize>(
 #[inline(always)]
 fn extrapolate_blocks<const N: usize, const G: usize>(
     plane: &Plane,
-    blocks: &[Block<N, G>],
+    blocks: &[ElementBlock<N, G>],
     batch: &[ElasticElement<N, G>],
     at: &State,
     dq: &[Vec3],

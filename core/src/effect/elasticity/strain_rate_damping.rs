@@ -1,5 +1,5 @@
-//! The stiffness part of Rayleigh damping: stresses beta C d(Gamma, K)/dt of the material frame, so
-//! that rigid motion is not damped. C is the stiffness of the section at rest.
+//! The stiffness part of Rayleigh damping: material stresses beta C d(Gamma, K)/dt, so that rigid
+//! motions are not damped. C is the stiffness of the section at rest, and beta a time.
 //!
 //! With b_k = w dE_k/dq for each strain component E_k of a point of weight w, and G_k = db_k/dq:
 //!
@@ -8,13 +8,13 @@
 //! df/dqd = sum b_k (beta C / w)_kl b_l,   df/dq = sum s_k G_k + sum b_k (beta C / w)_kl (G_l qd)
 //! ```
 //!
-//! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s,
-//! whatever its interpolation. b_k is its force under a unit stress, and G_k qd the rate of that: a
-//! jet along the motion brings both.
+//! f and sum s_k G_k are force and geometric tangent of the elastic element under the stress s, for
+//! any interpolation. b_k is its force under a unit stress, and G_k qd the rate of that force: a
+//! jet along the motion gives both.
 
 use super::beam::BeamElasticity;
-use super::element::{ElasticElement, ElasticPoint, Member};
-use super::interpolation::{Interpolation, PointSum, Posture, Scratch, View};
+use super::element::{ElasticElement, ElasticPoint, ElementNodes};
+use super::interpolation::{ElementConfiguration, Interpolation, PointSum, View, Workspace};
 use crate::effect::{Effect, Roles, TangentForm, after_displacement, for_each_batch};
 use crate::kernel::elastic::Point;
 use crate::kernel::law::{SectionLaw, Stiffness, Strain, Stress};
@@ -25,7 +25,7 @@ use crate::tensor::{Mat3, Vec3};
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Damping of all beams that interpolate in one way.
+/// Strain-rate damping of all beams with the interpolation `I`.
 pub struct StrainRateDamping<I> {
     /// The beams
     pub elasticity: Arc<BeamElasticity<I>>,
@@ -51,7 +51,7 @@ impl<I: Interpolation> Effect for StrainRateDamping<I> {
     }
 
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
-        // Of the elasticity, which shows itself.
+        // The elasticity shows the data of its beams itself.
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
@@ -77,64 +77,54 @@ fn add_batch<I: Interpolation, const N: usize, const G: usize>(
     weights: Weights,
     out: &mut Assembler,
 ) {
-    let room = RefCell::new(Room::new(2 * N));
+    let scratch_memory = RefCell::new(DampingScratch { element: Workspace::new(N), jets: Workspace::new(N) });
     let mut system = ElementSystem::new(2 * N);
     for (k, element) in batch.iter().enumerate() {
         let member = element.member();
         member.connection.evaluate(at, weights, true, after_displacement, &mut system, &|nodes, weights, out| {
-            let motion = Motion::new(member, nodes, at);
-            motion.add::<I, G>(&element.points(), factor, weights, &mut room.borrow_mut(), out);
+            let motion = ElementMotion::new(member, nodes, at);
+            motion.add::<I, G>(&element.points(), factor, weights, &mut scratch_memory.borrow_mut(), out);
         });
         out.add(first + k, &system);
     }
 }
 
-/// Room to work in, kept between elements.
-struct Room {
-    element: (ElementSystem, Scratch),
-    jets: (ElementSystem<Jet>, Scratch<Jet>),
+/// Scratch memory, kept between elements.
+struct DampingScratch {
+    element: Workspace,
+    jets: Workspace<Jet>,
 }
 
-impl Room {
-    fn new(blocks: usize) -> Self {
-        let nodes = blocks / 2;
-        Self {
-            element: (ElementSystem::new(blocks), Scratch::new(nodes)),
-            jets: (ElementSystem::new(blocks), Scratch::new(nodes)),
-        }
-    }
-}
-
-/// Where the nodes of an element are, in one chart, and how fast they move.
-struct Motion<const N: usize> {
-    posture: Posture<N>,
+/// The configuration of an element in one chart, with the rates of its nodes.
+struct ElementMotion<const N: usize> {
+    configuration: ElementConfiguration<N>,
     displacements: [Vec3; N],
     rotations: [RotationRate; N],
 }
 
-impl<const N: usize> Motion<N> {
-    fn new(member: Member<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
+impl<const N: usize> ElementMotion<N> {
+    fn new(member: ElementNodes<N>, nodes: &[NodeMotion; N], at: &State) -> Self {
         let rotation = |i: usize| match at.turns.is_empty() {
             true => RotationRate::of_vector(nodes[i].p_rate),
             false => at.rotation_rate(member.connection.nodes[i].p),
         };
         Self {
-            posture: Posture::new(member, nodes, at),
+            configuration: ElementConfiguration::new(member, nodes, at),
             displacements: nodes.map(|node| node.u_rate),
             rotations: std::array::from_fn(rotation),
         }
     }
 
-    /// Derivatives over the rate of the unknown of a block, and over the unknown, from the
-    /// derivative over the rate of the state.
+    /// Derivatives over the rate of the unknown of a block and over the unknown, from the
+    /// derivative over the rate that the state holds.
     fn pull_back(&self, block: usize, over_rate: Vec3) -> (Vec3, Vec3) {
         if block.is_multiple_of(2) { (over_rate, Vec3::ZERO) } else { self.rotations[block / 2].pull_back(over_rate) }
     }
 
-    /// The posture as a function of time.
-    fn jets(&self) -> Posture<N, Jet> {
-        let Posture { arms, u, p, base } = &self.posture;
-        Posture {
+    /// The configuration as a function of time, to first order.
+    fn jets(&self) -> ElementConfiguration<N, Jet> {
+        let ElementConfiguration { arms, u, p, base } = &self.configuration;
+        ElementConfiguration {
             arms: arms.map(Vec3::constant),
             u: std::array::from_fn(|i| jet(u[i], self.displacements[i])),
             p: std::array::from_fn(|i| jet(p[i], self.rotations[i].rate)),
@@ -142,30 +132,30 @@ impl<const N: usize> Motion<N> {
         }
     }
 
-    /// Adds force and tangent of all points.
+    /// Adds force and tangent of all points; `factor` is beta.
     fn add<I: Interpolation, const G: usize>(
         &self,
         points: &[ElasticPoint<N>; G],
         factor: f64,
         weights: Weights,
-        room: &mut Room,
+        scratch_memory: &mut DampingScratch,
         out: &mut ElementSystem,
     ) {
-        let view = I::View::<N, f64>::new(&self.posture);
+        let view = I::View::<N, f64>::new(&self.configuration);
         let sum = Stressed { points, stresses: &self.stresses(&view, points, factor) };
-        let (system, scratch) = &mut room.element;
+        let Workspace { system, scratch } = &mut scratch_memory.element;
         view.fill(&sum, weights.stiffness, scratch, system);
         out.add_system(system, weights.stiffness != 0.0);
         if weights.stiffness != 0.0 || weights.damping != 0.0 {
             let moving = I::View::<N, Jet>::new(&self.jets());
             for point in points {
-                let strains = Strains::new(self, &moving, &point.lifted(), &mut room.jets);
+                let strains = Strains::new(self, &moving, &point.lifted(), &mut scratch_memory.jets);
                 strains.add_tangent(&point.law.stiffness_at_rest(), factor / point.weight, weights, out);
             }
         }
     }
 
-    /// s of each point.
+    /// The stress s at each point; `factor` is beta.
     fn stresses<const G: usize>(
         &self,
         view: &impl View<N, f64>,
@@ -183,12 +173,12 @@ impl<const N: usize> Motion<N> {
     }
 }
 
-/// A vector that moves.
+/// A vector with its rate as a jet.
 fn jet(value: Vec3, rate: Vec3) -> Vec3<Jet> {
     Vec3(std::array::from_fn(|i| Jet { value: value.0[i], rate: rate.0[i], rate2: 0.0 }))
 }
 
-/// Points under stresses that do not depend on their strains.
+/// Points under constant stresses.
 struct Stressed<'a, const N: usize, const G: usize> {
     points: &'a [ElasticPoint<N>; G],
     stresses: &'a [Stress; G],
@@ -211,7 +201,7 @@ impl<const N: usize, const G: usize> PointSum<N, f64> for Stressed<'_, N, G> {
     }
 }
 
-/// A moving point, at a known place, under a stress of one in one component.
+/// A moving point, with its configuration, under a unit stress in one component.
 struct UnitStress<'a, const N: usize> {
     point: &'a ElasticPoint<N, Jet>,
     place: &'a Point<Jet>,
@@ -232,12 +222,13 @@ impl<const N: usize> PointSum<N, Jet> for UnitStress<'_, N> {
     }
 }
 
-/// How the six strains of a point follow the blocks of the element, times its weight.
+/// Derivatives of the six strain rates of a point over the blocks of the element, times the weight
+/// of the point.
 struct Strains {
     blocks: [Vec<StrainBlock>; 6],
 }
 
-/// How one strain follows one block.
+/// Derivatives of one strain rate over one block, times the weight of the point.
 #[derive(Clone, Copy)]
 struct StrainBlock {
     /// b_k
@@ -250,10 +241,10 @@ struct StrainBlock {
 
 impl Strains {
     fn new<const N: usize>(
-        motion: &Motion<N>,
+        motion: &ElementMotion<N>,
         moving: &impl View<N, Jet>,
         point: &ElasticPoint<N, Jet>,
-        (system, scratch): &mut (ElementSystem<Jet>, Scratch<Jet>),
+        Workspace { system, scratch }: &mut Workspace<Jet>,
     ) -> Self {
         let place = point.configuration(moving.nodes());
         let blocks = std::array::from_fn(|component| {
@@ -269,10 +260,10 @@ impl Strains {
         Self { blocks }
     }
 
-    /// Adds what comes of the change of s; `factor` is beta / w.
+    /// Adds the part of the tangent by the change of s; `factor` is beta / w.
     fn add_tangent(&self, stiffness: &Stiffness, factor: f64, weights: Weights, out: &mut ElementSystem) {
         for column in 0..out.blocks() {
-            // One row a strain
+            // Each strain is a row.
             let over = |component: usize| {
                 let block = self.blocks[component][column];
                 (block.over_rate * weights.damping + block.over_unknown * weights.stiffness) * factor

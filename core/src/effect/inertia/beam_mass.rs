@@ -1,15 +1,17 @@
-//! Translational inertia of beams without eccentric mass: consistent mass matrices, which never
-//! change and know no charts.
+//! Translational inertia of beams without eccentric mass: consistent mass matrices, which are
+//! constant.
 
 use crate::effect::volume::{VolumeElement, VolumeElements};
-use crate::effect::{AT_ONCE, ByOrder, Effect, Energy, Masses, Momentum, Roles, TangentForm, for_each_batch, shared};
+use crate::effect::{
+    ByOrder, ELEMENTS_PER_TASK, Effect, Energy, Masses, Momentum, Roles, TangentForm, for_each_batch, shared,
+};
 use crate::kernel::Weights;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Slot, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// All beam elements with mass on their centre line.
+/// The mass of all beam elements, on their centre lines.
 #[derive(Clone, Debug, Default)]
 pub struct BeamMass {
     elements: ByOrder<MassElement<2>, MassElement<3>, MassElement<4>>,
@@ -18,20 +20,21 @@ pub struct BeamMass {
 /// The mass of an element of N nodes.
 #[derive(Clone, Debug)]
 struct MassElement<const N: usize> {
-    /// Displacements of its nodes
+    /// The slots of the displacements of its nodes
     u: [Slot; N],
-    /// The initial place of the first
+    /// The initial place of its first node
     place: Vec3,
-    /// All else, for it and neighbours that have the same
-    common: Arc<Common<N>>,
+    /// Data shared with equal neighbours
+    common: Arc<SharedMassData<N>>,
 }
 
-/// The data that neighbours share.
+/// The data that neighbouring mass elements share.
 #[derive(Debug, PartialEq)]
-struct Common<const N: usize> {
-    /// The initial places of the nodes as seen from the first
+struct SharedMassData<const N: usize> {
+    /// The initial places of the nodes from the first node
     arms: [Vec3; N],
-    /// The sum of w rhoA N_i N_j over the points, the same in all directions
+    /// The consistent mass matrix, the sum of w rhoA N_i N_j over the points; equal in all
+    /// directions
     mass: [[f64; N]; N],
 }
 
@@ -41,7 +44,8 @@ impl<const N: usize> MassElement<N> {
             element.points().iter().map(|point| point.weight * point.quantity * point.shape[i] * point.shape[j]).sum()
         };
         let mass = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-        let common = shared(Common { arms: *element.arms(), mass }, neighbour.map(|neighbour| &neighbour.common));
+        let common =
+            shared(SharedMassData { arms: *element.arms(), mass }, neighbour.map(|neighbour| &neighbour.common));
         Self { u: element.connection.nodes.map(|node| node.u), place: element.place(), common }
     }
 
@@ -50,7 +54,7 @@ impl<const N: usize> MassElement<N> {
         &self.common.mass
     }
 
-    /// The mass times what its displacements do: M a, or M v.
+    /// The mass matrix times a field at the nodes: forces M a or momenta M v.
     #[inline(always)]
     fn times(&self, field: &[Vec3]) -> [Vec3; N] {
         let mut out = [Vec3::ZERO; N];
@@ -69,7 +73,8 @@ impl<const N: usize> MassElement<N> {
         0.5 * (0..N).map(twice).sum::<f64>()
     }
 
-    /// Shows each node's number, its present place and its share of M v.
+    /// Calls `show` with the number of each node, its present place and its momentum, its part of M
+    /// v.
     fn each_momentum(&self, at: &State, mut show: impl FnMut(usize, Vec3, Vec3)) {
         for (i, linear) in self.times(&at.v).into_iter().enumerate() {
             show(i, self.place + self.common.arms[i] + at.q[self.u[i] as usize], linear);
@@ -78,13 +83,13 @@ impl<const N: usize> MassElement<N> {
 }
 
 impl BeamMass {
-    /// The matrices of elements, by their mass per length.
+    /// The mass of elements with their masses per length.
     pub fn new(elements: &VolumeElements<f64>) -> Self {
         let VolumeElements { two, three, four } = elements;
         Self { elements: ByOrder { two: matrices(two), three: matrices(three), four: matrices(four) } }
     }
 
-    /// No element has mass.
+    /// True if no element has mass.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
@@ -116,7 +121,7 @@ impl Effect for BeamMass {
     }
 
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {
-        // On the centre line, which the mesh shows.
+        // Mass lies on the centre line, which the mesh shows.
     }
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
@@ -131,7 +136,7 @@ impl Effect for BeamMass {
         let mut kinetic = 0.0;
         for_each_batch!(self.elements, |_first, batch| {
             let energy_of = |elements: &[MassElement<_>]| elements.iter().map(|element| element.energy(at)).sum();
-            threads::in_order(batch.chunks(AT_ONCE), energy_of, |own: f64| kinetic += own);
+            threads::in_order(batch.chunks(ELEMENTS_PER_TASK), energy_of, |own: f64| kinetic += own);
         });
         Energy { kinetic, strain: 0.0 }
     }
@@ -150,7 +155,7 @@ impl Masses for BeamMass {
         let mut sum = Momentum::default();
         for_each_batch!(self.elements, |_first, batch| for element in batch {
             element.each_momentum(at, |i, x, linear| {
-                // A row of the matrix is what a node has of the mass.
+                // The mass of a node is the sum of its row of the matrix.
                 let mass = element.mass()[i].iter().sum();
                 sum.add(Momentum { mass, moment: x * mass, linear, angular: x.cross(linear) });
             });
@@ -170,7 +175,7 @@ mod tests {
     const LENGTH: f64 = 3.0;
     const MASS: f64 = 2.5;
 
-    /// An element along x, from the origin on, with an even mass.
+    /// An element along x, from the origin on, with a uniform mass.
     fn element<const N: usize>() -> VolumeElement<N, f64> {
         let point = |g: usize| {
             let (xi, weight) = shape::gauss(N)[g];
@@ -182,7 +187,7 @@ mod tests {
         VolumeElement::new(connection, Vec3::ZERO, std::array::from_fn(place), std::array::from_fn(point), None)
     }
 
-    /// Spins an element about a pivot beside it, as a rigid body.
+    /// Checks energy and momenta of an element that spins about a pivot beside it as a rigid body.
     fn spins<const N: usize>(elements: &VolumeElements<f64>) {
         let mass = BeamMass::new(elements);
         let mut state = State::rest(2 * N, 1, 0, 0);
@@ -195,7 +200,7 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-14 * MASS * 100.0, "{N} nodes: {a} instead of {b}");
         let centre = Vec3([0.5 * LENGTH, 0.0, 0.0]);
         let velocity = spin.cross(centre - pivot);
-        // A thin rod: nothing turns about its own line.
+        // A thin rod has no inertia about its own line.
         let about_centre = MASS * LENGTH * LENGTH / 12.0;
         let across = Vec3([0.0, spin.0[1], spin.0[2]]);
         near(mass.energy(&state).kinetic, 0.5 * (MASS * velocity.squared() + about_centre * across.squared()));

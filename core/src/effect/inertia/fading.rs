@@ -1,11 +1,11 @@
-//! Forces of inertia and damping of a structure that a static stage finds in motion: they fade with
-//! its load factor.
+//! Fading inertia: forces of inertia and damping of a structure that a static stage finds in
+//! motion, which fade with the load factor.
 //!
-//! A static stage knows no inertia. Where it follows a dynamic one the state that it begins with is
-//! out of balance by all that inertia and damping carried, and no smaller load level would bring
-//! balance nearer. So the stage begins in balance with these forces, and takes them away from load
-//! factor 0 to 1. Each stays what it was, conjugate to the unknowns of its node in the chart that
-//! this had: they have a potential, and their tangent is zero until the chart changes.
+//! A static stage has no inertia. After a dynamic stage its first state is out of balance by the
+//! forces of inertia and damping, and a smaller load level would not bring it nearer to balance. So
+//! the stage begins in balance with these forces, and removes them from load factor 0 to 1. Each
+//! force is constant and conjugate to the unknowns of its node in the chart at the start of the
+//! stage: it has a potential, and its tangent is zero until the chart changes.
 
 use crate::effect::{Effect, Roles, TangentForm, one_by_one, own_part};
 use crate::kernel::load::force_on_complement;
@@ -16,10 +16,10 @@ use crate::system::{
 };
 use crate::tensor::{Mat3, Vec3};
 
-/// The forces at all slots of nodes, see [`State::fading`].
+/// Fading forces at all slots of nodes, see [`State::fading`].
 #[derive(Clone, Debug)]
 pub struct FadingInertia {
-    /// The slots, each with whether it is one of a rotation
+    /// The slots of nodes; true for those of rotations
     pub slots: Vec<(Slot, bool)>,
     /// The static stages that may begin in motion
     pub stages: StageSet,
@@ -46,7 +46,7 @@ impl Effect for FadingInertia {
         stage.kind.ramps_load() && self.stages.contains(stage.number)
     }
 
-    /// Motion that lies in a plane has forces that do.
+    /// A motion in a plane has forces in that plane: there are no data to show.
     fn mirror_data(&self, _show: &mut dyn FnMut(MirrorData)) {}
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
@@ -74,7 +74,8 @@ impl Effect for FadingInertia {
     }
 }
 
-/// The whole force over the present unknowns, and its tangent.
+/// The unfaded force, conjugate to the present unknowns `q`, and its tangent; `turns` is true for
+/// the slot of a rotation.
 pub fn fading_force(fading: &Fading, turns: bool, q: Vec3) -> (Vec3, Mat3) {
     let is_far = |p: Vec3| (complement(p) - fading.at).squared() < (p - fading.at).squared();
     match turns && q != Vec3::ZERO && is_far(q) {
@@ -87,7 +88,7 @@ pub fn fading_force(fading: &Fading, turns: bool, q: Vec3) -> (Vec3, Mat3) {
 mod tests {
     use super::*;
 
-    /// The work of a force along a motion does not depend on the chart that its node has come to.
+    /// The work of a force along a motion does not depend on the present chart of its node.
     #[test]
     fn a_change_of_chart_changes_no_work() {
         let fading = Fading { force: Vec3([1.0, -2.0, 0.5]), at: Vec3([0.2, 2.9, 0.3]) };

@@ -1,4 +1,4 @@
-//! The mass part of Rayleigh damping: alpha M qd, on beams and bodies.
+//! The mass part of Rayleigh damping, alpha M qd, of beams and bodies.
 
 use super::inertia_mirror_data;
 use super::rigid_body::Body;
@@ -9,12 +9,12 @@ use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
-/// The damping of beams by the mass of their sections.
+/// Mass-proportional damping of beams.
 #[derive(Clone, Debug)]
 pub struct BeamMassDamping {
-    /// alpha, one over a time
+    /// alpha, 1/time
     pub factor: f64,
-    /// Elements by the mass properties of their points
+    /// The elements, with the mass properties of their points per length
     pub elements: VolumeElements<Inertia>,
 }
 
@@ -52,10 +52,10 @@ impl Effect for BeamMassDamping {
     }
 }
 
-/// The damping of bodies by their mass.
+/// Mass-proportional damping of bodies.
 #[derive(Clone, Debug)]
 pub struct BodyMassDamping {
-    /// alpha, one over a time
+    /// alpha, 1/time
     pub factor: f64,
     /// The bodies
     pub bodies: Vec<Body>,

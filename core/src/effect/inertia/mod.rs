@@ -1,5 +1,5 @@
-//! Mass of beams and bodies: inertia at rest and in rotating frames, the damping that goes with
-//! mass, and inertia that fades.
+//! Effects of the mass of beams and bodies: inertia, inertia in rotating frames, mass-proportional
+//! damping, and fading inertia.
 
 mod beam_mass;
 mod fading;
@@ -21,7 +21,7 @@ pub use section::SectionInertia;
 use crate::kernel::inertia::Inertia;
 use crate::system::MirrorData;
 
-/// Shows the mass properties that decide whether a scene lies in a plane.
+/// Shows the mirror data of mass properties, by which a scene may lie in a plane.
 pub(super) fn inertia_mirror_data(inertia: &Inertia, show: &mut dyn FnMut(MirrorData)) {
     show(MirrorData::Vector(inertia.offset));
     show(MirrorData::Tensor(inertia.about_node));

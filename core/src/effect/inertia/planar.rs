@@ -1,4 +1,4 @@
-//! Inertia of bodies at nodes in a scene that lies in a plane.
+//! Inertia of bodies at nodes in a planar scene.
 
 use super::rigid_body::{RigidBody, are_centred};
 use crate::effect::{PlanarForm, at_slots, own_blocks};
@@ -9,7 +9,7 @@ use crate::system::{Assembler, Memory, Plane, Slot, State};
 use crate::tensor::Vec3;
 use std::sync::Arc;
 
-/// Bodies at nodes.
+/// The planar form of [`RigidBody`].
 pub struct PlanarBodies {
     plane: Plane,
     spatial: Arc<RigidBody>,
@@ -18,13 +18,15 @@ pub struct PlanarBodies {
 
 /// Bodies side by side.
 struct BodyBlock {
+    /// Slots of displacements
     u: [Slot; LANES],
+    /// Slots of rotations
     p: [Slot; LANES],
     body: PlanarBody<Lanes>,
 }
 
 impl PlanarBodies {
-    /// The bodies of `spatial`, which lie in this plane.
+    /// The planar form of the bodies of `spatial`, which lie in `plane`.
     pub fn new(spatial: Arc<RigidBody>, plane: Plane) -> Self {
         let bodies = spatial.bodies.chunks(LANES).map(|bodies| {
             let all: [_; LANES] = each_lane!(|k| &bodies[k.min(bodies.len() - 1)]);
@@ -73,7 +75,8 @@ impl PlanarBodies {
 }
 
 impl PlanarForm for PlanarBodies {
-    /// A spin about one axis has no gyroscopic moments; only masses beside their node pull.
+    /// True if all mass centres are at their nodes: spins about one axis have no gyroscopic
+    /// moments, only centrifugal forces of eccentric masses.
     fn is_symmetric(&self) -> bool {
         are_centred(&self.spatial.bodies)
     }

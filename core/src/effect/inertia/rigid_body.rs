@@ -1,10 +1,10 @@
-//! Rigid bodies at nodes, with their mass centre at an offset.
+//! Rigid bodies at nodes, with their mass centres at offsets.
 
 use super::inertia_mirror_data;
 use super::planar::PlanarBodies;
 use crate::effect::{
-    AT_ONCE, Effect, Energy, Masses, Momentum, PlanarForm, Roles, TangentForm, at_slots, motion_of, quadratic,
-    side_by_side,
+    ELEMENTS_PER_TASK, Effect, Energy, Masses, Momentum, PlanarForm, Roles, TangentForm, at_slots, motion_of,
+    quadratic, side_by_side,
 };
 use crate::kernel::inertia::{self, Inertia, Spin};
 use crate::kernel::{ElementSystem, NodeMotion, Weights};
@@ -14,27 +14,26 @@ use crate::tensor::Vec3;
 use crate::threads;
 use std::sync::Arc;
 
-/// A body.
+/// A rigid body at a node.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// The node it sits at
+    /// The node of the body
     pub node: Node,
     /// The node's initial place
     pub place: Vec3,
-    /// Its mass properties about the node; those that neighbours along a beam have in common stand
-    /// once.
+    /// Its mass properties about the node, shared with equal neighbours along a beam
     pub inertia: Arc<Inertia>,
 }
 
-/// The inertia of all bodies of one kind: those of the deck, or what sections of beams have at
-/// their nodes.
+/// The inertia of all bodies of one kind: the bodies of the deck, or the section inertia of beams
+/// lumped at nodes.
 #[derive(Clone, Debug)]
 pub struct RigidBody {
     /// The effect's name
     pub name: &'static str,
     /// The bodies
     pub bodies: Vec<Body>,
-    /// Spins have forces without accelerations
+    /// True if gyroscopic and centrifugal forces count
     pub gyroscopic: bool,
 }
 
@@ -70,7 +69,7 @@ impl Effect for RigidBody {
 
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let centred = are_centred(&self.bodies[out.instances()]);
-        // Increments of rotation have spins of their own.
+        // Increments of rotation have spins that lanes do not compute.
         let vectors = at.turns.is_empty().then(Instructions::here);
         let done = vectors.and_then(|instructions| {
             instructions.run_side_by_side(
@@ -86,7 +85,7 @@ impl Effect for RigidBody {
 
     fn energy(&self, at: &State) -> Energy {
         let mut kinetic = 0.0;
-        threads::in_order(self.bodies.chunks(AT_ONCE), |bodies| energy_of(bodies, at), |own| kinetic += own);
+        threads::in_order(self.bodies.chunks(ELEMENTS_PER_TASK), |bodies| energy_of(bodies, at), |own| kinetic += own);
         Energy { kinetic, strain: 0.0 }
     }
 
@@ -112,7 +111,8 @@ impl Masses for RigidBody {
 }
 
 impl RigidBody {
-    /// Adds body `k`; `system` is scratch, `centred` see [`are_centred`].
+    /// Adds body `k`. `centred` is true if its mass centre is at its node; `system` is scratch
+    /// memory.
     pub(super) fn add_one(
         &self,
         k: usize,
@@ -146,7 +146,7 @@ impl RigidBody {
         out.take_back(systems);
     }
 
-    /// Puts force and tangent in the place of what stands in `system`.
+    /// Overwrites `system` with force and tangent of a body.
     #[inline(always)]
     fn put<T: Real>(
         &self,
@@ -167,7 +167,7 @@ impl RigidBody {
     }
 }
 
-/// Every mass centre is at its node.
+/// True if every mass centre is at its node.
 pub(super) fn are_centred(bodies: &[Body]) -> bool {
     bodies.iter().all(|body| body.inertia.offset == Vec3::ZERO)
 }
@@ -186,7 +186,7 @@ fn energy_of(bodies: &[Body], at: &State) -> f64 {
     sum
 }
 
-/// Shows the kinetic energy of each body, in their order.
+/// Calls `show` with the kinetic energy of each body, in their order.
 #[inline(always)]
 fn each_energy(all: &[Body], at: &State, show: &mut dyn FnMut(f64)) {
     for first in (0..all.len()).step_by(LANES) {
@@ -197,7 +197,7 @@ fn each_energy(all: &[Body], at: &State, show: &mut dyn FnMut(f64)) {
     }
 }
 
-/// m v.v/2 + m v.R(Omega x d) + Omega.J0 Omega/2
+/// The kinetic energy of mass properties: m v.v/2 + m v.R(Omega x d) + Omega.J0 Omega/2.
 #[inline(always)]
 pub(super) fn kinetic<T: Real>(inertia: &Inertia<T>, motion: &NodeMotion<T>) -> T {
     let spin = Spin::new(motion.p, motion.p_rate, Vec3::zero());
@@ -206,7 +206,8 @@ pub(super) fn kinetic<T: Real>(inertia: &Inertia<T>, motion: &NodeMotion<T>) -> 
     inertia.mass * (v.squared() * 0.5 + v.dot(relative)) + quadratic(inertia.about_node, spin.omega)
 }
 
-/// The momenta of `weight` times these mass properties at the node that started at `place`.
+/// Mass and momenta of `weight` times the mass properties `inertia`, at a node with the initial
+/// place `place`.
 pub(super) fn momentum(inertia: &Inertia, place: Vec3, motion: &NodeMotion, weight: f64) -> Momentum {
     let spin = Spin::new(motion.p, motion.p_rate, Vec3::ZERO);
     let r = spin.rotation.r;
@@ -214,7 +215,7 @@ pub(super) fn momentum(inertia: &Inertia, place: Vec3, motion: &NodeMotion, weig
     let x = place + motion.u;
     let arm = r * inertia.offset;
     let linear = (motion.u_rate + r * spin.omega.cross(inertia.offset)) * m;
-    // About the node: J0 Omega + m d x R^T v.
+    // The angular momentum about the node is R (J0 Omega + m d x R^T v).
     let about_node = r * (inertia.about_node * spin.omega) + arm.cross(motion.u_rate) * m;
     Momentum {
         mass: m * weight,

@@ -1,5 +1,5 @@
 //! Rotary inertia of beam sections without eccentric mass: mass, gyroscopic and centrifugal terms
-//! ((51), (52), (68)–(71)).
+//! (Makinen 2007, equations (51), (52), (68)–(71)).
 
 use crate::effect::volume::VolumeElements;
 use crate::effect::{Effect, Energy, Masses, Momentum, Roles, TangentForm, quadratic};
@@ -10,13 +10,13 @@ use crate::rotation::Rotation;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// All beam elements whose sections have rotary inertia, by J per length in global components of
-/// the initial placement.
+/// The rotary inertia of all beam elements without eccentric mass.
 #[derive(Clone, Debug, Default)]
 pub struct RotaryInertia {
-    /// The elements
+    /// The elements, with J per length at their points, in global components of the initial
+    /// placement
     pub elements: VolumeElements<Mat3>,
-    /// Spins have forces without accelerations
+    /// True if gyroscopic forces count
     pub gyroscopic: bool,
 }
 
@@ -74,7 +74,7 @@ impl Masses for RotaryInertia {
     }
 }
 
-/// R and Omega
+/// The rotation R and the material spin Omega of a motion.
 fn spin(motion: &NodeMotion) -> (Rotation, Vec3) {
     let rotation = Rotation::new(motion.p);
     (rotation, rotation.t * motion.p_rate)

@@ -1,7 +1,7 @@
-//! Inertia as seen from a frame that turns steadily: centrifugal and Coriolis forces, gyroscopic
-//! moments of sections.
+//! Inertia in a frame that turns steadily: centrifugal and Coriolis forces, gyroscopic moments of
+//! sections.
 //!
-//! It stands for all inertia of its stage: of steady states, and of small motions about them.
+//! It replaces all other inertia of its stage, for steady states and small motions about them.
 
 use super::inertia_mirror_data;
 use super::rigid_body::Body;
@@ -12,20 +12,21 @@ use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, StageContext, State};
 use crate::tensor::Vec3;
 
-/// All mass of the scene in one stage's frame.
+/// The inertia of all mass of the scene in the rotating frame of a stage.
 #[derive(Clone, Debug)]
 pub struct RotatingFrame {
-    /// The stage it belongs to, from 0
+    /// The number of its stage, from 0
     pub stage: usize,
-    /// Angular velocity of the frame
+    /// The angular velocity of the frame, spatial, 1/time
     pub spin: Vec3,
-    /// A point on its axis
+    /// A point on the axis of the frame
     pub about: Vec3,
-    /// The number of the amplitude with which a static stage brings the spin in; `None`: in full
+    /// The index of the amplitude by which a static stage increases the spin; `None` for the full
+    /// spin
     pub amplitude: Option<usize>,
-    /// Beams by the mass properties and initial places of their points
+    /// Beam elements, with the mass properties per length and the initial places of their points
     pub elements: VolumeElements<(Inertia, Vec3)>,
-    /// Bodies, and what relative beams have at their nodes
+    /// Bodies, and the lumped section inertia of beams with relative rotations
     pub bodies: Vec<Body>,
 }
 

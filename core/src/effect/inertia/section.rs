@@ -1,5 +1,5 @@
-//! Inertia of beam sections with a full 6x6 mass: the mass centre lies off the centre line, or J
-//! couples.
+//! Inertia of beam sections with a full 6x6 mass matrix: the mass centre lies off the centre line,
+//! or J couples.
 
 use super::{inertia_mirror_data, rigid_body};
 use crate::effect::volume::VolumeElements;
@@ -10,12 +10,12 @@ use crate::kernel::{NodeMotion, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
-/// All beam elements with eccentric mass, by their mass properties per length.
+/// The inertia of all beam elements with eccentric mass.
 #[derive(Clone, Debug, Default)]
 pub struct SectionInertia {
-    /// The elements
+    /// The elements, with the mass properties of their points per length
     pub elements: VolumeElements<Inertia>,
-    /// Spins have forces without accelerations
+    /// True if gyroscopic and centrifugal forces count
     pub gyroscopic: bool,
 }
 

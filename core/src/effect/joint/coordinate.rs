@@ -1,4 +1,4 @@
-//! The free coordinates of joints, angle and slide, with their derivatives over u_A, P_A, u_B, P_B.
+//! Free coordinates of joints, angle and slide, with their derivatives over u_A, P_A, u_B, P_B.
 
 use super::{FreeCoordinate, Joint};
 use crate::kernel::ElementSystem;
@@ -9,32 +9,32 @@ use std::f64::consts::PI;
 
 /// A free coordinate of a joint in some state.
 pub(super) struct Coordinate {
-    /// Radians, or a length
+    /// The value of the coordinate: radians, or a length
     pub value: f64,
-    /// First derivatives
+    /// First derivatives over u_A, P_A, u_B, P_B
     pub gradient: [Vec3; 4],
-    /// Second derivatives, in the tangent
+    /// Second derivatives, as the tangent of a system
     pub hessian: ElementSystem,
 }
 
-/// The rate of a coordinate.
+/// The rate of a free coordinate.
 pub(super) struct Rate {
-    /// Per time
+    /// The rate: radians or a length over time
     pub value: f64,
-    /// Derivatives over the rates of the unknowns
+    /// Derivatives of the rate over the rates of the unknowns
     pub over_rate: [Vec3; 4],
-    /// Derivatives over the unknowns
+    /// Derivatives of the rate over the unknowns
     pub over_unknown: [Vec3; 4],
 }
 
-/// An angle without its whole turns, in (-pi, pi].
+/// An angle in radians less its whole turns, in [-pi, pi].
 pub fn nearest_angle(angle: f64) -> f64 {
     angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }
 
 impl Coordinate {
-    /// Adds the forces of a multiplier on this coordinate, their tangent, and the multiplier's own
-    /// row and column, number `row` of its block.
+    /// Adds the forces of a multiplier on this coordinate, their tangent, and the row and column of
+    /// the multiplier, which is number `row` of the block [`block::BETWEEN`].
     pub fn add_multiplier(&self, multiplier: f64, factors: GapFactors, row: usize, out: &mut ElementSystem) {
         let mut unit = Vec3::ZERO;
         unit.0[row] = factors.multiplier;
@@ -51,7 +51,8 @@ impl Coordinate {
 }
 
 impl Joint {
-    /// A free coordinate; an angle that the state remembers is continued through whole turns.
+    /// A free coordinate of the joint. An angle with a memory in the state is continued through
+    /// whole turns.
     pub(super) fn coordinate(&self, which: FreeCoordinate, at: &State, ends: &[End; 2]) -> Coordinate {
         match which {
             FreeCoordinate::Slide => self.slide_of(ends),
@@ -64,7 +65,7 @@ impl Joint {
         }
     }
 
-    /// How far B has slid along e_1 of A.
+    /// The slide, the displacement of B along e_1 of A.
     fn slide_of(&self, ends: &[End; 2]) -> Coordinate {
         let mut own = ElementSystem::new(block::COUNT);
         add_along(&self.axes, &self.arms, ends, Vec3::UNIT[0], GapFactors::HESSIAN, &mut own);
@@ -108,7 +109,7 @@ impl Joint {
         Coordinate { value: libm::atan2(s, c), gradient, hessian }
     }
 
-    /// The rate of a coordinate.
+    /// The rate of a free coordinate of the joint.
     pub(super) fn rate(&self, at: &State, coordinate: &Coordinate) -> Rate {
         let mut out = Rate { value: 0.0, over_rate: coordinate.gradient, over_unknown: [Vec3::ZERO; 4] };
         let mut rates = [Vec3::ZERO; 4];

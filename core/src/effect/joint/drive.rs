@@ -8,12 +8,12 @@ use crate::scalar::Jet;
 use crate::system::State;
 use crate::tensor::Vec3;
 
-/// A prescribed course of a free coordinate.
+/// A motor: it prescribes the course of a free coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Motor {
-    /// Angle or displacement
+    /// Angle in radians, or displacement, at an amplitude of one
     pub value: f64,
-    /// The number of its amplitude
+    /// The index of its amplitude
     pub amplitude: usize,
 }
 
@@ -23,7 +23,7 @@ impl Motor {
         self.value * at.amplitude[self.amplitude]
     }
 
-    /// Angle or displacement with its time derivatives.
+    /// The present angle or displacement with its derivatives over time.
     pub(super) fn course(&self, at: &State) -> Jet {
         let [rate, rate2] = at.amplitude_rates[self.amplitude];
         Jet { value: self.value(at), rate: self.value * rate, rate2: self.value * rate2 }
@@ -39,17 +39,17 @@ pub struct SpringDamper {
     pub damping: f64,
 }
 
-/// A drive of a joint.
+/// A drive of a joint, on one of its free coordinates.
 #[derive(Clone, Copy, Debug)]
 pub enum Drive {
-    /// A spring and a damper
+    /// A spring with a damper
     Spring(FreeCoordinate, SpringDamper),
     /// A motor
     Motor(FreeCoordinate, Motor),
 }
 
 impl Joint {
-    /// Its motor on this coordinate.
+    /// The motor of the joint, if it acts on this coordinate.
     pub(super) fn motor_on(&self, coordinate: FreeCoordinate) -> Option<Motor> {
         match self.drive {
             Some(Drive::Motor(on, motor)) if on == coordinate => Some(motor),
@@ -57,7 +57,7 @@ impl Joint {
         }
     }
 
-    /// Its motor, with the coordinate.
+    /// The motor of the joint, with the coordinate that it prescribes.
     pub(super) fn motor(&self) -> Option<(FreeCoordinate, Motor)> {
         match self.drive {
             Some(Drive::Motor(on, motor)) => Some((on, motor)),
@@ -65,7 +65,7 @@ impl Joint {
         }
     }
 
-    /// Its spring and damper, with the coordinate.
+    /// The spring and the damper of the joint, with the coordinate that they act on.
     pub(super) fn spring(&self) -> Option<(FreeCoordinate, SpringDamper)> {
         match self.drive {
             Some(Drive::Spring(on, spring)) => Some((on, spring)),
@@ -73,12 +73,13 @@ impl Joint {
         }
     }
 
-    /// A damper acts on it.
+    /// True if the joint has a damper.
     pub(super) fn damps(&self) -> bool {
         self.spring().is_some_and(|(_, spring)| spring.damping != 0.0)
     }
 
-    /// Adds spring and damper: f = (k x + c dx/dt) dx/dq.
+    /// Adds force and tangent of spring and damper: f = (k x + c dx/dt) dx/dq. The damping part of
+    /// the force is left to [`Self::drag`].
     pub(super) fn add_spring(&self, at: &State, ends: &[End; 2], weights: Weights, out: &mut ElementSystem) {
         let Some((on, SpringDamper { stiffness, damping })) = self.spring() else { return };
         let coordinate = self.coordinate(on, at, ends);
@@ -104,7 +105,7 @@ impl Joint {
         coordinate.gradient.map(|gradient| gradient * (spring.damping * rate))
     }
 
-    /// The energy of the spring.
+    /// The strain energy of the spring of the joint.
     pub(super) fn strain_energy(&self, at: &State) -> f64 {
         let Some((on, SpringDamper { stiffness, .. })) = self.spring() else { return 0.0 };
         if stiffness == 0.0 {
@@ -114,8 +115,8 @@ impl Joint {
         0.5 * stiffness * value * value
     }
 
-    /// By how much a field of increments changes the coordinate of its spring: radians, or a part
-    /// of `length`; zero without a stiffness.
+    /// The change of the coordinate of its spring by a field of increments: radians, or a share of
+    /// `length`; zero without a stiffness.
     pub(super) fn strain_of(&self, at: &State, field: &[Vec3], length: f64) -> f64 {
         let Some((on, SpringDamper { stiffness, .. })) = self.spring() else { return 0.0 };
         if stiffness == 0.0 {

@@ -1,15 +1,16 @@
-//! Kinds of joints, one row of data each. Nothing else in the code knows one kind from another: a
-//! new kind is a row here, and its word in the deck's JSON Schema.
+//! Kinds of joints, one row of data each. No other code distinguishes kinds: a new kind is a row
+//! here, and its word in the JSON Schema of decks.
 
 use std::fmt;
 
 /// A pair of axes, the first carried by A and the second by B, that stay normal to each other.
 pub type NormalPair = (usize, usize);
 
-/// A coordinate of a joint: how far B has turned about e_1, or slid along it, as seen from A.
+/// A free coordinate of a joint: the rotation of B about e_1, or its displacement along e_1,
+/// relative to A.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FreeCoordinate {
-    /// The angle about e_1
+    /// The angle about e_1, in radians
     Angle,
     /// The displacement along e_1
     Slide,
@@ -25,48 +26,46 @@ impl FreeCoordinate {
     }
 }
 
-/// A joint to ground that sits at its node, without arms: held components of the node's own
-/// unknowns do most of its work.
+/// The holds of a joint to ground without arms, which holds components of the unknowns of its node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroundHold {
-    /// Held displacements along e_1, e_2, e_3 and held components of the rotation vector along
-    /// these axes. Two held components make a hinge.
+    /// Held displacements along e_1, e_2, e_3, then held components of the rotation vector along
+    /// these axes; two held rotation components make a hinge
     pub components: [bool; 6],
-    /// Pairs that no held component keeps normal, and that need multipliers
+    /// Pairs of axes that need multipliers, since held components do not keep them normal
     pub normal: &'static [NormalPair],
 }
 
-/// A kind of joint. The joint's axes are e_1, e_2, e_3; the deck gives none of them, e_1, or e_1
-/// and e_2.
+/// A kind of joint. Its axes are e_1, e_2, e_3, of which the deck gives none, e_1, or e_1 and e_2.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct JointKind {
-    /// The deck's word
+    /// The word of the kind in the deck
     pub word: &'static str,
-    /// How many axes the deck gives
+    /// The number of axes that the deck gives
     pub axes: usize,
     /// Axes of A along which B does not slide
     pub held: [bool; 3],
     /// Pairs of axes that stay normal
     pub normal: &'static [NormalPair],
-    /// The holds of a joint to ground at its node
+    /// The holds of a joint of this kind between ground and a node, without arms
     pub ground: GroundHold,
     /// The coordinate on which a spring, a damper or a motor may act
     pub driven: Option<FreeCoordinate>,
 }
 
-/// B does not slide: both ends stay at one point.
+/// Held axes of a joint without slide: both ends stay at one point.
 const POINT: [bool; 3] = [true; 3];
 
-/// B slides along e_1 of A only.
+/// Held axes of a joint that slides along e_1 of A.
 const ACROSS: [bool; 3] = [false, true, true];
 
-/// B turns about e_1 only, which both carry.
+/// Normal pairs of a joint that turns about e_1 only, an axis of both ends.
 const HINGE: &[NormalPair] = &[(0, 1), (0, 2)];
 
-/// B does not turn.
+/// Normal pairs of a joint without rotation.
 const LOCKED: &[NormalPair] = &[(0, 1), (1, 2), (2, 0)];
 
-/// Held components do all the work of a joint to ground.
+/// The holds of a joint to ground without multipliers.
 const fn by_components(components: [bool; 6]) -> GroundHold {
     GroundHold { components, normal: &[] }
 }
@@ -95,8 +94,8 @@ impl JointKind {
             word: "prismatic", axes: 1, held: ACROSS, normal: LOCKED, driven: Some(FreeCoordinate::Slide),
             ground: by_components([false, true, true, true, true, true]),
         },
-        // B slides along e_1 and turns about it. A drive would have to say on which of the two it
-        // acts: there is none.
+        // B slides along e_1 and turns about it. It has no drive, which would have to choose
+        // between both coordinates.
         Self {
             word: "cylindrical", axes: 1, held: ACROSS, normal: HINGE, driven: None,
             ground: by_components([false, true, true, false, true, true]),
@@ -108,17 +107,17 @@ impl JointKind {
         },
     ];
 
-    /// The kind with this word.
+    /// The kind with a word of the deck.
     pub fn of_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.word == word)
     }
 
-    /// A and B have one displacement: nodes at one point can share its unknowns.
+    /// True if both ends have one displacement, whose unknowns nodes at one point can share.
     pub fn shares_displacement(&self) -> bool {
         self.held == POINT
     }
 
-    /// It takes hold of the rotation of its ends.
+    /// True if it constrains the rotations of its ends.
     pub fn holds_rotation(&self) -> bool {
         !self.normal.is_empty()
     }
@@ -134,7 +133,7 @@ impl fmt::Debug for JointKind {
 mod tests {
     use super::*;
 
-    /// A joint between nodes and the same joint to ground leave as many motions free.
+    /// A joint between nodes and a joint of equal kind to ground constrain equally many motions.
     #[test]
     fn ground_holds_as_many_components_as_gaps_are_closed() {
         for kind in JointKind::ALL {

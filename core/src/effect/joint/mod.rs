@@ -1,6 +1,6 @@
-//! Joints between two nodes, or a node and ground: multipliers close the gaps that a
-//! [kind](JointKind) keeps closed; see [`crate::kernel::joint`]. Springs, dampers and motors act on
-//! a free coordinate.
+//! Joints between two nodes, or a node and ground: multipliers close the gaps of a
+//! [kind](JointKind), see [`crate::kernel::joint`]. Springs, dampers and motors act on a free
+//! coordinate.
 
 mod coordinate;
 mod drive;
@@ -10,7 +10,7 @@ pub use coordinate::nearest_angle;
 pub use drive::{Drive, Motor, SpringDamper};
 pub use kind::{FreeCoordinate, GroundHold, JointKind, NormalPair};
 
-use super::{Constraint, Driven, Effect, Energy, MotorState, Roles, TangentForm};
+use super::{Constraint, DrivenCoordinates, Effect, Energy, MotorState, Roles, TangentForm};
 use crate::kernel::joint::{DirectionPair, End, GapFactors, add_along, add_between, block, cosine, slides};
 use crate::kernel::{ElementSystem, Weights};
 use crate::rotation::Rotation;
@@ -18,54 +18,56 @@ use crate::scalar::{Jet, Real};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node, Slot, State};
 use crate::tensor::{Mat3, Vec3};
 
-/// One joint.
+/// A joint that needs multipliers or has a spring.
 #[derive(Clone, Debug)]
 pub struct Joint {
     /// Axes of A along which B does not slide
     pub held: [bool; 3],
     /// Pairs of axes that multipliers keep normal
     pub normal: &'static [NormalPair],
-    /// A and B; `None` is ground
+    /// The nodes A and B; `None` is ground
     pub nodes: [Option<Node>; 2],
-    /// Their initial places
+    /// The initial places of the nodes
     pub places: [Vec3; 2],
-    /// From each to the joint, at the start
+    /// The initial vectors from each node to the joint
     pub arms: [Vec3; 2],
-    /// e_1, e_2, e_3 as columns
+    /// e_1, e_2, e_3 as columns, in the initial placement
     pub axes: Mat3,
-    /// Multipliers of gaps along axes, where there are any: ends with arms or slides
+    /// The slot of multipliers of gaps along axes, for ends with arms or slides
     pub along: Option<Slot>,
-    /// Multipliers of gaps between directions
+    /// The slot of multipliers of gaps between directions
     pub between: Option<Slot>,
-    /// On its free coordinate
+    /// The drive on its free coordinate
     pub drive: Option<Drive>,
-    /// Where the state remembers its angle, if it has a spring
+    /// The index of its angle in the memory of a state, for a spring on the angle
     pub angle: Option<usize>,
 }
 
-/// All joints that need multipliers or have a spring.
+/// The effect of all joints that need multipliers or have a spring.
 #[derive(Clone, Debug)]
 pub struct Joints {
     /// The joints
     pub joints: Vec<Joint>,
 }
 
-/// The gaps of a joint, zero where it closes none; by multiplier.
+/// The gaps of a joint by multiplier; zero for multipliers without a gap.
 struct Gaps<T> {
+    /// Along axes of A, lengths
     along: Vec3<T>,
+    /// Between directions: cosines, and the angle of a motor in radians
     between: Vec3<T>,
 }
 
 impl Joint {
     fn slots(&self) -> [Option<Slot>; block::COUNT] {
         let [a, b] = self.nodes;
-        // Ends that share their displacement need none.
+        // Joints of ends that share their displacement have moments only.
         let displacement = |node: Option<Node>| node.filter(|_| self.pulls()).map(|node| node.u);
         let rotation = |node: Option<Node>| node.map(|node| node.p);
         [displacement(a), rotation(a), displacement(b), rotation(b), self.along, self.between]
     }
 
-    /// Forces act at its ends, beside moments.
+    /// True if forces act at its ends, not only moments.
     fn pulls(&self) -> bool {
         let slides = self.spring().is_some_and(|(on, _)| on == FreeCoordinate::Slide);
         self.along.is_some() || slides
@@ -78,7 +80,7 @@ impl Joint {
         })
     }
 
-    /// The ends in time, without accelerations.
+    /// The ends as functions of time, for a motion without accelerations.
     fn moving_ends(&self, at: &State) -> [End<Jet>; 2] {
         let jet = |value: Vec3, rate: Vec3| {
             Vec3(std::array::from_fn(|k| Jet { value: value.0[k], rate: rate.0[k], rate2: 0.0 }))
@@ -104,18 +106,18 @@ impl Joint {
         self.normal.iter().map(|&(i, k)| DirectionPair { a: e(i), b: e(k) }).collect()
     }
 
-    /// The motor of its angle, with the row of its multiplier: behind those of the pairs.
+    /// The motor on its angle, with the row of its multiplier, which follows those of the pairs.
     fn turning_motor(&self) -> Option<(Motor, usize)> {
         self.motor_on(FreeCoordinate::Angle).map(|motor| (motor, self.normal.len()))
     }
 
-    /// The axes along which gaps are closed: those that are held, and that of a motor that slides.
+    /// The axes along which gaps are closed: held ones, and that of a motor on the slide.
     fn closed_along(&self) -> [bool; 3] {
         let driven = self.motor_on(FreeCoordinate::Slide).is_some();
         [self.held[0] || driven, self.held[1], self.held[2]]
     }
 
-    /// The slot of its motor's multiplier.
+    /// The slot of the multiplier of its motor.
     pub fn motor_slot(&self) -> Option<Slot> {
         let (on, _) = self.motor()?;
         match on {
@@ -124,7 +126,7 @@ impl Joint {
         }
     }
 
-    /// The multipliers of a slot that are used.
+    /// The used components of a slot of its multipliers.
     pub fn used(&self, slot: Slot) -> [bool; 3] {
         if self.along == Some(slot) {
             return self.closed_along();
@@ -168,8 +170,8 @@ impl Joint {
         Gaps { along, between }
     }
 
-    /// Puts forces, tangent and the rows of the multipliers in the place of what stands in `out`:
-    /// u_A, P_A, u_B, P_B, and multipliers along and between, see [`block`].
+    /// Overwrites `out` with forces, tangent and the rows of the multipliers, in the blocks u_A,
+    /// P_A, u_B, P_B and the multipliers along and between, see [`block`].
     pub fn system(&self, at: &State, weights: Weights, out: &mut ElementSystem) {
         out.clear();
         let ends = self.ends(at);
@@ -177,9 +179,9 @@ impl Joint {
         self.add_spring(at, &ends, weights, out);
     }
 
-    /// Adds the forces of the multipliers, and their rows.
+    /// Adds the forces of the multipliers, their tangent and their rows.
     fn hold(&self, at: &State, ends: &[End; 2], weights: Weights, out: &mut ElementSystem) {
-        // Without a stiffness in the tangent the multipliers belong to accelerations.
+        // In a tangent without stiffness multipliers constrain accelerations.
         let couple = if weights.stiffness != 0.0 { weights.stiffness } else { weights.mass };
         let factors = GapFactors { forces: weights.stiffness, multiplier: couple };
         let gaps = self.gaps(at, ends);
@@ -222,7 +224,7 @@ impl Effect for Joints {
         TangentForm::symmetric(!self.damps())
     }
 
-    /// Joints have no kernel for planes.
+    /// Joints have no planar form.
     fn mirror_data(&self, show: &mut dyn FnMut(MirrorData)) {
         show(MirrorData::Spatial);
     }
@@ -307,11 +309,11 @@ impl Constraint for Joints {
     }
 }
 
-impl Driven for Joints {
+impl DrivenCoordinates for Joints {
     fn drives(&self, at: &State, show: &mut dyn FnMut(f64, f64)) {
         for joint in &self.joints {
             let Some((on, motor)) = joint.motor() else { continue };
-            // L = lambda (coordinate - value): what the motor gives grows with -value.
+            // L = lambda (coordinate - value), so that the derivative over the value is -lambda.
             let multiplier = match on {
                 FreeCoordinate::Angle => joint.multipliers(at, joint.between).0[joint.normal.len()],
                 FreeCoordinate::Slide => joint.multipliers(at, joint.along).0[0],

@@ -1,4 +1,4 @@
-//! Weight of beams and bodies: forces fixed in space at the mass centres.
+//! Weight of beams and bodies: spatial forces at their mass centres.
 
 use crate::effect::inertia::{Body, inertia_mirror_data};
 use crate::effect::volume::VolumeElements;
@@ -10,15 +10,14 @@ use crate::kernel::{ElementSystem, Weights};
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
-/// The weight of all beams. Elements with their mass on the centre line need no rotation and no
-/// tangent.
+/// The weight of all beams. Elements with mass on the centre line have no tangent.
 #[derive(Clone, Debug)]
 pub struct BeamGravity {
-    /// The acceleration of gravity
+    /// The acceleration of gravity at an amplitude of one, spatial
     pub acceleration: Vec3,
-    /// The number of its amplitude
+    /// The index of its amplitude
     pub amplitude: usize,
-    /// Elements by the mass properties of their points
+    /// The elements, with the mass properties of their points per length
     pub elements: VolumeElements<Inertia>,
 }
 
@@ -65,9 +64,9 @@ impl Effect for BeamGravity {
 /// The weight of all bodies.
 #[derive(Clone, Debug)]
 pub struct BodyGravity {
-    /// The acceleration of gravity
+    /// The acceleration of gravity at an amplitude of one, spatial
     pub acceleration: Vec3,
-    /// The number of its amplitude
+    /// The index of its amplitude
     pub amplitude: usize,
     /// The bodies
     pub bodies: Vec<Body>,

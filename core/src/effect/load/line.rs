@@ -1,30 +1,31 @@
-//! Forces and moments per initial length along beams: fixed in space, or turning with the section.
+//! Line loads: forces and moments per initial length of beams, spatial (dead) or material
+//! (following the section).
 
 use crate::effect::volume::VolumeElements;
 use crate::effect::{Effect, Roles, TangentForm};
 use crate::kernel::Weights;
-use crate::kernel::load::{Intensity, Line};
+use crate::kernel::load::{DistributedLoad, Intensity};
 use crate::kernel::volume::Blocks;
 use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, State};
 use crate::tensor::Vec3;
 
-/// The frame of the components.
+/// The frame of the components of line loads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineLoadKind {
-    /// Fixed in space
+    /// Fixed in space: dead loads
     Spatial,
-    /// Turning with the section
+    /// Turning with the section: following loads
     Material,
 }
 
 /// All line loads of one kind.
 #[derive(Clone, Debug)]
 pub struct LineLoad {
-    /// Their frame
+    /// The frame of the loads
     pub kind: LineLoadKind,
     /// The loaded elements
     pub elements: VolumeElements<Intensity>,
-    /// The tangent follows how they turn
+    /// True if the tangent includes the derivatives of the loads
     pub tangent: bool,
 }
 
@@ -59,8 +60,8 @@ impl Effect for LineLoad {
     fn add(&self, at: &State, _memory: &Memory, weights: Weights, out: &mut Assembler) {
         let amplitudes = &at.amplitude[..];
         match self.kind {
-            LineLoadKind::Spatial => self.elements.add(&Line::<false> { amplitudes }, at, weights, out),
-            LineLoadKind::Material => self.elements.add(&Line::<true> { amplitudes }, at, weights, out),
+            LineLoadKind::Spatial => self.elements.add(&DistributedLoad::<false> { amplitudes }, at, weights, out),
+            LineLoadKind::Material => self.elements.add(&DistributedLoad::<true> { amplitudes }, at, weights, out),
         }
     }
 

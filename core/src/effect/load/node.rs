@@ -1,4 +1,4 @@
-//! Forces and moments at nodes: fixed in space, or turning with the section.
+//! Forces and moments at nodes, spatial (dead) or material (following the section).
 
 use crate::effect::{Effect, Roles, TangentForm};
 use crate::kernel::load::{material_force, material_moment, spatial_moment};
@@ -22,22 +22,23 @@ pub enum NodeLoadKind {
 /// A force or a moment at a node.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeForce {
-    /// The node it acts at
+    /// The loaded node
     pub node: Node,
-    /// Its components: spatial, or material in global axes of the initial placement
+    /// Force or moment at an amplitude of one: spatial, or material in global components of the
+    /// initial placement
     pub vector: Vec3,
-    /// The number of its amplitude
+    /// The index of its amplitude
     pub amplitude: usize,
 }
 
 /// All loads at nodes of one kind.
 #[derive(Clone, Debug)]
 pub struct NodeLoad {
-    /// Their kind
+    /// The kind of the loads
     pub kind: NodeLoadKind,
     /// The loads
     pub loads: Vec<NodeForce>,
-    /// The tangent follows how they turn
+    /// True if the tangent includes the derivatives of the loads
     pub tangent: bool,
 }
 

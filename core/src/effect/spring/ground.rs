@@ -1,9 +1,9 @@
 //! Springs from nodes to ground.
 //!
-//! A rotational spring acts on the rotation vector continued since the start (`State::unwrapped`):
-//! unwrapped up by two turns it pulls with 4 pi times its stiffness, and it does not notice when
-//! the node changes its chart. With the unwrapped vector Pw = P + 2 pi k n, D = dPw/dP and
-//! stiffness k: energy Pw.k Pw/2, f_P = D^T k Pw.
+//! A rotational spring acts on the unwrapped rotation vector, which is continued through whole
+//! turns from the start of the run (`State::unwrapped`): after two turns its moment is 4 pi times
+//! its stiffness, and it does not depend on the chart of the node. With the unwrapped vector Pw = P
+//! + 2 pi k n, D = dPw/dP and stiffness K: energy Pw.K Pw/2, f_P = D^T K Pw.
 
 use crate::effect::{Effect, Energy, Roles, TangentForm};
 use crate::kernel::{ElementSystem, Weights};
@@ -13,23 +13,35 @@ use crate::system::{Assembler, Category, Connectivity, Memory, MirrorData, Node,
 use crate::tensor::{Mat3, Vec3};
 use std::f64::consts::PI;
 
-/// Rotation vectors shorter than this have come to a whole turn.
-const WHOLE_TURN: f64 = 1e-9;
+/// The length, in radians, below which a rotation vector counts as a whole turn, which has no axis.
+const MAX_WHOLE_TURN: f64 = 1e-9;
+
+/// Forces of a damper to ground and their tangents.
+struct DamperForce {
+    /// Spatial force
+    force: Vec3,
+    /// Moment conjugate to the rotation unknown
+    moment: Vec3,
+    /// Weighted derivative of the force over the displacement
+    over_u: Mat3,
+    /// Weighted derivative of the moment over the rotation unknown
+    over_p: Mat3,
+}
 
 /// A spring with a damper from a node to ground.
 #[derive(Clone, Copy, Debug)]
 pub struct GroundSpring {
-    /// The node it holds
+    /// The node
     pub node: Node,
-    /// Its stiffness against displacement, global components
+    /// Stiffness against displacement, force per length in global components
     pub translation: Mat3,
-    /// Its stiffness against rotation, global components
+    /// Stiffness against rotation, moment per radian in global components
     pub rotation: Mat3,
-    /// Its damping of displacement, global components
+    /// Damping of displacement, force per velocity in global components
     pub translation_damping: Mat3,
-    /// Its damping of the spatial angular velocity, global components
+    /// Damping of the spatial angular velocity, moment times time in global components
     pub rotation_damping: Mat3,
-    /// The number of its amplitude: 0 in stages where it is absent, else 1
+    /// The index of its amplitude, which is 0 in stages without the spring and otherwise 1
     pub amplitude: usize,
 }
 
@@ -87,9 +99,9 @@ impl Effect for GroundSprings {
                 || at.v[spring.node.u as usize] != Vec3::ZERO
                 || at.v[spring.node.p as usize] != Vec3::ZERO;
             let damping = (spring.is_damped() && moves).then(|| spring.damping(at, weights));
-            if let Some((force, moment, tangents)) = damping {
-                system.add_tangent(0, 0, tangents[0] * on);
-                system.add_tangent(1, 1, tangents[1] * on);
+            if let Some(DamperForce { force, moment, over_u, over_p }) = damping {
+                system.add_tangent(0, 0, over_u * on);
+                system.add_tangent(1, 1, over_p * on);
                 out.add(k, &system);
                 out.add_damping(k, &[force * on, moment * on]);
             } else {
@@ -133,18 +145,18 @@ impl GroundSpring {
         self.translation_damping != Mat3::ZERO || self.rotation_damping != Mat3::ZERO
     }
 
-    /// Forces of the damper and their tangents. A moment c w fixed in space, with w = R Omega: f_P
-    /// = T c w, whose tangent is C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
-    fn damping(&self, at: &State, weights: Weights) -> (Vec3, Vec3, [Mat3; 2]) {
+    /// Forces of the damper and their tangents. Its spatial moment is c w, with the spatial spin w
+    /// = R Omega: f_P = T c w, whose tangent is C1(c w) + T c dw, dw = R (dOmega - Omega~ T dP).
+    fn damping(&self, at: &State, weights: Weights) -> DamperForce {
         let force = self.translation_damping * at.v[self.node.u as usize];
         let over_velocity = self.translation_damping * weights.damping;
         if self.rotation_damping == Mat3::ZERO {
-            return (force, Vec3::ZERO, [over_velocity, Mat3::ZERO]);
+            return DamperForce { force, moment: Vec3::ZERO, over_u: over_velocity, over_p: Mat3::ZERO };
         }
         let spin = at.spin(self.node.p);
         let rotation = &spin.rotation;
         let moment = self.rotation_damping * (rotation.r * spin.omega);
-        // T^T R^T = T holds for total vectors; of an increment after a base only T^T R^T is meant.
+        // For total vectors T^T R^T = T, but not for an increment after a base rotation.
         let back = rotation.t.transpose() * rotation.r.transpose();
         let material = rotation.r.transpose_mul(moment);
         let turned = Mat3::skew_mul(spin.omega, rotation.t) * -weights.stiffness;
@@ -152,24 +164,24 @@ impl GroundSpring {
         let tangent = back * (self.rotation_damping * d_spatial)
             + (rotation.c2(material) + rotation.t.transpose_matmul(Mat3::skew_mul(material, rotation.t)))
                 * weights.stiffness;
-        (force, back * moment, [over_velocity, tangent])
+        DamperForce { force, moment: back * moment, over_u: over_velocity, over_p: tangent }
     }
 }
 
-/// Force and tangent of a rotational spring over the unknown of the state: the total vector, or an
-/// increment X after which it is P. With the material moment M = T(P)^-T f_P: f_X = T(X)^T M, and
-/// dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
+/// Force and tangent of a rotational spring, conjugate to the unknown of the state: the total
+/// vector P, or an increment X whose rotation has the total vector P. With the material moment M =
+/// T(P)^-T f_P and a material spin t: f_X = T(X)^T M, and dM = T(P)^-T (K_P - C2(M)) T(P)^-1 t.
 fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     let unwrapped = at.unwrapped_at(slot);
     if at.turn(slot).is_none() {
-        return wound_up(stiffness, at.q[slot as usize], unwrapped);
+        return unwrapped_spring(stiffness, at.q[slot as usize], unwrapped);
     }
     if stiffness == Mat3::ZERO {
         return (Vec3::ZERO, Mat3::ZERO);
     }
     let increment = at.rotation(slot);
     let total = Rotation::new(log(increment.r));
-    let (force, tangent) = wound_up(stiffness, total.p, unwrapped);
+    let (force, tangent) = unwrapped_spring(stiffness, total.p, unwrapped);
     let inverse = total.t_inverse();
     let moment = inverse.transpose_mul(force);
     let spun = inverse.transpose_matmul(tangent - total.c2(moment)) * inverse;
@@ -177,30 +189,32 @@ fn turned(stiffness: Mat3, at: &State, slot: Slot) -> (Vec3, Mat3) {
     (t.transpose_mul(moment), t.transpose_matmul(spun * t) + increment.c2(moment))
 }
 
-/// Force and tangent of a rotational spring whose node was last unwrapped by `unwrapped`. At a
-/// whole turn P has no axis of its own and keeps the one of before.
-fn wound_up(stiffness: Mat3, p: Vec3, unwrapped: Vec3) -> (Vec3, Mat3) {
-    if p.norm() < WHOLE_TURN {
+/// Force and tangent, conjugate to P, of a rotational spring whose node had the unwrapped vector
+/// `unwrapped` in the last converged state. At a whole turn P has no axis and keeps that of
+/// `unwrapped`.
+fn unwrapped_spring(stiffness: Mat3, p: Vec3, unwrapped: Vec3) -> (Vec3, Mat3) {
+    if p.norm() < MAX_WHOLE_TURN {
         (stiffness * unwound(p, unwrapped), stiffness)
     } else {
         rotational(stiffness, nearest_turn(p, unwrapped), p)
     }
 }
 
-/// Pw = P + 2 pi k n
-fn wind<T: Real>(turns: f64, p: Vec3<T>) -> Vec3<T> {
+/// The unwrapped vector Pw = P + 2 pi k n for k whole `turns`.
+fn unwrapped_vector<T: Real>(turns: f64, p: Vec3<T>) -> Vec3<T> {
     if turns == 0.0 { p } else { p * (T::one() + T::constant(2.0 * PI * turns) / p.norm()) }
 }
 
-/// Force and tangent of a rotational spring that has been unwrapped by whole `turns`.
+/// Force and tangent, conjugate to P, of a rotational spring whose node has gone through k whole
+/// `turns`.
 pub fn rotational<T: Real>(stiffness: Mat3, turns: f64, p: Vec3<T>) -> (Vec3<T>, Mat3<T>) {
     let k = Mat3::constant(stiffness);
     if turns == 0.0 {
         return (k * p, k);
     }
-    // D = I + k (I - B): the complement chart's B, turned into whole turns the other way.
+    // D = I + k (I - B), with the tensor B of the complement chart.
     let b = Complement::new(p, Vec3::zero(), Vec3::zero()).b;
     let d = Mat3::identity() + (Mat3::identity() - b).scale(turns);
-    let pull = k * wind(turns, p);
+    let pull = k * unwrapped_vector(turns, p);
     (d.transpose_mul(pull), d.transpose_matmul(k * d) - Complement::geometric(p, pull).scale(turns))
 }

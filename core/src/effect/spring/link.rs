@@ -1,4 +1,4 @@
-//! Springs and cables between two nodes: a force along the line that joins them,
+//! Springs and cables between two nodes, with a force along the line between them:
 //!
 //! ```text
 //! n = (x_b - x_a)/l,   F = k (l - l0) + c dl/dt,   f_b = F n = -f_a
@@ -15,7 +15,7 @@ use crate::tensor::{Mat3, Vec3};
 pub struct Link {
     /// The nodes at its ends
     pub nodes: [Node; 2],
-    /// Their initial places
+    /// The initial places of the nodes
     pub places: [Vec3; 2],
     /// k, force per length
     pub stiffness: f64,
@@ -23,9 +23,9 @@ pub struct Link {
     pub damping: f64,
     /// l0, its length without force
     pub length: f64,
-    /// A cable does not push.
+    /// True for a cable, which has no force at lengths below l0
     pub tension_only: bool,
-    /// The number of its amplitude: 0 in stages where it is absent, else 1
+    /// The index of its amplitude, which is 0 in stages without the link and otherwise 1
     pub amplitude: usize,
 }
 
@@ -36,22 +36,22 @@ pub struct Links {
     pub links: Vec<Link>,
 }
 
-/// The force at the second node and its derivatives over its place and velocity, relative to the
-/// first.
+/// The force g (internal, spatial) at the second node, and its derivatives over place and velocity
+/// of the second node relative to the first.
 #[derive(Clone, Copy, Debug)]
 pub struct Pull<T = f64> {
     /// k (l - l0) n
     pub elastic: Vec3<T>,
     /// c dl/dt n
     pub damping: Vec3<T>,
-    /// Over the place
+    /// The derivative over the relative place
     pub over_place: Mat3<T>,
-    /// Over the velocity
+    /// The derivative over the relative velocity
     pub over_velocity: Mat3<T>,
 }
 
 impl Link {
-    /// The pull over the vector `d` from the first node to the second, and its rate.
+    /// The pull for the vector `d` from the first node to the second, and its rate.
     pub fn pull<T: Real>(&self, d: Vec3<T>, rate: Vec3<T>) -> Pull<T> {
         let zero = Pull {
             elastic: Vec3::zero(),
@@ -65,7 +65,7 @@ impl Link {
             return zero;
         }
         if length.largest() == 0.0 {
-            // No direction of its own: as if it had no length.
+            // Nodes at one place give no direction: the link acts as if l0 were zero.
             return Pull { over_place: Mat3::identity().scale(self.stiffness), ..zero };
         }
         let inverse = T::one() / length;
@@ -154,7 +154,7 @@ impl Effect for Links {
             let change = b - a;
             let distance = d.norm();
             let slack = link.tension_only && distance <= link.length;
-            // Ends in one place have no direction of their own.
+            // Nodes at one place give no direction: any change stretches the link.
             let stretch = if distance == 0.0 { change.norm() } else { d.dot(change).abs() / distance };
             if slack || link.stiffness == 0.0 { 0.0 } else { stretch / length }
         };

@@ -1,4 +1,4 @@
-//! Springs and dampers: from nodes to ground, and between nodes, cables among them.
+//! Springs and dampers: from nodes to ground, and between nodes, including cables.
 
 mod ground;
 mod link;

@@ -11,7 +11,7 @@ use super::energy::{EnergyGuard, Growth};
 use super::failure::Failure;
 use super::plan::TimeStepping;
 use super::stage_run::{Analysis, StageRun};
-use crate::integrate::{Increments, Predictor, Rotations, Step, TimeError};
+use crate::integrate::{Increments, Predictor, Rotations, Step, StepEnds, TimeError};
 use crate::kernel::Weights;
 use crate::solve::NewtonFailure;
 use crate::system::{Slot, State};
@@ -108,9 +108,9 @@ impl Dynamics<'_, '_> {
     fn follow_errors(&mut self) {
         let first = self.first_step();
         let StageRun { assembly, newton, state, model, .. } = &mut *self.stage;
-        let start = (&**state, self.increments.as_ref());
+        let increments = self.increments.as_ref();
         let duration = self.settings.end - state.time;
-        newton.time_error = Some(TimeError::new(model, assembly, start, &self.massive, (first, duration)));
+        newton.time_error = Some(TimeError::new(model, assembly, state, increments, &self.massive, first, duration));
     }
 
     /// Rows at start + k step, the last one at `end`.
@@ -250,7 +250,7 @@ impl Dynamics<'_, '_> {
         self.refuse_turns(step.length)?;
         self.stage.refuse_leaps()?;
         let StageRun { assembly, newton, state, good, .. } = &mut *self.stage;
-        newton.end_step(&assembly.system, (good, state), &step, self.increments.as_ref());
+        newton.end_step(&assembly.system, StepEnds { from: good, to: state }, &step, self.increments.as_ref());
         Ok(())
     }
 
