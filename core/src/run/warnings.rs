@@ -62,7 +62,7 @@ impl StageRun<'_> {
         let round_off = self.assembly.round_off(self.state);
         self.assembly.evaluate(self.state, Weights::NONE, None);
         let loose = Convergence { tolerance: LOOSE_BALANCE };
-        let (verdict, _) = loose.judge(self.model, &self.assembly.system, round_off, None);
+        let verdict = loose.judge(self.model, &self.assembly.system, round_off, None).verdict;
         if !matches!(verdict, Verdict::Converged | Verdict::Noisy) {
             let message = "the state of a modal or buckling stage is not in balance: let a static stage come before it";
             self.warn(WarningKind::OutOfBalance, message);
