@@ -168,7 +168,9 @@ impl Peaks {
             let mut sum = 0.0;
             for force in system.acting_in(region) {
                 let size = measure(force[slot]);
-                (total, largest, sum) = (total + force[slot], larger(size, largest), sum + size);
+                total += force[slot];
+                largest = larger(size, largest);
+                sum += size;
             }
             let whole = !tilted && dof_map.is_plain(slot as Slot);
             let free = if whole { total } else { free_part(dof_map, slot as Slot, total) };

@@ -147,7 +147,8 @@ impl LinearSolver {
     /// Factorises with the block solver, unless that was done last; `false` on failure.
     pub(super) fn factorise_by_own(&mut self, tangent: &mut Tangent) -> bool {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
-        (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
+        self.factored = done;
+        self.revision = done.then_some(tangent.system().revision);
         done
     }
 
@@ -379,7 +380,8 @@ impl LinearSolver {
     fn return_to_blocks(&mut self) {
         if self.blocks.is_some() {
             self.choice = MethodChoice { in_blocks: true, absence: 0, ..self.choice };
-            (self.factored, self.revision) = (false, None);
+            self.factored = false;
+            self.revision = None;
         }
     }
 }

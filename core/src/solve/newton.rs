@@ -183,7 +183,8 @@ enum Decision {
 impl Solution<'_> {
     fn begin(&mut self) {
         let newton = &mut *self.newton;
-        (newton.last, newton.contraction) = (None, 0.0);
+        newton.last = None;
+        newton.contraction = 0.0;
         newton.first.clear();
         newton.reuse.begin(newton.given.take() == Some(self.assembly.system.revision));
     }

@@ -37,7 +37,8 @@ impl Refinement {
         let cosine = along / (own * others).sqrt();
         self.aligned = cosine > 0.5;
         self.ratio = if self.before.is_empty() { 0.0 } else { size / self.size };
-        (self.size, self.last) = (size, size / unknowns);
+        self.size = size;
+        self.last = size / unknowns;
         self.before.take(if self.last.is_finite() { dq.len() } else { 0 }, |slot| dq[slot].0);
         self
     }

@@ -46,8 +46,11 @@ impl Reuse {
     /// Begins a solution; `kept` if the tangent is, except for loads, that of its first iterate.
     pub fn begin(&mut self, kept: bool) {
         self.history.clear();
-        (self.kept, self.own, self.needed) = (kept, false, 0);
-        (self.noisy, self.fine) = (false, false);
+        self.kept = kept;
+        self.own = false;
+        self.needed = 0;
+        self.noisy = false;
+        self.fine = false;
     }
 
     /// Records the residual of the current iterate, relative to its tolerance; `noisy` if it is
@@ -106,7 +109,8 @@ impl Reuse {
     /// converged; `leaps` if the next correction includes prescribed increments.
     pub fn form(&mut self, leaps: bool) {
         self.needed += usize::from(!self.brings_balance());
-        (self.kept, self.own) = (true, true);
+        self.kept = true;
+        self.own = true;
         self.fine = self.noisy && !leaps;
     }
 

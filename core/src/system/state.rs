@@ -131,7 +131,9 @@ impl State {
     pub fn stand_still(&mut self) {
         if self.moves() {
             let rest = Field::zero(self.v.len());
-            (self.v, self.a, self.algorithmic) = (rest.clone(), rest, Field::none());
+            self.v = rest.clone();
+            self.a = rest;
+            self.algorithmic = Field::none();
         }
     }
 

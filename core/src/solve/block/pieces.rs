@@ -270,7 +270,8 @@ fn within_mut<'a, T>(elimination: &'a Elimination, tiles: &'a mut [T]) -> Vec<Di
 
 impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     fn factorise(&mut self, elimination: &Elimination, matrix: Matrix) -> bool {
-        (self.is_within, self.signs) = (false, None);
+        self.is_within = false;
+        self.signs = None;
         if !self.make_room(elimination.order.len()) {
             return false;
         }
@@ -289,7 +290,9 @@ impl<P: Piece<W>, const W: usize> Factor for Pieces<P, W> {
     }
 
     fn factorise_within(&mut self, elimination: &Elimination, system: &mut System) -> bool {
-        (self.is_within, self.signs, self.diagonal) = (true, None, Vec::new());
+        self.is_within = true;
+        self.signs = None;
+        self.diagonal = Vec::new();
         let (own, beside) = system.give_to_factors::<W>();
         let diagonals = within_mut(elimination, P::within_mut(own));
         self.signs = self.eliminate(elimination, None, beside, diagonals);
