@@ -46,17 +46,17 @@ struct MethodChoice {
     absence: u32,
     next: u32,
     /// True if sparse LU has failed, too, so that the block solver stays for one attempt
-    in_vain: bool,
+    sparse_lu_failed: bool,
     /// True if the last block factorisation certainly lost no digits
     is_sure: bool,
 }
 
 /// Backward error at which a solution is accepted: it solves a system whose entries differ by this
 /// relative amount (Oettli and Prager 1964).
-const BACKWARD_ERROR: f64 = 1e-11;
+const ACCEPTED_BACKWARD_ERROR: f64 = 1e-11;
 
 /// Backward error above which iterative refinement has failed.
-const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
+const MAX_BACKWARD_ERROR: f64 = 1e-8;
 
 /// Largest number of refinements of a solution
 const MAX_REFINEMENTS: usize = 3;
@@ -99,7 +99,13 @@ impl LinearSolver {
     ) -> Option<Self> {
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
-            choice: MethodChoice { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false, is_sure: true },
+            choice: MethodChoice {
+                in_blocks: blocks.is_some(),
+                absence: 0,
+                next: 1,
+                sparse_lu_failed: false,
+                is_sure: true,
+            },
             blocks: blocks.map(Box::new),
             general,
             factored: false,
@@ -309,14 +315,14 @@ impl LinearSolver {
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
-    /// Refines a solution until its backward error is at most [`BACKWARD_ERROR`]; `false` if it
-    /// remains above [`LARGEST_BACKWARD_ERROR`].
+    /// Refines a solution until its backward error is at most [`ACCEPTED_BACKWARD_ERROR`]; `false`
+    /// if it remains above [`MAX_BACKWARD_ERROR`].
     fn refine(&mut self, system: &System, wanted: &[f64], x: &mut [f64]) -> bool {
         let mut error = f64::INFINITY;
         for _ in 0..=MAX_REFINEMENTS {
             let now = system.residual(wanted, x, &mut self.leftover);
             // A refinement that increases the error shows that only round-off is left.
-            if now <= BACKWARD_ERROR || now >= error {
+            if now <= ACCEPTED_BACKWARD_ERROR || now >= error {
                 error = error.min(now);
                 break;
             }
@@ -328,7 +334,7 @@ impl LinearSolver {
             }
             x.iter_mut().zip(&residual).for_each(|(x, correction)| *x += correction);
         }
-        error <= LARGEST_BACKWARD_ERROR
+        error <= MAX_BACKWARD_ERROR
     }
 
     /// True if the block solver is in use.
@@ -342,10 +348,10 @@ impl LinearSolver {
     pub(super) fn gives_way_to_blocks(&mut self) -> bool {
         if !self.choice.in_blocks {
             self.return_to_blocks();
-            self.choice.in_vain = true;
+            self.choice.sparse_lu_failed = true;
             return true;
         }
-        std::mem::take(&mut self.choice.in_vain)
+        std::mem::take(&mut self.choice.sparse_lu_failed)
     }
 
     /// Changes to sparse LU, until the block solver is tried again, and factorises the tangent;
@@ -357,7 +363,8 @@ impl LinearSolver {
         let Some(general) = &mut self.general else { return false };
         let next = self.choice.next;
         let next_time = next.saturating_mul(2);
-        self.choice = MethodChoice { in_blocks: false, absence: next, next: next_time, in_vain: false, is_sure: false };
+        self.choice =
+            MethodChoice { in_blocks: false, absence: next, next: next_time, sparse_lu_failed: false, is_sure: false };
         general.factorise(system)
     }
 
@@ -365,7 +372,7 @@ impl LinearSolver {
     /// structure does not: the block solver is tried again, after twice as many solutions with each
     /// failure, and one fewer with each success.
     pub fn succeeded(&mut self) {
-        self.choice.in_vain = false;
+        self.choice.sparse_lu_failed = false;
         if self.choice.in_blocks {
             self.choice.next = (self.choice.next - 1).max(1);
             return;

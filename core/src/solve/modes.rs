@@ -378,7 +378,8 @@ impl<'a> ModeSearch<'a> {
 ///
 /// ```text
 /// C = 0:     (K + e^2 M)^-1 M x = x/(e^2 - s^2)
-/// general:   with z = (x, s x/e):   A z = z/(s - e),   from   Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
+/// general:   A z = z/(s - e) with z = (x, s x/e), and A (r1, r2) = (x', s x'/e) from
+///            Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
 /// ```
 ///
 /// Inner products are kinetic energies, in the general case the sum of strain and kinetic energies:

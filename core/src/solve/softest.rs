@@ -197,8 +197,8 @@ fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
 }
 
 /// Ratio of |x.Jx| to the round-off of its terms, eps sqrt(sum (x_i J_ij x_j)^2). The sum itself is
-/// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are not
-/// taken for mechanisms.
+/// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are
+/// not taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
 }

@@ -30,8 +30,8 @@ pub struct SystemSlice<'a> {
     /// prescribed
     pub(super) prescribed_increment: Option<&'a [Vec3]>,
     /// Tangent times prescribed increments, one number per equation of this slice
-    pub(super) lifted: &'a mut [f64],
-    pub(super) room: &'a mut Vec<ElementSystem<Lanes>>,
+    pub(super) prescribed_forces: &'a mut [f64],
+    pub(super) buffers: &'a mut Vec<ElementSystem<Lanes>>,
 }
 
 impl<'a> SystemSlice<'a> {
@@ -58,7 +58,8 @@ impl<'a> SystemSlice<'a> {
         with_tangent: bool,
         instances: Range<usize>,
     ) -> Assembler<'_> {
-        let SystemSlice { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
+        let SystemSlice { pattern, acting, region, force, values, prescribed_increment, prescribed_forces, buffers } =
+            self;
         let force = force.each_mut().map(|force| &mut force[..]);
         let values = values.reborrow();
         let part = SystemSlice {
@@ -68,8 +69,8 @@ impl<'a> SystemSlice<'a> {
             force,
             values,
             prescribed_increment: *prescribed_increment,
-            lifted,
-            room,
+            prescribed_forces,
+            buffers,
         };
         part.into_assembler(effect, category, with_tangent, instances)
     }
@@ -83,7 +84,8 @@ impl<'a> SystemSlice<'a> {
         with_tangent: bool,
         instances: Range<usize>,
     ) -> Assembler<'a> {
-        let SystemSlice { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
+        let SystemSlice { pattern, acting, region, force, values, prescribed_increment, prescribed_forces, buffers } =
+            self;
         debug_assert!(acting.contains(&(category as usize)), "forces of a category that nothing clears");
         let start = region.map(|region| &pattern.regions[region]);
         let [internal, inertia, external, damping] = force;
@@ -103,8 +105,8 @@ impl<'a> SystemSlice<'a> {
             damping,
             values,
             prescribed_increment,
-            lifted,
-            room,
+            prescribed_forces,
+            buffers,
             with_tangent,
             may_damp: acting.contains(&(Category::Damping as usize)),
         }
@@ -155,8 +157,8 @@ pub struct Assembler<'a> {
     damping: Option<&'a mut [Vec3]>,
     values: TileValues<'a>,
     prescribed_increment: Option<&'a [Vec3]>,
-    lifted: &'a mut [f64],
-    room: &'a mut Vec<ElementSystem<Lanes>>,
+    prescribed_forces: &'a mut [f64],
+    buffers: &'a mut Vec<ElementSystem<Lanes>>,
     with_tangent: bool,
     /// True if damping is among the acting categories, so that its forces have been cleared.
     may_damp: bool,
@@ -172,10 +174,10 @@ impl Assembler<'_> {
     /// Lends a buffer of `blocks` blocks for element forces and tangents. Its forces are those of
     /// the last user. A tangent is zero unless the effect forms it (`forms_tangent`) by assignment.
     pub fn lend(&mut self, blocks: usize, forms_tangent: bool) -> ElementSystem<Lanes> {
-        let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
+        let Some(fits) = self.buffers.iter().position(|system| system.blocks() == blocks) else {
             return ElementSystem::new(blocks);
         };
-        let mut system = self.room.swap_remove(fits);
+        let mut system = self.buffers.swap_remove(fits);
         if self.with_tangent && !forms_tangent {
             system.clear();
         }
@@ -184,7 +186,7 @@ impl Assembler<'_> {
 
     /// Takes a lent buffer back for the next evaluation.
     pub fn take_back(&mut self, system: ElementSystem<Lanes>) {
-        self.room.push(system);
+        self.buffers.push(system);
     }
 
     /// Adds forces and tangent of instance `k`; the blocks of `element` are in the order of the
@@ -377,7 +379,8 @@ impl Assembler<'_> {
                     match (columns[c], prescribed_increment) {
                         (DofMap::HELD, None) => {}
                         (DofMap::HELD, Some(prescribed_increment)) => {
-                            self.lifted[rows[r] as usize - self.first_equation] += value * prescribed_increment.0[c];
+                            self.prescribed_forces[rows[r] as usize - self.first_equation] +=
+                                value * prescribed_increment.0[c];
                         }
                         _ => self.block(k, number / nodes, number % nodes).add(width, r, c, value),
                     }
@@ -415,7 +418,8 @@ impl Assembler<'_> {
                         if let Some(prescribed_increment) = self.prescribed_increment {
                             let of_slot = prescribed_increment[column.slot as usize];
                             let increment = self.pattern.dof_map.to_local(column.slot, of_slot).0[entry / 3];
-                            self.lifted[row.equation as usize - self.first_equation] += value.0[lane] * increment;
+                            self.prescribed_forces[row.equation as usize - self.first_equation] +=
+                                value.0[lane] * increment;
                         }
                         continue;
                     }
@@ -471,7 +475,7 @@ impl Assembler<'_> {
                         match (columns[c], prescribed_increment) {
                             (DofMap::HELD, None) => {}
                             (DofMap::HELD, Some(prescribed_increment)) => {
-                                self.lifted[rows[r] as usize - self.first_equation] +=
+                                self.prescribed_forces[rows[r] as usize - self.first_equation] +=
                                     block.0[r][c] * prescribed_increment.0[c];
                             }
                             _ => self.block(k, row, column).add(width, r, c, block.0[r][c]),

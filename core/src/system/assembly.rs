@@ -86,13 +86,13 @@ pub struct System {
     /// True if factors have overwritten the diagonal tiles.
     holds_factors: bool,
     /// Prescribed increments of held directions, by slot (global components). The tangent times
-    /// these is summed in `lifted`, by equation.
+    /// these is summed in `prescribed_forces`, by equation.
     prescribed_increment: Vec<Vec3>,
-    lifts: bool,
-    lifted: Vec<f64>,
+    is_prescribed: bool,
+    prescribed_forces: Vec<f64>,
     /// Buffers for element forces and tangents, kept between evaluations: of the whole scene, then
     /// of each region
-    rooms: Vec<Vec<ElementSystem<Lanes>>>,
+    buffers: Vec<Vec<ElementSystem<Lanes>>>,
 }
 
 impl System {
@@ -108,7 +108,7 @@ impl System {
         };
         let values = pattern.values();
         Self {
-            rooms: vec![Vec::new(); 1 + pattern.regions.len()],
+            buffers: vec![Vec::new(); 1 + pattern.regions.len()],
             pattern,
             force: Category::ALL.map(force),
             acting,
@@ -117,8 +117,8 @@ impl System {
             revision: 0,
             holds_factors: false,
             prescribed_increment: Vec::new(),
-            lifts: false,
-            lifted: Vec::new(),
+            is_prescribed: false,
+            prescribed_forces: Vec::new(),
         }
     }
 
@@ -143,11 +143,11 @@ impl System {
     pub fn begin(&mut self, with_tangent: bool, prescribed_increment: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
         self.holds_factors &= !with_tangent;
-        if self.lifts || prescribed_increment.is_some() {
-            self.lifted.clear();
-            self.lifted.resize(self.pattern.dof_map.count(), 0.0);
+        if self.is_prescribed || prescribed_increment.is_some() {
+            self.prescribed_forces.clear();
+            self.prescribed_forces.resize(self.pattern.dof_map.count(), 0.0);
         }
-        self.lifts = prescribed_increment.is_some();
+        self.is_prescribed = prescribed_increment.is_some();
         if let Some(prescribed_increment) = prescribed_increment {
             threads::copy(&mut self.prescribed_increment, prescribed_increment);
         }
@@ -326,19 +326,19 @@ impl System {
     }
 
     /// Largest backward error of a solution x of A x = b: max over the rows of |b - A x|_i / (|A|
-    /// |x| + |b|)_i. The residual stays in `room`.
-    pub fn residual(&self, b: &[f64], x: &[f64], room: &mut ResidualBuffer) -> f64 {
+    /// |x| + |b|)_i. The residual stays in `buffer`.
+    pub fn residual(&self, b: &[f64], x: &[f64], buffer: &mut ResidualBuffer) -> f64 {
         if self.pattern.width() == WIDTH {
-            self.residual_of::<WIDTH>(b, x, room)
+            self.residual_of::<WIDTH>(b, x, buffer)
         } else {
-            self.residual_of::<3>(b, x, room)
+            self.residual_of::<3>(b, x, buffer)
         }
     }
 
-    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut ResidualBuffer) -> f64 {
+    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], buffer: &mut ResidualBuffer) -> f64 {
         debug_assert!(!self.holds_factors, "there is no tangent");
         let pattern = &self.pattern;
-        let residuals = room.take::<W>(pattern);
+        let residuals = buffer.take::<W>(pattern);
         threads::each_part(residuals, |start, residuals| {
             for (node_block, [residual, size]) in (start..).zip(residuals) {
                 *residual = pattern.part(node_block, b);
@@ -367,12 +367,12 @@ impl System {
     }
 
     /// Writes the residual b - A x of the last call of [`System::residual`] to `out`, by equation.
-    pub fn last_residual(&self, room: &ResidualBuffer, out: &mut [f64]) {
-        if self.pattern.width() == WIDTH { self.join::<WIDTH>(room, out) } else { self.join::<3>(room, out) }
+    pub fn last_residual(&self, buffer: &ResidualBuffer, out: &mut [f64]) {
+        if self.pattern.width() == WIDTH { self.join::<WIDTH>(buffer, out) } else { self.join::<3>(buffer, out) }
     }
 
-    fn join<const W: usize>(&self, room: &ResidualBuffer, out: &mut [f64]) {
-        let residuals = room.residuals.as_chunks::<W>().0;
+    fn join<const W: usize>(&self, buffer: &ResidualBuffer, out: &mut [f64]) {
+        let residuals = buffer.residuals.as_chunks::<W>().0;
         self.pattern.join(|node_block| &residuals[2 * node_block], out);
     }
 
@@ -393,11 +393,11 @@ impl System {
         let mut own = [0.0; W];
         let force = |slot: u32| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot as usize]);
         let slots = node_blocks.members(node_block);
-        if !self.lifts && dof_map.are_components(slots.clone()) && 3 * slots.len() == W {
+        if !self.is_prescribed && dof_map.are_components(slots.clone()) && 3 * slots.len() == W {
             slots.zip(own.as_chunks_mut().0).for_each(|(slot, own)| *own = (-force(slot)).0);
             return own;
         }
-        if W == 3 && !self.lifts && dof_map.are_planar(slots.clone()) {
+        if W == 3 && !self.is_prescribed && dof_map.are_planar(slots.clone()) {
             let u = slots.start;
             let p = slots.start + 1;
             let across = dof_map.to_local(u, -force(u));
@@ -411,8 +411,10 @@ impl System {
             let own = &mut own[..own_equations.len()];
             dof_map.each_of(slot as usize, local, own_equations.start, own, |own, entry| *own = -entry);
         }
-        if self.lifts {
-            own.iter_mut().zip(&self.lifted[own_equations]).for_each(|(own, lifted)| *own -= lifted);
+        if self.is_prescribed {
+            own.iter_mut()
+                .zip(&self.prescribed_forces[own_equations])
+                .for_each(|(own, prescribed_forces)| *own -= prescribed_forces);
         }
         self.pattern.spread(node_block, own)
     }
@@ -420,7 +422,7 @@ impl System {
     /// Increments of held directions (by slot, global components) that the next correction
     /// includes.
     pub fn prescribed_increment(&self) -> Option<&[Vec3]> {
-        self.lifts.then_some(&self.prescribed_increment)
+        self.is_prescribed.then_some(&self.prescribed_increment)
     }
 
     /// Right-hand side -f - J du_prescribed for given forces f by slot (global components).
@@ -432,7 +434,7 @@ impl System {
     /// increments.
     pub fn right_hand_side_without_lift(&self, force: &[Vec3], out: &mut [f64]) {
         self.right_hand_side_of(force, out);
-        out.iter_mut().zip(&self.lifted).for_each(|(out, lifted)| *out += lifted);
+        out.iter_mut().zip(&self.prescribed_forces).for_each(|(out, prescribed_forces)| *out += prescribed_forces);
     }
 
     fn fill_right_hand_side(&self, force: impl Fn(&Region, usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
@@ -442,9 +444,9 @@ impl System {
                 let local = dof_map.to_local(slot as Slot, force(region, slot));
                 dof_map.each_of(slot, local, region.equations.start, out, |out, entry| *out = -entry);
             }
-            if self.lifts {
-                let lifted = &self.lifted[region.equations.clone()];
-                out.iter_mut().zip(lifted).for_each(|(out, lifted)| *out -= lifted);
+            if self.is_prescribed {
+                let prescribed_forces = &self.prescribed_forces[region.equations.clone()];
+                out.iter_mut().zip(prescribed_forces).for_each(|(out, prescribed_forces)| *out -= prescribed_forces);
             }
         });
     }
@@ -456,7 +458,17 @@ impl System {
 
     /// The slices of all regions, which are disjoint.
     fn parts(&mut self) -> Vec<SystemSlice<'_>> {
-        let Self { pattern, acting_in, force, values, prescribed_increment, lifts, lifted, rooms, .. } = self;
+        let Self {
+            pattern,
+            acting_in,
+            force,
+            values,
+            prescribed_increment,
+            is_prescribed,
+            prescribed_forces,
+            buffers,
+            ..
+        } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
         let storage = &pattern.storage;
@@ -472,17 +484,17 @@ impl System {
             let lists = [&mut own, &mut beside].map(|list| list.next().unwrap_or_default());
             TileValues::part(storage, lists, places(region).map(|range| range.start))
         });
-        let mut lifted = threads::split(lifted, ends(|r| r.equations.end)).into_iter();
-        let stretches = values.zip(&mut rooms[1..]).enumerate();
-        let part = |(region, (values, room)): (usize, _)| SystemSlice {
+        let mut prescribed_forces = threads::split(prescribed_forces, ends(|r| r.equations.end)).into_iter();
+        let stretches = values.zip(&mut buffers[1..]).enumerate();
+        let part = |(region, (values, buffers)): (usize, _)| SystemSlice {
             pattern,
             acting: &acting_in[region],
             region: Some(region),
             force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
             values,
-            prescribed_increment: lifts.then_some(&prescribed_increment[..]),
-            lifted: lifted.next().unwrap_or_default(),
-            room,
+            prescribed_increment: is_prescribed.then_some(&prescribed_increment[..]),
+            prescribed_forces: prescribed_forces.next().unwrap_or_default(),
+            buffers,
         };
         stretches.map(part).collect()
     }
@@ -495,9 +507,9 @@ impl System {
             region: None,
             force: self.force.each_mut().map(|force| &mut force[..]),
             values: TileValues::all(&self.pattern.storage, &mut self.values),
-            prescribed_increment: self.lifts.then_some(&self.prescribed_increment[..]),
-            lifted: &mut self.lifted,
-            room: &mut self.rooms[0],
+            prescribed_increment: self.is_prescribed.then_some(&self.prescribed_increment[..]),
+            prescribed_forces: &mut self.prescribed_forces,
+            buffers: &mut self.buffers[0],
         }
     }
 

@@ -1,5 +1,5 @@
-//! StoredBlock LU factorisation of unsymmetric tangents, with row pivoting inside diagonal tiles that
-//! have small pivots.
+//! Block LU factorisation of unsymmetric tangents, with row pivoting inside diagonal tiles
+//! that have small pivots.
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
