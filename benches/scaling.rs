@@ -9,7 +9,7 @@ use beamsim_core::kernel::{ElementSystem, Weights};
 use beamsim_core::model::{Assembly, Model, Schedule, StageContext, StageKind};
 use beamsim_core::run::{Failure, Observer, Run, Snapshot};
 use beamsim_core::solve::{Convergence, LinearSolver};
-use beamsim_core::system::Leftover;
+use beamsim_core::system::ResidualBuffer;
 use beamsim_core::tensor::Vec3;
 use std::hint::black_box;
 use std::time::Instant;
@@ -54,7 +54,7 @@ fn assembly_seconds(model: &Model, kind: StageKind) -> f64 {
         let start = Instant::now();
         for (number, (effect, connectivity)) in effects.iter().zip(&shapes).enumerate() {
             let element = ElementSystem::new(connectivity.iter().next().map_or(1, <[u32]>::len));
-            let mut sink = assembly.system.sink(number, effect.category(), effect.tangent().exists());
+            let mut sink = assembly.system.assembler(number, effect.category(), effect.tangent().exists());
             for k in 0..connectivity.len() {
                 sink.add(k, black_box(&element));
             }
@@ -100,7 +100,7 @@ fn parts(elements: usize, dynamic: bool, interpolation: &str) {
     let mut x = vec![1.0; system.pattern.dof_map.count()];
     let solve = quickest(|| assert!(solver.solve_once(system, &mut x)));
     let b = vec![1.0; x.len()];
-    let mut room = Leftover::default();
+    let mut room = ResidualBuffer::default();
     let residual = quickest(|| {
         black_box(system.residual(&b, &x, &mut room));
     });

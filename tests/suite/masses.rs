@@ -56,8 +56,8 @@ fn masses_are_added_as_elements_are() {
                     element.set_force(i, forces[i]);
                     (0..2).for_each(|j| element.set_tangent(i, j, &Mat3::IDENTITY.scale(mass[i][j] * weight)));
                 }
-                as_masses.sink(0, Category::Internal, true).add_mass(k, &forces, &mass, weight);
-                as_elements.sink(0, Category::Internal, true).add(k, &element);
+                as_masses.assembler(0, Category::Internal, true).add_mass(k, &forces, &mass, weight);
+                as_elements.assembler(0, Category::Internal, true).add(k, &element);
             }
             let what = format!(
                 "plane {}, symmetry {symmetry:?}, prescribed_increment {}",

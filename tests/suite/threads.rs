@@ -136,7 +136,7 @@ fn regions_change_nothing_but_the_order_of_sums() {
         for (number, effect) in model.acting(&stage).iter().enumerate() {
             let with_tangent = effect.tangent().exists();
             let weights = if with_tangent { weights } else { Weights::NONE };
-            let mut sink = assembly.system.sink(number, effect.category(), with_tangent);
+            let mut sink = assembly.system.assembler(number, effect.category(), with_tangent);
             effect.add(&state, &Memory::default(), weights, &mut sink);
         }
         assert!(apart(&cut.0, &forces(&assembly)) < 1e-14);

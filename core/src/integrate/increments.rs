@@ -59,7 +59,7 @@ impl Increments {
     /// Begins a step: replaces total vectors by increments. `before` is the length of the step
     /// before.
     pub fn begin(&self, state: &mut State, step: &Step, before: f64) {
-        state.wound_apart();
+        state.unwrapped_mut();
         let mut turns = std::mem::take(&mut state.turns);
         turns.resize(state.q.len(), None);
         for &(slot, carrier) in &self.carriers {

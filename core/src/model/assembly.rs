@@ -5,7 +5,8 @@ use super::{Model, StageContext};
 use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
 use crate::kernel::Weights;
 use crate::system::{
-    Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Part, Pattern, Plane, State, Symmetry, System,
+    Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Pattern, Plane, State, Symmetry, System,
+    SystemSlice,
 };
 use crate::tensor::{Vec3, zeros};
 use crate::threads;
@@ -74,26 +75,26 @@ impl Acting {
 }
 
 /// Adds forces and tangents of the instances that belong to a part of the system.
-fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut Part) {
+fn add_part(effects: &[Acting], state: &State, weights: Weights, part: &mut SystemSlice) {
     for (number, acting) in effects.iter().enumerate() {
         let with_tangent = weights != Weights::NONE && acting.has_tangent;
         let weights = if with_tangent { weights } else { Weights::NONE };
         for instances in part.instances(number) {
             let category = acting.effect.category();
-            acting.add(state, weights, &mut part.sink(number, category, with_tangent, instances.clone()));
+            acting.add(state, weights, &mut part.assembler(number, category, with_tangent, instances.clone()));
         }
     }
 }
 
 /// Adds the forces of effects with inertia or damping, without a tangent.
-fn add_rates(effects: &[Acting], state: &State, part: &mut Part) {
+fn add_rates(effects: &[Acting], state: &State, part: &mut SystemSlice) {
     for (number, acting) in effects.iter().enumerate() {
         if !acting.categories().any(|category| matches!(category, Category::Inertia | Category::Damping)) {
             continue;
         }
         for instances in part.instances(number) {
             let category = acting.effect.category();
-            acting.add(state, Weights::NONE, &mut part.sink(number, category, false, instances.clone()));
+            acting.add(state, Weights::NONE, &mut part.assembler(number, category, false, instances.clone()));
         }
     }
 }
@@ -191,7 +192,7 @@ impl Assembly {
 
     /// Adds forces and tangents, in parallel over the regions of a large scene, each after
     /// `make_ready`; then those of the instances that lie in no region.
-    fn add_effects(&mut self, state: &State, weights: Weights, make_ready: impl Fn(&mut Part) + Send + Sync) {
+    fn add_effects(&mut self, state: &State, weights: Weights, make_ready: impl Fn(&mut SystemSlice) + Send + Sync) {
         let Self { effects, system, evaluations, .. } = self;
         system.each_part(|part| {
             make_ready(part);
@@ -276,7 +277,7 @@ impl Assembly {
         self.system.clear(None);
         for (number, acting) in self.effects.iter().enumerate().filter(|(k, a)| told[*k].is_none() && a.has_tangent) {
             let category = acting.effect.category();
-            acting.add(state, Weights::STIFFNESS, &mut self.system.sink(number, category, true));
+            acting.add(state, Weights::STIFFNESS, &mut self.system.assembler(number, category, true));
         }
         let dof_map = &self.system.pattern.dof_map;
         let mut x = vec![0.0; dof_map.count()];
@@ -291,7 +292,7 @@ impl Assembly {
         for (number, acting) in self.effects.iter().enumerate() {
             self.system.clear(None);
             let category = acting.effect.category();
-            acting.add(state, Weights::NONE, &mut self.system.sink(number, category, false));
+            acting.add(state, Weights::NONE, &mut self.system.assembler(number, category, false));
             let forces = &self.system.force[category as usize];
             if let Some(slot) = forces.iter().position(|f| !f.is_finite()) {
                 return Some((acting.effect.name(), slot));

@@ -51,7 +51,7 @@ const NEAR_WHOLE_TURN: f64 = 0.5;
 /// the rate of a momentum, which does not depend on charts.
 pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>) -> usize {
     let Some(first) = first_beyond(state, rotations, band) else { return 0 };
-    state.wound_apart();
+    state.unwrapped_mut();
     let mut switched = 0;
     for slot in rotations.iter().skip_while(|slot| **slot != first).map(|&slot| slot as usize) {
         for _ in 0..MAX_COMPLEMENTS {

@@ -119,7 +119,7 @@ impl Motion {
                 state.v.put(slot, n * rate);
                 state.a.put(slot, n * rate2);
                 if !state.unwrapped.is_empty() || state.q[slot] != end {
-                    state.wound_apart()[slot] = end;
+                    state.unwrapped_mut()[slot] = end;
                 }
                 turned.abs()
             }

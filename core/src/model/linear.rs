@@ -50,7 +50,7 @@ impl LinearisedSystem {
             whole.clear(None);
             let forget = Memory::default();
             for (number, effect) in effects.iter().enumerate().filter(|(_, effect)| effect.tangent().exists()) {
-                effect.add(&origin, &forget, weights, &mut whole.sink(number, effect.category(), true));
+                effect.add(&origin, &forget, weights, &mut whole.assembler(number, effect.category(), true));
             }
             whole.values.clone()
         };

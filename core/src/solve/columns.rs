@@ -4,17 +4,18 @@ use crate::system::{Pattern, System};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// Compressed columns of a tangent, with the position of each entry among its values.
-pub struct Columns {
+pub struct CompressedColumns {
     starts: Vec<u32>,
     rows: Vec<u32>,
     places: Vec<u32>,
     values: Vec<f64>,
 }
 
-impl Columns {
+impl CompressedColumns {
     /// Compressed columns of a pattern.
     pub fn new(pattern: &Pattern) -> Self {
-        let (mut rows, mut places) = (Vec::new(), Vec::new());
+        let mut rows = Vec::new();
+        let mut places = Vec::new();
         let mut starts = vec![0];
         for column in 0..pattern.dof_map.count() as u32 {
             let mut entries: Vec<_> = pattern.entries(column).collect();

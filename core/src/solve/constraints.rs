@@ -18,12 +18,12 @@ use std::collections::BTreeMap;
 
 /// Weight of a multiplier, relative to the stiffness of the unknowns it constrains: large enough
 /// that these remain stiff when they lose their own stiffness.
-const FACTOR: f64 = 8.0;
+const RELATIVE_WEIGHT: f64 = 8.0;
 
 /// The multipliers of a pattern, and the values of the last prepared tangent.
 pub struct Constraints {
     rows: Vec<Multiplier>,
-    additions: Vec<Addition>,
+    additions: Vec<WeightedProduct>,
     /// Node blocks of the multipliers, ascending
     node_blocks: Vec<u32>,
     /// Weight W of each multiplier
@@ -34,12 +34,12 @@ pub struct Constraints {
 /// Equation of a multiplier and the unknowns it constrains.
 struct Multiplier {
     equation: u32,
-    ties: Vec<Tie>,
+    ties: Vec<ConstrainedUnknown>,
 }
 
 /// An unknown that a multiplier constrains, with the positions of its entries of C, of B and of the
 /// diagonal.
-struct Tie {
+struct ConstrainedUnknown {
     equation: u32,
     of_column: usize,
     of_row: usize,
@@ -48,7 +48,7 @@ struct Tie {
 
 /// An entry of C W B: the position it is added to, the index of the multiplier, and the positions
 /// of its factors in C and B.
-struct Addition {
+struct WeightedProduct {
     place: usize,
     row: usize,
     of_column: usize,
@@ -58,32 +58,34 @@ struct Addition {
 impl Constraints {
     /// Constraints of the given multiplier slots; `None` if they have no equation.
     pub fn new(pattern: &Pattern, multipliers: &[Slot]) -> Option<Self> {
-        let dof_map = multipliers.iter().flat_map(|&slot| pattern.dof_map.of(slot));
-        let dof_map: Vec<u32> = dof_map.filter(|&equation| equation != DofMap::HELD).collect();
-        if dof_map.is_empty() {
+        let equations = multipliers.iter().flat_map(|&slot| pattern.dof_map.of(slot));
+        let equations: Vec<u32> = equations.filter(|&equation| equation != DofMap::HELD).collect();
+        if equations.is_empty() {
             return None;
         }
         let mut is_multiplier = vec![false; pattern.dof_map.count()];
-        dof_map.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
+        equations.iter().for_each(|&equation| is_multiplier[equation as usize] = true);
         let mut columns: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
         let mut place = |row: u32, column: u32| {
             let entries = || pattern.entries(column).map(|entry| (entry.row, entry.place)).collect();
             columns.entry(column).or_insert_with(entries).get(&row).copied()
         };
-        let (mut rows, mut additions) = (Vec::new(), Vec::new());
-        for (number, &equation) in dof_map.iter().enumerate() {
+        let mut rows = Vec::new();
+        let mut additions = Vec::new();
+        for (number, &equation) in equations.iter().enumerate() {
             let met: Vec<u32> = pattern.entries(equation).map(|entry| entry.row).collect();
             let others = met.into_iter().filter(|&other| !is_multiplier[other as usize]);
             let tie = |other: u32| {
-                let (of_column, of_row) = (place(other, equation)?, place(equation, other)?);
-                Some(Tie { equation: other, of_column, of_row, diagonal: place(other, other)? })
+                let of_column = place(other, equation)?;
+                let of_row = place(equation, other)?;
+                Some(ConstrainedUnknown { equation: other, of_column, of_row, diagonal: place(other, other)? })
             };
-            let ties: Vec<Tie> = others.filter_map(tie).collect();
+            let ties: Vec<ConstrainedUnknown> = others.filter_map(tie).collect();
             for (k, a) in ties.iter().enumerate() {
                 for b in &ties[k..] {
                     let pair = [place(a.equation, b.equation), place(b.equation, a.equation)];
                     let [Some(above), Some(below)] = pair else { continue };
-                    let add = |place, of_column, of_row| Addition { place, row: number, of_column, of_row };
+                    let add = |place, of_column, of_row| WeightedProduct { place, row: number, of_column, of_row };
                     additions.push(add(above, a.of_column, b.of_row));
                     // In symmetric storage both entries have one position.
                     if below != above {
@@ -93,7 +95,7 @@ impl Constraints {
             }
             rows.push(Multiplier { equation, ties });
         }
-        let mut node_blocks: Vec<u32> = multipliers.iter().map(|&slot| pattern.node_blocks.of(slot).0 as u32).collect();
+        let mut node_blocks: Vec<u32> = multipliers.iter().map(|&slot| pattern.node_blocks.of(slot) as u32).collect();
         node_blocks.sort_unstable();
         node_blocks.dedup();
         let weights = vec![0.0; rows.len()];
@@ -106,7 +108,7 @@ impl Constraints {
     }
 
     /// Equations of the multipliers.
-    pub fn dof_map(&self) -> impl Iterator<Item = usize> {
+    pub fn equations(&self) -> impl Iterator<Item = usize> {
         self.rows.iter().map(|row| row.equation as usize)
     }
 
@@ -151,12 +153,12 @@ impl Multiplier {
     /// `RELATIVE_WEIGHT`/w = sum B_k C_k/|K_kk|. Without any such stiffness the `largest` of the
     /// scene is used.
     fn weight(&self, values: &[f64], largest: f64) -> f64 {
-        let square = |tie: &Tie| (values[tie.of_column] * values[tie.of_row]).abs();
+        let square = |tie: &ConstrainedUnknown| (values[tie.of_column] * values[tie.of_row]).abs();
         let stiff = self.ties.iter().filter(|tie| values[tie.diagonal] != 0.0);
         let softness: f64 = stiff.map(|tie| square(tie) / values[tie.diagonal].abs()).sum();
         let squares: f64 = self.ties.iter().map(square).sum();
         match (softness > 0.0, squares > 0.0) {
-            (true, _) => FACTOR / softness,
+            (true, _) => RELATIVE_WEIGHT / softness,
             (false, true) => largest / squares,
             (false, false) => 0.0,
         }

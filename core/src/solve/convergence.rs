@@ -20,14 +20,14 @@ pub struct Convergence {
 
 /// Correction below which the iteration ends: displacements relative to the length of the scene,
 /// rotations in radians.
-const SMALLEST_CORRECTION: f64 = 1e-12;
+const NEGLIGIBLE_CORRECTION: f64 = 1e-12;
 
 /// Tolerance of constraint gaps relative to that of forces. Translational gaps are relative to the
 /// length of the scene, rotational ones in radians.
-const GAP: f64 = 1e-2;
+const RELATIVE_GAP_TOLERANCE: f64 = 1e-2;
 
 /// A nodal force is a sum of a few products; its round-off is this many times that of one product.
-const NOISE_FACTOR: f64 = 4.0;
+const ROUND_OFF_FACTOR: f64 = 4.0;
 
 /// Largest residual, relative to its tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,22 +58,34 @@ pub enum Verdict {
     NotFinite,
 }
 
+/// Verdict of the stop test with the residual that it is based on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judgement {
+    /// Verdict
+    pub verdict: Verdict,
+    /// Largest residual, relative to its tolerance
+    pub residual: Residual,
+}
+
 impl Convergence {
     /// Judges the forces of `system` and the [`size`] of the last correction: `None` before the
     /// first, infinite if charts have changed since.
-    pub fn judge(&self, model: &Model, system: &System, round_off: RoundOff, last: Option<f64>) -> (Verdict, Residual) {
+    pub fn judge(&self, model: &Model, system: &System, round_off: RoundOff, last: Option<f64>) -> Judgement {
         let residual = self.residual(model, system, round_off);
         if !(residual.ratio.is_finite() && residual.force.is_finite()) {
-            return (Verdict::NotFinite, residual);
+            return Judgement { verdict: Verdict::NotFinite, residual };
         }
-        let small = last.is_some_and(|size| size <= SMALLEST_CORRECTION);
-        let verdict = match residual.ratio {
-            _ if small => Verdict::Converged,
-            ratio if ratio > 1.0 => Verdict::Continue,
-            _ if residual.noisy => Verdict::Noisy,
-            _ => Verdict::Converged,
+        let small = last.is_some_and(|size| size <= NEGLIGIBLE_CORRECTION);
+        let verdict = if small {
+            Verdict::Converged
+        } else if residual.ratio > 1.0 {
+            Verdict::Continue
+        } else if residual.noisy {
+            Verdict::Noisy
+        } else {
+            Verdict::Converged
         };
-        (verdict, residual)
+        Judgement { verdict, residual }
     }
 
     fn residual(&self, model: &Model, system: &System, round_off: RoundOff) -> Residual {
@@ -90,15 +102,15 @@ impl Convergence {
         }
         for (kind, peak) in SlotKind::ALL.into_iter().zip(peaks.residuals) {
             let tolerated = match kind {
-                SlotKind::Force => GAP * self.tolerance * model.length,
-                SlotKind::Moment => GAP * self.tolerance,
+                SlotKind::Force => RELATIVE_GAP_TOLERANCE * self.tolerance * model.length,
+                SlotKind::Moment => RELATIVE_GAP_TOLERANCE * self.tolerance,
                 SlotKind::Displacement => self.tolerance * force,
                 SlotKind::Rotation => self.tolerance * force * model.length,
             };
             let allowed = match kind {
                 SlotKind::Force | SlotKind::Moment => tolerated,
-                SlotKind::Displacement => tolerated.max(NOISE_FACTOR * round_off.force),
-                SlotKind::Rotation => tolerated.max(NOISE_FACTOR * round_off.moment),
+                SlotKind::Displacement => tolerated.max(ROUND_OFF_FACTOR * round_off.force),
+                SlotKind::Rotation => tolerated.max(ROUND_OFF_FACTOR * round_off.moment),
             };
             worst.noisy |= peak.size > tolerated;
             let ratio = if peak.size == 0.0 { 0.0 } else { peak.size / allowed };
@@ -147,12 +159,18 @@ impl Peaks {
         let dof_map = &system.pattern.dof_map;
         // In a tilted plane, vectors have round-off out of the plane.
         let tilted = dof_map.plane().is_some_and(Plane::is_tilted);
-        let (mut forces, mut residuals, mut poison) = ([0.0; 4], [Peak::default(); 4], 0.0);
+        let mut forces = [0.0; 4];
+        let mut residuals = [Peak::default(); 4];
+        let mut poison = 0.0;
         for (slot, &kind) in slots.clone().zip(&model.kinds[slots]) {
-            let (mut total, mut largest, mut sum) = (Vec3::ZERO, 0.0, 0.0);
+            let mut total = Vec3::ZERO;
+            let mut largest = 0.0;
+            let mut sum = 0.0;
             for force in system.acting_in(region) {
                 let size = measure(force[slot]);
-                (total, largest, sum) = (total + force[slot], larger(size, largest), sum + size);
+                total += force[slot];
+                largest = larger(size, largest);
+                sum += size;
             }
             let whole = !tilted && dof_map.is_plain(slot as Slot);
             let free = if whole { total } else { free_part(dof_map, slot as Slot, total) };

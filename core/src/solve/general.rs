@@ -1,7 +1,7 @@
 //! LU with partial pivoting and a fill-reducing column order, by faer, for tangents that the block
 //! solver cannot factorise.
 
-use super::columns::Columns;
+use super::columns::CompressedColumns;
 use crate::system::System;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::mat::MatMut;
@@ -10,7 +10,7 @@ use faer::{Conj, Par};
 
 /// A sparse LU factorisation with its symbolic analysis.
 pub struct GeneralSolver {
-    columns: Columns,
+    columns: CompressedColumns,
     symbolic: SymbolicLu<u32>,
     numeric: NumericLu<u32, f64>,
     memory: MemBuffer,
@@ -19,7 +19,7 @@ pub struct GeneralSolver {
 impl GeneralSolver {
     /// Analyses the pattern of a system. `None` if memory is not available.
     pub fn new(system: &System) -> Option<Self> {
-        let columns = Columns::new(&system.pattern);
+        let columns = CompressedColumns::new(&system.pattern);
         let symbolic = factorize_symbolic_lu(columns.structure(), Default::default()).ok()?;
         let factor = symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default());
         let solve = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);

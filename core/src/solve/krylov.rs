@@ -24,21 +24,21 @@ pub trait Operator {
 #[derive(Default)]
 pub struct Spectrum {
     /// Eigenvalues
-    pub values: Vec<Complex<f64>>,
+    pub(crate) values: Vec<Complex<f64>>,
     /// Coordinates of each eigenvector in the basis
     coordinates: Vec<Vec<Complex<f64>>>,
-    space: Space,
+    space: KrylovSpace,
 }
 
 /// Size of the basis of a rough estimate of eigenvalues
-const ROUGH: usize = 12;
+const ROUGH_BASIS_SIZE: usize = 12;
 /// Number of vectors in a block
-const BLOCK: usize = 6;
+const BLOCK_SIZE: usize = 6;
 /// Relative change of eigenvalues between two projections at which they have converged
-const FOUND: f64 = 1e-11;
+const EIGENVALUE_TOLERANCE: f64 = 1e-11;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
 /// basis.
-const NOTHING_NEW: f64 = 1e-11;
+const DEPENDENT_NORM_RATIO: f64 = 1e-11;
 
 /// The `wanted` eigenvalues of largest magnitude, descending; fewer if the space has fewer
 /// dimensions. `None` if an image cannot be computed.
@@ -50,7 +50,7 @@ pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option
 /// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
 /// cannot be computed.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
-    let most = operator.size().min(ROUGH);
+    let most = operator.size().min(ROUGH_BASIS_SIZE);
     eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
 }
 
@@ -60,9 +60,9 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
     if size == 0 {
         return Some(Spectrum::default());
     }
-    let mut space = Space::default();
+    let mut space = KrylovSpace::default();
     let mut block: Vec<Vec<f64>> = Vec::new();
-    for k in 0..BLOCK.min(size) {
+    for k in 0..BLOCK_SIZE.min(size) {
         block.push(operator.apply(&start(size, k))?);
     }
     let mut last: Vec<Complex<f64>> = Vec::new();
@@ -85,9 +85,9 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
         }
         look = space.basis.len() + space.basis.len() / 4;
         // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
-        let guard = wanted + BLOCK;
+        let guard = wanted + BLOCK_SIZE;
         let now = space.eigenvalues(operator.is_symmetric(), guard);
-        let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= FOUND * a.norm();
+        let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
         let still =
             now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
         if still || space.basis.len() >= most {
@@ -106,14 +106,16 @@ impl Spectrum {
     /// Relative residual of an eigenvector, |A x - theta x| over |theta x|, in the norm of the
     /// inner product.
     pub fn residual(&self, operator: &mut dyn Operator, number: usize) -> f64 {
-        let (theta, [re, im]) = (self.values[number], self.vector(number));
+        let theta = self.values[number];
+        let [re, im] = self.vector(number);
         let [mut left_re, mut left_im] = self.combine(number, &self.space.images);
         for k in 0..re.len() {
             left_re[k] -= theta.re * re[k] - theta.im * im[k];
             left_im[k] -= theta.re * im[k] + theta.im * re[k];
         }
         let mut squared = |x: &[f64]| dot(x, &operator.weigh(x)).max(0.0);
-        let (left, all) = (squared(&left_re) + squared(&left_im), squared(&re) + squared(&im));
+        let left = squared(&left_re) + squared(&left_im);
+        let all = squared(&re) + squared(&im);
         (left / all).sqrt() / theta.norm()
     }
 
@@ -143,7 +145,7 @@ fn start(size: usize, number: usize) -> Vec<f64> {
 }
 
 #[derive(Default)]
-struct Space {
+struct KrylovSpace {
     basis: Vec<Vec<f64>>,
     /// W times the basis
     weighed: Vec<Vec<f64>>,
@@ -155,13 +157,14 @@ struct Space {
 
 /// Inner product in vector lanes, whose sums are independent.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let (a, a_rest) = a.as_chunks::<LANES>();
+    let (b, b_rest) = b.as_chunks::<LANES>();
     let sums = a.iter().zip(b).fold(Lanes([0.0; LANES]), |sums, (x, y)| sums + Lanes(*x) * Lanes(*y));
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
     sums.0.iter().sum::<f64>() + rest
 }
 
-impl Space {
+impl KrylovSpace {
     /// Orthogonalises a vector against the basis and adds it, normalised, unless it is linearly
     /// dependent.
     fn add(&mut self, operator: &mut dyn Operator, mut vector: Vec<f64>, most: usize) {
@@ -180,7 +183,7 @@ impl Space {
         }
         weighed = operator.weigh(&vector);
         let length = size(&vector, &weighed);
-        if length.is_nan() || length <= NOTHING_NEW * before {
+        if length.is_nan() || length <= DEPENDENT_NORM_RATIO * before {
             return;
         }
         vector.iter_mut().for_each(|v| *v /= length);

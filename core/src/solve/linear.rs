@@ -6,7 +6,7 @@ use super::constraints::Constraints;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
 use super::tangent::Tangent;
-use crate::system::{Leftover, Slot, System};
+use crate::system::{ResidualBuffer, Slot, System};
 use crate::tensor::Vec3;
 
 /// Solves linear systems whose tangents share one pattern.
@@ -20,7 +20,7 @@ pub struct LinearSolver {
     blocks: Option<Box<BlockSolver>>,
     /// Sparse LU, once the block solver has failed, or if there is none
     general: Option<Box<GeneralSolver>>,
-    trust: Trust,
+    choice: MethodChoice,
     /// True if the last factorisation has succeeded
     pub(super) factored: bool,
     /// [`System::revision`] of the tangent factorised last; `None` if its values may have changed
@@ -34,32 +34,41 @@ pub struct LinearSolver {
     /// Buffers, by equation: the solution, its right-hand side, and the residual
     right_hand_side: Vec<f64>,
     wanted: Vec<f64>,
-    leftover: Leftover,
+    leftover: ResidualBuffer,
 }
 
 /// State of the choice between block solver and sparse LU.
 #[derive(Clone, Copy)]
-struct Trust {
+struct MethodChoice {
     in_blocks: bool,
     /// Number of solutions until the block solver is tried again, and the number after its next
     /// failure
     absence: u32,
     next: u32,
     /// True if sparse LU has failed, too, so that the block solver stays for one attempt
-    in_vain: bool,
+    sparse_lu_failed: bool,
     /// True if the last block factorisation certainly lost no digits
     is_sure: bool,
 }
 
 /// Backward error at which a solution is accepted: it solves a system whose entries differ by this
 /// relative amount (Oettli and Prager 1964).
-const BACKWARD_ERROR: f64 = 1e-11;
+const ACCEPTED_BACKWARD_ERROR: f64 = 1e-11;
 
 /// Backward error above which iterative refinement has failed.
-const LARGEST_BACKWARD_ERROR: f64 = 1e-8;
+const MAX_BACKWARD_ERROR: f64 = 1e-8;
 
 /// Largest number of refinements of a solution
-const REFINEMENTS: usize = 3;
+const MAX_REFINEMENTS: usize = 3;
+
+/// Outcome of a request for a factorisation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Factorisation {
+    /// True if there is a factorisation of the tangent
+    pub is_done: bool,
+    /// True if it was not there before
+    pub is_new: bool,
+}
 
 impl LinearSolver {
     /// Analyses the pattern of a system. `None` if memory is not available.
@@ -90,7 +99,13 @@ impl LinearSolver {
     ) -> Option<Self> {
         let general = if blocks.is_none() { Some(Box::new(GeneralSolver::new(system)?)) } else { None };
         Some(Self {
-            trust: Trust { in_blocks: blocks.is_some(), absence: 0, next: 1, in_vain: false, is_sure: true },
+            choice: MethodChoice {
+                in_blocks: blocks.is_some(),
+                absence: 0,
+                next: 1,
+                sparse_lu_failed: false,
+                is_sure: true,
+            },
             blocks: blocks.map(Box::new),
             general,
             factored: false,
@@ -100,7 +115,7 @@ impl LinearSolver {
             pivots: None,
             right_hand_side: Vec::new(),
             wanted: Vec::new(),
-            leftover: Leftover::default(),
+            leftover: ResidualBuffer::default(),
         })
     }
 
@@ -116,12 +131,12 @@ impl LinearSolver {
 
     /// Block solver, if it is in use.
     fn blocks_in_use(&mut self) -> Option<&mut BlockSolver> {
-        self.blocks.as_deref_mut().filter(|_| self.trust.in_blocks)
+        self.blocks.as_deref_mut().filter(|_| self.choice.in_blocks)
     }
 
     /// True if the factorisation in use is one for symmetric tangents, without pivoting.
     pub(super) fn is_symmetric(&self) -> bool {
-        self.trust.in_blocks && self.blocks().is_some_and(BlockSolver::is_symmetric)
+        self.choice.in_blocks && self.blocks().is_some_and(BlockSolver::is_symmetric)
     }
 
     /// True if the last factorised tangent is known to have positive pivots only, so that no digits
@@ -138,7 +153,8 @@ impl LinearSolver {
     /// Factorises with the block solver, unless that was done last; `false` on failure.
     pub(super) fn factorise_by_own(&mut self, tangent: &mut Tangent) -> bool {
         let done = self.has_factorised(tangent.system()) || self.factorise_in_blocks(tangent);
-        (self.factored, self.revision) = (done, done.then_some(tangent.system().revision));
+        self.factored = done;
+        self.revision = done.then_some(tangent.system().revision);
         done
     }
 
@@ -146,7 +162,7 @@ impl LinearSolver {
     /// constraints; `None` if it does not tell them.
     pub(super) fn negative_of_last(&self) -> Option<usize> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
-        let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
+        let blocks = self.blocks().filter(|_| self.choice.in_blocks && self.factored)?;
         blocks.negative()?.checked_sub(of_multipliers)
     }
 
@@ -155,7 +171,7 @@ impl LinearSolver {
     /// the block solver is not in use.
     pub(super) fn has_negative_determinant(&self) -> Option<bool> {
         let of_multipliers = self.constraints.as_ref().map_or(0, Constraints::count);
-        let blocks = self.blocks().filter(|_| self.trust.in_blocks && self.factored)?;
+        let blocks = self.blocks().filter(|_| self.choice.in_blocks && self.factored)?;
         Some(blocks.has_negative_determinant()? != (of_multipliers % 2 == 1))
     }
 
@@ -165,7 +181,8 @@ impl LinearSolver {
     /// superfluous. `false` if there is no solution.
     pub fn correct(&mut self, system: &System, looks: bool, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         let nothing_to_look_at = !looks || self.is_positive_definite() || system.holds_factors();
-        let (is_factored, is_plain) = (self.factored, self.constraints.is_none());
+        let is_factored = self.factored;
+        let is_plain = self.constraints.is_none();
         if let Some(blocks) = self.blocks_in_use().filter(|_| nothing_to_look_at && is_plain) {
             return is_factored && blocks.correct(system, held, out);
         }
@@ -182,7 +199,7 @@ impl LinearSolver {
 
     /// Name of the method in use.
     pub fn name(&self) -> &'static str {
-        self.blocks().filter(|_| self.trust.in_blocks).map_or("sparse LU", BlockSolver::name)
+        self.blocks().filter(|_| self.choice.in_blocks).map_or("sparse LU", BlockSolver::name)
     }
 
     /// True if the last factorisation is that of the tangent of this system.
@@ -190,32 +207,31 @@ impl LinearSolver {
         self.factored && self.revision == Some(system.revision)
     }
 
-    /// Factorises a tangent, unless that was done last. First result: true if there is a
-    /// factorisation; second: true if it is new.
-    pub fn factorise_new(&mut self, tangent: &mut Tangent) -> (bool, bool) {
+    /// Factorises a tangent, unless that was done last.
+    pub fn factorise_new(&mut self, tangent: &mut Tangent) -> Factorisation {
         if self.has_factorised(tangent.system()) {
-            return (true, false);
+            return Factorisation { is_done: true, is_new: false };
         }
-        self.factored = match self.trust.in_blocks {
+        self.factored = match self.choice.in_blocks {
             true => self.factorise_in_blocks(tangent) || self.leave_blocks(tangent.look()),
             false => self.factorise(tangent.look()),
         };
         self.revision = Some(tangent.system().revision);
-        (self.factored, true)
+        Factorisation { is_done: self.factored, is_new: true }
     }
 
     /// Factorises with the block solver, overwriting the tangent if it may be destroyed and no
     /// digits are lost. `false` on failure.
     fn factorise_in_blocks(&mut self, tangent: &mut Tangent) -> bool {
         if self.constraints.is_some() {
-            return self.trust.in_blocks && self.factorise_staying(tangent.look());
+            return self.choice.in_blocks && self.factorise_staying(tangent.look());
         }
-        let was_sure = self.trust.is_sure;
+        let was_sure = self.choice.is_sure;
         let Some(blocks) = self.blocks_in_use() else { return false };
         let free = tangent.give_away().filter(|system| was_sure && blocks.can_stay_within(system));
         let within = free.is_some_and(|system| blocks.factorise_within(system) && blocks.is_sure());
         let done = within || blocks.factorise(tangent.look().matrix());
-        self.trust.is_sure = blocks.is_sure();
+        self.choice.is_sure = blocks.is_sure();
         done
     }
 
@@ -235,7 +251,7 @@ impl LinearSolver {
     pub fn factorise(&mut self, system: &System) -> bool {
         // The values may change without a new revision.
         self.revision = None;
-        self.factored = match self.trust.in_blocks {
+        self.factored = match self.choice.in_blocks {
             true => self.factorise_staying(system) || self.leave_blocks(system),
             false => self.general.as_mut().is_some_and(|general| general.factorise(system)),
         };
@@ -258,7 +274,7 @@ impl LinearSolver {
     /// tangent is overwritten: such factorisations are [sure](BlockSolver::is_sure), and their
     /// residual shows in Newton's next one.
     pub fn solve(&mut self, system: &System, right_hand_side: &mut [f64]) -> bool {
-        if !self.trust.in_blocks || self.is_positive_definite() || system.holds_factors() {
+        if !self.choice.in_blocks || self.is_positive_definite() || system.holds_factors() {
             return self.solve_once(system, right_hand_side);
         }
         let mut wanted = std::mem::take(&mut self.wanted);
@@ -283,28 +299,30 @@ impl LinearSolver {
         if !self.factored {
             return false;
         }
-        match (self.trust.in_blocks, &mut self.blocks, &mut self.general) {
-            (true, Some(blocks), _) => match &self.constraints {
+        if self.choice.in_blocks {
+            let Some(blocks) = &mut self.blocks else { return false };
+            match &self.constraints {
                 Some(constraints) => {
                     constraints.change(right_hand_side);
                     blocks.solve(constraints.matrix(&system.pattern), right_hand_side);
                 }
                 None => blocks.solve(system.matrix(), right_hand_side),
-            },
-            (false, _, Some(general)) => general.solve(right_hand_side),
-            _ => return false,
+            }
+        } else {
+            let Some(general) = &mut self.general else { return false };
+            general.solve(right_hand_side);
         }
         right_hand_side.iter().all(|x| x.is_finite())
     }
 
-    /// Refines a solution until its backward error is at most [`BACKWARD_ERROR`]; `false` if it
-    /// remains above [`LARGEST_BACKWARD_ERROR`].
+    /// Refines a solution until its backward error is at most [`ACCEPTED_BACKWARD_ERROR`]; `false`
+    /// if it remains above [`MAX_BACKWARD_ERROR`].
     fn refine(&mut self, system: &System, wanted: &[f64], x: &mut [f64]) -> bool {
         let mut error = f64::INFINITY;
-        for _ in 0..=REFINEMENTS {
+        for _ in 0..=MAX_REFINEMENTS {
             let now = system.residual(wanted, x, &mut self.leftover);
             // A refinement that increases the error shows that only round-off is left.
-            if now <= BACKWARD_ERROR || now >= error {
+            if now <= ACCEPTED_BACKWARD_ERROR || now >= error {
                 error = error.min(now);
                 break;
             }
@@ -316,24 +334,24 @@ impl LinearSolver {
             }
             x.iter_mut().zip(&residual).for_each(|(x, correction)| *x += correction);
         }
-        error <= LARGEST_BACKWARD_ERROR
+        error <= MAX_BACKWARD_ERROR
     }
 
     /// True if the block solver is in use.
     pub(super) fn is_in_blocks(&self) -> bool {
-        self.trust.in_blocks
+        self.choice.in_blocks
     }
 
     /// Called after Newton's iteration has failed. If sparse LU is in use, returns to the block
     /// solver, which then stays for the next attempt whatever its accuracy (`true`). `false` if the
     /// block solver is in use and may be replaced.
     pub(super) fn gives_way_to_blocks(&mut self) -> bool {
-        if !self.trust.in_blocks {
+        if !self.choice.in_blocks {
             self.return_to_blocks();
-            self.trust.in_vain = true;
+            self.choice.sparse_lu_failed = true;
             return true;
         }
-        std::mem::take(&mut self.trust.in_vain)
+        std::mem::take(&mut self.choice.sparse_lu_failed)
     }
 
     /// Changes to sparse LU, until the block solver is tried again, and factorises the tangent;
@@ -343,9 +361,10 @@ impl LinearSolver {
             self.general = GeneralSolver::new(system).map(Box::new);
         }
         let Some(general) = &mut self.general else { return false };
-        let next = self.trust.next;
+        let next = self.choice.next;
         let next_time = next.saturating_mul(2);
-        self.trust = Trust { in_blocks: false, absence: next, next: next_time, in_vain: false, is_sure: false };
+        self.choice =
+            MethodChoice { in_blocks: false, absence: next, next: next_time, sparse_lu_failed: false, is_sure: false };
         general.factorise(system)
     }
 
@@ -353,13 +372,13 @@ impl LinearSolver {
     /// structure does not: the block solver is tried again, after twice as many solutions with each
     /// failure, and one fewer with each success.
     pub fn succeeded(&mut self) {
-        self.trust.in_vain = false;
-        if self.trust.in_blocks {
-            self.trust.next = (self.trust.next - 1).max(1);
+        self.choice.sparse_lu_failed = false;
+        if self.choice.in_blocks {
+            self.choice.next = (self.choice.next - 1).max(1);
             return;
         }
-        self.trust.absence = self.trust.absence.saturating_sub(1);
-        if self.trust.absence == 0 {
+        self.choice.absence = self.choice.absence.saturating_sub(1);
+        if self.choice.absence == 0 {
             self.return_to_blocks();
         }
     }
@@ -367,8 +386,9 @@ impl LinearSolver {
     /// Changes to the block solver, if there is one.
     fn return_to_blocks(&mut self) {
         if self.blocks.is_some() {
-            self.trust = Trust { in_blocks: true, absence: 0, ..self.trust };
-            (self.factored, self.revision) = (false, None);
+            self.choice = MethodChoice { in_blocks: true, absence: 0, ..self.choice };
+            self.factored = false;
+            self.revision = None;
         }
     }
 }

@@ -21,10 +21,10 @@ mod tangent;
 mod work;
 
 pub use block::BlockSolver;
-pub use convergence::{Convergence, Residual, Verdict, size};
+pub use convergence::{Convergence, Judgement, Residual, Verdict, size};
 pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues};
-pub use linear::LinearSolver;
+pub use linear::{Factorisation, LinearSolver};
 pub use modes::{Matrices, ModeSearch, ModeShape, SmallMotion};
 pub use newton::Newton;
 pub use newton_failure::NewtonFailure;

@@ -9,67 +9,67 @@ use nalgebra::Complex;
 
 /// A rigid motion is linearly dependent on others if orthogonalisation reduces it to this part of
 /// its norm.
-const MADE_OF_OTHERS: f64 = 1e-6;
+const DEPENDENT_RIGID_RATIO: f64 = 1e-6;
 
 /// Largest relative residual of an eigenvector.
-const RESIDUAL: f64 = 1e-5;
+const MAX_RESIDUAL: f64 = 1e-5;
 
 /// Largest relative residual of an eigenvector of a conservative scene, whose frequencies err by
 /// its square only; solutions for slender beams leave more than in general.
-const RESIDUAL_OF_SYMMETRIC: f64 = 1e-3;
+const MAX_RESIDUAL_OF_SYMMETRIC: f64 = 1e-3;
 
 /// Largest relative imbalance of the energies of a mode.
-const BALANCE: f64 = 1e-6;
+const MAX_ENERGY_IMBALANCE: f64 = 1e-6;
 
 /// Damping forces below this part of inertia and stiffness forces are taken for zero.
-const NO_DAMPING: f64 = 1e-14;
+const NEGLIGIBLE_DAMPING_RATIO: f64 = 1e-14;
 
 /// Number of exponents of a rough estimate that are nearly right.
-const NEARLY_RIGHT: usize = 6;
+const ROUGH_EXPONENTS: usize = 6;
 
 /// Relative uncertainty of a frequency by round-off above which it is computed again from strains.
-const UNCERTAIN: f64 = 1e-9;
+const MAX_UNCERTAINTY: f64 = 1e-9;
 
 /// Motions slower than this part of the shift are free motions: their stiffness is round-off, and
 /// energies need not balance.
-const FREE: f64 = 1e-3;
+const FREE_MOTION_RATIO: f64 = 1e-3;
 
 /// Without damping, a motion with growth above this part of |s| has a decaying counterpart.
-const TWIN: f64 = 1e-6;
+const MIN_FLUTTER_RATIO: f64 = 1e-6;
 
 /// K, C and M on the pattern of the tangent.
 pub struct Matrices {
     /// Stiffness K
-    pub stiffness: Vec<f64>,
+    pub(crate) stiffness: Vec<f64>,
     /// Damping C, of dampers and of Coriolis and gyroscopic forces
-    pub damping: Vec<f64>,
+    pub(crate) damping: Vec<f64>,
     /// Mass M
-    pub mass: Vec<f64>,
+    pub(crate) mass: Vec<f64>,
 }
 
 /// A small motion x exp(s t) with its exponent and uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmallMotion {
     /// s = growth + i omega [1/s], omega >= 0
-    pub exponent: Complex<f64>,
+    pub(crate) exponent: Complex<f64>,
     /// Relative error of |s| that round-off in the stiffness may cause
-    pub uncertainty: f64,
+    pub(crate) uncertainty: f64,
     /// Shape of an uncertain motion of an undamped symmetric problem
-    pub shape: Option<ModeShape>,
+    pub(crate) shape: Option<ModeShape>,
 }
 
 /// Shape of a small motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeShape {
     /// Unknowns x by equation
-    pub unknowns: Vec<f64>,
+    pub(crate) unknowns: Vec<f64>,
     /// Modal mass x . M x
-    pub mass: f64,
+    pub(crate) mass: f64,
 }
 
 /// Structure of the eigenvalue problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+enum ProblemForm {
     /// K symmetric, C = 0: s^2 is real.
     Symmetric,
     /// C = 0: if s is an exponent, so is -s.
@@ -80,8 +80,8 @@ enum Form {
     General,
 }
 
-impl Form {
-    /// Exponent s of an eigenvalue theta of the operator, see [`Motions`].
+impl ProblemForm {
+    /// Exponent s of an eigenvalue theta of the operator, see [`ModeOperator`].
     fn exponent(self, shift: f64, theta: Complex<f64>) -> Complex<f64> {
         match self {
             Self::Symmetric | Self::Undamped => root(shift * shift - theta.inv()),
@@ -96,7 +96,7 @@ pub struct ModeSearch<'a> {
     system: &'a mut System,
     solver: &'a mut LinearSolver,
     matrices: &'a Matrices,
-    form: Form,
+    form: ProblemForm,
     /// Orthonormal rigid motions of free parts, and M times each; all vectors are orthogonal to
     /// them
     rigid: Vec<[Vec<f64>; 2]>,
@@ -106,7 +106,7 @@ pub struct ModeSearch<'a> {
     /// Number of negative pivots of K + shift^2 M, for symmetric K
     negative: Option<usize>,
     /// Number of factorisations so far
-    pub factorisations: u64,
+    pub(crate) factorisations: u64,
 }
 
 impl Matrices {
@@ -127,9 +127,11 @@ impl Matrices {
     /// there is none, of the largest stiffness over the largest mass.
     pub fn softest_frequency(&self, system: &System) -> f64 {
         let Self { stiffness, mass, .. } = self;
-        let (mut softest, mut largest) = (f64::INFINITY, [0.0_f64; 2]);
+        let mut softest = f64::INFINITY;
+        let mut largest = [0.0_f64; 2];
         system.pattern.each_diagonal(|_, place| {
-            let (k, m) = (stiffness[place].abs(), mass[place]);
+            let k = stiffness[place].abs();
+            let m = mass[place];
             largest = [largest[0].max(k), largest[1].max(m)];
             if m > 0.0 && k > 0.0 {
                 softest = softest.min(k / m);
@@ -158,13 +160,14 @@ impl<'a> ModeSearch<'a> {
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let [stiffest, heaviest, dampest] =
             [&matrices.stiffness, &matrices.mass, &matrices.damping].map(|values| largest(values));
-        let damped = dampest > NO_DAMPING * (stiffest * heaviest).sqrt();
+        let damped = dampest > NEGLIGIBLE_DAMPING_RATIO * (stiffest * heaviest).sqrt();
         let symmetric = is_symmetric(&system.pattern, &matrices.stiffness);
-        let form = match (symmetric, damped) {
-            (true, false) => Form::Symmetric,
-            (false, false) => Form::Undamped,
-            (true, true) if is_skew(system, &matrices.damping) => Form::Gyroscopic,
-            _ => Form::General,
+        let form = if !damped {
+            if symmetric { ProblemForm::Symmetric } else { ProblemForm::Undamped }
+        } else if symmetric && is_skew(system, &matrices.damping) {
+            ProblemForm::Gyroscopic
+        } else {
+            ProblemForm::General
         };
         let mut search = Self {
             system,
@@ -194,7 +197,7 @@ impl<'a> ModeSearch<'a> {
         }
         let mut weighed = self.system.multiply(&self.matrices.mass, &motion);
         let size = dot(&motion, &weighed).max(0.0).sqrt();
-        if size > MADE_OF_OTHERS * before {
+        if size > DEPENDENT_RIGID_RATIO * before {
             motion.iter_mut().chain(&mut weighed).for_each(|v| *v /= size);
             self.rigid.push([motion, weighed]);
         }
@@ -215,14 +218,14 @@ impl<'a> ModeSearch<'a> {
         }
         self.shift = shift;
         self.factorisations += 1;
-        if matches!(self.form, Form::Gyroscopic | Form::General) {
+        if matches!(self.form, ProblemForm::Gyroscopic | ProblemForm::General) {
             self.matrices.combine_squared(shift * shift, &mut self.system.values);
             self.negative = self.solver.negative_beside(self.system);
         }
         self.matrices.combine(shift, &mut self.system.values);
         self.system.revision += 1;
         let done = self.solver.factorise_surely(self.system);
-        if self.form == Form::Symmetric {
+        if self.form == ProblemForm::Symmetric {
             self.negative = self.count(done);
         }
         self.is_ready = done;
@@ -238,7 +241,7 @@ impl<'a> ModeSearch<'a> {
     /// Number of motions that grow faster than the shift, of symmetric problems; `None` if it is
     /// unknown.
     pub fn growing(&self) -> Option<usize> {
-        self.negative.filter(|_| self.form == Form::Symmetric)
+        self.negative.filter(|_| self.form == ProblemForm::Symmetric)
     }
 
     /// True if K + shift^2 M is positive definite, so that a motion can only grow by damping forces
@@ -252,8 +255,8 @@ impl<'a> ModeSearch<'a> {
     pub fn reaches(&self, motions: &[SmallMotion], other: f64) -> bool {
         let shift = Complex::from(self.shift);
         let distance = |exponent: Complex<f64>| match self.form {
-            Form::Symmetric | Form::Undamped => (exponent * exponent - shift * shift).norm(),
-            Form::Gyroscopic | Form::General => (exponent - shift).norm(),
+            ProblemForm::Symmetric | ProblemForm::Undamped => (exponent * exponent - shift * shift).norm(),
+            ProblemForm::Gyroscopic | ProblemForm::General => (exponent - shift).norm(),
         };
         let reach = motions.iter().map(|motion| distance(motion.exponent)).fold(0.0, f64::max);
         reach >= 2.0 * distance(other.into())
@@ -265,7 +268,7 @@ impl<'a> ModeSearch<'a> {
     pub fn slower(&mut self, omega: f64) -> Option<usize> {
         self.matrices.combine_squared(-omega * omega, &mut self.system.values);
         self.system.revision += 1;
-        if self.form != Form::Symmetric {
+        if self.form != ProblemForm::Symmetric {
             return None;
         }
         self.is_ready = false;
@@ -276,16 +279,18 @@ impl<'a> ModeSearch<'a> {
 
     /// Rough magnitudes |s| of the exponents nearest to the shift; `None` if a solution fails.
     pub fn roughly_nearest(&mut self) -> Option<Vec<f64>> {
-        let (shift, form, diagonal) = (self.shift, self.form, self.inner_product());
-        let values = roughly_largest_eigenvalues(&mut Motions { search: self, diagonal })?;
+        let shift = self.shift;
+        let form = self.form;
+        let diagonal = self.inner_product();
+        let values = roughly_largest_eigenvalues(&mut ModeOperator { search: self, diagonal })?;
         // Only the first few are nearly right.
-        let there = values.into_iter().filter(|theta| theta.norm() > 0.0).take(NEARLY_RIGHT);
+        let there = values.into_iter().filter(|theta| theta.norm() > 0.0).take(ROUGH_EXPONENTS);
         Some(there.map(|theta| form.exponent(shift, theta).norm()).collect())
     }
 
-    /// See [`Motions::diagonal`].
+    /// See [`ModeOperator::diagonal`].
     fn inner_product(&self) -> Vec<f64> {
-        let takes_energies = matches!(self.form, Form::Symmetric | Form::Undamped) || self.is_held();
+        let takes_energies = matches!(self.form, ProblemForm::Symmetric | ProblemForm::Undamped) || self.is_held();
         if takes_energies { Vec::new() } else { self.diagonal() }
     }
 
@@ -293,22 +298,24 @@ impl<'a> ModeSearch<'a> {
     /// verification. `None` if a solution fails.
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
         let room = match self.form {
-            Form::Symmetric | Form::Undamped => wanted,
-            Form::Gyroscopic | Form::General => 2 * wanted + 2,
+            ProblemForm::Symmetric | ProblemForm::Undamped => wanted,
+            ProblemForm::Gyroscopic | ProblemForm::General => 2 * wanted + 2,
         };
-        let (shift, form, diagonal) = (self.shift, self.form, self.inner_product());
-        let mut operator = Motions { search: self, diagonal };
+        let shift = self.shift;
+        let form = self.form;
+        let diagonal = self.inner_product();
+        let mut operator = ModeOperator { search: self, diagonal };
         let spectrum = largest_eigenvalues(&mut operator, room)?;
         let allowed = match form {
-            Form::Symmetric => RESIDUAL_OF_SYMMETRIC,
-            Form::Undamped | Form::Gyroscopic | Form::General => RESIDUAL,
+            ProblemForm::Symmetric => MAX_RESIDUAL_OF_SYMMETRIC,
+            ProblemForm::Undamped | ProblemForm::Gyroscopic | ProblemForm::General => MAX_RESIDUAL,
         };
         let mut found = Vec::new();
         for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| theta.norm() > 0.0) {
             let exponent = form.exponent(shift, theta);
             // One exponent of each conjugate pair is kept.
             let upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
-            let is_twin = form == Form::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
+            let is_twin = form == ProblemForm::Gyroscopic && exponent.im == 0.0 && exponent.re < 0.0;
             if upper && !is_twin && spectrum.residual(&mut operator, number) <= allowed {
                 found.push((number, exponent));
             }
@@ -321,7 +328,7 @@ impl<'a> ModeSearch<'a> {
         for motion in found.into_iter().filter_map(|(number, exponent)| self.check(&spectrum, number, exponent)) {
             let s = motion.exponent;
             // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
-            let twin = form == Form::Undamped && s.re > TWIN * s.norm() && s.im > 0.0;
+            let twin = form == ProblemForm::Undamped && s.re > MIN_FLUTTER_RATIO * s.norm() && s.im > 0.0;
             let twin = twin.then(|| SmallMotion { exponent: -s.conj(), ..motion.clone() });
             motions.push(motion);
             motions.extend(twin);
@@ -347,11 +354,11 @@ impl<'a> ModeSearch<'a> {
         let of_part = if dot(&re, &re) >= dot(&im, &im) { &re } else { &im };
         let uncertainty = lost_part(self.system, of_part);
         let all: f64 = terms.iter().map(|term| term.norm()).sum();
-        let balances = (terms[0] + terms[1] + terms[2]).norm() <= (BALANCE + 10.0 * uncertainty) * all;
-        let is_free = exponent.norm() <= FREE * self.shift;
+        let balances = (terms[0] + terms[1] + terms[2]).norm() <= (MAX_ENERGY_IMBALANCE + 10.0 * uncertainty) * all;
+        let is_free = exponent.norm() <= FREE_MOTION_RATIO * self.shift;
         // s is proportional to the root of K.
         let uncertainty = if is_free { 0.0 } else { 0.5 * uncertainty };
-        let is_asked_for = self.form == Form::Symmetric && uncertainty > UNCERTAIN;
+        let is_asked_for = self.form == ProblemForm::Symmetric && uncertainty > MAX_UNCERTAINTY;
         let shape = is_asked_for.then_some(ModeShape { unknowns: re, mass: mass.re });
         (balances || is_free).then_some(SmallMotion { exponent, uncertainty, shape })
     }
@@ -371,24 +378,25 @@ impl<'a> ModeSearch<'a> {
 ///
 /// ```text
 /// C = 0:     (K + e^2 M)^-1 M x = x/(e^2 - s^2)
-/// general:   with z = (x, s x/e):   A z = z/(s - e),   from   Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
+/// general:   A z = z/(s - e) with z = (x, s x/e), and A (r1, r2) = (x', s x'/e) from
+///            Q(e) x' = -[M r2 e + (C + e M) r1],  s x' = e x' + r1
 /// ```
 ///
 /// Inner products are kinetic energies, in the general case the sum of strain and kinetic energies:
 /// a conservative A is then normal, so that round-off creates no spurious motions.
-struct Motions<'s, 'a> {
+struct ModeOperator<'s, 'a> {
     search: &'s mut ModeSearch<'a>,
     /// Diagonal that replaces K in the inner product if strain energies are indefinite; else empty
     diagonal: Vec<f64>,
 }
 
-impl Motions<'_, '_> {
+impl ModeOperator<'_, '_> {
     fn is_doubled(&self) -> bool {
-        matches!(self.search.form, Form::Gyroscopic | Form::General)
+        matches!(self.search.form, ProblemForm::Gyroscopic | ProblemForm::General)
     }
 }
 
-impl Operator for Motions<'_, '_> {
+impl Operator for ModeOperator<'_, '_> {
     fn size(&self) -> usize {
         let n = self.search.system.pattern.dof_map.count();
         if self.is_doubled() { 2 * n } else { n }
@@ -397,7 +405,8 @@ impl Operator for Motions<'_, '_> {
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>> {
         let doubled = self.is_doubled();
         let ModeSearch { system, solver, matrices, shift: e, .. } = &mut *self.search;
-        let (n, e) = (system.pattern.dof_map.count(), *e);
+        let n = system.pattern.dof_map.count();
+        let e = *e;
         if !doubled {
             let mut out = system.multiply(&matrices.mass, x);
             let done = solver.solve_once(system, &mut out);
@@ -406,7 +415,8 @@ impl Operator for Motions<'_, '_> {
         }
         let (r1, r2) = x.split_at(n);
         let scaled: Vec<f64> = r1.iter().zip(r2).map(|(a, b)| e * a + e * b).collect();
-        let (mass, damping) = (system.multiply(&matrices.mass, &scaled), system.multiply(&matrices.damping, r1));
+        let mass = system.multiply(&matrices.mass, &scaled);
+        let damping = system.multiply(&matrices.damping, r1);
         let mut out: Vec<f64> = mass.iter().zip(&damping).map(|(m, c)| -(m + c)).collect();
         if !solver.solve_once(system, &mut out) {
             return None;
@@ -440,7 +450,7 @@ impl Operator for Motions<'_, '_> {
     }
 
     fn is_symmetric(&self) -> bool {
-        self.search.form == Form::Symmetric
+        self.search.form == ProblemForm::Symmetric
     }
 }
 
@@ -465,7 +475,8 @@ fn is_skew(system: &System, values: &[f64]) -> bool {
     // Tested with pseudo-random vectors: y.C x = -x.C y, and x.C x = 0.
     let sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let size = dot(&y, &system.multiply(&sizes, &x));
-    let (of_x, of_y) = (system.multiply(values, &x), system.multiply(values, &y));
+    let of_x = system.multiply(values, &x);
+    let of_y = system.multiply(values, &y);
     let near = |value: f64| value.abs() <= 1e-12 * size;
     near(dot(&y, &of_x) + dot(&x, &of_y)) && near(dot(&x, &of_x)) && near(dot(&y, &of_y))
 }

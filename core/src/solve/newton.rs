@@ -1,7 +1,7 @@
 //! Newton's iteration for one time step or load level.
 
-use super::convergence::{Convergence, Residual, Verdict, size};
-use super::linear::LinearSolver;
+use super::convergence::{Convergence, Judgement, Residual, Verdict, size};
+use super::linear::{Factorisation, LinearSolver};
 use super::newton_failure::NewtonFailure;
 use super::refinement::Refinement;
 use super::reuse::Reuse;
@@ -22,7 +22,7 @@ use crate::tensor::{Vec3, zeros};
 /// Newton's iteration with its linear solver and buffers, kept between solutions.
 pub struct Newton {
     /// Stop test
-    pub convergence: Convergence,
+    pub(crate) convergence: Convergence,
     /// Largest number of linear solves in a solution
     pub max_iterations: usize,
     /// Linear solver
@@ -33,14 +33,14 @@ pub struct Newton {
     last: Option<f64>,
     /// First correction of the last solution in statics, tangential to the equilibrium path; empty
     /// if there was none
-    pub first: CompressedField<3>,
+    pub(crate) first: CompressedField<3>,
     /// Largest ratio of successive corrections of the last solution, above round-off; small if the
     /// iteration follows the path
-    pub contraction: f64,
+    pub(crate) contraction: f64,
     reuse: Reuse,
     stress_predictor: StressPredictor,
     /// Error estimator of time steps, in adaptive dynamics
-    pub time_error: Option<TimeError>,
+    pub(crate) time_error: Option<TimeError>,
     /// Revision of the tangent if it is that of the start of the next solution, see
     /// [`Newton::begin_with`]
     given: Option<u64>,
@@ -48,11 +48,11 @@ pub struct Newton {
 
 /// Corrections below this size (relative to the length of the scene, or in radians) do not count
 /// for the contraction.
-const NO_CORRECTION: f64 = 1e-6;
+const SMALLEST_COMPARED_CORRECTION: f64 = 1e-6;
 
 /// Corrections above this size (relative to the length of the scene, or in radians) show
 /// divergence.
-const RUNAWAY: f64 = 1e6;
+const DIVERGED_CORRECTION: f64 = 1e6;
 
 impl Newton {
     /// Newton's iteration for a stage with this system.
@@ -167,7 +167,7 @@ struct Solution<'s> {
 
 /// Decision about an iterate.
 #[derive(PartialEq)]
-enum Next {
+enum Decision {
     /// The iterate is the solution.
     Done,
     /// The iterate is to be corrected.
@@ -177,7 +177,8 @@ enum Next {
 impl Solution<'_> {
     fn begin(&mut self) {
         let newton = &mut *self.newton;
-        (newton.last, newton.contraction) = (None, 0.0);
+        newton.last = None;
+        newton.contraction = 0.0;
         newton.first.clear();
         newton.reuse.begin(newton.given.take() == Some(self.assembly.system.revision));
     }
@@ -185,8 +186,8 @@ impl Solution<'_> {
     fn find(&mut self) -> Result<(), NewtonFailure> {
         loop {
             let forms = self.forms_tangent();
-            let (verdict, residual) = self.evaluate(forms);
-            if self.decide(verdict, residual, forms)? == Next::Done {
+            let Judgement { verdict, residual } = self.evaluate(forms);
+            if self.decide(verdict, residual, forms)? == Decision::Done {
                 return Ok(());
             }
             self.choose_tangent(forms);
@@ -204,7 +205,7 @@ impl Solution<'_> {
 
     /// Evaluates the forces of the current iterate, and its tangent if `forms`, and applies the
     /// stop test.
-    fn evaluate(&mut self, forms: bool) -> (Verdict, Residual) {
+    fn evaluate(&mut self, forms: bool) -> Judgement {
         let weights = if forms { self.method.weights() } else { Weights::NONE };
         let Newton { stress_predictor, convergence, reuse, dq, last, .. } = &mut *self.newton;
         if forms {
@@ -212,13 +213,13 @@ impl Solution<'_> {
         }
         let seconds = &mut self.work.evaluation_seconds;
         timed(seconds, || self.assembly.evaluate(self.state, weights, self.prescribed_increment));
-        let (verdict, residual) = convergence.judge(self.model, &self.assembly.system, self.round_off, *last);
-        reuse.look(residual.ratio, verdict == Verdict::Noisy);
-        (verdict, residual)
+        let judgement = convergence.judge(self.model, &self.assembly.system, self.round_off, *last);
+        reuse.look(judgement.residual.ratio, judgement.verdict == Verdict::Noisy);
+        judgement
     }
 
     /// Decides about the iterate. `Err` if no further correction is possible.
-    fn decide(&mut self, verdict: Verdict, residual: Residual, forms: bool) -> Result<Next, NewtonFailure> {
+    fn decide(&mut self, verdict: Verdict, residual: Residual, forms: bool) -> Result<Decision, NewtonFailure> {
         let is_last = self.iterations >= self.newton.max_iterations;
         match verdict {
             Verdict::Converged if self.prescribed_increment.is_none() => {
@@ -226,7 +227,7 @@ impl Solution<'_> {
                     self.polish(forms);
                 }
                 self.end();
-                return Ok(Next::Done);
+                return Ok(Decision::Done);
             }
             // Each correction from a new residual refines the solution, until round-off prevents
             // further progress.
@@ -237,11 +238,11 @@ impl Solution<'_> {
             Verdict::Continue if !is_last => self.refinement = Refinement::default(),
             Verdict::Continue | Verdict::Converged | Verdict::Noisy => {}
         }
-        if is_last { Err(self.not_converged(residual)) } else { Ok(Next::Correct) }
+        if is_last { Err(self.not_converged(residual)) } else { Ok(Decision::Correct) }
     }
 
     /// Decides about an iterate whose residual is round-off, by its last correction.
-    fn refine(&mut self, is_last: bool) -> Next {
+    fn refine(&mut self, is_last: bool) -> Decision {
         let Newton { reuse, dq, last, .. } = &mut *self.newton;
         let refined = self.refinement.look(self.model, dq, last.unwrap_or_default(), size(self.model, &self.state.q));
         if refined.stalls() && !reuse.is_own() && !self.has_formed_anew {
@@ -251,9 +252,9 @@ impl Solution<'_> {
         } else if refined.is_done() || is_last {
             self.work.uncertainty = self.work.uncertainty.max(refined.uncertainty());
             self.end();
-            return Next::Done;
+            return Decision::Done;
         }
-        Next::Correct
+        Decision::Correct
     }
 
     /// Keeps the current tangent, or forms that of the iterate.
@@ -282,7 +283,7 @@ impl Solution<'_> {
         }
         self.iterations += 1;
         let length = size(self.model, &self.newton.dq);
-        if length > RUNAWAY {
+        if length > DIVERGED_CORRECTION {
             // Round-off may look like stiffness where there is none.
             return Err(match self.mechanism() {
                 Some(vector) => NewtonFailure::Singular(Some(vector)),
@@ -306,7 +307,7 @@ impl Solution<'_> {
     /// Adds a correction of size `length` to the state.
     fn correct(&mut self, length: f64) {
         let newton = &mut *self.newton;
-        if let Some(last) = newton.last.filter(|&last| last > NO_CORRECTION) {
+        if let Some(last) = newton.last.filter(|&last| last > SMALLEST_COMPARED_CORRECTION) {
             newton.contraction = newton.contraction.max(length / last);
         }
         let changes_charts = self.method.changes_charts();
@@ -402,9 +403,9 @@ impl Solution<'_> {
         let mut tangent = Tangent::that_may_go(self.assembly, self.state, self.method.weights());
         let Work { solve_seconds, factorisations, .. } = &mut *self.work;
         timed(solve_seconds, || {
-            let (done, new) = solver.factorise_new(&mut tangent);
-            *factorisations += u64::from(new);
-            done && solver.correct(tangent.system(), looks || new, prescribed_increment, dq)
+            let Factorisation { is_done, is_new } = solver.factorise_new(&mut tangent);
+            *factorisations += u64::from(is_new);
+            is_done && solver.correct(tangent.system(), looks || is_new, prescribed_increment, dq)
         })
     }
 

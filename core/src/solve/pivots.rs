@@ -14,7 +14,7 @@ pub(super) struct Pivots {
 
 /// Largest difference of mirrored entries of a symmetric tangent, relative to the roots of the two
 /// diagonal entries in their row and column, so that stiff directions do not hide soft ones.
-const SYMMETRY: f64 = 1e-9;
+const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 impl Pivots {
     /// Factorisation for tangents of the pattern of a system, in the order of elimination of the
@@ -66,12 +66,13 @@ pub fn is_symmetric(pattern: &Pattern, values: &[f64]) -> bool {
         let mut pairs = rows.map(|row| (row, pattern.tile(row, column), pattern.tile(column, row)));
         pairs.all(|(row, tile, mirror)| match (tile, mirror) {
             (Some(tile), Some(mirror)) => (0..width * width).all(|k| {
-                let (c, r) = (k / width, k % width);
+                let c = k / width;
+                let r = k % width;
                 let difference = entry(tile, r, c) - entry(mirror, c, r);
-                difference.abs() <= SYMMETRY * roots[column][c] * roots[row][r]
+                difference.abs() <= SYMMETRY_TOLERANCE * roots[column][c] * roots[row][r]
             }),
             // Every off-diagonal tile has a mirrored one.
-            _ => false,
+            (None, _) | (_, None) => false,
         })
     })
 }

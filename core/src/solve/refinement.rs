@@ -6,7 +6,7 @@ use crate::tensor::Vec3;
 
 /// Size of a correction, relative to that of the unknowns, that ends an iteration with a residual
 /// at round-off.
-const FINE: f64 = 1e-8;
+const FINAL_CORRECTION_RATIO: f64 = 1e-8;
 
 /// Observes successive corrections that refine a solution whose residual is round-off.
 #[derive(Default)]
@@ -26,7 +26,8 @@ pub(super) struct Refinement {
 impl Refinement {
     /// Observes a correction `dq` of this size, for unknowns of size `unknowns`.
     pub fn look(&mut self, model: &Model, dq: &[Vec3], size: f64, unknowns: f64) -> &Self {
-        let (now, before) = (|slot: usize| dq[slot], |slot: usize| Vec3(self.before.get(slot)));
+        let now = |slot: usize| dq[slot];
+        let before = |slot: usize| Vec3(self.before.get(slot));
         let count = self.before.len();
         let [along, own, others] = [
             model.inner_product(count, now, before),
@@ -36,20 +37,21 @@ impl Refinement {
         let cosine = along / (own * others).sqrt();
         self.aligned = cosine > 0.5;
         self.ratio = if self.before.is_empty() { 0.0 } else { size / self.size };
-        (self.size, self.last) = (size, size / unknowns);
+        self.size = size;
+        self.last = size / unknowns;
         self.before.take(if self.last.is_finite() { dq.len() } else { 0 }, |slot| dq[slot].0);
         self
     }
 
     /// True if corrections are small enough, or do not decrease any more.
     pub fn is_done(&self) -> bool {
-        self.last <= FINE || self.stalls()
+        self.last <= FINAL_CORRECTION_RATIO || self.stalls()
     }
 
     /// True if corrections are not small enough and do not decrease any more.
     pub fn stalls(&self) -> bool {
         let most = if self.aligned { 0.9 } else { 0.5 };
-        self.last > FINE && self.last.is_finite() && self.ratio > most
+        self.last > FINAL_CORRECTION_RATIO && self.last.is_finite() && self.ratio > most
     }
 
     /// Sum of the remaining corrections relative to the unknowns: a geometric series with factor

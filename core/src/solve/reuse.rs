@@ -10,14 +10,14 @@
 
 /// Expected residual, relative to its tolerance, below which the next iterate is expected to
 /// converge.
-const EXPECTED: f64 = 0.1;
+const EXPECTED_RESIDUAL_RATIO: f64 = 0.1;
 
 /// Ratio of the reductions of the residual by the second and by the first correction with one
 /// tangent: twice the value of theory.
-const SAME: f64 = 4.0;
+const KEPT_TANGENT_FACTOR: f64 = 4.0;
 
 /// Number of corrections with an old tangent that cost less than one with a new tangent
-const CHEAP: i32 = 2;
+const CHEAP_CORRECTIONS: i32 = 2;
 
 /// Observes successive solutions and decides about their tangents.
 #[derive(Debug)]
@@ -46,8 +46,11 @@ impl Reuse {
     /// Begins a solution; `kept` if the tangent is, except for loads, that of its first iterate.
     pub fn begin(&mut self, kept: bool) {
         self.history.clear();
-        (self.kept, self.own, self.needed) = (kept, false, 0);
-        (self.noisy, self.fine) = (false, false);
+        self.kept = kept;
+        self.own = false;
+        self.needed = 0;
+        self.noisy = false;
+        self.fine = false;
     }
 
     /// Records the residual of the current iterate, relative to its tolerance; `noisy` if it is
@@ -94,7 +97,7 @@ impl Reuse {
 
     /// True if the current tangent is expected to lead to equilibrium soon enough.
     fn brings_balance(&self) -> bool {
-        self.kept && (self.begins() || self.will_do(CHEAP))
+        self.kept && (self.begins() || self.will_do(CHEAP_CORRECTIONS))
     }
 
     /// True at the first iterate, whose tangent may have been given.
@@ -106,7 +109,8 @@ impl Reuse {
     /// converged; `leaps` if the next correction includes prescribed increments.
     pub fn form(&mut self, leaps: bool) {
         self.needed += usize::from(!self.brings_balance());
-        (self.kept, self.own) = (true, true);
+        self.kept = true;
+        self.own = true;
         self.fine = self.noisy && !leaps;
     }
 
@@ -130,8 +134,8 @@ impl Reuse {
     /// expected to converge.
     fn will_do(&self, corrections: i32) -> bool {
         let [.., before, last] = self.history[..] else { return false };
-        let factor = if self.own && corrections > 1 { SAME * last / before } else { last / before };
-        last * factor.powi(corrections) < EXPECTED
+        let factor = if self.own && corrections > 1 { KEPT_TANGENT_FACTOR * last / before } else { last / before };
+        last * factor.powi(corrections) < EXPECTED_RESIDUAL_RATIO
     }
 }
 
@@ -142,7 +146,8 @@ mod tests {
     /// Number of tangents formed in a solution with these residuals, and number of superfluous
     /// evaluations.
     fn solve(reuse: &mut Reuse, residuals: &[f64]) -> (usize, usize) {
-        let (mut formed, mut twice) = (0, 0);
+        let mut formed = 0;
+        let mut twice = 0;
         reuse.begin(false);
         for &residual in residuals {
             let forms = reuse.expects_tangent();

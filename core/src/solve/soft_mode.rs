@@ -9,7 +9,7 @@ use crate::model::Model;
 /// The softest motion of a tangent, with its strain.
 pub struct SoftMode {
     /// The motion
-    pub vector: NullVector,
+    pub(crate) vector: NullVector,
     /// True if the motion causes strain
     strains: bool,
     /// True if the motion moves nodes most, not the multiplier of a joint
@@ -19,7 +19,7 @@ pub struct SoftMode {
 /// Strain relative to the size of a motion, below which it is a rigid motion. Motions with
 /// stiffness strain by about their own size; round-off in motions without any causes less than
 /// this, up to condition numbers of 1e13.
-const NO_STRAIN: f64 = 1e-3;
+const RIGID_STRAIN_RATIO: f64 = 1e-3;
 
 impl SoftMode {
     /// Finds the softest motion of a tangent. A tangent that stays must be the one that `solver`
@@ -28,7 +28,8 @@ impl SoftMode {
     /// `None` if there are no equations or the iteration fails.
     pub fn find(solver: &mut LinearSolver, tangent: &mut Tangent, model: &Model, stress: bool) -> Option<Self> {
         let vector = solver.softest(tangent)?;
-        let (assembly, state) = (tangent.assembly(), tangent.state());
+        let assembly = tangent.assembly();
+        let state = tangent.state();
         if vector.held && !stress {
             return Some(Self { vector, strains: true, moves: true });
         }
@@ -37,7 +38,7 @@ impl SoftMode {
         // strain.
         let moves = !model.kinds[largest].is_multiplier();
         let size = if moves { size(model, &motion) } else { 0.0 };
-        let strains = size > 0.0 && assembly.strain_of(state, &motion, model.length) > NO_STRAIN * size;
+        let strains = size > 0.0 && assembly.strain_of(state, &motion, model.length) > RIGID_STRAIN_RATIO * size;
         Some(Self { vector, strains, moves })
     }
 

@@ -13,13 +13,13 @@ use std::ops::Range;
 #[derive(Clone, Debug, PartialEq)]
 pub struct NullVector {
     /// Motion by equation, scaled by the roots of the diagonal so that entries of all units compare
-    pub entries: Vec<f64>,
+    pub(crate) entries: Vec<f64>,
     /// Motion by equation, in units of the unknowns
-    pub motion: Vec<f64>,
+    pub(crate) motion: Vec<f64>,
     /// True if the tangent has stiffness against the motion
-    pub held: bool,
+    pub(crate) held: bool,
     /// True if no factorisation of the tangent has succeeded
-    pub broke_down: bool,
+    pub(crate) broke_down: bool,
 }
 
 impl NullVector {
@@ -44,13 +44,13 @@ impl NullVector {
 
 /// Ratio of x.Jx to its round-off, eps sqrt(sum (x_i J_ij x_j)^2), below which a direction has no
 /// stiffness.
-const NO_STIFFNESS: f64 = 8.0;
+const MIN_STIFFNESS_RATIO: f64 = 8.0;
 
 /// Number of decimal digits of the softest stiffness that a block factorisation must leave.
-const FEW_DIGITS: f64 = 4.0;
+const MIN_STIFFNESS_DIGITS: f64 = 4.0;
 
 /// Sum of multiplier forces, relative to the sum of their magnitudes, below which they cancel.
-const SAID_TWICE: f64 = 1e-10;
+const CANCELLATION_RATIO: f64 = 1e-10;
 
 impl LinearSolver {
     /// Direction in which the tangent has no stiffness, if there is one.
@@ -69,7 +69,7 @@ impl LinearSolver {
         let diagonal = diagonal(system);
         let empty = empty_column(system, &diagonal);
         let scale = scales(system, diagonal);
-        let broke_down = !(if tangent.stays() { self.factored } else { self.factorise_new(tangent).0 });
+        let broke_down = !(if tangent.stays() { self.factored } else { self.factorise_new(tangent).is_done });
         if let Some(empty) = empty {
             let mut entries = vec![0.0; tangent.system().pattern.dof_map.count()];
             entries[empty] = 1.0;
@@ -92,7 +92,7 @@ impl LinearSolver {
             part.iter_mut().zip(&x[start..]).for_each(|(scale, x)| *scale = x / *scale)
         });
         let system = tangent.look();
-        let held = stiffness_of(system, &motion) > NO_STIFFNESS && !self.is_said_twice(system, &x, &motion);
+        let held = stiffness_of(system, &motion) > MIN_STIFFNESS_RATIO && !self.is_redundant(system, &x, &motion);
         Some(NullVector { entries: x, motion, held, broke_down: false })
     }
 
@@ -106,7 +106,7 @@ impl LinearSolver {
         // The factorisation may be that of the iterate before; either solution may change the
         // method itself.
         let softest = self.softest(tangent).filter(|vector| !vector.broke_down);
-        let is_doubtful = softest.is_some_and(|vector| vector.digits(tangent.look()) < FEW_DIGITS);
+        let is_doubtful = softest.is_some_and(|vector| vector.digits(tangent.look()) < MIN_STIFFNESS_DIGITS);
         if is_doubtful && self.is_in_blocks() {
             self.factored = self.leave_blocks(tangent.look());
         }
@@ -114,10 +114,10 @@ impl LinearSolver {
 
     /// True if the largest scaled components are multipliers whose forces cancel, which belong to
     /// redundant constraints. Their values are round-off and have no stiffness.
-    fn is_said_twice(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
+    fn is_redundant(&self, system: &System, entries: &[f64], motion: &[f64]) -> bool {
         let Some(constraints) = self.constraints() else { return false };
         let mut multipliers = vec![0.0; motion.len()];
-        constraints.dof_map().for_each(|k| multipliers[k] = motion[k]);
+        constraints.equations().for_each(|k| multipliers[k] = motion[k]);
         let largest = |of_multipliers: bool| {
             let kind = entries.iter().zip(&multipliers).filter(|(_, m)| (**m != 0.0) == of_multipliers);
             kind.fold(0.0_f64, |largest, (entry, _)| largest.max(entry.abs()))
@@ -127,8 +127,9 @@ impl LinearSolver {
         }
         let sizes: Vec<f64> = system.values.iter().map(|v| v.abs()).collect();
         let all: Vec<f64> = multipliers.iter().map(|v| v.abs()).collect();
-        let (left, all) = (system.multiply(&system.values, &multipliers), system.multiply(&sizes, &all));
-        left.iter().zip(&all).all(|(left, all)| left.abs() <= SAID_TWICE * all)
+        let left = system.multiply(&system.values, &multipliers);
+        let all = system.multiply(&sizes, &all);
+        left.iter().zip(&all).all(|(left, all)| left.abs() <= CANCELLATION_RATIO * all)
     }
 
     /// Direction of least stiffness after a failed factorisation, of a tangent with a slightly
@@ -156,7 +157,8 @@ impl LinearSolver {
 fn diagonal(system: &System) -> Vec<f64> {
     let mut diagonal = vec![0.0; system.pattern.dof_map.count()];
     system.pattern.each_region(&mut diagonal, |region, own| {
-        let (node_blocks, first) = (region.node_blocks.clone(), region.dof_map.start);
+        let node_blocks = region.node_blocks.clone();
+        let first = region.equations.start;
         system.pattern.each_diagonal_of(node_blocks, |equation, place| own[equation - first] = system.values[place]);
     });
     diagonal
@@ -195,8 +197,8 @@ fn empty_column(system: &System, diagonal: &[f64]) -> Option<usize> {
 }
 
 /// Ratio of |x.Jx| to the round-off of its terms, eps sqrt(sum (x_i J_ij x_j)^2). The sum itself is
-/// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are not
-/// taken for mechanisms.
+/// compensated, so that fine meshes of slender beams, whose softest motions are nearly free, are
+/// not taken for mechanisms.
 fn stiffness_of(system: &System, x: &[f64]) -> f64 {
     if system.pattern.width() == WIDTH { stiffness_in::<WIDTH>(system, x) } else { stiffness_in::<3>(system, x) }
 }
@@ -207,7 +209,8 @@ pub(super) fn lost_part(system: &System, x: &[f64]) -> f64 {
 }
 
 fn stiffness_in<const W: usize>(system: &System, x: &[f64]) -> f64 {
-    let (mut whole, mut squares) = (Compensated::default(), 0.0);
+    let mut whole = Compensated::default();
+    let mut squares = 0.0;
     let add = |(sums, part): ([Compensated; W], [f64; W])| {
         sums.iter().flat_map(|sum| [sum.sum, sum.lost]).for_each(|term| whole.add(term));
         squares += part.iter().sum::<f64>();
@@ -224,7 +227,8 @@ fn stiffness_of_columns<const W: usize>(
     x: &[f64],
     columns: Range<usize>,
 ) -> ([Compensated; W], [f64; W]) {
-    let (mut sums, mut squares) = ([Compensated::default(); W], [0.0; W]);
+    let mut sums = [Compensated::default(); W];
+    let mut squares = [0.0; W];
     let pattern = &system.pattern;
     Instructions::here().run(
         #[inline(always)]
@@ -232,7 +236,8 @@ fn stiffness_of_columns<const W: usize>(
             system.each_tile::<W>(columns, |row, column, tile| {
                 // Tiles that are not stored count as well.
                 let times = if pattern.symmetry.halves() && row != column { 2.0 } else { 1.0 };
-                let (of_row, of_column) = (pattern.part::<W>(row, x), pattern.part::<W>(column, x));
+                let of_row = pattern.part::<W>(row, x);
+                let of_column = pattern.part::<W>(column, x);
                 for (line, x) in tile.iter().zip(of_column) {
                     for r in 0..W {
                         let term = of_row[r] * line[r] * x;

@@ -7,7 +7,7 @@ use super::node_blocks::NodeBlocks;
 use super::pattern::{Pattern, ScatterMap, TILE, WIDTH};
 use super::plane::Plane;
 use super::state::Slot;
-use super::values::{BlockMut, Values};
+use super::values::{BlockMut, TileValues};
 use crate::kernel::{ElementSystem, PlanarSystem};
 use crate::scalar::{LANES, Lanes, each_lane};
 use crate::tensor::{Mat3, Vec3};
@@ -15,7 +15,7 @@ use std::ops::Range;
 
 /// A slice of the system that one thread writes to: the slots, equations and tiles of one region,
 /// or all of them.
-pub struct Part<'a> {
+pub struct SystemSlice<'a> {
     pub(super) pattern: &'a Pattern,
     /// Indices ([`Category`] as a number) of the force categories that some effect adds to in this
     /// slice
@@ -25,16 +25,16 @@ pub struct Part<'a> {
     /// Nodal forces of the slots of this slice, one list per category (global components)
     pub(super) force: [&'a mut [Vec3]; 4],
     /// Tangent values of the tiles of this slice
-    pub(super) values: Values<'a>,
+    pub(super) values: TileValues<'a>,
     /// Prescribed increments of all slots of the scene (global components); `None` if nothing is
     /// prescribed
     pub(super) prescribed_increment: Option<&'a [Vec3]>,
     /// Tangent times prescribed increments, one number per equation of this slice
-    pub(super) lifted: &'a mut [f64],
-    pub(super) room: &'a mut Vec<ElementSystem<Lanes>>,
+    pub(super) prescribed_forces: &'a mut [f64],
+    pub(super) buffers: &'a mut Vec<ElementSystem<Lanes>>,
 }
 
-impl<'a> Part<'a> {
+impl<'a> SystemSlice<'a> {
     /// Sets the forces of the acting categories to zero, and the tangent if it is going to be
     /// formed.
     pub fn clear(&mut self, with_tangent: bool) {
@@ -47,43 +47,45 @@ impl<'a> Part<'a> {
     /// Ranges of the instances of effect number `effect` that lie in this region; for the whole
     /// system, of the instances that lie in no single region.
     pub fn instances(&self, effect: usize) -> &'a [Range<usize>] {
-        self.pattern.places[effect].shares.of(self.region)
+        self.pattern.places[effect].ranges.of(self.region)
     }
 
     /// Assembler of the given instances of effect number `effect`, which borrows this slice.
-    pub fn sink(
+    pub fn assembler(
         &mut self,
         effect: usize,
         category: Category,
         with_tangent: bool,
         instances: Range<usize>,
     ) -> Assembler<'_> {
-        let Part { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
+        let SystemSlice { pattern, acting, region, force, values, prescribed_increment, prescribed_forces, buffers } =
+            self;
         let force = force.each_mut().map(|force| &mut force[..]);
         let values = values.reborrow();
-        let part = Part {
+        let part = SystemSlice {
             pattern,
             acting,
             region: *region,
             force,
             values,
             prescribed_increment: *prescribed_increment,
-            lifted,
-            room,
+            prescribed_forces,
+            buffers,
         };
-        part.into_sink(effect, category, with_tangent, instances)
+        part.into_assembler(effect, category, with_tangent, instances)
     }
 
     /// Assembler of the given instances of effect number `effect`, which takes over the borrows of
     /// this slice.
-    pub(super) fn into_sink(
+    pub(super) fn into_assembler(
         self,
         effect: usize,
         category: Category,
         with_tangent: bool,
         instances: Range<usize>,
     ) -> Assembler<'a> {
-        let Part { pattern, acting, region, force, values, prescribed_increment, lifted, room } = self;
+        let SystemSlice { pattern, acting, region, force, values, prescribed_increment, prescribed_forces, buffers } =
+            self;
         debug_assert!(acting.contains(&(category as usize)), "forces of a category that nothing clears");
         let start = region.map(|region| &pattern.regions[region]);
         let [internal, inertia, external, damping] = force;
@@ -98,13 +100,13 @@ impl<'a> Part<'a> {
             pattern,
             instances,
             first_slot: start.map_or(0, |region| region.slots.start),
-            first_equation: start.map_or(0, |region| region.dof_map.start),
+            first_equation: start.map_or(0, |region| region.equations.start),
             force,
             damping,
             values,
             prescribed_increment,
-            lifted,
-            room,
+            prescribed_forces,
+            buffers,
             with_tangent,
             may_damp: acting.contains(&(Category::Damping as usize)),
         }
@@ -121,7 +123,7 @@ fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
                 *sums = (Lanes(*sums) + Lanes(each_lane!(|k| lanes[k].0[lane]))).0;
             }
         }
-        _ => place.add_tile::<WIDTH>(|entry| tile[entry].0[lane]),
+        BlockMut::Upper(..) | BlockMut::Nowhere => place.add_tile::<WIDTH>(|entry| tile[entry].0[lane]),
     }
 }
 
@@ -129,7 +131,16 @@ fn add_lane(mut place: BlockMut, tile: &[Lanes; TILE], lane: usize) {
 /// instance.
 #[inline(always)]
 fn corner(node_blocks: &NodeBlocks, slots: &[Slot], pair: [usize; 2]) -> [usize; 2] {
-    pair.map(|number| node_blocks.row(slots[number]).1)
+    pair.map(|number| node_blocks.row(slots[number]).row)
+}
+
+/// An unknown of a planar element.
+struct PlanarUnknown {
+    /// Number of its slot in the instance
+    number: usize,
+    slot: Slot,
+    /// Equation, or [`DofMap::HELD`]
+    equation: u32,
 }
 
 /// Access for an effect to add the forces and tangents of its instances.
@@ -144,10 +155,10 @@ pub struct Assembler<'a> {
     force: &'a mut [Vec3],
     /// Nodal damping forces; `None` if the category of the effect is damping itself
     damping: Option<&'a mut [Vec3]>,
-    values: Values<'a>,
+    values: TileValues<'a>,
     prescribed_increment: Option<&'a [Vec3]>,
-    lifted: &'a mut [f64],
-    room: &'a mut Vec<ElementSystem<Lanes>>,
+    prescribed_forces: &'a mut [f64],
+    buffers: &'a mut Vec<ElementSystem<Lanes>>,
     with_tangent: bool,
     /// True if damping is among the acting categories, so that its forces have been cleared.
     may_damp: bool,
@@ -163,10 +174,10 @@ impl Assembler<'_> {
     /// Lends a buffer of `blocks` blocks for element forces and tangents. Its forces are those of
     /// the last user. A tangent is zero unless the effect forms it (`forms_tangent`) by assignment.
     pub fn lend(&mut self, blocks: usize, forms_tangent: bool) -> ElementSystem<Lanes> {
-        let Some(fits) = self.room.iter().position(|system| system.blocks() == blocks) else {
+        let Some(fits) = self.buffers.iter().position(|system| system.blocks() == blocks) else {
             return ElementSystem::new(blocks);
         };
-        let mut system = self.room.swap_remove(fits);
+        let mut system = self.buffers.swap_remove(fits);
         if self.with_tangent && !forms_tangent {
             system.clear();
         }
@@ -175,21 +186,25 @@ impl Assembler<'_> {
 
     /// Takes a lent buffer back for the next evaluation.
     pub fn take_back(&mut self, system: ElementSystem<Lanes>) {
-        self.room.push(system);
+        self.buffers.push(system);
     }
 
     /// Adds forces and tangent of instance `k`; the blocks of `element` are in the order of the
     /// slots of the instance.
     #[inline]
     pub fn add(&mut self, k: usize, element: &ElementSystem) {
-        let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        let forces = &mut *self.force;
+        let first_slot = self.first_slot;
         for (force, &slot) in element.forces().iter().zip(self.places.connectivity.get(k)) {
             forces[slot as usize - first_slot] += Vec3(*force);
         }
-        match () {
-            () if !self.with_tangent => {}
-            () if self.is_constrained(k) => self.add_constrained(k, element.tiles(), |value| *value),
-            () => self.add_tangent(k, element),
+        if !self.with_tangent {
+            return;
+        }
+        if self.is_constrained(k) {
+            self.add_constrained(k, element.tiles(), |value| *value);
+        } else {
+            self.add_tangent(k, element);
         }
     }
 
@@ -229,7 +244,8 @@ impl Assembler<'_> {
 
     #[inline(always)]
     fn add_forces(&mut self, k: usize, elements: &ElementSystem<Lanes>, lane: usize) {
-        let (forces, first_slot) = (&mut *self.force, self.first_slot);
+        let forces = &mut *self.force;
+        let first_slot = self.first_slot;
         for (force, &slot) in elements.forces().iter().zip(self.places.connectivity.get(k)) {
             forces[slot as usize - first_slot] += Vec3([force[0].0[lane], force[1].0[lane], force[2].0[lane]]);
         }
@@ -242,14 +258,14 @@ impl Assembler<'_> {
         for lane in lanes.clone() {
             self.add_forces(first + lane, elements, lane);
         }
-        match () {
-            () if !self.with_tangent => {}
-            () if self.places.whole => self.add_whole(first, lanes, elements),
-            () => {
-                for lane in lanes {
-                    self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
-                }
-            }
+        if !self.with_tangent {
+            return;
+        }
+        if self.places.whole {
+            return self.add_whole(first, lanes, elements);
+        }
+        for lane in lanes {
+            self.add_blocks(first + lane, elements.blocks(), elements.tiles(), |lanes| lanes.0[lane]);
         }
     }
 
@@ -284,7 +300,8 @@ impl Assembler<'_> {
                 alone(lane, self);
                 continue;
             }
-            let (all, first_slot) = (&mut *self.force, self.first_slot);
+            let all = &mut *self.force;
+            let first_slot = self.first_slot;
             for (force, &slot) in forces.as_flattened().iter().zip(self.places.connectivity.get(first + lane)) {
                 all[slot as usize - first_slot] += Vec3(force.0.map(|component| component.0[lane]));
             }
@@ -305,15 +322,20 @@ impl Assembler<'_> {
     /// (N x N): `forces` in global components, and `weight` times the matrix to the tangent.
     #[inline(always)]
     pub fn add_mass<const N: usize>(&mut self, k: usize, forces: &[Vec3; N], mass: &[[f64; N]; N], weight: f64) {
-        let (all, first_slot) = (&mut *self.force, self.first_slot);
+        let all = &mut *self.force;
+        let first_slot = self.first_slot;
         for (force, &slot) in forces.iter().zip(self.places.connectivity.get(k)) {
             all[slot as usize - first_slot] += *force;
         }
-        match self.pattern.dof_map.plane() {
-            _ if !self.with_tangent || weight == 0.0 => {}
-            _ if self.places.special[k] => self.add_constrained_mass(k, N, mass.as_flattened(), weight),
-            None => self.add_free_mass::<N, WIDTH, 3>(k, mass, weight),
-            Some(_) => self.add_free_mass::<N, 3, 2>(k, mass, weight),
+        if !self.with_tangent || weight == 0.0 {
+            return;
+        }
+        if self.places.special[k] {
+            self.add_constrained_mass(k, N, mass.as_flattened(), weight);
+        } else if self.pattern.dof_map.plane().is_none() {
+            self.add_free_mass::<N, WIDTH, 3>(k, mass, weight);
+        } else {
+            self.add_free_mass::<N, 3, 2>(k, mass, weight);
         }
     }
 
@@ -326,7 +348,8 @@ impl Assembler<'_> {
         mass: &[[f64; N]; N],
         weight: f64,
     ) {
-        let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
+        let slots = self.places.connectivity.get(k);
+        let node_blocks = &self.pattern.node_blocks;
         for (number, (entry, &place)) in mass.as_flattened().iter().zip(self.places.of(k)).enumerate() {
             let corner = || corner(node_blocks, slots, [number / N, number % N]);
             self.values.block(place, corner).add_along_diagonal::<W, DIRECTIONS>(entry * weight);
@@ -342,8 +365,10 @@ impl Assembler<'_> {
         let (width, directions) = self.pattern.dof_map.plane().map_or((WIDTH, 3), |_| (3, 2));
         let frame = |slot: Slot| self.pattern.dof_map.frame(slot).unwrap_or(Mat3::IDENTITY);
         for (number, entry) in mass.iter().enumerate() {
-            let (i, j) = (slots[number / nodes], slots[number % nodes]);
-            let (rows, columns) = (self.pattern.dof_map.of(i), self.pattern.dof_map.of(j));
+            let i = slots[number / nodes];
+            let j = slots[number % nodes];
+            let rows = self.pattern.dof_map.of(i);
+            let columns = self.pattern.dof_map.of(j);
             let cosines = frame(i).transpose_matmul(frame(j));
             let prescribed_increment = self
                 .prescribed_increment
@@ -354,7 +379,8 @@ impl Assembler<'_> {
                     match (columns[c], prescribed_increment) {
                         (DofMap::HELD, None) => {}
                         (DofMap::HELD, Some(prescribed_increment)) => {
-                            self.lifted[rows[r] as usize - self.first_equation] += value * prescribed_increment.0[c];
+                            self.prescribed_forces[rows[r] as usize - self.first_equation] +=
+                                value * prescribed_increment.0[c];
                         }
                         _ => self.block(k, number / nodes, number % nodes).add(width, r, c, value),
                     }
@@ -373,27 +399,32 @@ impl Assembler<'_> {
     /// directions or shared displacements. Columns of held directions multiply the prescribed
     /// increments.
     fn add_planar_entries<const N: usize>(&mut self, k: usize, elements: &PlanarSystem<N, Lanes>, lane: usize) {
-        let (slots, places) = (self.places.connectivity.get(k), self.places.of(k));
+        let slots = self.places.connectivity.get(k);
+        let places = self.places.of(k);
         let unknown = |node: usize, direction: usize| {
-            let (number, slot) = (2 * node + direction / 2, slots[2 * node + direction / 2]);
-            (number, slot, self.pattern.dof_map.of(slot)[direction])
+            let number = 2 * node + direction / 2;
+            let slot = slots[number];
+            PlanarUnknown { number, slot, equation: self.pattern.dof_map.of(slot)[direction] }
         };
         for (i, tiles) in elements.tangent.iter().enumerate() {
             for (j, tile) in tiles.iter().enumerate() {
                 for (entry, value) in tile.iter().enumerate() {
-                    let ((row, _, to), (column, slot, from)) = (unknown(i, entry % 3), unknown(j, entry / 3));
-                    if to == DofMap::HELD {
+                    let row = unknown(i, entry % 3);
+                    let column = unknown(j, entry / 3);
+                    if row.equation == DofMap::HELD {
                         continue;
                     }
-                    if from == DofMap::HELD {
+                    if column.equation == DofMap::HELD {
                         if let Some(prescribed_increment) = self.prescribed_increment {
-                            let increment =
-                                self.pattern.dof_map.to_local(slot, prescribed_increment[slot as usize]).0[entry / 3];
-                            self.lifted[to as usize - self.first_equation] += value.0[lane] * increment;
+                            let of_slot = prescribed_increment[column.slot as usize];
+                            let increment = self.pattern.dof_map.to_local(column.slot, of_slot).0[entry / 3];
+                            self.prescribed_forces[row.equation as usize - self.first_equation] +=
+                                value.0[lane] * increment;
                         }
                         continue;
                     }
-                    let place = if self.places.whole { places[N * i + j] } else { places[2 * N * row + column] };
+                    let place =
+                        if self.places.whole { places[N * i + j] } else { places[2 * N * row.number + column.number] };
                     self.values.tile(place).add(3, entry % 3, entry / 3, value.0[lane]);
                 }
             }
@@ -415,10 +446,12 @@ impl Assembler<'_> {
     /// the instance from a tile entry.
     #[inline(always)]
     fn add_constrained<T>(&mut self, k: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let (slots, width) = (self.places.connectivity.get(k), self.pattern.node_blocks.width());
+        let slots = self.places.connectivity.get(k);
+        let width = self.pattern.node_blocks.width();
         let across = slots.len().div_ceil(2);
         for (column, &j) in slots.iter().enumerate() {
-            let (columns, turn) = (self.pattern.dof_map.of(j), self.pattern.dof_map.frame(j));
+            let columns = self.pattern.dof_map.of(j);
+            let turn = self.pattern.dof_map.frame(j);
             let prescribed_increment = self
                 .prescribed_increment
                 .map(|prescribed_increment| self.pattern.dof_map.to_local(j, prescribed_increment[j as usize]));
@@ -442,7 +475,7 @@ impl Assembler<'_> {
                         match (columns[c], prescribed_increment) {
                             (DofMap::HELD, None) => {}
                             (DofMap::HELD, Some(prescribed_increment)) => {
-                                self.lifted[rows[r] as usize - self.first_equation] +=
+                                self.prescribed_forces[rows[r] as usize - self.first_equation] +=
                                     block.0[r][c] * prescribed_increment.0[c];
                             }
                             _ => self.block(k, row, column).add(width, r, c, block.0[r][c]),
@@ -457,8 +490,9 @@ impl Assembler<'_> {
     /// `k`.
     #[inline(always)]
     fn block(&mut self, k: usize, row: usize, column: usize) -> BlockMut<'_> {
-        let (places, slots, node_blocks) =
-            (self.places.of(k), self.places.connectivity.get(k), &self.pattern.node_blocks);
+        let places = self.places.of(k);
+        let slots = self.places.connectivity.get(k);
+        let node_blocks = &self.pattern.node_blocks;
         let corner = || corner(node_blocks, slots, [row, column]);
         match self.places.whole {
             false => self.values.block(places[row * slots.len() + column], corner),
@@ -473,9 +507,11 @@ impl Assembler<'_> {
     /// number of the instance from a tile entry.
     #[inline(always)]
     fn add_blocks<T>(&mut self, k: usize, blocks: usize, tiles: &[[T; TILE]], pick: impl Fn(&T) -> f64) {
-        let (slots, node_blocks) = (self.places.connectivity.get(k), &self.pattern.node_blocks);
+        let slots = self.places.connectivity.get(k);
+        let node_blocks = &self.pattern.node_blocks;
         for (number, &place) in self.places.of(k).iter().enumerate() {
-            let (row, column) = (number / blocks, number % blocks);
+            let row = number / blocks;
+            let column = number % blocks;
             let tile = &tiles[row / 2 * blocks.div_ceil(2) + column / 2];
             let block = &tile[column % 2 * 3 * WIDTH + row % 2 * 3..][..2 * WIDTH + 3];
             let corner = || corner(node_blocks, slots, [row, column]);

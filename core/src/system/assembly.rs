@@ -1,13 +1,13 @@
 //! Forces and tangent of the whole scene.
 
-use super::assembler::{Assembler, Part};
+use super::assembler::{Assembler, SystemSlice};
 use super::category::Category;
-use super::pattern::{Pattern, Symmetry, WIDTH};
+use super::pattern::{CouplingTile, Pattern, Symmetry, WIDTH};
 use super::regions::{self, Region};
 use super::state::Slot;
 use super::storage::{Tiles, as_tiles};
 use super::tile::{Tile, transposed};
-use super::values::Values;
+use super::values::TileValues;
 use crate::kernel::ElementSystem;
 use crate::scalar::{Instructions, Lanes};
 use crate::tensor::{Mat3, Vec3, zeros};
@@ -16,11 +16,11 @@ use std::ops::Range;
 
 /// Buffer for residuals of linear solves, kept between solves to save its allocation.
 #[derive(Default)]
-pub struct Leftover {
+pub struct ResidualBuffer {
     residuals: Vec<f64>,
 }
 
-impl Leftover {
+impl ResidualBuffer {
     /// Slices of the buffer by node block: the residual of each tile row, and the size it is
     /// compared with.
     fn take<const W: usize>(&mut self, pattern: &Pattern) -> &mut [[[f64; W]; 2]] {
@@ -86,13 +86,13 @@ pub struct System {
     /// True if factors have overwritten the diagonal tiles.
     holds_factors: bool,
     /// Prescribed increments of held directions, by slot (global components). The tangent times
-    /// these is summed in `lifted`, by equation.
+    /// these is summed in `prescribed_forces`, by equation.
     prescribed_increment: Vec<Vec3>,
-    lifts: bool,
-    lifted: Vec<f64>,
+    is_prescribed: bool,
+    prescribed_forces: Vec<f64>,
     /// Buffers for element forces and tangents, kept between evaluations: of the whole scene, then
     /// of each region
-    rooms: Vec<Vec<ElementSystem<Lanes>>>,
+    buffers: Vec<Vec<ElementSystem<Lanes>>>,
 }
 
 impl System {
@@ -108,7 +108,7 @@ impl System {
         };
         let values = pattern.values();
         Self {
-            rooms: vec![Vec::new(); 1 + pattern.regions.len()],
+            buffers: vec![Vec::new(); 1 + pattern.regions.len()],
             pattern,
             force: Category::ALL.map(force),
             acting,
@@ -117,8 +117,8 @@ impl System {
             revision: 0,
             holds_factors: false,
             prescribed_increment: Vec::new(),
-            lifts: false,
-            lifted: Vec::new(),
+            is_prescribed: false,
+            prescribed_forces: Vec::new(),
         }
     }
 
@@ -131,7 +131,7 @@ impl System {
 
     /// Calls `work` on the slice of each region, in parallel, or on the whole system if it has one
     /// region only.
-    pub fn each_part(&mut self, work: impl Fn(&mut Part) + Send + Sync) {
+    pub fn each_part(&mut self, work: impl Fn(&mut SystemSlice) + Send + Sync) {
         match self.is_cut() {
             true => threads::each(self.parts().into_iter(), |mut part| work(&mut part)),
             false => work(&mut self.whole()),
@@ -143,11 +143,11 @@ impl System {
     pub fn begin(&mut self, with_tangent: bool, prescribed_increment: Option<&[Vec3]>) {
         self.revision += u64::from(with_tangent);
         self.holds_factors &= !with_tangent;
-        if self.lifts || prescribed_increment.is_some() {
-            self.lifted.clear();
-            self.lifted.resize(self.pattern.dof_map.count(), 0.0);
+        if self.is_prescribed || prescribed_increment.is_some() {
+            self.prescribed_forces.clear();
+            self.prescribed_forces.resize(self.pattern.dof_map.count(), 0.0);
         }
-        self.lifts = prescribed_increment.is_some();
+        self.is_prescribed = prescribed_increment.is_some();
         if let Some(prescribed_increment) = prescribed_increment {
             threads::copy(&mut self.prescribed_increment, prescribed_increment);
         }
@@ -250,7 +250,7 @@ impl System {
                 }
             },
         );
-        self.pattern.join(|group| &sums[group], x);
+        self.pattern.join(|node_block| &sums[node_block], x);
     }
 
     /// Calls `show` with each tile, the item of the node block of its rows, and the entries of x of
@@ -264,7 +264,8 @@ impl System {
         show: impl Fn(&mut K, &Tile<W>, &[f64; W]) + Send + Sync,
     ) {
         let Pattern { regions, storage, symmetry, .. } = &self.pattern;
-        let (tiles, halves) = (storage.tiles::<W>(values), symmetry.halves());
+        let tiles = storage.tiles::<W>(values);
+        let halves = symmetry.halves();
         regions::each(
             regions,
             of_rows,
@@ -274,7 +275,8 @@ impl System {
                     #[inline(always)]
                     || {
                         for column in region.node_blocks.clone() {
-                            let (own, x_own) = (column - region.node_blocks.start, self.pattern.part::<W>(column, x));
+                            let own = column - region.node_blocks.start;
+                            let x_own = self.pattern.part::<W>(column, x);
                             tiles.own.with(
                                 column,
                                 #[inline(always)]
@@ -296,7 +298,7 @@ impl System {
                 );
             },
         );
-        for &(column, tile) in &self.pattern.between {
+        for &CouplingTile { column, tile } in &self.pattern.between {
             let row = self.pattern.rows[tile] as usize;
             show(&mut of_rows[row], &tiles.beside[tile], &self.pattern.part::<W>(column, x));
             if halves {
@@ -324,22 +326,22 @@ impl System {
     }
 
     /// Largest backward error of a solution x of A x = b: max over the rows of |b - A x|_i / (|A|
-    /// |x| + |b|)_i. The residual stays in `room`.
-    pub fn residual(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+    /// |x| + |b|)_i. The residual stays in `buffer`.
+    pub fn residual(&self, b: &[f64], x: &[f64], buffer: &mut ResidualBuffer) -> f64 {
         if self.pattern.width() == WIDTH {
-            self.residual_of::<WIDTH>(b, x, room)
+            self.residual_of::<WIDTH>(b, x, buffer)
         } else {
-            self.residual_of::<3>(b, x, room)
+            self.residual_of::<3>(b, x, buffer)
         }
     }
 
-    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], room: &mut Leftover) -> f64 {
+    fn residual_of<const W: usize>(&self, b: &[f64], x: &[f64], buffer: &mut ResidualBuffer) -> f64 {
         debug_assert!(!self.holds_factors, "there is no tangent");
         let pattern = &self.pattern;
-        let residuals = room.take::<W>(pattern);
+        let residuals = buffer.take::<W>(pattern);
         threads::each_part(residuals, |start, residuals| {
-            for (group, [residual, size]) in (start..).zip(residuals) {
-                *residual = pattern.part(group, b);
+            for (node_block, [residual, size]) in (start..).zip(residuals) {
+                *residual = pattern.part(node_block, b);
                 *size = residual.map(f64::abs);
             }
         });
@@ -365,13 +367,13 @@ impl System {
     }
 
     /// Writes the residual b - A x of the last call of [`System::residual`] to `out`, by equation.
-    pub fn last_residual(&self, room: &Leftover, out: &mut [f64]) {
-        if self.pattern.width() == WIDTH { self.join::<WIDTH>(room, out) } else { self.join::<3>(room, out) }
+    pub fn last_residual(&self, buffer: &ResidualBuffer, out: &mut [f64]) {
+        if self.pattern.width() == WIDTH { self.join::<WIDTH>(buffer, out) } else { self.join::<3>(buffer, out) }
     }
 
-    fn join<const W: usize>(&self, room: &Leftover, out: &mut [f64]) {
-        let residuals = room.residuals.as_chunks::<W>().0;
-        self.pattern.join(|group| &residuals[2 * group], out);
+    fn join<const W: usize>(&self, buffer: &ResidualBuffer, out: &mut [f64]) {
+        let residuals = buffer.residuals.as_chunks::<W>().0;
+        self.pattern.join(|node_block| &residuals[2 * node_block], out);
     }
 
     /// Right-hand side of the linear system of a correction: -g - J du_prescribed, by free
@@ -384,37 +386,43 @@ impl System {
 
     /// Right-hand side -g - J du_prescribed of one node block, by tile row.
     #[inline(always)]
-    pub fn right_hand_side_at<const W: usize>(&self, group: usize) -> [f64; W] {
+    pub fn right_hand_side_at<const W: usize>(&self, node_block: usize) -> [f64; W] {
         let Pattern { dof_map, node_blocks, .. } = &self.pattern;
-        let (region, own_equations, mut own) =
-            (self.pattern.region_of(group), self.pattern.equations_of(group), [0.0; W]);
+        let region = self.pattern.region_of(node_block);
+        let own_equations = self.pattern.equations_of(node_block);
+        let mut own = [0.0; W];
         let force = |slot: u32| self.acting_in(region).fold(Vec3::ZERO, |sum, force| sum + force[slot as usize]);
-        let slots = node_blocks.members(group);
-        if !self.lifts && dof_map.are_components(slots.clone()) && 3 * slots.len() == W {
+        let slots = node_blocks.members(node_block);
+        if !self.is_prescribed && dof_map.are_components(slots.clone()) && 3 * slots.len() == W {
             slots.zip(own.as_chunks_mut().0).for_each(|(slot, own)| *own = (-force(slot)).0);
             return own;
         }
-        if W == 3 && !self.lifts && dof_map.are_planar(slots.clone()) {
-            let (u, p) = (slots.start, slots.start + 1);
-            let (across, about) = (dof_map.to_local(u, -force(u)), dof_map.to_local(p, -force(p)));
+        if W == 3 && !self.is_prescribed && dof_map.are_planar(slots.clone()) {
+            let u = slots.start;
+            let p = slots.start + 1;
+            let across = dof_map.to_local(u, -force(u));
+            let about = dof_map.to_local(p, -force(p));
             own.copy_from_slice(&[across.0[0], across.0[1], about.0[2]]);
             return own;
         }
         for slot in slots {
             let force = force(slot);
-            let (local, own) = (dof_map.to_local(slot, force), &mut own[..own_equations.len()]);
+            let local = dof_map.to_local(slot, force);
+            let own = &mut own[..own_equations.len()];
             dof_map.each_of(slot as usize, local, own_equations.start, own, |own, entry| *own = -entry);
         }
-        if self.lifts {
-            own.iter_mut().zip(&self.lifted[own_equations]).for_each(|(own, lifted)| *own -= lifted);
+        if self.is_prescribed {
+            own.iter_mut()
+                .zip(&self.prescribed_forces[own_equations])
+                .for_each(|(own, prescribed_forces)| *own -= prescribed_forces);
         }
-        self.pattern.spread(group, own)
+        self.pattern.spread(node_block, own)
     }
 
     /// Increments of held directions (by slot, global components) that the next correction
     /// includes.
     pub fn prescribed_increment(&self) -> Option<&[Vec3]> {
-        self.lifts.then_some(&self.prescribed_increment)
+        self.is_prescribed.then_some(&self.prescribed_increment)
     }
 
     /// Right-hand side -f - J du_prescribed for given forces f by slot (global components).
@@ -426,7 +434,7 @@ impl System {
     /// increments.
     pub fn right_hand_side_without_lift(&self, force: &[Vec3], out: &mut [f64]) {
         self.right_hand_side_of(force, out);
-        out.iter_mut().zip(&self.lifted).for_each(|(out, lifted)| *out += lifted);
+        out.iter_mut().zip(&self.prescribed_forces).for_each(|(out, prescribed_forces)| *out += prescribed_forces);
     }
 
     fn fill_right_hand_side(&self, force: impl Fn(&Region, usize) -> Vec3 + Send + Sync, out: &mut [f64]) {
@@ -434,11 +442,11 @@ impl System {
         self.pattern.each_region(out, |region, out| {
             for slot in region.slots.clone() {
                 let local = dof_map.to_local(slot as Slot, force(region, slot));
-                dof_map.each_of(slot, local, region.dof_map.start, out, |out, entry| *out = -entry);
+                dof_map.each_of(slot, local, region.equations.start, out, |out, entry| *out = -entry);
             }
-            if self.lifts {
-                let lifted = &self.lifted[region.dof_map.clone()];
-                out.iter_mut().zip(lifted).for_each(|(out, lifted)| *out -= lifted);
+            if self.is_prescribed {
+                let prescribed_forces = &self.prescribed_forces[region.equations.clone()];
+                out.iter_mut().zip(prescribed_forces).for_each(|(out, prescribed_forces)| *out -= prescribed_forces);
             }
         });
     }
@@ -449,55 +457,66 @@ impl System {
     }
 
     /// The slices of all regions, which are disjoint.
-    fn parts(&mut self) -> Vec<Part<'_>> {
-        let Self { pattern, acting_in, force, values, prescribed_increment, lifts, lifted, rooms, .. } = self;
+    fn parts(&mut self) -> Vec<SystemSlice<'_>> {
+        let Self {
+            pattern,
+            acting_in,
+            force,
+            values,
+            prescribed_increment,
+            is_prescribed,
+            prescribed_forces,
+            buffers,
+            ..
+        } = self;
         let regions = &pattern.regions;
         let ends = |end: fn(&Region) -> usize| regions.iter().map(end);
         let storage = &pattern.storage;
-        let places = |region: &Region| [storage.on_diagonal(&region.node_blocks), storage.beside(&region.tiles)];
+        let places = |region: &Region| [storage.on_diagonal(&region.node_blocks), storage.off_diagonal(&region.tiles)];
         let mut forces = force.each_mut().map(|force| threads::split(force, ends(|r| r.slots.end)).into_iter());
         let (own, beside) = values.split_at_mut(storage.boundary());
         let own = threads::split(own, regions.iter().map(|region| places(region)[0].end));
         let beside = threads::split(beside, regions.iter().map(|region| places(region)[1].end - storage.boundary()));
         // Without coupled nodes the list of off-diagonal tiles is empty.
-        let (mut own, mut beside) = (own.into_iter(), beside.into_iter());
+        let mut own = own.into_iter();
+        let mut beside = beside.into_iter();
         let values = regions.iter().map(|region| {
             let lists = [&mut own, &mut beside].map(|list| list.next().unwrap_or_default());
-            Values::part(storage, lists, places(region).map(|range| range.start))
+            TileValues::part(storage, lists, places(region).map(|range| range.start))
         });
-        let mut lifted = threads::split(lifted, ends(|r| r.dof_map.end)).into_iter();
-        let stretches = values.zip(&mut rooms[1..]).enumerate();
-        let part = |(region, (values, room)): (usize, _)| Part {
+        let mut prescribed_forces = threads::split(prescribed_forces, ends(|r| r.equations.end)).into_iter();
+        let stretches = values.zip(&mut buffers[1..]).enumerate();
+        let part = |(region, (values, buffers)): (usize, _)| SystemSlice {
             pattern,
             acting: &acting_in[region],
             region: Some(region),
             force: forces.each_mut().map(|forces| forces.next().unwrap_or_default()),
             values,
-            prescribed_increment: lifts.then_some(&prescribed_increment[..]),
-            lifted: lifted.next().unwrap_or_default(),
-            room,
+            prescribed_increment: is_prescribed.then_some(&prescribed_increment[..]),
+            prescribed_forces: prescribed_forces.next().unwrap_or_default(),
+            buffers,
         };
         stretches.map(part).collect()
     }
 
     /// The slice that consists of the whole system, for instances that lie in no single region.
-    pub fn whole(&mut self) -> Part<'_> {
-        Part {
+    pub fn whole(&mut self) -> SystemSlice<'_> {
+        SystemSlice {
             pattern: &self.pattern,
             acting: &self.acting,
             region: None,
             force: self.force.each_mut().map(|force| &mut force[..]),
-            values: Values::all(&self.pattern.storage, &mut self.values),
-            prescribed_increment: self.lifts.then_some(&self.prescribed_increment[..]),
-            lifted: &mut self.lifted,
-            room: &mut self.rooms[0],
+            values: TileValues::all(&self.pattern.storage, &mut self.values),
+            prescribed_increment: self.is_prescribed.then_some(&self.prescribed_increment[..]),
+            prescribed_forces: &mut self.prescribed_forces,
+            buffers: &mut self.buffers[0],
         }
     }
 
     /// Assembler of all instances of effect number `effect`.
-    pub fn sink(&mut self, effect: usize, category: Category, with_tangent: bool) -> Assembler<'_> {
+    pub fn assembler(&mut self, effect: usize, category: Category, with_tangent: bool) -> Assembler<'_> {
         let all = 0..self.pattern.places[effect].connectivity.len();
-        self.whole().into_sink(effect, category, with_tangent, all)
+        self.whole().into_assembler(effect, category, with_tangent, all)
     }
 }
 

@@ -1,13 +1,13 @@
 //! Connectivity: the slots that each instance of an effect couples.
 
-use super::runs::Runs;
+use super::range_list::RangeList;
 use super::state::Slot;
 
 /// The slots that each instance of an effect couples, one list per element, spring or joint.
 #[derive(Clone, Debug, Default)]
 pub struct Connectivity {
     slots: Vec<Slot>,
-    instances: Runs,
+    instances: RangeList,
     pub(super) divisible: bool,
 }
 

@@ -8,11 +8,11 @@ use crate::threads;
 
 /// Unit vectors are parallel if their inner product differs from ±1 by less than this, and
 /// orthogonal if it is smaller than this. Decks must give axes to nine digits.
-const SAME_AXIS: f64 = 1e-9;
+const AXIS_TOLERANCE: f64 = 1e-9;
 
 /// An axis is a global one if the magnitude of their inner product differs from 1 by less than
 /// this, the round-off of normalisation.
-const GLOBAL_AXIS: f64 = 1e-15;
+const GLOBAL_AXIS_TOLERANCE: f64 = 1e-15;
 
 /// A constrained direction of a slot, whose value is zero or prescribed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub struct FrameConflict {
 }
 
 /// Frame number of slots whose local axes are the global ones.
-const GLOBAL: u32 = u32::MAX;
+const GLOBAL_FRAME: u32 = u32::MAX;
 
 /// The numbers of the free equations, slot by slot, and the local axes in which directions are free
 /// or held.
@@ -40,7 +40,7 @@ pub struct DofMap {
     /// First equation of each slot; the last item is the number of all equations
     first: Vec<u32>,
     /// Free directions of each slot
-    freedom: Vec<Freedom>,
+    freedom: Vec<FreeDirections>,
     /// Index into `frames` for each slot, or [`GLOBAL_FRAME`]; empty if all slots have global axes
     frame: Vec<u32>,
     /// Local axes as columns (global components)
@@ -51,9 +51,9 @@ pub struct DofMap {
 /// Free local directions of a slot, one bit each. A fourth bit tells that a constraint other than
 /// the plane of the scene holds a direction.
 #[derive(Clone, Copy, Debug)]
-struct Freedom(u8);
+struct FreeDirections(u8);
 
-impl Freedom {
+impl FreeDirections {
     fn new(is_held: [bool; 3], constrained: bool) -> Self {
         let [a, b, c] = is_held.map(|held| u8::from(!held));
         Self(a | b << 1 | c << 2 | u8::from(constrained) << 3)
@@ -104,7 +104,8 @@ impl DofMap {
         plane: Plane,
         turns: impl Fn(Slot) -> bool,
     ) -> Result<Self, FrameConflict> {
-        let (normal, own) = (plane.normal(), (!plane.is_global()).then_some(*plane.axes()));
+        let normal = plane.normal();
+        let own = (!plane.is_global()).then_some(*plane.axes());
         let mut out = Self::empty(slots, Some(plane));
         for (slot, known) in by_slot(slots, held)?.iter().enumerate() {
             // Only the component in the free space of the slot counts: the plane itself holds the
@@ -128,13 +129,14 @@ impl DofMap {
     }
 
     fn empty(slots: usize, plane: Option<Plane>) -> Self {
-        let (mut first, freedom) = (Vec::with_capacity(slots + 1), Vec::with_capacity(slots));
+        let mut first = Vec::with_capacity(slots + 1);
+        let freedom = Vec::with_capacity(slots);
         first.push(0);
         Self { first, freedom, frame: Vec::new(), frames: Vec::new(), plane }
     }
 
     fn push(&mut self, slot: usize, frame: Option<Mat3>, is_held: [bool; 3], constrained: bool) {
-        let freedom = Freedom::new(is_held, constrained);
+        let freedom = FreeDirections::new(is_held, constrained);
         self.first.push(self.first[slot] + freedom.count());
         self.freedom.push(freedom);
         // Consecutive slots with equal axes share one frame.
@@ -142,8 +144,8 @@ impl DofMap {
             self.frames.push(frame);
         }
         if !self.frames.is_empty() {
-            self.frame.resize(slot, GLOBAL);
-            self.frame.push(frame.map_or(GLOBAL, |_| self.frames.len() as u32 - 1));
+            self.frame.resize(slot, GLOBAL_FRAME);
+            self.frame.push(frame.map_or(GLOBAL_FRAME, |_| self.frames.len() as u32 - 1));
         }
     }
 
@@ -172,7 +174,8 @@ impl DofMap {
     /// Equation numbers of a slot by local direction, [`DofMap::HELD`] for held directions.
     #[inline]
     pub fn of(&self, slot: Slot) -> [u32; 3] {
-        let (first, freedom) = (self.first[slot as usize], self.freedom[slot as usize]);
+        let first = self.first[slot as usize];
+        let freedom = self.freedom[slot as usize];
         if freedom.is_whole() {
             return [first, first + 1, first + 2];
         }
@@ -205,7 +208,7 @@ impl DofMap {
     #[inline(always)]
     pub fn are_planar(&self, slots: std::ops::Range<Slot>) -> bool {
         let freedom = self.freedom.get(slots.start as usize..slots.end as usize);
-        matches!(freedom, Some([Freedom(0b011), Freedom(0b100)]))
+        matches!(freedom, Some([FreeDirections(0b011), FreeDirections(0b100)]))
     }
 
     /// Rotated local axes of a slot as columns (global components); `None` if they are the global
@@ -302,7 +305,8 @@ impl DofMap {
     pub fn scatter_found(&self, solution: impl Fn(usize) -> f64 + Send + Sync, out: &mut [Vec3]) {
         threads::each_part(out, |start, out| {
             for (slot, out) in (start..).zip(out) {
-                let (first, end) = (self.before(slot), self.before(slot + 1));
+                let first = self.before(slot);
+                let end = self.before(slot + 1);
                 let own: [f64; 3] = std::array::from_fn(|k| if first + k < end { solution(first + k) } else { 0.0 });
                 *out = self.at(slot, &own[..end - first], first, None);
             }
@@ -364,10 +368,10 @@ fn by_slot(slots: usize, held: &[Direction]) -> Result<Vec<Vec<Vec3>>, FrameConf
         let axis = direction.axis;
         let known = &mut axes[direction.slot as usize];
         let spans = known.len() == 3;
-        if spans || known.iter().any(|a| a.dot(axis).abs() > 1.0 - SAME_AXIS) {
+        if spans || known.iter().any(|a| a.dot(axis).abs() > 1.0 - AXIS_TOLERANCE) {
             continue;
         }
-        if known.iter().any(|a| a.dot(axis).abs() > SAME_AXIS) {
+        if known.iter().any(|a| a.dot(axis).abs() > AXIS_TOLERANCE) {
             return Err(FrameConflict { slot: direction.slot });
         }
         known.push(axis);
@@ -380,21 +384,23 @@ fn spanned(vectors: impl Iterator<Item = Vec3>) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = Vec::new();
     for vector in vectors {
         let rest = out.iter().fold(vector, |rest, known| rest - *known * known.dot(rest));
-        out.extend(rest.normalized().filter(|_| rest.norm() > SAME_AXIS));
+        out.extend(rest.normalized().filter(|_| rest.norm() > AXIS_TOLERANCE));
     }
     out
 }
 
 /// True if `axis` is parallel to local axis k of the plane.
 fn is_axis(plane: &Plane, k: usize, axis: Vec3) -> bool {
-    plane.axes().column(k).dot(axis).abs() > 1.0 - GLOBAL_AXIS
+    plane.axes().column(k).dot(axis).abs() > 1.0 - GLOBAL_AXIS_TOLERANCE
 }
 
 /// Local axes whose first columns are the held directions, and which of them are held; no frame is
 /// needed if all held directions are global axes.
 fn local_axes(held: &[Vec3]) -> (Option<Mat3>, [bool; 3]) {
-    let global =
-        held.iter().map(|axis| (0..3).find(|&k| axis.0[k].abs() > 1.0 - GLOBAL_AXIS)).collect::<Option<Vec<_>>>();
+    let global = held
+        .iter()
+        .map(|axis| (0..3).find(|&k| axis.0[k].abs() > 1.0 - GLOBAL_AXIS_TOLERANCE))
+        .collect::<Option<Vec<_>>>();
     if let Some(global) = global {
         return (None, [0, 1, 2].map(|k| global.contains(&k)));
     }

@@ -5,40 +5,49 @@ use super::state::Slot;
 use std::ops::Range;
 
 /// Largest number of slots in a node block.
-pub const SLOTS: usize = 2;
+pub const SLOTS_PER_BLOCK: usize = 2;
 
 /// The slots of a scene in node blocks of one or two.
 #[derive(Clone, Debug)]
 pub struct NodeBlocks {
     slots: usize,
     /// Lists by slot; `None` if every node block has two slots
-    uneven: Option<Uneven>,
+    lists: Option<SlotLists>,
     layout: Layout,
 }
 
 #[derive(Clone, Debug)]
-struct Uneven {
-    /// For each slot `SLOTS` times its node block plus its position in it
+struct SlotLists {
+    /// For each slot `SLOTS_PER_BLOCK` times its node block plus its position in it
     places: Vec<u32>,
     /// First slot of each node block; the last item is the number of all slots
     starts: Vec<Slot>,
 }
 
-impl Uneven {
+impl SlotLists {
     fn new(slots: usize, joins: impl Fn(Slot) -> bool) -> Self {
-        let (mut places, mut starts) = (Vec::with_capacity(slots), Vec::with_capacity(slots / SLOTS + 1));
+        let mut places = Vec::with_capacity(slots);
+        let mut starts = Vec::with_capacity(slots / SLOTS_PER_BLOCK + 1);
         for slot in 0..slots as Slot {
-            let joined = starts.last().filter(|&&first| slot - first < SLOTS as Slot && joins(slot)).copied();
+            let joined = starts.last().filter(|&&first| slot - first < SLOTS_PER_BLOCK as Slot && joins(slot)).copied();
             if joined.is_none() {
                 starts.push(slot);
             }
             let place = joined.map_or(0, |first| slot - first);
-            places.push(SLOTS as u32 * (starts.len() as u32 - 1) + place);
+            places.push(SLOTS_PER_BLOCK as u32 * (starts.len() as u32 - 1) + place);
         }
         starts.push(slots as Slot);
         starts.shrink_to_fit();
         Self { places, starts }
     }
+}
+
+/// A row of the tiles of a node block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TileRow {
+    pub node_block: usize,
+    /// Row in the tile
+    pub row: usize,
 }
 
 /// Rows of a tile by slot and direction.
@@ -55,15 +64,15 @@ impl NodeBlocks {
     /// Node blocks of `slots` slots; `joins` is true for slots that share the node block of the
     /// slot before.
     pub fn new(slots: usize, layout: Layout, joins: impl Fn(Slot) -> bool) -> Self {
-        let second = |slot: Slot| !slot.is_multiple_of(SLOTS as Slot);
-        let are_pairs =
-            slots.is_multiple_of(SLOTS) && (0..slots as Slot).all(|slot| (slot > 0 && joins(slot)) == second(slot));
-        Self { slots, uneven: (!are_pairs).then(|| Uneven::new(slots, joins)), layout }
+        let second = |slot: Slot| !slot.is_multiple_of(SLOTS_PER_BLOCK as Slot);
+        let are_pairs = slots.is_multiple_of(SLOTS_PER_BLOCK)
+            && (0..slots as Slot).all(|slot| (slot > 0 && joins(slot)) == second(slot));
+        Self { slots, lists: (!are_pairs).then(|| SlotLists::new(slots, joins)), layout }
     }
 
     /// Number of node blocks.
     pub fn count(&self) -> usize {
-        self.uneven.as_ref().map_or(self.slots / SLOTS, |uneven| uneven.starts.len() - 1)
+        self.lists.as_ref().map_or(self.slots / SLOTS_PER_BLOCK, |lists| lists.starts.len() - 1)
     }
 
     /// Number of slots.
@@ -74,39 +83,46 @@ impl NodeBlocks {
     /// First slot of a node block; for `count()` the number of all slots. The slots of a node block
     /// are consecutive.
     #[inline]
-    pub fn first_slot(&self, group: usize) -> usize {
-        self.uneven.as_ref().map_or(SLOTS * group, |uneven| uneven.starts[group] as usize)
+    pub fn first_slot(&self, node_block: usize) -> usize {
+        self.lists.as_ref().map_or(SLOTS_PER_BLOCK * node_block, |lists| lists.starts[node_block] as usize)
     }
 
     /// Rows of a tile.
     pub fn width(&self) -> usize {
         match self.layout {
-            Layout::Spatial => 3 * SLOTS,
+            Layout::Spatial => 3 * SLOTS_PER_BLOCK,
             Layout::Planar => 3,
         }
     }
 
     /// Node block of a slot, and the tile row of its first direction.
     #[inline]
-    pub fn row(&self, slot: Slot) -> (usize, usize) {
-        let (group, place) = self.of(slot);
-        match self.layout {
-            Layout::Spatial => (group, 3 * place),
-            Layout::Planar => (group, 0),
-        }
+    pub(super) fn row(&self, slot: Slot) -> TileRow {
+        let place = self.place(slot);
+        let node_block = place / SLOTS_PER_BLOCK;
+        let row = match self.layout {
+            Layout::Spatial => 3 * (place % SLOTS_PER_BLOCK),
+            Layout::Planar => 0,
+        };
+        TileRow { node_block, row }
     }
 
-    /// Node block of a slot, and its position in it (0 or 1).
+    /// Node block of a slot.
     #[inline]
-    pub fn of(&self, slot: Slot) -> (usize, usize) {
-        let place = self.uneven.as_ref().map_or(slot, |uneven| uneven.places[slot as usize]) as usize;
-        (place / SLOTS, place % SLOTS)
+    pub fn of(&self, slot: Slot) -> usize {
+        self.place(slot) / SLOTS_PER_BLOCK
+    }
+
+    /// `SLOTS_PER_BLOCK` times the node block of a slot plus its position in it.
+    #[inline]
+    fn place(&self, slot: Slot) -> usize {
+        self.lists.as_ref().map_or(slot, |lists| lists.places[slot as usize]) as usize
     }
 
     /// Slots of a node block.
     #[inline]
-    pub fn members(&self, group: usize) -> Range<Slot> {
-        self.first_slot(group) as Slot..self.first_slot(group + 1) as Slot
+    pub fn members(&self, node_block: usize) -> Range<Slot> {
+        self.first_slot(node_block) as Slot..self.first_slot(node_block + 1) as Slot
     }
 }
 
@@ -115,26 +131,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slots_that_join_share_a_group() {
+    fn slots_that_join_share_a_node_block() {
         let node_blocks = NodeBlocks::new(6, Layout::Spatial, |slot| [1, 2, 5].contains(&slot));
-        let members: Vec<_> = (0..node_blocks.count()).map(|group| node_blocks.members(group)).collect();
+        let members: Vec<_> = (0..node_blocks.count()).map(|node_block| node_blocks.members(node_block)).collect();
         assert_eq!(members, [0..2, 2..3, 3..4, 4..6]);
-        assert_eq!(
-            [0, 1, 2, 3, 4, 5].map(|slot| node_blocks.of(slot)),
-            [(0, 0), (0, 1), (1, 0), (2, 0), (3, 0), (3, 1)]
-        );
-        assert_eq!((node_blocks.row(1), node_blocks.first_slot(4), node_blocks.slots()), ((0, 3), 6, 6));
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| node_blocks.of(slot)), [0, 0, 1, 2, 3, 3]);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|slot| node_blocks.row(slot).row), [0, 3, 0, 0, 0, 3]);
+        assert_eq!((node_blocks.first_slot(4), node_blocks.slots()), (6, 6));
         assert_eq!(NodeBlocks::new(0, Layout::Planar, |_| true).count(), 0);
     }
 
     #[test]
     fn pairs_need_no_list() {
         let node_blocks = NodeBlocks::new(8, Layout::Spatial, |slot| slot % 2 == 1);
-        let members: Vec<_> = (0..node_blocks.count()).map(|group| node_blocks.members(group)).collect();
+        let members: Vec<_> = (0..node_blocks.count()).map(|node_block| node_blocks.members(node_block)).collect();
         assert_eq!(members, [0..2, 2..4, 4..6, 6..8]);
-        assert_eq!((node_blocks.of(5), node_blocks.row(5), node_blocks.first_slot(4)), ((2, 1), (2, 3), 8));
+        assert_eq!((node_blocks.row(5), node_blocks.first_slot(4)), (TileRow { node_block: 2, row: 3 }, 8));
         assert!(
-            node_blocks.uneven.is_none() && NodeBlocks::new(7, Layout::Spatial, |slot| slot % 2 == 1).uneven.is_some()
+            node_blocks.lists.is_none() && NodeBlocks::new(7, Layout::Spatial, |slot| slot % 2 == 1).lists.is_some()
         );
     }
 }

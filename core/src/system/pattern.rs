@@ -3,9 +3,9 @@
 
 use super::connectivity::Connectivity;
 use super::dof_map::DofMap;
-use super::node_blocks::{NodeBlocks, SLOTS};
-use super::regions::{self, Region, Shares};
-use super::runs::Runs;
+use super::node_blocks::{NodeBlocks, SLOTS_PER_BLOCK, TileRow};
+use super::range_list::RangeList;
+use super::regions::{self, InstanceRanges, Region};
 use super::state::Slot;
 use super::storage::{NOT_KEPT, Storage};
 pub use crate::kernel::{TILE, WIDTH};
@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 /// Tiles of spatial tangents have the size of element tiles.
-const _: () = assert!(WIDTH == 3 * SLOTS);
+const _: () = assert!(WIDTH == 3 * SLOTS_PER_BLOCK);
 
 /// Positions in the tangent of the element blocks of one effect.
 #[derive(Clone, Debug)]
@@ -26,10 +26,10 @@ pub(super) struct ScatterMap {
     /// Position of each block by instance, then by block row, or [`NOT_KEPT`]. Blocks are tiles if
     /// `whole`, else 3 x 3 blocks of two slots.
     pub values: Vec<u32>,
-    of_instances: Runs,
+    of_instances: RangeList,
     /// True for instances with a held direction or rotated axes
     pub special: Vec<bool>,
-    pub shares: Shares,
+    pub ranges: InstanceRanges,
 }
 
 impl ScatterMap {
@@ -46,7 +46,7 @@ pub enum Symmetry {
     None,
     /// Off-diagonal tiles are transposes of each other. Diagonal tiles are unsymmetric, for
     /// instance by gyroscopic terms of bodies or by moments at single nodes.
-    BetweenGroups,
+    BetweenNodeBlocks,
     /// The tangent is symmetric.
     Whole,
 }
@@ -55,10 +55,10 @@ impl Symmetry {
     /// Symmetry of the sum of effects, given by connectivity and symmetry of their tangents.
     /// Unsymmetric effects that act on single nodes spoil the diagonal tiles only.
     pub fn of<'a>(effects: impl IntoIterator<Item = (&'a Connectivity, bool)>, node_blocks: &NodeBlocks) -> Self {
-        let one = |slots: &[Slot]| slots.windows(2).all(|pair| node_blocks.of(pair[0]).0 == node_blocks.of(pair[1]).0);
+        let one = |slots: &[Slot]| slots.windows(2).all(|pair| node_blocks.of(pair[0]) == node_blocks.of(pair[1]));
         let of_effect = |(connectivity, symmetric): (&Connectivity, bool)| match symmetric {
             true => Self::Whole,
-            false if connectivity.iter().all(one) => Self::BetweenGroups,
+            false if connectivity.iter().all(one) => Self::BetweenNodeBlocks,
             false => Self::None,
         };
         effects.into_iter().map(of_effect).min().unwrap_or(Self::Whole)
@@ -86,25 +86,43 @@ pub struct Pattern {
     /// Symmetry that the tangents have in common
     pub symmetry: Symmetry,
     /// Positions of tiles in the list of values
-    pub storage: Storage,
+    pub(crate) storage: Storage,
     /// First off-diagonal tile of each column; the last item is the number of all
-    pub column_starts: Vec<u32>,
+    pub(crate) column_starts: Vec<u32>,
     /// Row (node block) of each off-diagonal tile
-    pub rows: Vec<u32>,
+    pub(crate) rows: Vec<u32>,
     /// Tiles that are not stored, computed when entries are asked for
-    mirrors: OnceLock<Mirrors>,
-    /// Rows without an equation: node block, and row in its tile
-    pub idle: Vec<(u32, u8)>,
+    mirrors: OnceLock<TransposedTiles>,
+    /// Rows without an equation, by node block
+    pub(crate) idle: Vec<IdleRow>,
     /// Regions of nodes that are evaluated in parallel
-    pub regions: Vec<Region>,
-    /// Off-diagonal tiles that couple two regions: column, and number of the tile
-    pub between: Vec<(usize, usize)>,
+    pub(crate) regions: Vec<Region>,
+    /// Off-diagonal tiles that couple two regions
+    pub(super) between: Vec<CouplingTile>,
     pub(super) places: Vec<ScatterMap>,
+}
+
+/// A row of a diagonal tile without an equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct IdleRow {
+    /// Node block of the tile, or its row in an elimination
+    pub block_row: u32,
+    /// Row of the tile
+    pub tile_row: u8,
+}
+
+/// An off-diagonal tile that couples two regions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CouplingTile {
+    /// Node block of its columns
+    pub column: usize,
+    /// Number of the tile
+    pub tile: usize,
 }
 
 /// An off-diagonal tile above the diagonal that is not stored.
 #[derive(Clone, Copy, Debug, Default)]
-struct Mirror {
+struct TransposedTile {
     /// Node block of its rows
     row: u32,
     /// Number of the stored tile, its transpose
@@ -113,7 +131,7 @@ struct Mirror {
 
 /// An entry of the tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct TangentEntry {
     /// Equation of the row
     pub row: u32,
     /// Index of the value
@@ -126,7 +144,9 @@ impl Pattern {
         let (column_starts, rows) = compressed_columns(&node_blocks, &effects, symmetry.halves());
         let regions = regions::cut(&node_blocks, &dof_map, &column_starts);
         let storage = Storage::new(node_blocks.width(), node_blocks.count(), symmetry == Symmetry::Whole);
-        let (idle, between, places) = (Vec::new(), Vec::new(), Vec::new());
+        let idle = Vec::new();
+        let between = Vec::new();
+        let places = Vec::new();
         let mut pattern = Self {
             dof_map,
             node_blocks,
@@ -140,7 +160,10 @@ impl Pattern {
             between,
             places,
         };
-        debug_assert!((0..pattern.node_blocks.count()).all(|group| pattern.is_ascending(group)), "rows out of order");
+        debug_assert!(
+            (0..pattern.node_blocks.count()).all(|node_block| pattern.is_ascending(node_block)),
+            "rows out of order"
+        );
         pattern.idle = pattern.idle();
         pattern.between = pattern.between();
         pattern.places = threads::map(effects.into_iter(), |connectivity| pattern.places_of(connectivity));
@@ -160,7 +183,7 @@ impl Pattern {
 
     /// Number of stored values.
     pub fn values(&self) -> usize {
-        self.storage.other(self.rows.len())
+        self.storage.off_diagonal_tile(self.rows.len())
     }
 
     /// Numbers of the off-diagonal tiles stored in a column.
@@ -176,20 +199,24 @@ impl Pattern {
     }
 
     /// Adjacency of node blocks.
-    pub fn meetings(&self) -> Meetings<'_> {
-        Meetings { pattern: self, mirrors: self.find_mirrors() }
+    pub fn adjacency(&self) -> Adjacency<'_> {
+        Adjacency { pattern: self, mirrors: self.find_mirrors() }
     }
 
-    fn find_mirrors(&self) -> Mirrors {
-        if self.symmetry.halves() { Mirrors::new(&self.column_starts, &self.rows) } else { Mirrors::default() }
+    fn find_mirrors(&self) -> TransposedTiles {
+        if self.symmetry.halves() {
+            TransposedTiles::new(&self.column_starts, &self.rows)
+        } else {
+            TransposedTiles::default()
+        }
     }
 
     /// Equation of each tile row of a node block, [`DofMap::HELD`] for rows without.
     #[inline]
-    pub fn numbers(&self, group: usize) -> impl Iterator<Item = u32> {
+    pub fn numbers(&self, node_block: usize) -> impl Iterator<Item = u32> {
         let mut numbers = [DofMap::HELD; WIDTH];
-        for slot in self.node_blocks.members(group) {
-            let (_, first) = self.node_blocks.row(slot);
+        for slot in self.node_blocks.members(node_block) {
+            let first = self.node_blocks.row(slot).row;
             // In a plane the slots of a node share rows, each of which is free in one slot at most.
             for (row, number) in numbers[first..].iter_mut().zip(self.dof_map.of(slot)) {
                 *row = number.min(*row);
@@ -201,34 +228,34 @@ impl Pattern {
     /// Entries of a vector by equation at the tile rows of a node block; zero for rows without an
     /// equation.
     #[inline(always)]
-    pub fn part<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
-        let own = x.get(self.equations_of(group)).and_then(|own| own.first_chunk::<W>());
+    pub fn part<const W: usize>(&self, node_block: usize, x: &[f64]) -> [f64; W] {
+        let own = x.get(self.equations_of(node_block)).and_then(|own| own.first_chunk::<W>());
         match own {
             Some(own) => *own,
-            None => self.part_by_rows(group, x),
+            None => self.part_by_rows(node_block, x),
         }
     }
 
     /// Distributes the entries of the equations of a node block, in `own`, to its tile rows; zero
     /// for rows without an equation.
     #[inline(always)]
-    pub fn spread<const W: usize>(&self, group: usize, own: [f64; W]) -> [f64; W] {
-        let dof_map = self.equations_of(group);
-        if dof_map.len() == W {
+    pub fn spread<const W: usize>(&self, node_block: usize, own: [f64; W]) -> [f64; W] {
+        let equations = self.equations_of(node_block);
+        if equations.len() == W {
             return own;
         }
-        let mut numbers = self.numbers(group);
-        let of_row = |number: u32| own.get((number as usize).wrapping_sub(dof_map.start)).copied();
+        let mut numbers = self.numbers(node_block);
+        let of_row = |number: u32| own.get((number as usize).wrapping_sub(equations.start)).copied();
         std::array::from_fn(|_| numbers.next().and_then(of_row).unwrap_or(0.0))
     }
 
     /// Collects the entries of the tile rows of a node block that have an equation, in the order of
     /// equations; the inverse of [`Pattern::spread`].
     #[inline(always)]
-    fn gathered<const W: usize>(&self, group: usize, part: &[f64; W]) -> [f64; W] {
+    fn gathered<const W: usize>(&self, node_block: usize, part: &[f64; W]) -> [f64; W] {
         let mut own = *part;
-        if self.equations_of(group).len() != W {
-            let free = self.numbers(group).zip(part).filter(|(number, _)| *number != DofMap::HELD);
+        if self.equations_of(node_block).len() != W {
+            let free = self.numbers(node_block).zip(part).filter(|(number, _)| *number != DofMap::HELD);
             own.iter_mut().zip(free).for_each(|(own, (_, &value))| *own = value);
         }
         own
@@ -236,36 +263,38 @@ impl Pattern {
 
     /// Entries of a vector by equation at the tile rows of a node block, looked up row by row.
     #[cold]
-    fn part_by_rows<const W: usize>(&self, group: usize, x: &[f64]) -> [f64; W] {
-        let mut numbers = self.numbers(group);
+    fn part_by_rows<const W: usize>(&self, node_block: usize, x: &[f64]) -> [f64; W] {
+        let mut numbers = self.numbers(node_block);
         std::array::from_fn(|_| numbers.next().and_then(|k| x.get(k as usize)).copied().unwrap_or(0.0))
     }
 
     /// True if the equations of a node block ascend with its tile rows.
-    fn is_ascending(&self, group: usize) -> bool {
-        self.numbers(group).filter(|&number| number != DofMap::HELD).is_sorted()
+    fn is_ascending(&self, node_block: usize) -> bool {
+        self.numbers(node_block).filter(|&number| number != DofMap::HELD).is_sorted()
     }
 
     /// Equations of a node block. If they are as many as a tile has rows, they are in the order of
     /// rows.
     #[inline(always)]
-    pub fn equations_of(&self, group: usize) -> Range<usize> {
-        self.dof_map.before(self.node_blocks.first_slot(group))
-            ..self.dof_map.before(self.node_blocks.first_slot(group + 1))
+    pub fn equations_of(&self, node_block: usize) -> Range<usize> {
+        self.dof_map.before(self.node_blocks.first_slot(node_block))
+            ..self.dof_map.before(self.node_blocks.first_slot(node_block + 1))
     }
 
     /// Collects a vector by equation from its parts by node block; the inverse of
     /// [`Pattern::part`].
     pub fn join<'a, const W: usize>(&self, part: impl Fn(usize) -> &'a [f64; W] + Send + Sync, out: &mut [f64]) {
         self.each_region(out, |region, out| {
-            for group in region.node_blocks.clone() {
-                let (dof_map, part, start) = (self.equations_of(group), part(group), region.dof_map.start);
-                let out = &mut out[dof_map.start - start..dof_map.end - start];
+            for node_block in region.node_blocks.clone() {
+                let equations = self.equations_of(node_block);
+                let part = part(node_block);
+                let start = region.equations.start;
+                let out = &mut out[equations.start - start..equations.end - start];
                 match out.first_chunk_mut::<W>() {
                     Some(out) => *out = *part,
                     None => {
                         let length = out.len();
-                        out.copy_from_slice(&self.gathered(group, part)[..length]);
+                        out.copy_from_slice(&self.gathered(node_block, part)[..length]);
                     }
                 }
             }
@@ -285,8 +314,9 @@ impl Pattern {
             out,
             |region| region.slots.end,
             |region, out| {
-                for group in region.node_blocks.clone() {
-                    let (slots, part) = (self.node_blocks.members(group), part(group));
+                for node_block in region.node_blocks.clone() {
+                    let slots = self.node_blocks.members(node_block);
+                    let part = part(node_block);
                     let first = slots.start as usize - region.slots.start;
                     let out = &mut out[first..first + slots.len()];
                     if 3 * slots.len() == W && self.dof_map.are_components(slots.clone()) {
@@ -300,9 +330,10 @@ impl Pattern {
                         *about = self.dof_map.to_global(slots.start + 1, Vec3([0.0, 0.0, *angle]));
                         continue;
                     }
-                    let (own, dof_map) = (self.gathered(group, part), self.equations_of(group));
+                    let own = self.gathered(node_block, part);
+                    let equations = self.equations_of(node_block);
                     for (slot, out) in slots.zip(out) {
-                        *out = self.dof_map.at(slot as usize, &own[..dof_map.len()], dof_map.start, held);
+                        *out = self.dof_map.at(slot as usize, &own[..equations.len()], equations.start, held);
                     }
                 }
             },
@@ -311,54 +342,64 @@ impl Pattern {
 
     /// Region of a node block.
     #[inline(always)]
-    pub fn region_of(&self, group: usize) -> &Region {
+    pub fn region_of(&self, node_block: usize) -> &Region {
         match &self.regions[..] {
             [all] => all,
             // All regions but the last have the length of the first.
-            regions => &regions[group / regions[0].node_blocks.len()],
+            regions => &regions[node_block / regions[0].node_blocks.len()],
         }
     }
 
     /// Calls `work` for each region, in parallel, with the entries of its equations in `out`.
     pub fn each_region(&self, out: &mut [f64], work: impl Fn(&Region, &mut [f64]) + Send + Sync) {
-        regions::each(&self.regions, out, |region| region.dof_map.end, work);
+        regions::each(&self.regions, out, |region| region.equations.end, work);
     }
 
     /// Entries of the column of an equation, tile by tile.
-    pub fn entries(&self, column: u32) -> impl Iterator<Item = Entry> {
-        let ((group, c), storage) = (self.row_of(column), &self.storage);
-        let free = |group: usize| {
-            let numbers = self.numbers(group).enumerate();
+    pub fn entries(&self, column: u32) -> impl Iterator<Item = TangentEntry> {
+        let TileRow { node_block, row: c } = self.row_of(column);
+        let storage = &self.storage;
+        let free = |node_block: usize| {
+            let numbers = self.numbers(node_block).enumerate();
             numbers.filter(|&(_, row)| row != DofMap::HELD).map(|(r, row)| (row, r))
         };
         let in_tile = move |row: usize, tile: usize| {
-            free(row).map(move |(row, r)| Entry { row, place: storage.entry(tile, r, c) })
+            free(row).map(move |(row, r)| TangentEntry { row, place: storage.entry(tile, r, c) })
         };
-        let mirrored = move |mirror: &Mirror| {
-            let tile = storage.other(mirror.tile as usize);
-            free(mirror.row as usize).map(move |(row, r)| Entry { row, place: storage.entry(tile, c, r) })
+        let mirrored = move |mirror: &TransposedTile| {
+            let tile = storage.off_diagonal_tile(mirror.tile as usize);
+            free(mirror.row as usize).map(move |(row, r)| TangentEntry { row, place: storage.entry(tile, c, r) })
         };
-        let kept = self.tiles_of(group).flat_map(move |tile| in_tile(self.rows[tile] as usize, storage.other(tile)));
+        let kept = self
+            .tiles_of(node_block)
+            .flat_map(move |tile| in_tile(self.rows[tile] as usize, storage.off_diagonal_tile(tile)));
         let mirrors = self.mirrors.get_or_init(|| self.find_mirrors());
-        mirrors.of(group).iter().flat_map(mirrored).chain(in_tile(group, storage.own(group))).chain(kept)
+        mirrors
+            .of(node_block)
+            .iter()
+            .flat_map(mirrored)
+            .chain(in_tile(node_block, storage.diagonal_tile(node_block)))
+            .chain(kept)
     }
 
     /// Number of entries whose row and column are equations.
     pub fn nonzeros(&self) -> usize {
-        let meetings = self.meetings();
-        let free = |group: usize| self.numbers(group).filter(|&n| n != DofMap::HELD).count();
-        let column = |c: usize| free(c) * (free(c) + meetings.of(c).map(|row| free(row as usize)).sum::<usize>());
+        let adjacency = self.adjacency();
+        let free = |node_block: usize| self.numbers(node_block).filter(|&n| n != DofMap::HELD).count();
+        let column = |c: usize| free(c) * (free(c) + adjacency.of(c).map(|row| free(row as usize)).sum::<usize>());
         (0..self.node_blocks.count()).map(column).sum()
     }
 
     /// Entries of the diagonal block of a slot in its free directions: row and column in its local
     /// axes, and index of the value.
     pub fn own_entries(&self, slot: Slot) -> impl Iterator<Item = ([usize; 2], usize)> {
-        let ((group, first), storage) = (self.node_blocks.row(slot), &self.storage);
+        let TileRow { node_block, row: first } = self.node_blocks.row(slot);
+        let storage = &self.storage;
         let numbers = self.dof_map.of(slot);
         let free = move || (0..3).filter(move |&k| numbers[k] != DofMap::HELD);
-        let column =
-            move |c: usize| free().map(move |r| ([r, c], storage.entry(storage.own(group), first + r, first + c)));
+        let column = move |c: usize| {
+            free().map(move |r| ([r, c], storage.entry(storage.diagonal_tile(node_block), first + r, first + c)))
+        };
         free().flat_map(column)
     }
 
@@ -368,10 +409,11 @@ impl Pattern {
         if row == DofMap::HELD || column == DofMap::HELD {
             return None;
         }
-        let (row, column) = (self.row_of(row), self.row_of(column));
-        let kept = self.keeps(row.0, column.0);
-        let ((i, r), (j, c)) = if kept { (row, column) } else { (column, row) };
-        Some(self.storage.entry(self.tile(i, j)?, r, c))
+        let row = self.row_of(row);
+        let column = self.row_of(column);
+        let is_kept = self.keeps(row.node_block, column.node_block);
+        let [row, column] = if is_kept { [row, column] } else { [column, row] };
+        Some(self.storage.entry(self.tile(row.node_block, column.node_block)?, row.row, column.row))
     }
 
     /// True if the same node blocks are coupled as in another pattern, as in spatial and planar
@@ -395,18 +437,18 @@ impl Pattern {
 
     /// Calls `show` with each equation of some node blocks and the index of its diagonal entry.
     pub fn each_diagonal_of(&self, node_blocks: Range<usize>, mut show: impl FnMut(usize, usize)) {
-        for group in node_blocks {
-            for (r, number) in self.numbers(group).enumerate().filter(|(_, number)| *number != DofMap::HELD) {
-                show(number as usize, self.storage.entry(self.storage.own(group), r, r));
+        for node_block in node_blocks {
+            for (r, number) in self.numbers(node_block).enumerate().filter(|(_, number)| *number != DofMap::HELD) {
+                show(number as usize, self.storage.entry(self.storage.diagonal_tile(node_block), r, r));
             }
         }
     }
 
     /// Node block and tile row of an equation.
-    fn row_of(&self, equation: u32) -> (usize, usize) {
+    fn row_of(&self, equation: u32) -> TileRow {
         let (slot, k) = self.dof_map.origin(equation as usize);
-        let (group, first) = self.node_blocks.row(slot);
-        (group, first + k as usize)
+        let first = self.node_blocks.row(slot);
+        TileRow { row: first.row + k as usize, ..first }
     }
 
     /// True if the tile of two coupled node blocks is stored.
@@ -419,24 +461,26 @@ impl Pattern {
     /// is not stored.
     pub fn tile(&self, row: usize, column: usize) -> Option<usize> {
         if row == column {
-            return Some(self.storage.own(row));
+            return Some(self.storage.diagonal_tile(row));
         }
         let found = self.rows_of(column).binary_search(&(row as u32)).ok()?;
-        Some(self.storage.other(self.column_starts[column] as usize + found))
+        Some(self.storage.off_diagonal_tile(self.column_starts[column] as usize + found))
     }
 
-    fn idle(&self) -> Vec<(u32, u8)> {
-        let rows = |group: usize| (0..).zip(self.numbers(group)).map(move |(r, number)| (group as u32, r, number));
-        let held = (0..self.node_blocks.count()).flat_map(rows).filter(|&(.., number)| number == DofMap::HELD);
-        held.map(|(group, r, _)| (group, r)).collect()
+    fn idle(&self) -> Vec<IdleRow> {
+        let of_block = |node_block: usize| {
+            let rows = (0..).zip(self.numbers(node_block)).filter(|&(_, number)| number == DofMap::HELD);
+            rows.map(move |(tile_row, _)| IdleRow { block_row: node_block as u32, tile_row })
+        };
+        (0..self.node_blocks.count()).flat_map(of_block).collect()
     }
 
-    fn between(&self) -> Vec<(usize, usize)> {
+    fn between(&self) -> Vec<CouplingTile> {
         let mut between = Vec::new();
         for region in &self.regions {
             for column in region.node_blocks.clone() {
                 let elsewhere = |tile: &usize| !region.node_blocks.contains(&(self.rows[*tile] as usize));
-                between.extend(self.tiles_of(column).filter(elsewhere).map(|tile| (column, tile)));
+                between.extend(self.tiles_of(column).filter(elsewhere).map(|tile| CouplingTile { column, tile }));
             }
         }
         between
@@ -444,23 +488,26 @@ impl Pattern {
 
     fn places_of(&self, connectivity: Connectivity) -> ScatterMap {
         let whole = connectivity.iter().all(|slots| self.is_whole(slots));
-        let step = if whole { SLOTS } else { 1 };
+        let step = if whole { SLOTS_PER_BLOCK } else { 1 };
         let mut places = ScatterMap {
             whole,
             values: Vec::with_capacity(connectivity.iter().map(|slots| (slots.len() / step).pow(2)).sum()),
-            of_instances: Runs::default(),
+            of_instances: RangeList::default(),
             special: Vec::with_capacity(connectivity.len()),
-            shares: Shares::new(&connectivity, &self.node_blocks, &self.regions),
+            ranges: InstanceRanges::new(&connectivity, &self.node_blocks, &self.regions),
             connectivity: Connectivity::default(),
         };
         for slots in connectivity.iter() {
             let before = places.values.len();
             let corners = || slots.iter().step_by(step).map(|&slot| self.node_blocks.row(slot));
-            for (i, r) in corners() {
-                let place = |(j, c): (usize, usize)| match self.keeps(i, j) {
+            for first in corners() {
+                let place = |second: TileRow| match self.keeps(first.node_block, second.node_block) {
                     // Every pair of an instance has a tile: the pattern was made of the same
                     // connectivity.
-                    true => self.tile(i, j).map(|tile| self.storage.target(tile, r, c) as u32),
+                    true => {
+                        let tile = self.tile(first.node_block, second.node_block)?;
+                        Some(self.storage.target(tile, first.row, second.row) as u32)
+                    }
                     false => Some(NOT_KEPT),
                 };
                 places.values.extend(corners().filter_map(place));
@@ -477,10 +524,10 @@ impl Pattern {
     /// True if the slots are the complete node blocks of several nodes, one after the other.
     fn is_whole(&self, slots: &[Slot]) -> bool {
         let pair = |pair: &[Slot]| match *pair {
-            [u, p] => self.node_blocks.members(self.node_blocks.of(u).0).eq([u, p]),
+            [u, p] => self.node_blocks.members(self.node_blocks.of(u)).eq([u, p]),
             _ => false,
         };
-        slots.chunks(SLOTS).all(pair)
+        slots.chunks(SLOTS_PER_BLOCK).all(pair)
     }
 }
 
@@ -509,7 +556,8 @@ fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves
         }
     });
     // Duplicates are removed in place: a column has at most as many rows as couplings.
-    let (mut start, mut count) = (0, 0);
+    let mut start = 0;
+    let mut count = 0;
     for end in ends {
         let first = count;
         rows[start..*end as usize].sort_unstable();
@@ -528,12 +576,12 @@ fn compressed_columns(node_blocks: &NodeBlocks, effects: &[Connectivity], halves
 
 /// Transposes of all tiles below the diagonal, column by column.
 #[derive(Clone, Debug, Default)]
-struct Mirrors {
+struct TransposedTiles {
     starts: Vec<u32>,
-    all: Vec<Mirror>,
+    all: Vec<TransposedTile>,
 }
 
-impl Mirrors {
+impl TransposedTiles {
     fn new(column_starts: &[u32], rows: &[u32]) -> Self {
         let (starts, all) = mirrors(column_starts, rows);
         Self { starts, all }
@@ -541,7 +589,7 @@ impl Mirrors {
 
     /// Transposed tiles in a column.
     #[inline]
-    fn of(&self, column: usize) -> &[Mirror] {
+    fn of(&self, column: usize) -> &[TransposedTile] {
         match self.starts.get(column..column + 2) {
             Some(&[start, end]) => &self.all[start as usize..end as usize],
             _ => &[],
@@ -550,25 +598,25 @@ impl Mirrors {
 }
 
 /// Adjacency of node blocks, with both directions of each pair.
-pub struct Meetings<'a> {
+pub struct Adjacency<'a> {
     pattern: &'a Pattern,
-    mirrors: Mirrors,
+    mirrors: TransposedTiles,
 }
 
-impl Meetings<'_> {
+impl Adjacency<'_> {
     /// Number of pairs of coupled node blocks.
     pub fn pairs(&self) -> usize {
         self.pattern.pairs()
     }
 
     /// The other node blocks that a node block is coupled with, ascending.
-    pub fn of(&self, group: usize) -> impl Iterator<Item = u32> {
-        let kept = self.pattern.rows_of(group).iter().copied();
-        self.mirrors.of(group).iter().map(|mirror| mirror.row).chain(kept)
+    pub fn of(&self, node_block: usize) -> impl Iterator<Item = u32> {
+        let kept = self.pattern.rows_of(node_block).iter().copied();
+        self.mirrors.of(node_block).iter().map(|mirror| mirror.row).chain(kept)
     }
 }
 
-fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
+fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<TransposedTile>) {
     let columns = column_starts.len() - 1;
     let below = || {
         let of = |column: usize| column_starts[column] as usize..column_starts[column + 1] as usize;
@@ -578,10 +626,10 @@ fn mirrors(column_starts: &[u32], rows: &[u32]) -> (Vec<u32>, Vec<Mirror>) {
     below().for_each(|(_, tile)| starts[rows[tile] as usize + 1] += 1);
     (0..columns).for_each(|column| starts[column + 1] += starts[column]);
     let mut ends = starts.clone();
-    let mut mirrors = vec![Mirror::default(); starts[columns] as usize];
+    let mut mirrors = vec![TransposedTile::default(); starts[columns] as usize];
     for (column, tile) in below() {
         let end = &mut ends[rows[tile] as usize];
-        mirrors[*end as usize] = Mirror { row: column as u32, tile: tile as u32 };
+        mirrors[*end as usize] = TransposedTile { row: column as u32, tile: tile as u32 };
         *end += 1;
     }
     (starts, mirrors)
@@ -592,7 +640,7 @@ fn each_meeting(node_blocks: &NodeBlocks, effects: &[Connectivity], show: &mut d
     let mut met = Vec::new();
     for clique in effects.iter().flat_map(Connectivity::iter) {
         met.clear();
-        met.extend(clique.iter().map(|&slot| node_blocks.of(slot).0 as u32));
+        met.extend(clique.iter().map(|&slot| node_blocks.of(slot) as u32));
         met.dedup();
         show(&met);
     }

@@ -10,16 +10,16 @@ use std::fmt;
 /// Largest distance from a plane, relative to the size of the scene or to the length of the vector,
 /// of what counts as lying in it: some hundreds of units in the last place, the round-off of sines,
 /// cosines and a few sums in a deck.
-const ROUND_OFF: f64 = 1e-13;
+const PLANE_ROUND_OFF: f64 = 1e-13;
 
 /// A normal is replaced by a global axis if the norm of their difference is smaller than this, so
 /// that vectors in coordinate planes have exact zeros. The scene is checked against the resulting
 /// plane afterwards.
-const SNAP: f64 = 1e-12;
+const AXIS_SNAP_DISTANCE: f64 = 1e-12;
 
 /// Two directions determine a plane only if their cross product exceeds this part of the squared
 /// length of the longer one: below, the normal would have fewer than ten correct digits.
-const NO_PLANE: f64 = 1e-6;
+const MIN_CROSS_PRODUCT_RATIO: f64 = 1e-6;
 
 /// A datum of a scene, with its behaviour under reflection in a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +87,7 @@ impl Plane {
         if e.0[nearest] < 0.0 {
             e = -e;
         }
-        if (e - Vec3::UNIT[nearest]).norm() < SNAP {
+        if (e - Vec3::UNIT[nearest]).norm() < AXIS_SNAP_DISTANCE {
             let [x, y, z] = Vec3::UNIT;
             let [a, b] = [[y, z], [z, x], [x, y]][nearest];
             return Some(Self { axes: Mat3::from_columns(a, b, Vec3::UNIT[nearest]) });
@@ -119,15 +119,15 @@ impl Plane {
         !Vec3::UNIT.contains(&self.normal())
     }
 
-    /// True if a vector is normal to the plane, up to `ROUND_OFF` times its length.
+    /// True if a vector is normal to the plane, up to `PLANE_ROUND_OFF` times its length.
     pub fn is_normal(&self, v: Vec3) -> bool {
         let e = self.normal();
-        (v - e * v.dot(e)).norm() <= ROUND_OFF * v.norm()
+        (v - e * v.dot(e)).norm() <= PLANE_ROUND_OFF * v.norm()
     }
 
-    /// True if a vector lies in the plane, up to `ROUND_OFF` times its length.
+    /// True if a vector lies in the plane, up to `PLANE_ROUND_OFF` times its length.
     pub fn is_along(&self, v: Vec3) -> bool {
-        v.dot(self.normal()).abs() <= ROUND_OFF * v.norm()
+        v.dot(self.normal()).abs() <= PLANE_ROUND_OFF * v.norm()
     }
 
     /// True if a datum is its own mirror image. Positions are compared with `origin`, a point of
@@ -137,23 +137,25 @@ impl Plane {
         // A tensor is symmetric under reflection if it maps the normal to a multiple of itself, and
         // so does its transpose.
         let across = |m: Mat3| {
-            let (left, right) = (m.transpose_mul(e), m * e);
+            let left = m.transpose_mul(e);
+            let right = m * e;
             let along = e * e.dot(right);
             (left - along).norm().max((right - along).norm())
         };
         match *aspect {
-            MirrorData::Place(x) => (x - origin).dot(e).abs() <= ROUND_OFF * length.max(x.norm()),
+            MirrorData::Place(x) => (x - origin).dot(e).abs() <= PLANE_ROUND_OFF * length.max(x.norm()),
             MirrorData::Vector(v) => self.is_along(v),
             MirrorData::Axial(v) => self.is_normal(v),
             MirrorData::Line(v) => self.is_along(v) || self.is_normal(v),
-            MirrorData::Tensor(m) => across(m) <= ROUND_OFF * m.max_abs(),
+            MirrorData::Tensor(m) => across(m) <= PLANE_ROUND_OFF * m.max_abs(),
             // A coupling is symmetric under reflection if it maps the normal (axial) into the
             // plane, and axial vectors in the plane to the normal.
             MirrorData::Coupling(m) => {
-                let (right, left) = (m * e, m.transpose_mul(e));
+                let right = m * e;
+                let left = m.transpose_mul(e);
                 let along = right.dot(e);
                 let rest = m - right.outer(e) - e.outer(left) + e.outer(e).scale(along);
-                rest.max_abs().max(along.abs()) <= ROUND_OFF * m.max_abs()
+                rest.max_abs().max(along.abs()) <= PLANE_ROUND_OFF * m.max_abs()
             }
             MirrorData::Spatial => false,
         }
@@ -162,7 +164,7 @@ impl Plane {
     /// Plane of a scene of the given length whose data are visited by `shown`. `Err`: the reason
     /// why the scene is spatial.
     pub fn of(length: f64, shown: &Shown) -> Result<Self, String> {
-        let search = Search::through(length, shown);
+        let search = PlaneSearch::through(length, shown);
         if let Some(name) = search.spatial {
             return Err(format!("{name} has no planar form"));
         }
@@ -183,12 +185,12 @@ impl Plane {
 
 /// Quantities collected from the data of a scene to find candidate normals.
 #[derive(Default)]
-struct Search {
+struct PlaneSearch {
     origin: Option<Vec3>,
     /// Span of positions relative to the origin
-    places: Span,
+    places: VectorSpan,
     /// Span of relative positions and of vectors scaled to the length of the scene
-    vectors: Span,
+    vectors: VectorSpan,
     axial: Option<Vec3>,
     spatial: Option<&'static str>,
     length: f64,
@@ -196,13 +198,13 @@ struct Search {
 
 /// Plane spanned by some vectors.
 #[derive(Default)]
-struct Span {
+struct VectorSpan {
     longest: Vec3,
     /// Cross product of largest norm of the longest vector with another
     product: Vec3,
 }
 
-impl Span {
+impl VectorSpan {
     fn measure(&mut self, v: Vec3) {
         if v.norm() > self.longest.norm() {
             self.longest = v;
@@ -218,20 +220,20 @@ impl Span {
 
     /// Normal, of any length; `None` if the vectors are nearly parallel.
     fn normal(&self) -> Option<Vec3> {
-        let tells = self.product.norm() > NO_PLANE * self.longest.squared().max(f64::MIN_POSITIVE);
+        let tells = self.product.norm() > MIN_CROSS_PRODUCT_RATIO * self.longest.squared().max(f64::MIN_POSITIVE);
         tells.then_some(self.product)
     }
 }
 
-impl Search {
+impl PlaneSearch {
     fn through(length: f64, shown: &Shown) -> Self {
         let mut search = Self { length, ..Self::default() };
         shown(&mut |name, aspect| search.look(name, &aspect));
-        shown(&mut |_, aspect| search.each_span(&aspect, Span::turn));
+        shown(&mut |_, aspect| search.each_span(&aspect, VectorSpan::turn));
         search
     }
 
-    fn each_span(&mut self, aspect: &MirrorData, show: impl Fn(&mut Span, Vec3)) {
+    fn each_span(&mut self, aspect: &MirrorData, show: impl Fn(&mut VectorSpan, Vec3)) {
         let Some(v) = self.vector(aspect) else { return };
         if matches!(aspect, MirrorData::Place(_)) {
             show(&mut self.places, v);
@@ -244,16 +246,25 @@ impl Search {
             MirrorData::Place(x) => _ = self.origin.get_or_insert(x),
             MirrorData::Axial(v) if v != Vec3::ZERO && self.axial.is_none() => self.axial = Some(v),
             MirrorData::Spatial if self.spatial.is_none() => self.spatial = Some(name),
-            _ => {}
+            MirrorData::Vector(_)
+            | MirrorData::Axial(_)
+            | MirrorData::Line(_)
+            | MirrorData::Tensor(_)
+            | MirrorData::Coupling(_)
+            | MirrorData::Spatial => {}
         }
-        self.each_span(aspect, Span::measure);
+        self.each_span(aspect, VectorSpan::measure);
     }
 
     fn vector(&self, aspect: &MirrorData) -> Option<Vec3> {
         match *aspect {
             MirrorData::Place(x) => self.origin.map(|origin| x - origin),
             MirrorData::Vector(v) => v.normalized().map(|v| v * self.length),
-            _ => None,
+            MirrorData::Axial(_)
+            | MirrorData::Line(_)
+            | MirrorData::Tensor(_)
+            | MirrorData::Coupling(_)
+            | MirrorData::Spatial => None,
         }
     }
 

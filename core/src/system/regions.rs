@@ -14,31 +14,31 @@ use std::ops::Range;
 
 /// Least number of node blocks in a region of a large scene: enough work for a thread, few enough
 /// that the values it writes stay in its cache
-const GROUPS: usize = 1024;
+const NODE_BLOCKS_PER_REGION: usize = 1024;
 
 /// A run of consecutive node blocks.
 #[derive(Clone, Debug)]
 pub struct Region {
     /// Index of the region
-    pub number: usize,
+    pub(crate) number: usize,
     /// Node blocks, which are columns of tiles
-    pub node_blocks: Range<usize>,
+    pub(crate) node_blocks: Range<usize>,
     /// Slots of these node blocks
-    pub slots: Range<usize>,
+    pub(crate) slots: Range<usize>,
     /// Equations of these slots
-    pub dof_map: Range<usize>,
+    pub(crate) equations: Range<usize>,
     /// Off-diagonal tiles stored in these columns
-    pub tiles: Range<usize>,
+    pub(crate) tiles: Range<usize>,
 }
 
 /// Instances of an effect by region, as ranges.
 #[derive(Clone, Debug, Default)]
-pub struct Shares {
+pub struct InstanceRanges {
     inside: Vec<Vec<Range<usize>>>,
     others: Vec<Range<usize>>,
 }
 
-impl Shares {
+impl InstanceRanges {
     /// Divides the instances of an effect into those within one region and all others. Effects that
     /// are not [divisible](Connectivity::divisible) have others only.
     pub fn new(connectivity: &Connectivity, node_blocks: &NodeBlocks, regions: &[Region]) -> Self {
@@ -69,7 +69,7 @@ impl Shares {
 
 /// Region of a slot. All regions but the last have the length of the first.
 fn region_of(slot: u32, node_blocks: &NodeBlocks, regions: &[Region]) -> usize {
-    node_blocks.of(slot).0 / regions[0].node_blocks.len()
+    node_blocks.of(slot) / regions[0].node_blocks.len()
 }
 
 /// By region: true if some instance of an effect has a slot in it.
@@ -112,20 +112,20 @@ pub fn each<T: Send>(
 
 /// Number of regions of a scene of `nodes` nodes.
 pub fn most(nodes: usize) -> usize {
-    (nodes / GROUPS).max(1)
+    (nodes / NODE_BLOCKS_PER_REGION).max(1)
 }
 
 /// Cuts a scene into regions of equal length.
-pub fn cut(all_groups: &NodeBlocks, dof_map: &DofMap, column_starts: &[u32]) -> Vec<Region> {
-    let all = all_groups.count();
+pub fn cut(all_blocks: &NodeBlocks, dof_map: &DofMap, column_starts: &[u32]) -> Vec<Region> {
+    let all = all_blocks.count();
     let count = most(all);
     let length = all.div_ceil(count).max(1);
     let region = |number: usize| {
         let node_blocks = (length * number).min(all)..(length * (number + 1)).min(all);
-        let slots = all_groups.first_slot(node_blocks.start)..all_groups.first_slot(node_blocks.end);
-        let dof_map = dof_map.before(slots.start)..dof_map.before(slots.end);
+        let slots = all_blocks.first_slot(node_blocks.start)..all_blocks.first_slot(node_blocks.end);
+        let equations = dof_map.before(slots.start)..dof_map.before(slots.end);
         let tiles = column_starts[node_blocks.start] as usize..column_starts[node_blocks.end] as usize;
-        Region { number, node_blocks, slots, dof_map, tiles }
+        Region { number, node_blocks, slots, equations, tiles }
     };
     (0..all.div_ceil(length).max(1)).map(region).collect()
 }

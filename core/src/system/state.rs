@@ -27,10 +27,10 @@ pub struct Node {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fading {
     /// Full force, at load factor 0, on the side of the internal forces (global components)
-    pub force: Vec3,
+    pub(crate) force: Vec3,
     /// Unknowns of the slot when the force was computed, which identify the chart that it is
     /// conjugate in
-    pub at: Vec3,
+    pub(crate) at: Vec3,
 }
 
 /// Unknowns towards which the artificial resistance of a static stage pulls, see
@@ -38,9 +38,9 @@ pub struct Fading {
 #[derive(Clone, Debug)]
 pub struct Anchor {
     /// Stiffness, force per displacement, at every node
-    pub resistance: f64,
+    pub(crate) resistance: f64,
     /// Unknowns by slot
-    pub q: Vec<Vec3>,
+    pub(crate) q: Vec<Vec3>,
 }
 
 /// The variables of a run. Effects are functions of it.
@@ -60,12 +60,12 @@ pub struct State {
     /// `a`. If the unknowns of a step are increments, that of a rotation is the rate of its angular
     /// momentum, see [`Turn`]; during the iterations of a step it has the value at the start of the
     /// step.
-    pub algorithmic: Field,
+    pub(crate) algorithmic: Field,
     /// Factor of each load, valid at `time` and `load`
     pub amplitude: Vec<f64>,
     /// For each beam element the nodes whose rotation is converted into the chart of the first;
     /// constant during a Newton iteration
-    pub mixed: Vec<Conversion>,
+    pub(crate) mixed: Vec<Conversion>,
     /// For each rotation slot the rotation vector continued without jumps since the start, valid at
     /// the last converged state. Springs that count turns and the output columns `rc` read it.
     /// Empty as long as no chart has changed: `q` itself is then without jumps.
@@ -74,9 +74,9 @@ pub struct State {
     pub amplitude_rates: Vec<[f64; 2]>,
     /// For each slot the inertia and damping force at the end of the motion before a static stage;
     /// empty without such a motion
-    pub fading: Arc<Vec<Fading>>,
+    pub(crate) fading: Arc<Vec<Fading>>,
     /// Anchor of the artificial resistance while a static stage searches for an equilibrium
-    pub anchor: Option<Arc<Anchor>>,
+    pub(crate) anchor: Option<Arc<Anchor>>,
     /// Angle of each joint spring [rad], continued without jumps, valid at the last converged state
     pub angles: Vec<f64>,
     /// For each rotation slot the base of the current time step, during the iterations of a step
@@ -131,7 +131,9 @@ impl State {
     pub fn stand_still(&mut self) {
         if self.moves() {
             let rest = Field::zero(self.v.len());
-            (self.v, self.a, self.algorithmic) = (rest.clone(), rest, Field::none());
+            self.v = rest.clone();
+            self.a = rest;
+            self.algorithmic = Field::none();
         }
     }
 
@@ -191,7 +193,7 @@ impl State {
     }
 
     /// Rotation vectors continued without jumps, by slot, stored separately from `q` from here on.
-    pub fn wound_apart(&mut self) -> &mut [Vec3] {
+    pub fn unwrapped_mut(&mut self) -> &mut [Vec3] {
         if self.unwrapped.is_empty() {
             threads::copy(&mut self.unwrapped, &self.q);
         }
@@ -239,7 +241,8 @@ impl State {
     /// Motion of a node, for effects that support total rotation vectors only.
     #[inline]
     pub fn motion(&self, node: Node) -> NodeMotion {
-        let (u, p) = (node.u as usize, node.p as usize);
+        let u = node.u as usize;
+        let p = node.p as usize;
         NodeMotion {
             u: self.q[u],
             u_rate: self.v[u],

@@ -33,12 +33,12 @@ impl Storage {
 
     /// Positions of the values of some diagonal tiles.
     pub(super) fn on_diagonal(&self, node_blocks: &Range<usize>) -> Range<usize> {
-        self.own(node_blocks.start)..self.own(node_blocks.end)
+        self.diagonal_tile(node_blocks.start)..self.diagonal_tile(node_blocks.end)
     }
 
     /// Positions of the values of some off-diagonal tiles.
-    pub(super) fn beside(&self, tiles: &Range<usize>) -> Range<usize> {
-        self.other(tiles.start)..self.other(tiles.end)
+    pub(super) fn off_diagonal(&self, tiles: &Range<usize>) -> Range<usize> {
+        self.off_diagonal_tile(tiles.start)..self.off_diagonal_tile(tiles.end)
     }
 
     /// True if diagonal tiles store only their upper triangle.
@@ -55,13 +55,13 @@ impl Storage {
 
     /// Position of the diagonal tile of a node block.
     #[inline(always)]
-    pub(super) fn own(&self, group: usize) -> usize {
-        self.lengths[0] * group
+    pub(super) fn diagonal_tile(&self, node_block: usize) -> usize {
+        self.lengths[0] * node_block
     }
 
     /// Position of an off-diagonal tile.
     #[inline(always)]
-    pub(super) fn other(&self, tile: usize) -> usize {
+    pub(super) fn off_diagonal_tile(&self, tile: usize) -> usize {
         self.boundary + self.lengths[1] * tile
     }
 
@@ -90,7 +90,8 @@ impl Storage {
     /// A list of values as tiles.
     pub(super) fn tiles<'a, const W: usize>(&self, values: &'a [f64]) -> Tiles<'a, W> {
         let (own, beside) = values.split_at(self.boundary);
-        let own = if self.keeps_upper { Own::Halves(own) } else { Own::Whole(as_tiles(own)) };
+        let own =
+            if self.keeps_upper { DiagonalTiles::UpperTriangles(own) } else { DiagonalTiles::Whole(as_tiles(own)) };
         Tiles { own, beside: as_tiles(beside) }
     }
 }
@@ -116,28 +117,29 @@ pub const fn upper_start(width: usize, row: usize) -> usize {
 #[derive(Clone, Copy)]
 pub struct Tiles<'a, const W: usize> {
     /// Diagonal tiles, one per node block
-    pub own: Own<'a, W>,
+    pub(crate) own: DiagonalTiles<'a, W>,
     /// Off-diagonal tiles, in the order of the pattern
-    pub beside: &'a [Tile<W>],
+    pub(crate) beside: &'a [Tile<W>],
 }
 
 /// Diagonal tiles of a tangent.
 #[derive(Clone, Copy)]
-pub enum Own<'a, const W: usize> {
+pub enum DiagonalTiles<'a, const W: usize> {
     /// Complete tiles
     Whole(&'a [Tile<W>]),
     /// Upper triangles, each row by row
-    Halves(&'a [f64]),
+    UpperTriangles(&'a [f64]),
 }
 
-impl<'a, const W: usize> Own<'a, W> {
+impl<'a, const W: usize> DiagonalTiles<'a, W> {
     /// Calls `work` with the tile of a node block.
     #[inline(always)]
-    pub fn with<T>(&self, group: usize, work: impl FnOnce(&Tile<W>) -> T) -> T {
+    pub fn with<T>(&self, node_block: usize, work: impl FnOnce(&Tile<W>) -> T) -> T {
         match self {
-            Self::Whole(tiles) => work(&tiles[group]),
-            Self::Halves(numbers) => {
-                let (numbers, mut tile) = (half::<W>(numbers, group), [[0.0; W]; W]);
+            Self::Whole(tiles) => work(&tiles[node_block]),
+            Self::UpperTriangles(numbers) => {
+                let numbers = half::<W>(numbers, node_block);
+                let mut tile = [[0.0; W]; W];
                 for r in 0..W {
                     for c in r..W {
                         tile[r][c] = numbers[upper_entry(W, r, c)];
@@ -151,12 +153,12 @@ impl<'a, const W: usize> Own<'a, W> {
 
     /// Copies the upper triangle of the symmetric tile of a node block.
     #[inline(always)]
-    pub fn copy_upper(&self, group: usize, upper: &mut [f64]) {
+    pub fn copy_upper(&self, node_block: usize, upper: &mut [f64]) {
         match self {
-            Self::Halves(numbers) => upper.copy_from_slice(half::<W>(numbers, group)),
+            Self::UpperTriangles(numbers) => upper.copy_from_slice(half::<W>(numbers, node_block)),
             Self::Whole(tiles) => {
                 for r in 0..W {
-                    let row = &tiles[group][r][r..];
+                    let row = &tiles[node_block][r][r..];
                     upper[upper_entry(W, r, r)..][..W - r].copy_from_slice(row);
                 }
             }
@@ -166,8 +168,8 @@ impl<'a, const W: usize> Own<'a, W> {
 
 /// Upper triangle of one node block in the list of all.
 #[inline(always)]
-fn half<const W: usize>(numbers: &[f64], group: usize) -> &[f64] {
-    &numbers[upper_length(W) * group..][..upper_length(W)]
+fn half<const W: usize>(numbers: &[f64], node_block: usize) -> &[f64] {
+    &numbers[upper_length(W) * node_block..][..upper_length(W)]
 }
 
 /// A list of values as complete tiles.

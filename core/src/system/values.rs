@@ -3,7 +3,7 @@
 use super::storage::{NOT_KEPT, Storage, upper_entry};
 
 /// Mutable values of a slice of the tangent.
-pub struct Values<'a> {
+pub struct TileValues<'a> {
     storage: &'a Storage,
     own: &'a mut [f64],
     beside: &'a mut [f64],
@@ -22,7 +22,7 @@ pub enum BlockMut<'a> {
     Nowhere,
 }
 
-impl<'a> Values<'a> {
+impl<'a> TileValues<'a> {
     /// Values of all tiles.
     pub(super) fn all(storage: &'a Storage, values: &'a mut [f64]) -> Self {
         let (own, beside) = values.split_at_mut(storage.boundary());
@@ -37,8 +37,8 @@ impl<'a> Values<'a> {
 
     /// Borrows the values again for a shorter time.
     #[inline]
-    pub(super) fn reborrow(&mut self) -> Values<'_> {
-        Values { storage: self.storage, own: self.own, beside: self.beside, first: self.first }
+    pub(super) fn reborrow(&mut self) -> TileValues<'_> {
+        TileValues { storage: self.storage, own: self.own, beside: self.beside, first: self.first }
     }
 
     /// Sets all values to zero.
@@ -52,11 +52,14 @@ impl<'a> Values<'a> {
     #[inline(always)]
     pub(super) fn block(&mut self, place: u32, corner: impl FnOnce() -> [usize; 2]) -> BlockMut<'_> {
         let at = place as usize;
-        match () {
-            () if place == NOT_KEPT => BlockMut::Nowhere,
-            () if at >= self.storage.boundary() => BlockMut::Whole(&mut self.beside[at - self.first[1]..]),
-            () if self.storage.keeps_upper() => BlockMut::Upper(&mut self.own[at - self.first[0]..], corner()),
-            () => BlockMut::Whole(&mut self.own[at - self.first[0]..]),
+        if place == NOT_KEPT {
+            BlockMut::Nowhere
+        } else if at >= self.storage.boundary() {
+            BlockMut::Whole(&mut self.beside[at - self.first[1]..])
+        } else if self.storage.keeps_upper() {
+            BlockMut::Upper(&mut self.own[at - self.first[0]..], corner())
+        } else {
+            BlockMut::Whole(&mut self.own[at - self.first[0]..])
         }
     }
 
@@ -88,7 +91,8 @@ impl<'a> BlockMut<'a> {
                 values[width * column + row] += value;
             }
             Self::Upper(values, [first_row, first_column]) => {
-                let (row, column) = (*first_row + row, *first_column + column);
+                let row = *first_row + row;
+                let column = *first_column + column;
                 if row <= column {
                     values[upper_entry(width, row, column)] += value;
                 }
@@ -146,34 +150,35 @@ impl<'a> BlockMut<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::storage::Own;
+    use super::super::storage::DiagonalTiles;
     use super::*;
 
     #[test]
     fn what_is_added_to_halves_is_found_in_both() {
         let storage = Storage::new(3, 2, true);
-        let mut values = vec![0.0; storage.other(1)];
+        let mut values = vec![0.0; storage.off_diagonal_tile(1)];
         let mut add = |place: usize| {
-            let mut all = Values::all(&storage, &mut values);
+            let mut all = TileValues::all(&storage, &mut values);
             all.tile(place as u32).add_tile::<3>(|k| [1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0][k]);
             let mut tile = all.tile(place as u32);
             (0..3).for_each(|c| (0..3).for_each(|r| tile.add(3, r, c, f64::from(u8::from(r != c)))));
             tile.within(3, [1, 1]).add_along_diagonal::<3, 2>(10.0);
             all.tile(place as u32).add_block::<3>(|r, c| f64::from(u8::from(r + c == 0)));
         };
-        add(storage.own(1));
-        add(storage.other(0));
+        add(storage.diagonal_tile(1));
+        add(storage.off_diagonal_tile(0));
         let expected = [[2.0, 3.0, 4.0], [3.0, 14.0, 6.0], [4.0, 6.0, 16.0]];
-        for place in [storage.own(1), storage.other(0)] {
+        for place in [storage.diagonal_tile(1), storage.off_diagonal_tile(0)] {
             let entry = |r: usize, c: usize| values[storage.entry(place, r, c)];
             assert!((0..9).all(|k| entry(k / 3, k % 3) == expected[k / 3][k % 3]));
         }
         let tiles = storage.tiles::<3>(&values);
         assert_eq!(tiles.own.with(1, |tile| *tile), expected);
         assert_eq!((tiles.own.with(0, |tile| *tile), tiles.beside), ([[0.0; 3]; 3], &[expected][..]));
-        let (mut half, mut whole) = ([0.0; 6], [0.0; 6]);
+        let mut half = [0.0; 6];
+        let mut whole = [0.0; 6];
         tiles.own.copy_upper(1, &mut half);
-        Own::Whole(tiles.beside).copy_upper(0, &mut whole);
+        DiagonalTiles::Whole(tiles.beside).copy_upper(0, &mut whole);
         assert_eq!((half, half), (whole, [2.0, 3.0, 4.0, 14.0, 6.0, 16.0]));
     }
 }

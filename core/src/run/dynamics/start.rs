@@ -158,7 +158,7 @@ impl Dynamics<'_, '_> {
         // Along no axis round-off leaves pivots where the mass matrix is singular: solved with,
         // they give accelerations of 1e16.
         let massless = solver.null_vector(&mut mass);
-        let factorised = massless.is_none() && solver.factorise_new(&mut mass).0;
+        let factorised = massless.is_none() && solver.factorise_new(&mut mass).is_done;
         let system = mass.system();
         if !factorised || !solver.solve(system, &mut right_hand_side) {
             let named = self.stage.name_mechanism(massless, &self.stage.assembly.system);
@@ -178,7 +178,7 @@ impl Dynamics<'_, '_> {
         let StageRun { assembly, newton, model, state, .. } = &mut *self.stage;
         assembly.evaluate(state, Weights::STIFFNESS, None);
         let mut tangent = Tangent::that_may_go(assembly, state, Weights::STIFFNESS);
-        newton.solver.factorise_new(&mut tangent).0
+        newton.solver.factorise_new(&mut tangent).is_done
             && SoftMode::find(&mut newton.solver, &mut tangent, model, false)
                 .is_none_or(|soft_mode| !soft_mode.is_loose())
     }

@@ -88,10 +88,10 @@ fn parts(system: &System, places: &[(Node, Vec3)]) -> Vec<Vec<(Node, Vec3)>> {
         system.pattern.rows_of(column).iter().for_each(|&row| join(row as usize, column));
     }
     // Nodes that share a displacement are one part.
-    places.iter().for_each(|(node, _)| join(node_blocks.of(node.u).0, node_blocks.of(node.p).0));
+    places.iter().for_each(|(node, _)| join(node_blocks.of(node.u), node_blocks.of(node.p)));
     let mut parts: BTreeMap<usize, Vec<(Node, Vec3)>> = BTreeMap::new();
     for &(node, place) in places {
-        parts.entry(root(&mut part_of, node_blocks.of(node.u).0)).or_default().push((node, place));
+        parts.entry(root(&mut part_of, node_blocks.of(node.u))).or_default().push((node, place));
     }
     parts.into_values().collect()
 }

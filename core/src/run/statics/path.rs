@@ -16,7 +16,7 @@ use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
-use crate::solve::{self, NewtonFailure, Signature, Tangent, Verdict, mechanism, timed};
+use crate::solve::{self, Judgement, NewtonFailure, Signature, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -266,7 +266,8 @@ impl Path {
             let StageRun { assembly, newton, prescribed_increment, .. } = stage;
             let seconds = &mut stage.counters.work.evaluation_seconds;
             timed(seconds, || assembly.evaluate(stage.state, Weights::STIFFNESS, Some(prescribed_increment)));
-            let (verdict, residual) = newton.convergence.judge(stage.model, &assembly.system, round_off, last);
+            let Judgement { verdict, residual } =
+                newton.convergence.judge(stage.model, &assembly.system, round_off, last);
             history.push(residual.ratio);
             match verdict {
                 Verdict::Converged | Verdict::Noisy => return Ok(iterations),

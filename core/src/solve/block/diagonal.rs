@@ -20,7 +20,7 @@ impl<'a, S> Diagonal<'a, S> {
 
     /// Tiles stored by node block from node block `first` on; `order` is the node block of each
     /// row.
-    pub fn by_groups(tiles: S, first: usize, order: &'a [u32]) -> Self {
+    pub fn by_node_blocks(tiles: S, first: usize, order: &'a [u32]) -> Self {
         Self { tiles, first, node_blocks: Some(order) }
     }
 

@@ -1,17 +1,17 @@
 //! Symbolic factorisation: the order of elimination and the positions of its updates, computed once
 //! for a pattern.
 
-use super::order::{self, Order};
-use crate::system::Pattern;
+use super::order::{self, EliminationOrder};
+use crate::system::{IdleRow, Pattern};
 use std::ops::Range;
 
 /// Limit of fill: with more blocks in the factor than this many times those of the tangent, a
 /// supernodal factorisation is faster.
-const MOST_FILL: usize = 8;
+const MAX_FILL_RATIO: usize = 8;
 
 /// Limit of fill of a factorisation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fill {
+pub enum FillLimit {
     /// At most [`MAX_FILL_RATIO`] times the blocks of the tangent
     Little,
     /// Any amount
@@ -20,22 +20,22 @@ pub enum Fill {
 
 /// Position of the first value of a block, packed into one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Source(u32);
+pub struct BlockSource(u32);
 
-/// Position of the first value of a block, unpacked from a [`Source`].
+/// Position of the first value of a block, unpacked from a [`BlockSource`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stands {
+pub enum BlockPosition {
     /// Off-diagonal tile of the tangent, by number
     Tile(usize),
     /// Transpose of an off-diagonal tile of the tangent
     Transpose(usize),
     /// Block of the factorisation that elimination changes, by number
-    Own(usize),
+    Changed(usize),
     /// Fill: a block that the tangent does not have.
     Nowhere,
 }
 
-impl Source {
+impl BlockSource {
     const NOWHERE: Self = Self(u32::MAX);
 
     fn tile(number: usize) -> Self {
@@ -53,13 +53,13 @@ impl Source {
 
     /// The position, unpacked.
     #[inline(always)]
-    pub fn stands(self) -> Stands {
+    pub fn position(self) -> BlockPosition {
         let number = (self.0 / 4) as usize;
         match self.0 % 4 {
-            0 => Stands::Tile(number),
-            1 => Stands::Transpose(number),
-            2 => Stands::Own(number),
-            _ => Stands::Nowhere,
+            0 => BlockPosition::Tile(number),
+            1 => BlockPosition::Transpose(number),
+            2 => BlockPosition::Changed(number),
+            _ => BlockPosition::Nowhere,
         }
     }
 }
@@ -95,26 +95,27 @@ pub struct Elimination {
     /// Blocks right of the diagonal that elimination changes, ascending
     changed: Vec<u32>,
     /// Sources of the initial values of each changed block and of its mirror image
-    begin: Vec<[Source; 2]>,
+    begin: Vec<[BlockSource; 2]>,
     /// Source of each block right of the diagonal; empty for symmetric off-diagonal tiles, for
     /// which `below` is used
-    above: Vec<Source>,
+    above: Vec<BlockSource>,
     /// Source of the transpose of the mirror image of each block
-    below: Vec<Source>,
-    /// Rows of diagonal tiles without an equation: row of elimination, and row of the tile
-    idle: Vec<(u32, u8)>,
+    below: Vec<BlockSource>,
+    /// Rows of diagonal tiles without an equation, by row of elimination
+    idle: Vec<IdleRow>,
 }
 
 impl Elimination {
     /// Elimination in the order of [`order::find`], without fill on chains and trees. `None` if
     /// fill exceeds its limit, or memory for the analysis is not available.
-    pub fn new(pattern: &Pattern, multipliers: &[u32], fill: Fill) -> Option<Self> {
+    pub fn new(pattern: &Pattern, multipliers: &[u32], fill: FillLimit) -> Option<Self> {
         let most = match fill {
-            Fill::Little => MOST_FILL * pattern.pairs(),
-            Fill::Any => usize::MAX,
+            FillLimit::Little => MAX_FILL_RATIO * pattern.pairs(),
+            FillLimit::Any => usize::MAX,
         };
-        let Order { order, branches, neighbours } = order::find(pattern, multipliers, most)?;
-        let (starts, later) = (neighbours.starts, neighbours.later);
+        let EliminationOrder { order, branches, neighbours } = order::find(pattern, multipliers, most)?;
+        let starts = neighbours.starts;
+        let later = neighbours.later;
         let (target_starts, mut targets) = targets(&starts, &later);
         let mut changed = targets.clone();
         changed.sort_unstable();
@@ -164,13 +165,13 @@ impl Elimination {
 
     /// Source of a block right of the diagonal.
     #[inline(always)]
-    pub fn above(&self, block: usize) -> Source {
+    pub fn above(&self, block: usize) -> BlockSource {
         *self.above.get(block).unwrap_or(&self.below[block])
     }
 
     /// Source of the transpose of the mirror image, left of the diagonal, of a block.
     #[inline(always)]
-    pub fn below(&self, block: usize) -> Source {
+    pub fn below(&self, block: usize) -> BlockSource {
         self.below[block]
     }
 
@@ -178,7 +179,7 @@ impl Elimination {
     /// the tangent.
     #[inline(always)]
     pub fn is_one(&self, block: usize) -> bool {
-        self.above.is_empty() && !matches!(self.below[block].stands(), Stands::Own(_))
+        self.above.is_empty() && !matches!(self.below[block].position(), BlockPosition::Changed(_))
     }
 
     /// Numbers, among changed blocks, of those in the given rows.
@@ -189,7 +190,7 @@ impl Elimination {
 
     /// Sources of the initial values of changed block `number` and of the transpose of its mirror
     /// image.
-    pub fn begin(&self, number: usize) -> [Source; 2] {
+    pub fn begin(&self, number: usize) -> [BlockSource; 2] {
         self.begin[number]
     }
 
@@ -207,28 +208,30 @@ impl Elimination {
 
     /// Position of the later row of a block relative to the piece of `rows`.
     #[inline(always)]
-    pub fn place(&self, rows: &Range<usize>, block: usize) -> Later {
+    pub fn place(&self, rows: &Range<usize>, block: usize) -> LaterRow {
         match self.later[block] as usize {
-            row if row < rows.end => Later::Own(row - rows.start),
-            row => Later::Beyond(row - self.trunk.start),
+            row if row < rows.end => LaterRow::InPiece(row - rows.start),
+            row => LaterRow::InTrunk(row - self.trunk.start),
         }
     }
 
     /// Rows of diagonal tiles without an equation, among `rows`.
-    pub fn idle(&self, rows: &Range<usize>) -> &[(u32, u8)] {
-        let place = |row: usize| self.idle.partition_point(|(other, _)| (*other as usize) < row);
+    pub fn idle(&self, rows: &Range<usize>) -> &[IdleRow] {
+        let place = |row: usize| self.idle.partition_point(|idle| (idle.block_row as usize) < row);
         &self.idle[place(rows.start)..place(rows.end)]
     }
 
     fn find_sources(&mut self, pattern: &Pattern) {
         let row_of = &self.row_of;
-        self.below = vec![Source::NOWHERE; self.later.len()];
+        self.below = vec![BlockSource::NOWHERE; self.later.len()];
         self.above = if pattern.symmetry.halves() { Vec::new() } else { self.below.clone() };
         for column in 0..pattern.node_blocks.count() {
             for tile in pattern.tiles_of(column) {
-                let (i, j) = (row_of[pattern.rows[tile] as usize], row_of[column]);
+                let i = row_of[pattern.rows[tile] as usize];
+                let j = row_of[column];
                 // Tiles are stored by columns; factors are by rows.
-                let (block, source) = (find(&self.starts, &self.later, i.min(j), i.max(j)), Source::tile(tile));
+                let block = find(&self.starts, &self.later, i.min(j), i.max(j));
+                let source = BlockSource::tile(tile);
                 match (i < j, self.above.get_mut(block)) {
                     (true, Some(above)) => *above = source.transposed(),
                     (true, None) => self.below[block] = source.transposed(),
@@ -240,30 +243,31 @@ impl Elimination {
             self.changed.iter().map(|&block| [self.above(block as usize), self.below(block as usize)]).collect();
         for sources in [&mut self.above, &mut self.below].into_iter().filter(|sources| !sources.is_empty()) {
             for (number, &block) in self.changed.iter().enumerate() {
-                sources[block as usize] = Source::own(number);
+                sources[block as usize] = BlockSource::own(number);
             }
         }
-        self.idle = pattern.idle.iter().map(|&(group, direction)| (row_of[group as usize], direction)).collect();
+        let of_row = |idle: &IdleRow| IdleRow { block_row: row_of[idle.block_row as usize], ..*idle };
+        self.idle = pattern.idle.iter().map(of_row).collect();
         self.idle.sort_unstable();
     }
 }
 
 /// Position of a later row relative to a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Later {
+pub enum LaterRow {
     /// Row of the same piece, from its first on
-    Own(usize),
+    InPiece(usize),
     /// Row of the trunk, from its first on
-    Beyond(usize),
+    InTrunk(usize),
 }
 
-impl Later {
+impl LaterRow {
     /// Item of the row, in the list of the piece or in that of the trunk.
     #[inline(always)]
     pub fn of<'a, T>(self, own: &'a [T], beyond: &'a [T]) -> &'a T {
         match self {
-            Self::Own(row) => &own[row],
-            Self::Beyond(row) => &beyond[row],
+            Self::InPiece(row) => &own[row],
+            Self::InTrunk(row) => &beyond[row],
         }
     }
 
@@ -271,8 +275,8 @@ impl Later {
     #[inline(always)]
     pub fn of_mut<'a, T>(self, own: &'a mut [T], beyond: &'a mut [T]) -> &'a mut T {
         match self {
-            Self::Own(row) => &mut own[row],
-            Self::Beyond(row) => &mut beyond[row],
+            Self::InPiece(row) => &mut own[row],
+            Self::InTrunk(row) => &mut beyond[row],
         }
     }
 }
@@ -292,7 +296,8 @@ fn find(starts: &[u32], later: &[u32], i: u32, j: u32) -> usize {
 }
 
 fn targets(starts: &[u32], later: &[u32]) -> (Vec<u32>, Vec<u32>) {
-    let (mut begins, mut targets) = (Vec::with_capacity(starts.len()), Vec::new());
+    let mut begins = Vec::with_capacity(starts.len());
+    let mut targets = Vec::new();
     for row in 0..starts.len() - 1 {
         begins.push(targets.len() as u32);
         let neighbours = &later[starts[row] as usize..starts[row + 1] as usize];

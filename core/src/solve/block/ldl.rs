@@ -2,9 +2,9 @@
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
-use super::pieces::{Look, Piece, Signs};
-use super::stretch::Stretch;
-use super::tile::{self, Block, Own, Part, Rows, Tile, Upper, Width};
+use super::list_range::ListRange;
+use super::pieces::{LaterTargets, Piece, PieceFactors, PivotSigns};
+use super::tile::{self, BlockVector, DiagonalTiles, Rows, StoredBlock, Tile, UpperTriangle, Width};
 use crate::system::upper_entry;
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ where
 {
     rows: Range<usize>,
     /// Blocks above the diagonal that elimination changes
-    changed: Stretch<Tile<W>>,
+    changed: ListRange<Tile<W>>,
     /// D^-1 Y of the row being eliminated
     row: Vec<Tile<W>>,
 }
@@ -29,22 +29,22 @@ where
     const NAME: &'static str = "block LDL^T";
     const SYMMETRIC: bool = true;
 
-    type Own = Upper<W>;
-    const NOTHING: Self::Own = <Width<W> as Rows<W>>::NOTHING;
+    type DiagonalTile = UpperTriangle<W>;
+    const NOTHING: Self::DiagonalTile = <Width<W> as Rows<W>>::NOTHING;
 
     fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self> {
-        Some(Self { rows, changed: Stretch::new(changed, tile::zero())?, row: Vec::new() })
+        Some(Self { rows, changed: ListRange::new(changed, tile::zero())?, row: Vec::new() })
     }
 
     fn rows(&self) -> Range<usize> {
         self.rows.clone()
     }
 
-    fn within(numbers: &[f64]) -> &[Self::Own] {
+    fn within(numbers: &[f64]) -> &[Self::DiagonalTile] {
         Width::<W>::uppers(numbers)
     }
 
-    fn within_mut(numbers: &mut [f64]) -> &mut [Self::Own] {
+    fn within_mut(numbers: &mut [f64]) -> &mut [Self::DiagonalTile] {
         Width::<W>::uppers_mut(numbers)
     }
 
@@ -53,9 +53,9 @@ where
         &mut self,
         rows: Range<usize>,
         elimination: &Elimination,
-        own: Option<&Own<W>>,
+        own: Option<&DiagonalTiles<W>>,
         beside: &[Tile<W>],
-        diagonal: &mut Diagonal<&mut [Self::Own]>,
+        diagonal: &mut Diagonal<&mut [Self::DiagonalTile]>,
     ) {
         if let Some(own) = own {
             for row in rows.clone() {
@@ -64,15 +64,18 @@ where
         }
         for number in elimination.changed(&rows) {
             // A block stored by columns is its mirror image stored by rows.
-            let ([_, below], none, block) = (elimination.begin(number), Stretch::nothing(), &mut self.changed[number]);
-            Block::find(below, beside, &none).with(|begin| tile::copy(block, begin));
+            let [_, below] = elimination.begin(number);
+            let none = ListRange::nothing();
+            let block = &mut self.changed[number];
+            StoredBlock::find(below, beside, &none).with(|begin| tile::copy(block, begin));
         }
-        for &(row, direction) in elimination.idle(&rows) {
-            diagonal[row as usize].as_mut()[upper_entry(W, direction as usize, direction as usize)] = 1.0;
+        for idle in elimination.idle(&rows) {
+            let r = idle.tile_row as usize;
+            diagonal[idle.block_row as usize].as_mut()[upper_entry(W, r, r)] = 1.0;
         }
     }
 
-    fn add_own(sum: &mut Self::Own, other: &Self::Own) -> bool {
+    fn add_own(sum: &mut Self::DiagonalTile, other: &Self::DiagonalTile) -> bool {
         sum.as_mut().iter_mut().zip(other.as_ref()).for_each(|(sum, other)| *sum += other);
         // The signs of pivots tell whether digits may be lost.
         true
@@ -92,26 +95,30 @@ where
         rows: Range<usize>,
         elimination: &Elimination,
         beside: &[Tile<W>],
-        diagonal: &mut Diagonal<&mut [Self::Own]>,
-        (beyond, of_beyond): (&mut Self, &mut Diagonal<&mut [Self::Own]>),
-    ) -> Option<Signs> {
+        diagonal: &mut Diagonal<&mut [Self::DiagonalTile]>,
+        beyond: LaterTargets<Self, W>,
+    ) -> Option<PivotSigns> {
         let Self { changed, row: before, .. } = self;
-        let (mut factor, mut y, mut w, mut negative) = (tile::zero(), tile::zero(), tile::zero(), 0);
+        let mut factor = tile::zero();
+        let mut y = tile::zero();
+        let mut w = tile::zero();
+        let mut negative = 0;
         for row in rows {
             tile::spread(&diagonal[row], &mut factor);
             negative += tile::factorise_symmetric(&mut factor)?;
-            let (neighbours, mut target) = (elimination.neighbours(row), elimination.first_target(row));
+            let neighbours = elimination.neighbours(row);
+            let mut target = elimination.first_target(row);
             before.clear();
             for k in neighbours.clone() {
                 let forward = |block: &Tile<W>| tile::forward_symmetric(&factor, block, &mut y);
-                Block::find(elimination.below(k), beside, changed).with(forward);
+                StoredBlock::find(elimination.below(k), beside, changed).with(forward);
                 for w in &*before {
                     let shared = elimination.targets[target] as usize;
-                    tile::subtract_product(changed.or(&mut beyond.changed, shared), w, &y);
+                    tile::subtract_product(changed.or(&mut beyond.blocks.changed, shared), w, &y);
                     target += 1;
                 }
                 tile::over_pivots(&factor, &y, &mut w);
-                let later = diagonal.or(of_beyond, elimination.later[k] as usize);
+                let later = diagonal.or(beyond.diagonal, elimination.later[k] as usize);
                 tile::subtract_symmetric_product(later, &w, &y);
                 if k + 1 < neighbours.end {
                     before.push(w);
@@ -120,22 +127,23 @@ where
             tile::invert_symmetric(&factor, &mut diagonal[row]);
         }
         // With positive pivots only no digits are lost, as in Cholesky's factorisation.
-        Some(Signs { negative, doubtful: negative })
+        Some(PivotSigns { negative, doubtful: negative })
     }
 
     #[inline(always)]
-    fn forward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+    fn forward(&self, factors: &PieceFactors<Self, W>, x: &mut [BlockVector<W>], beyond: &mut [BlockVector<W>]) {
         for row in self.rows() {
-            let part = tile::solve_symmetric(&look.diagonal[row], &x[row - self.rows.start]);
-            self.subtract_from_later(look, row, &part, x, beyond);
+            let part = tile::solve_symmetric(&factors.diagonal[row], &x[row - self.rows.start]);
+            self.subtract_from_later(factors, row, &part, x, beyond);
             x[row - self.rows.start] = part;
         }
     }
 
     #[inline(always)]
-    fn backward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
+    fn backward(&self, factors: &PieceFactors<Self, W>, x: &mut [BlockVector<W>], beyond: &[BlockVector<W>]) {
         for row in self.rows().rev() {
-            let part = tile::solve_symmetric(&look.diagonal[row], &self.subtracted_by_later(look, row, x, beyond));
+            let part =
+                tile::solve_symmetric(&factors.diagonal[row], &self.subtracted_by_later(factors, row, x, beyond));
             x[row - self.rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
         }
     }
@@ -149,25 +157,34 @@ where
     #[inline(always)]
     fn subtract_from_later(
         &self,
-        look: &Look<Self, W>,
+        factors: &PieceFactors<Self, W>,
         row: usize,
-        part: &Part<W>,
-        x: &mut [Part<W>],
-        beyond: &mut [Part<W>],
+        part: &BlockVector<W>,
+        x: &mut [BlockVector<W>],
+        beyond: &mut [BlockVector<W>],
     ) {
-        for k in look.elimination.neighbours(row) {
-            let later = look.elimination.place(&self.rows, k).of_mut(x, beyond);
-            Block::find(look.elimination.below(k), look.beside, &self.changed).transposed().subtract_times(later, part);
+        for k in factors.elimination.neighbours(row) {
+            let later = factors.elimination.place(&self.rows, k).of_mut(x, beyond);
+            StoredBlock::find(factors.elimination.below(k), factors.beside, &self.changed)
+                .transposed()
+                .subtract_times(later, part);
         }
     }
 
     /// -sum A_kj x_j over all later rows j
     #[inline(always)]
-    fn subtracted_by_later(&self, look: &Look<Self, W>, row: usize, x: &[Part<W>], beyond: &[Part<W>]) -> Part<W> {
+    fn subtracted_by_later(
+        &self,
+        factors: &PieceFactors<Self, W>,
+        row: usize,
+        x: &[BlockVector<W>],
+        beyond: &[BlockVector<W>],
+    ) -> BlockVector<W> {
         let mut part = [0.0; W];
-        for k in look.elimination.neighbours(row) {
-            let later = look.elimination.place(&self.rows, k).of(x, beyond);
-            Block::find(look.elimination.below(k), look.beside, &self.changed).subtract_times(&mut part, later);
+        for k in factors.elimination.neighbours(row) {
+            let later = factors.elimination.place(&self.rows, k).of(x, beyond);
+            StoredBlock::find(factors.elimination.below(k), factors.beside, &self.changed)
+                .subtract_times(&mut part, later);
         }
         part
     }

@@ -1,22 +1,22 @@
-//! Block LU factorisation of unsymmetric tangents, with row pivoting inside diagonal tiles that
-//! have small pivots.
+//! Block LU factorisation of unsymmetric tangents, with row pivoting inside diagonal tiles
+//! that have small pivots.
 
 use super::diagonal::Diagonal;
 use super::elimination::Elimination;
-use super::pieces::{Look, Piece, Signs};
-use super::stretch::Stretch;
-use super::tile::{self, Block, Own, Part, RowOrder, Rows, Tile, Width};
+use super::list_range::ListRange;
+use super::pieces::{LaterTargets, Piece, PieceFactors, PivotSigns};
+use super::tile::{self, BlockVector, DiagonalTiles, RowOrder, Rows, StoredBlock, Tile, Width};
 use std::ops::Range;
 
 /// Rows of a block LU factorisation, with P A_kk = L U the diagonal tile at the elimination of row
 /// k. Off-diagonal blocks keep the values they have then: with Y = L^-1 P A_kj and W = U^-T A_jk^T,
 /// row k subtracts W^T Y from later blocks.
 pub struct Lu<const W: usize> {
-    orders: Stretch<RowOrder<W>>,
+    orders: ListRange<RowOrder<W>>,
     /// Blocks above the diagonal that elimination changes
-    above: Stretch<Tile<W>>,
+    above: ListRange<Tile<W>>,
     /// Transposes of the mirror images of the blocks in `above`, in the same order
-    below: Stretch<Tile<W>>,
+    below: ListRange<Tile<W>>,
     /// Y and W of the row being eliminated
     row: Vec<[Tile<W>; 2]>,
 }
@@ -28,14 +28,14 @@ where
     const NAME: &'static str = "block LU";
     const SYMMETRIC: bool = false;
 
-    type Own = Tile<W>;
-    const NOTHING: Self::Own = tile::zero();
+    type DiagonalTile = Tile<W>;
+    const NOTHING: Self::DiagonalTile = tile::zero();
 
     fn new(rows: Range<usize>, changed: Range<usize>) -> Option<Self> {
         Some(Self {
-            orders: Stretch::new(rows, [0; W])?,
-            above: Stretch::new(changed.clone(), tile::zero())?,
-            below: Stretch::new(changed, tile::zero())?,
+            orders: ListRange::new(rows, [0; W])?,
+            above: ListRange::new(changed.clone(), tile::zero())?,
+            below: ListRange::new(changed, tile::zero())?,
             row: Vec::new(),
         })
     }
@@ -44,11 +44,11 @@ where
         self.orders.range()
     }
 
-    fn within(numbers: &[f64]) -> &[Self::Own] {
+    fn within(numbers: &[f64]) -> &[Self::DiagonalTile] {
         numbers.as_chunks().0.as_chunks().0
     }
 
-    fn within_mut(numbers: &mut [f64]) -> &mut [Self::Own] {
+    fn within_mut(numbers: &mut [f64]) -> &mut [Self::DiagonalTile] {
         numbers.as_chunks_mut().0.as_chunks_mut().0
     }
 
@@ -57,9 +57,9 @@ where
         &mut self,
         rows: Range<usize>,
         elimination: &Elimination,
-        own: Option<&Own<W>>,
+        own: Option<&DiagonalTiles<W>>,
         beside: &[Tile<W>],
-        diagonal: &mut Diagonal<&mut [Self::Own]>,
+        diagonal: &mut Diagonal<&mut [Self::DiagonalTile]>,
     ) {
         for row in rows.clone() {
             // Tiles of the tangent are stored by columns; factors are by rows.
@@ -73,17 +73,20 @@ where
             }
         }
         for number in elimination.changed(&rows) {
-            let (none, above, below) = (Stretch::nothing(), &mut self.above[number], &mut self.below[number]);
+            let none = ListRange::nothing();
+            let above = &mut self.above[number];
+            let below = &mut self.below[number];
             for (own, source) in [above, below].into_iter().zip(elimination.begin(number)) {
-                Block::find(source, beside, &none).with(|begin| tile::copy(own, begin));
+                StoredBlock::find(source, beside, &none).with(|begin| tile::copy(own, begin));
             }
         }
-        for &(row, direction) in elimination.idle(&rows) {
-            diagonal[row as usize][direction as usize][direction as usize] = 1.0;
+        for idle in elimination.idle(&rows) {
+            let r = idle.tile_row as usize;
+            diagonal[idle.block_row as usize][r][r] = 1.0;
         }
     }
 
-    fn add_own(sum: &mut Self::Own, other: &Self::Own) -> bool {
+    fn add_own(sum: &mut Self::DiagonalTile, other: &Self::DiagonalTile) -> bool {
         tile::add_moderate(sum, other)
     }
 
@@ -104,19 +107,23 @@ where
         rows: Range<usize>,
         elimination: &Elimination,
         beside: &[Tile<W>],
-        diagonal: &mut Diagonal<&mut [Self::Own]>,
-        (beyond, of_beyond): (&mut Self, &mut Diagonal<&mut [Self::Own]>),
-    ) -> Option<Signs> {
+        diagonal: &mut Diagonal<&mut [Self::DiagonalTile]>,
+        beyond: LaterTargets<Self, W>,
+    ) -> Option<PivotSigns> {
         let end = self.rows().end;
         let Self { orders, above, below, row: before } = self;
-        let (mut factor, mut y, mut w) = (tile::zero(), tile::zero(), tile::zero());
-        let (mut negative, mut doubtful) = (0, 0);
+        let mut factor = tile::zero();
+        let mut y = tile::zero();
+        let mut w = tile::zero();
+        let mut negative = 0;
+        let mut doubtful = 0;
         for row in rows {
             tile::copy(&mut factor, &diagonal[row]);
             let (order, mut is_sure) = tile::factorise(&mut factor)?;
             orders[row] = order;
             negative += usize::from(tile::has_negative_determinant(&factor, &order));
-            let (neighbours, mut target) = (elimination.neighbours(row), elimination.first_target(row));
+            let neighbours = elimination.neighbours(row);
+            let mut target = elimination.first_target(row);
             before.clear();
             for k in neighbours.clone() {
                 let is_one = elimination.is_one(k);
@@ -126,15 +133,15 @@ where
                         tile::forward(&factor, &order, block, &mut y);
                     }
                 };
-                Block::find(elimination.below(k), beside, below).with(both);
+                StoredBlock::find(elimination.below(k), beside, below).with(both);
                 if !is_one {
                     let forward = |block: &Tile<W>| tile::forward(&factor, &order, block, &mut y);
-                    Block::find(elimination.above(k), beside, above).with(forward);
+                    StoredBlock::find(elimination.above(k), beside, above).with(forward);
                 }
                 for [other_y, other_w] in &*before {
                     let shared = elimination.targets[target] as usize;
-                    tile::subtract_product(above.or(&mut beyond.above, shared), other_w, &y);
-                    tile::subtract_product(below.or(&mut beyond.below, shared), other_y, &w);
+                    tile::subtract_product(above.or(&mut beyond.blocks.above, shared), other_w, &y);
+                    tile::subtract_product(below.or(&mut beyond.blocks.below, shared), other_y, &w);
                     target += 1;
                 }
                 match elimination.later[k] as usize {
@@ -143,7 +150,7 @@ where
                         is_sure &= tile::is_moderate(&w, &y, later);
                         tile::subtract_product(later, &w, &y);
                     }
-                    later => tile::subtract_product(&mut of_beyond[later], &w, &y),
+                    later => tile::subtract_product(&mut beyond.diagonal[later], &w, &y),
                 }
                 if k + 1 < neighbours.end {
                     before.push([y, w]);
@@ -152,24 +159,24 @@ where
             tile::invert(&factor, &mut diagonal[row]);
             doubtful += usize::from(!is_sure);
         }
-        Some(Signs { negative, doubtful })
+        Some(PivotSigns { negative, doubtful })
     }
 
     #[inline(always)]
-    fn forward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &mut [Part<W>]) {
+    fn forward(&self, factors: &PieceFactors<Self, W>, x: &mut [BlockVector<W>], beyond: &mut [BlockVector<W>]) {
         let rows = self.rows();
         for row in rows.clone() {
-            let part = self.solved(look, row, &x[row - rows.start]);
-            self.subtract_from_later(look, row, &part, x, beyond);
+            let part = self.solved(factors, row, &x[row - rows.start]);
+            self.subtract_from_later(factors, row, &part, x, beyond);
             x[row - rows.start] = part;
         }
     }
 
     #[inline(always)]
-    fn backward(&self, look: &Look<Self, W>, x: &mut [Part<W>], beyond: &[Part<W>]) {
+    fn backward(&self, factors: &PieceFactors<Self, W>, x: &mut [BlockVector<W>], beyond: &[BlockVector<W>]) {
         let rows = self.rows();
         for row in rows.clone().rev() {
-            let part = self.solved(look, row, &self.subtracted_by_later(look, row, x, beyond));
+            let part = self.solved(factors, row, &self.subtracted_by_later(factors, row, x, beyond));
             x[row - rows.start].iter_mut().zip(part).for_each(|(x, change)| *x += change);
         }
     }
@@ -181,34 +188,44 @@ where
 {
     /// A_kk^-1 x, with A_kk the diagonal tile at the elimination of row k
     #[inline(always)]
-    fn solved(&self, look: &Look<Self, W>, row: usize, x: &Part<W>) -> Part<W> {
-        tile::solve(&look.diagonal[row], &tile::reordered(&self.orders[row], x))
+    fn solved(&self, factors: &PieceFactors<Self, W>, row: usize, x: &BlockVector<W>) -> BlockVector<W> {
+        tile::solve(&factors.diagonal[row], &tile::reordered(&self.orders[row], x))
     }
 
     /// x_j -= A_jk x_k for all later rows j, with x_k in `part`
     #[inline(always)]
     fn subtract_from_later(
         &self,
-        look: &Look<Self, W>,
+        factors: &PieceFactors<Self, W>,
         row: usize,
-        part: &Part<W>,
-        x: &mut [Part<W>],
-        beyond: &mut [Part<W>],
+        part: &BlockVector<W>,
+        x: &mut [BlockVector<W>],
+        beyond: &mut [BlockVector<W>],
     ) {
         let rows = self.rows();
-        for k in look.elimination.neighbours(row) {
-            let later = look.elimination.place(&rows, k).of_mut(x, beyond);
-            Block::find(look.elimination.below(k), look.beside, &self.below).transposed().subtract_times(later, part);
+        for k in factors.elimination.neighbours(row) {
+            let later = factors.elimination.place(&rows, k).of_mut(x, beyond);
+            StoredBlock::find(factors.elimination.below(k), factors.beside, &self.below)
+                .transposed()
+                .subtract_times(later, part);
         }
     }
 
     /// -sum A_kj x_j over all later rows j
     #[inline(always)]
-    fn subtracted_by_later(&self, look: &Look<Self, W>, row: usize, x: &[Part<W>], beyond: &[Part<W>]) -> Part<W> {
-        let (rows, mut part) = (self.rows(), [0.0; W]);
-        for k in look.elimination.neighbours(row) {
-            let later = look.elimination.place(&rows, k).of(x, beyond);
-            Block::find(look.elimination.above(k), look.beside, &self.above).subtract_times(&mut part, later);
+    fn subtracted_by_later(
+        &self,
+        factors: &PieceFactors<Self, W>,
+        row: usize,
+        x: &[BlockVector<W>],
+        beyond: &[BlockVector<W>],
+    ) -> BlockVector<W> {
+        let rows = self.rows();
+        let mut part = [0.0; W];
+        for k in factors.elimination.neighbours(row) {
+            let later = factors.elimination.place(&rows, k).of(x, beyond);
+            StoredBlock::find(factors.elimination.above(k), factors.beside, &self.above)
+                .subtract_times(&mut part, later);
         }
         part
     }

@@ -10,16 +10,16 @@ mod diagonal;
 mod elimination;
 mod factor;
 mod ldl;
+mod list_range;
 mod lu;
 mod order;
 mod pieces;
-mod stretch;
 mod tile;
 
 use crate::system::{Matrix, Pattern, Symmetry, System, WIDTH};
 use crate::tensor::Vec3;
 use crate::threads;
-use elimination::{Elimination, Fill};
+use elimination::{Elimination, FillLimit};
 use factor::Factor;
 use ldl::Ldl;
 use lu::Lu;
@@ -38,14 +38,14 @@ impl BlockSolver {
     /// Solver for tangents of this pattern. Node blocks of `multipliers` are eliminated after those
     /// they are coupled with. `None` if there is too much fill, or memory is not available.
     pub fn new(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
-        let elimination = Elimination::new(pattern, multipliers, Fill::Little)?;
+        let elimination = Elimination::new(pattern, multipliers, FillLimit::Little)?;
         Self::by(Arc::new(elimination), pattern, pattern.symmetry == Symmetry::Whole)
     }
 
     /// Solver with any amount of fill for symmetric tangents, even if the symmetry of the pattern
     /// is not declared. `None` if memory is not available.
     pub fn symmetric(pattern: &Pattern, multipliers: &[u32]) -> Option<Self> {
-        Self::by(Arc::new(Elimination::new(pattern, multipliers, Fill::Any)?), pattern, true)
+        Self::by(Arc::new(Elimination::new(pattern, multipliers, FillLimit::Any)?), pattern, true)
     }
 
     /// Solver in the same order for tangents of a pattern that is [like](Pattern::is_like) this
@@ -149,14 +149,15 @@ impl BlockSolver {
     fn correct_by<const W: usize>(&mut self, system: &System, held: Option<&[Vec3]>, out: &mut [Vec3]) -> bool {
         let Self { elimination, factor, parts } = self;
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
-            for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
-                *part = system.right_hand_side_at(group as usize);
+            for (part, &node_block) in parts.iter_mut().zip(&elimination.order[start..]) {
+                *part = system.right_hand_side_at(node_block as usize);
             }
         });
         factor.solve(elimination, system.matrix(), parts);
-        let (is_finite, parts) = (parts.iter().all(|x| x.is_finite()), parts.as_chunks::<W>().0);
+        let is_finite = parts.iter().all(|x| x.is_finite());
+        let parts = parts.as_chunks::<W>().0;
         if is_finite {
-            system.pattern.scatter(|group| &parts[elimination.row_of[group] as usize], held, out);
+            system.pattern.scatter(|node_block| &parts[elimination.row_of[node_block] as usize], held, out);
         }
         is_finite
     }
@@ -164,12 +165,12 @@ impl BlockSolver {
     fn solve_by<const W: usize>(&mut self, matrix: Matrix, x: &mut [f64]) {
         let Self { elimination, factor, parts } = self;
         threads::each_part(parts.as_chunks_mut::<W>().0, |start, parts| {
-            for (part, &group) in parts.iter_mut().zip(&elimination.order[start..]) {
-                *part = matrix.pattern.part(group as usize, x);
+            for (part, &node_block) in parts.iter_mut().zip(&elimination.order[start..]) {
+                *part = matrix.pattern.part(node_block as usize, x);
             }
         });
         factor.solve(elimination, matrix, parts);
         let parts = parts.as_chunks::<W>().0;
-        matrix.pattern.join(|group| &parts[elimination.row_of[group] as usize], x);
+        matrix.pattern.join(|node_block| &parts[elimination.row_of[node_block] as usize], x);
     }
 }

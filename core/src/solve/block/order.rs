@@ -6,7 +6,7 @@
 //! towards any of its cliques (Rose, Tarjan and Lueker 1976, doi:10.1137/0205021), here towards a
 //! clique in its middle.
 
-use crate::system::{Meetings, Pattern};
+use crate::system::{Adjacency, Pattern};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -15,19 +15,19 @@ use std::collections::BinaryHeap;
 use std::ops::Range;
 
 /// Least number of rows for which branches are looked for.
-const LEAST: usize = 1024;
+const MIN_ROWS_FOR_BRANCHES: usize = 1024;
 
 /// Largest number of rows in the trunk that is tried.
-const MOST_TRUNK: usize = 64;
+const MAX_TRUNK_ROWS: usize = 64;
 
 /// Number of parts of equal size into which branches are divided if the tree permits
-const PARTS: usize = 16;
+const BRANCH_PARTS: usize = 16;
 
 /// Row number that means no row, as the parent of a root
-const NONE: u32 = u32::MAX;
+const NO_ROW: u32 = u32::MAX;
 
 /// An order of elimination with its branches and fill.
-pub struct Order {
+pub struct EliminationOrder {
     /// Node block of each row
     pub order: Vec<u32>,
     /// Consecutive row ranges, from the first row on, that are coupled only with later rows after
@@ -48,12 +48,14 @@ pub struct Neighbours {
 impl Neighbours {
     /// Later neighbours: those in the pattern, and those that result from fill. `None` if there are
     /// more than `most`.
-    fn new(meetings: &Meetings, order: &[u32], most: usize) -> Option<Self> {
-        let (n, row_of) = (order.len(), inverse(order));
+    fn new(adjacency: &Adjacency, order: &[u32], most: usize) -> Option<Self> {
+        let n = order.len();
+        let row_of = inverse(order);
         // Rows whose first later neighbour is the index
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut seen = vec![u32::MAX; n];
-        let (mut starts, mut later) = (Vec::with_capacity(n + 1), Vec::with_capacity(meetings.pairs()));
+        let mut starts = Vec::with_capacity(n + 1);
+        let mut later = Vec::with_capacity(adjacency.pairs());
         starts.push(0);
         for row in 0..n {
             let start = later.len();
@@ -64,8 +66,8 @@ impl Neighbours {
                     later.push(other);
                 }
             };
-            for group in meetings.of(order[row] as usize) {
-                visit(row_of[group as usize], &mut later);
+            for node_block in adjacency.of(order[row] as usize) {
+                visit(row_of[node_block as usize], &mut later);
             }
             for child in std::mem::take(&mut children[row]) {
                 for k in starts[child as usize] as usize..starts[child as usize + 1] as usize {
@@ -88,7 +90,8 @@ impl Neighbours {
     /// changes, and these keep their relative order.
     fn permuted(&self, places: &[u32]) -> Self {
         let row_of = inverse(places);
-        let (mut starts, mut later) = (Vec::with_capacity(places.len() + 1), Vec::with_capacity(self.later.len()));
+        let mut starts = Vec::with_capacity(places.len() + 1);
+        let mut later = Vec::with_capacity(self.later.len());
         starts.push(0);
         for &place in places {
             let start = later.len();
@@ -109,7 +112,7 @@ impl Neighbours {
 
     /// Elimination tree: parent of each row, the first row that it changes.
     fn parents(&self) -> Vec<u32> {
-        (0..self.count()).map(|row| self.of(row).first().copied().unwrap_or(NONE)).collect()
+        (0..self.count()).map(|row| self.of(row).first().copied().unwrap_or(NO_ROW)).collect()
     }
 
     /// For each row, the rows whose elimination changes it.
@@ -117,7 +120,8 @@ impl Neighbours {
         let mut starts = vec![0; self.count() + 1];
         self.later.iter().for_each(|&row| starts[row as usize + 1] += 1);
         (0..self.count()).for_each(|row| starts[row + 1] += starts[row]);
-        let (mut ends, mut rows) = (starts.clone(), vec![0; self.later.len()]);
+        let mut ends = starts.clone();
+        let mut rows = vec![0; self.later.len()];
         for row in 0..self.count() {
             for &other in self.of(row) {
                 let end = &mut ends[other as usize];
@@ -132,24 +136,24 @@ impl Neighbours {
 /// Order for a pattern, in which the node blocks of `multipliers` come after those they are coupled
 /// with. `None` if the factor has more than `most` blocks right of the diagonal, or memory is not
 /// available.
-pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<Order> {
-    let meetings = &pattern.meetings();
+pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<EliminationOrder> {
+    let adjacency = &pattern.adjacency();
     let order = match multipliers {
         [] => minimum_degree(pattern.node_blocks.count(), &pattern.column_starts, &pattern.rows)?,
-        _ => constrained(pattern.node_blocks.count(), meetings, multipliers)?,
+        _ => constrained(pattern.node_blocks.count(), adjacency, multipliers)?,
     };
-    let neighbours = Neighbours::new(meetings, &order, most)?;
-    if order.len() < LEAST || !multipliers.is_empty() {
-        return Some(Order { order, branches: Vec::new(), neighbours });
+    let neighbours = Neighbours::new(adjacency, &order, most)?;
+    if order.len() < MIN_ROWS_FOR_BRANCHES || !multipliers.is_empty() {
+        return Some(EliminationOrder { order, branches: Vec::new(), neighbours });
     }
     let order = permuted(&order, &towards_the_middle(&neighbours));
-    let neighbours = Neighbours::new(meetings, &order, most)?;
+    let neighbours = Neighbours::new(adjacency, &order, most)?;
     let (sorted, branches) = branches(&neighbours.parents());
     if branches.is_empty() {
-        return Some(Order { order, branches, neighbours });
+        return Some(EliminationOrder { order, branches, neighbours });
     }
     let order = permuted(&order, &sorted);
-    Some(Order { neighbours: neighbours.permuted(&sorted), order, branches })
+    Some(EliminationOrder { neighbours: neighbours.permuted(&sorted), order, branches })
 }
 
 /// Inverse permutation: position of each entry.
@@ -167,37 +171,41 @@ fn permuted(order: &[u32], places: &[u32]) -> Vec<u32> {
 /// Minimum degree among all other node blocks, then each multiplier right after the last node block
 /// it is coupled with. With everything after it clamped, the parts it connects are complete, so
 /// that its pivot has the sign of a constraint (Vanderbei 1995, doi:10.1137/0805005).
-fn constrained(node_blocks: usize, meetings: &Meetings, multipliers: &[u32]) -> Option<Vec<u32>> {
+fn constrained(node_blocks: usize, adjacency: &Adjacency, multipliers: &[u32]) -> Option<Vec<u32>> {
     let mut is_multiplier = vec![false; node_blocks];
-    multipliers.iter().for_each(|&group| is_multiplier[group as usize] = true);
-    let others: Vec<u32> = (0..node_blocks as u32).filter(|&group| !is_multiplier[group as usize]).collect();
-    let mut number_of = vec![NONE; node_blocks];
-    (0..).zip(&others).for_each(|(number, &group)| number_of[group as usize] = number);
-    let (mut starts, mut rows) = (vec![0], Vec::new());
-    for &group in &others {
-        rows.extend(meetings.of(group as usize).map(|other| number_of[other as usize]).filter(|&row| row != NONE));
+    multipliers.iter().for_each(|&node_block| is_multiplier[node_block as usize] = true);
+    let others: Vec<u32> = (0..node_blocks as u32).filter(|&node_block| !is_multiplier[node_block as usize]).collect();
+    let mut number_of = vec![NO_ROW; node_blocks];
+    (0..).zip(&others).for_each(|(number, &node_block)| number_of[node_block as usize] = number);
+    let mut starts = vec![0];
+    let mut rows = Vec::new();
+    for &node_block in &others {
+        rows.extend(
+            adjacency.of(node_block as usize).map(|other| number_of[other as usize]).filter(|&row| row != NO_ROW),
+        );
         starts.push(rows.len() as u32);
     }
     let found = minimum_degree(others.len(), &starts, &rows)?;
     let mut order = permuted(&others, &found);
     let place_of = inverse(&found);
     let last_met = |multiplier: u32| {
-        let met = meetings.of(multiplier as usize).map(|other| number_of[other as usize]).filter(|&row| row != NONE);
+        let met = adjacency.of(multiplier as usize).map(|other| number_of[other as usize]).filter(|&row| row != NO_ROW);
         met.map(|number| place_of[number as usize]).max().unwrap_or(0)
     };
-    let mut places: Vec<(u32, u32)> = (0..).zip(&order).map(|(place, &group)| (place, group)).collect();
+    let mut places: Vec<(u32, u32)> = (0..).zip(&order).map(|(place, &node_block)| (place, node_block)).collect();
     places.extend(multipliers.iter().map(|&multiplier| (last_met(multiplier), multiplier)));
     // The sort is stable: at equal positions a multiplier stays after the node block.
     places.sort_by_key(|&(place, _)| place);
     order.clear();
-    order.extend(places.iter().map(|&(_, group)| group));
+    order.extend(places.iter().map(|&(_, node_block)| node_block));
     Some(order)
 }
 
 fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>> {
     let structure = SymbolicSparseColMatRef::new_checked(n, n, column_starts, None, rows);
     let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, rows.len())).ok()?;
-    let (mut order, mut row_of) = (vec![0_u32; n], vec![0_u32; n]);
+    let mut order = vec![0_u32; n];
+    let mut row_of = vec![0_u32; n];
     amd::order(&mut order, &mut row_of, structure, Default::default(), MemStack::new(&mut memory)).ok()?;
     Some(order)
 }
@@ -205,7 +213,8 @@ fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u
 /// Order without further fill that ends in a clique in the middle: the reverse of a maximum
 /// cardinality search from there.
 fn towards_the_middle(neighbours: &Neighbours) -> Vec<u32> {
-    let (n, earlier) = (neighbours.count(), neighbours.earlier());
+    let n = neighbours.count();
+    let earlier = neighbours.earlier();
     let start = middle(&neighbours.parents());
     let mut known = vec![0_u32; n];
     let mut is_done = vec![false; n];
@@ -248,7 +257,7 @@ fn middle(parents: &[u32]) -> usize {
 fn sizes(parents: &[u32]) -> Vec<u32> {
     let mut sizes = vec![1; parents.len()];
     for (row, &parent) in parents.iter().enumerate() {
-        if parent != NONE {
+        if parent != NO_ROW {
             sizes[parent as usize] += sizes[row];
         }
     }
@@ -260,12 +269,12 @@ fn sizes(parents: &[u32]) -> Vec<u32> {
 fn branches(parents: &[u32]) -> (Vec<u32>, Vec<Range<usize>>) {
     let n = parents.len();
     let roots = branch_roots(parents);
-    let mut owner = vec![NONE; n];
+    let mut owner = vec![NO_ROW; n];
     for (number, rows) in (0..).zip(&roots) {
         rows.iter().for_each(|&row| owner[row as usize] = number);
     }
     for row in (0..n).rev() {
-        if owner[row] == NONE && parents[row] != NONE {
+        if owner[row] == NO_ROW && parents[row] != NO_ROW {
             owner[row] = owner[parents[row] as usize];
         }
     }
@@ -296,23 +305,24 @@ fn branch_roots(parents: &[u32]) -> Vec<Vec<u32>> {
     }
     // Each row of the trunk waits for all branches, which counts double.
     let cost = |trees: &BinaryHeap<(u32, Reverse<u32>)>, trunk: usize| {
-        trees.peek().map_or(0, |(size, _)| (*size as usize).max(parents.len() / PARTS)) + 2 * trunk
+        trees.peek().map_or(0, |(size, _)| (*size as usize).max(parents.len() / BRANCH_PARTS)) + 2 * trunk
     };
     let mut best = (cost(&trees, 0), trees.clone());
-    for trunk in 1..=MOST_TRUNK {
+    for trunk in 1..=MAX_TRUNK_ROWS {
         let Some((_, Reverse(row))) = trees.pop() else { break };
         trees.extend(children[row as usize].iter().map(|&child| (sizes[child as usize], Reverse(child))));
         if cost(&trees, trunk) < best.0 {
             best = (cost(&trees, trunk), trees.clone());
         }
     }
-    in_branches(best.1.into_vec(), parents.len() / PARTS)
+    in_branches(best.1.into_vec(), parents.len() / BRANCH_PARTS)
 }
 
 /// Collects consecutive subtrees into branches of at least `enough` rows.
 fn in_branches(mut trees: Vec<(u32, Reverse<u32>)>, enough: usize) -> Vec<Vec<u32>> {
     trees.sort_unstable_by_key(|&(_, Reverse(row))| row);
-    let (mut branches, mut rows) = (Vec::<Vec<u32>>::new(), enough);
+    let mut branches = Vec::<Vec<u32>>::new();
+    let mut rows = enough;
     for (size, Reverse(row)) in trees {
         if rows >= enough {
             branches.push(Vec::new());
@@ -345,8 +355,8 @@ mod tests {
     #[test]
     fn neighbours_of_branches_are_those_of_their_order() {
         let pattern = star(700);
-        let Order { order, branches, neighbours } = find(&pattern, &[], usize::MAX).unwrap();
-        let found = Neighbours::new(&pattern.meetings(), &order, usize::MAX).unwrap();
+        let EliminationOrder { order, branches, neighbours } = find(&pattern, &[], usize::MAX).unwrap();
+        let found = Neighbours::new(&pattern.adjacency(), &order, usize::MAX).unwrap();
         assert!(branches.len() > 1, "nothing was permuted");
         assert_eq!((neighbours.starts, neighbours.later), (found.starts, found.later));
     }

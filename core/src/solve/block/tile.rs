@@ -1,24 +1,24 @@
 //! Dense arithmetic on tiles, the blocks of the tangent: 6 x 6, or 3 x 3 in planar scenes. All
 //! loops run along rows, which are contiguous.
 
-use super::elimination::{Source, Stands};
-use super::stretch::Stretch;
+use super::elimination::{BlockPosition, BlockSource};
+use super::list_range::ListRange;
 use crate::scalar::{LANES, Lanes, each_lane};
-pub use crate::system::{Own, Tile, transposed};
+pub use crate::system::{DiagonalTiles, Tile, transposed};
 use crate::system::{upper_entry, upper_start};
 
 /// Entries of a vector at the rows of one node block.
-pub type Part<const W: usize> = [f64; W];
+pub type BlockVector<const W: usize> = [f64; W];
 
 /// Limit for rows of a tile to keep their order: no pivot may subtract from the diagonal entry of a
 /// later row more than this many times its value. The measure is dimensionless, while entries of L
 /// may have units. Its value matters little: tiles with reordered rows are checked for lost digits.
-const GROWTH: f64 = 16.0;
+const MAX_GROWTH_IN_ORDER: f64 = 16.0;
 
 /// Limit for lost digits: terms subtracted from a diagonal entry may be this many times the entry,
 /// which multiplies its relative round-off (Higham, Accuracy and Stability of Numerical Algorithms,
 /// 2nd ed., theorem 13.6).
-const MODERATE: f64 = 1e3;
+const MAX_CANCELLATION: f64 = 1e3;
 
 /// Order in which the rows of a tile are pivots.
 pub type RowOrder<const W: usize> = [u8; W];
@@ -32,22 +32,22 @@ pub trait Rows<const W: usize> {
     type Row: Copy;
 
     /// Upper triangle of a symmetric tile, row by row
-    type Upper: Copy + Send + Sync + AsRef<[f64]> + AsMut<[f64]>;
+    type UpperTriangle: Copy + Send + Sync + AsRef<[f64]> + AsMut<[f64]>;
 
     /// Upper triangle of zeros
-    const NOTHING: Self::Upper;
+    const NOTHING: Self::UpperTriangle;
 
     /// Views a list of values as upper triangles.
-    fn uppers(numbers: &[f64]) -> &[Self::Upper];
+    fn uppers(numbers: &[f64]) -> &[Self::UpperTriangle];
 
     /// Mutable view of a list of values as upper triangles.
-    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper];
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::UpperTriangle];
 
     /// Loads a row into registers.
-    fn row(part: &Part<W>) -> Self::Row;
+    fn row(part: &BlockVector<W>) -> Self::Row;
 
     /// Stores a row from registers.
-    fn part(row: Self::Row) -> Part<W>;
+    fn part(row: Self::Row) -> BlockVector<W>;
 
     /// row -= factor * other
     fn subtract(row: &mut Self::Row, factor: f64, other: &Self::Row);
@@ -59,41 +59,41 @@ pub trait Rows<const W: usize> {
     fn add_sizes(sums: &mut Self::Row, a: &Self::Row, b: &Self::Row);
 
     /// Inner product a . b
-    fn dot(a: &Part<W>, b: &Part<W>) -> f64;
+    fn dot(a: &BlockVector<W>, b: &BlockVector<W>) -> f64;
 
     /// Row r of an upper triangle, with undefined entries left of the diagonal
-    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row;
+    fn upper_row(upper: &Self::UpperTriangle, r: usize) -> Self::Row;
 
     /// Stores row r of an upper triangle. This overwrites the ends of earlier rows: later rows must
     /// be stored first.
-    fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row);
+    fn set_upper_row(upper: &mut Self::UpperTriangle, r: usize, row: Self::Row);
 }
 
 /// Upper triangle of a symmetric tile of width W.
-pub type Upper<const W: usize> = <Width<W> as Rows<W>>::Upper;
+pub type UpperTriangle<const W: usize> = <Width<W> as Rows<W>>::UpperTriangle;
 
 impl Rows<6> for Width<6> {
     type Row = [Lanes; 2];
-    type Upper = [f64; 21];
+    type UpperTriangle = [f64; 21];
 
-    const NOTHING: Self::Upper = [0.0; 21];
+    const NOTHING: Self::UpperTriangle = [0.0; 21];
 
-    fn uppers(numbers: &[f64]) -> &[Self::Upper] {
+    fn uppers(numbers: &[f64]) -> &[Self::UpperTriangle] {
         numbers.as_chunks().0
     }
 
-    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper] {
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::UpperTriangle] {
         numbers.as_chunks_mut().0
     }
 
     #[inline(always)]
-    fn row(part: &Part<6>) -> Self::Row {
+    fn row(part: &BlockVector<6>) -> Self::Row {
         let [a, b, c, d, e, f] = *part;
         [Lanes([a, b, c, d]), Lanes([e, f, 0.0, 0.0])]
     }
 
     #[inline(always)]
-    fn part(row: Self::Row) -> Part<6> {
+    fn part(row: Self::Row) -> BlockVector<6> {
         let [Lanes([a, b, c, d]), Lanes([e, f, ..])] = row;
         [a, b, c, d, e, f]
     }
@@ -121,18 +121,18 @@ impl Rows<6> for Width<6> {
 
     /// Two sums of three terms have shorter dependency chains than one of six.
     #[inline(always)]
-    fn dot(a: &Part<6>, b: &Part<6>) -> f64 {
+    fn dot(a: &BlockVector<6>, b: &BlockVector<6>) -> f64 {
         (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
     }
 
     #[inline(always)]
-    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row {
+    fn upper_row(upper: &Self::UpperTriangle, r: usize) -> Self::Row {
         let row = &upper[upper_start(6, r)..][..6];
         [Lanes([row[0], row[1], row[2], row[3]]), Lanes([row[4], row[5], 0.0, 0.0])]
     }
 
     #[inline(always)]
-    fn set_upper_row(upper: &mut Self::Upper, r: usize, [left, right]: Self::Row) {
+    fn set_upper_row(upper: &mut Self::UpperTriangle, r: usize, [left, right]: Self::Row) {
         let row = &mut upper[upper_start(6, r)..][..6];
         if r < LANES {
             row[..LANES].copy_from_slice(&left.0);
@@ -143,25 +143,25 @@ impl Rows<6> for Width<6> {
 
 impl Rows<3> for Width<3> {
     type Row = [f64; 3];
-    type Upper = [f64; 6];
+    type UpperTriangle = [f64; 6];
 
-    const NOTHING: Self::Upper = [0.0; 6];
+    const NOTHING: Self::UpperTriangle = [0.0; 6];
 
-    fn uppers(numbers: &[f64]) -> &[Self::Upper] {
+    fn uppers(numbers: &[f64]) -> &[Self::UpperTriangle] {
         numbers.as_chunks().0
     }
 
-    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::Upper] {
+    fn uppers_mut(numbers: &mut [f64]) -> &mut [Self::UpperTriangle] {
         numbers.as_chunks_mut().0
     }
 
     #[inline(always)]
-    fn row(part: &Part<3>) -> Self::Row {
+    fn row(part: &BlockVector<3>) -> Self::Row {
         *part
     }
 
     #[inline(always)]
-    fn part(row: Self::Row) -> Part<3> {
+    fn part(row: Self::Row) -> BlockVector<3> {
         row
     }
 
@@ -183,18 +183,18 @@ impl Rows<3> for Width<3> {
     }
 
     #[inline(always)]
-    fn dot(a: &Part<3>, b: &Part<3>) -> f64 {
+    fn dot(a: &BlockVector<3>, b: &BlockVector<3>) -> f64 {
         (a[0] * b[0] + a[2] * b[2]) + a[1] * b[1]
     }
 
     #[inline(always)]
-    fn upper_row(upper: &Self::Upper, r: usize) -> Self::Row {
+    fn upper_row(upper: &Self::UpperTriangle, r: usize) -> Self::Row {
         let row = &upper[upper_start(3, r)..][..3];
         [row[0], row[1], row[2]]
     }
 
     #[inline(always)]
-    fn set_upper_row(upper: &mut Self::Upper, r: usize, row: Self::Row) {
+    fn set_upper_row(upper: &mut Self::UpperTriangle, r: usize, row: Self::Row) {
         upper[upper_start(3, r)..][..3].copy_from_slice(&row);
     }
 }
@@ -205,7 +205,7 @@ pub const fn zero<const W: usize>() -> Tile<W> {
 }
 
 #[inline(always)]
-fn row<const W: usize>(part: &Part<W>) -> <Width<W> as Rows<W>>::Row
+fn row<const W: usize>(part: &BlockVector<W>) -> <Width<W> as Rows<W>>::Row
 where
     Width<W>: Rows<W>,
 {
@@ -213,7 +213,7 @@ where
 }
 
 #[inline(always)]
-fn part<const W: usize>(row: <Width<W> as Rows<W>>::Row) -> Part<W>
+fn part<const W: usize>(row: <Width<W> as Rows<W>>::Row) -> BlockVector<W>
 where
     Width<W>: Rows<W>,
 {
@@ -268,7 +268,7 @@ macro_rules! each_row_backwards {
 
 /// A block of a factorisation, as stored in the tangent or by the factorisation.
 #[derive(Clone, Copy)]
-pub enum Block<'a, const W: usize> {
+pub enum StoredBlock<'a, const W: usize> {
     /// The tile itself
     Tile(&'a Tile<W>),
     /// Transpose of the tile
@@ -277,16 +277,16 @@ pub enum Block<'a, const W: usize> {
     Nothing,
 }
 
-impl<'a, const W: usize> Block<'a, W> {
+impl<'a, const W: usize> StoredBlock<'a, W> {
     /// Block at a position, in the off-diagonal tiles of the tangent or in the changed blocks `own`
     /// of the factorisation.
     #[inline(always)]
-    pub fn find(source: Source, beside: &'a [Tile<W>], own: &'a Stretch<Tile<W>>) -> Self {
-        match source.stands() {
-            Stands::Tile(number) => Self::Tile(&beside[number]),
-            Stands::Transpose(number) => Self::Transpose(&beside[number]),
-            Stands::Own(number) => Self::Tile(&own[number]),
-            Stands::Nowhere => Self::Nothing,
+    pub fn find(source: BlockSource, beside: &'a [Tile<W>], own: &'a ListRange<Tile<W>>) -> Self {
+        match source.position() {
+            BlockPosition::Tile(number) => Self::Tile(&beside[number]),
+            BlockPosition::Transpose(number) => Self::Transpose(&beside[number]),
+            BlockPosition::Changed(number) => Self::Tile(&own[number]),
+            BlockPosition::Nowhere => Self::Nothing,
         }
     }
 
@@ -312,7 +312,7 @@ impl<'a, const W: usize> Block<'a, W> {
 
     /// part -= b x, with b the block
     #[inline(always)]
-    pub fn subtract_times(self, part: &mut Part<W>, x: &Part<W>)
+    pub fn subtract_times(self, part: &mut BlockVector<W>, x: &BlockVector<W>)
     where
         Width<W>: Rows<W>,
     {
@@ -356,22 +356,23 @@ where
 {
     let mut sums = row::<W>(&[0.0; W]);
     each_row!(W, |d| Width::<W>::add_sizes(&mut sums, &row::<W>(&w[d]), &row::<W>(&y[d])));
-    let (sums, mut is_moderate) = (part::<W>(sums), true);
-    each_row!(W, |r| is_moderate &= sums[r] <= MODERATE * target[r][r].abs());
+    let sums = part::<W>(sums);
+    let mut is_moderate = true;
+    each_row!(W, |r| is_moderate &= sums[r] <= MAX_CANCELLATION * target[r][r].abs());
     is_moderate
 }
 
 /// sum += other for diagonal tiles; `false` if a diagonal entry of `other` exceeds
 /// [`MAX_CANCELLATION`] times that of `sum`.
 pub fn add_moderate<const W: usize>(sum: &mut Tile<W>, other: &Tile<W>) -> bool {
-    let is_moderate = (0..W).all(|r| other[r][r].abs() <= MODERATE * sum[r][r].abs());
+    let is_moderate = (0..W).all(|r| other[r][r].abs() <= MAX_CANCELLATION * sum[r][r].abs());
     sum.as_flattened_mut().iter_mut().zip(other.as_flattened()).for_each(|(sum, other)| *sum += other);
     is_moderate
 }
 
 /// target -= w^T y for a symmetric product, of which the upper triangle is stored.
 #[inline(always)]
-pub fn subtract_symmetric_product<const W: usize>(target: &mut Upper<W>, w: &Tile<W>, y: &Tile<W>)
+pub fn subtract_symmetric_product<const W: usize>(target: &mut UpperTriangle<W>, w: &Tile<W>, y: &Tile<W>)
 where
     Width<W>: Rows<W>,
 {
@@ -383,7 +384,7 @@ where
 
 /// Rows of an upper triangle, with undefined entries left of the diagonal.
 #[inline(always)]
-fn upper_rows<const W: usize>(upper: &Upper<W>) -> [<Width<W> as Rows<W>>::Row; W]
+fn upper_rows<const W: usize>(upper: &UpperTriangle<W>) -> [<Width<W> as Rows<W>>::Row; W]
 where
     Width<W>: Rows<W>,
 {
@@ -394,7 +395,7 @@ where
 
 /// Copies an upper triangle into a tile; entries below its diagonal are undefined.
 #[inline(always)]
-pub fn spread<const W: usize>(upper: &Upper<W>, out: &mut Tile<W>)
+pub fn spread<const W: usize>(upper: &UpperTriangle<W>, out: &mut Tile<W>)
 where
     Width<W>: Rows<W>,
 {
@@ -403,7 +404,7 @@ where
 
 /// part -= w^T x
 #[inline(always)]
-fn subtract_transposed<const W: usize>(part: &mut Part<W>, w: &Tile<W>, x: &Part<W>)
+fn subtract_transposed<const W: usize>(part: &mut BlockVector<W>, w: &Tile<W>, x: &BlockVector<W>)
 where
     Width<W>: Rows<W>,
 {
@@ -414,7 +415,7 @@ where
 
 /// part -= y x
 #[inline(always)]
-fn subtract_times<const W: usize>(part: &mut Part<W>, y: &Tile<W>, x: &Part<W>)
+fn subtract_times<const W: usize>(part: &mut BlockVector<W>, y: &Tile<W>, x: &BlockVector<W>)
 where
     Width<W>: Rows<W>,
 {
@@ -429,11 +430,13 @@ pub fn factorise_symmetric<const W: usize>(tile: &mut Tile<W>) -> Option<usize>
 where
     Width<W>: Rows<W>,
 {
-    let (mut negative, mut poison) = (0, 0.0);
+    let mut negative = 0;
+    let mut poison = 0.0;
     each_row!(W, |r| {
         let inverse = 1.0 / tile[r][r];
         poison += poison_of(tile[r][r], inverse);
-        let (pivot, lanes) = (tile[r], row::<W>(&tile[r]));
+        let pivot = tile[r];
+        let lanes = row::<W>(&tile[r]);
         each_row!(W, |k| if k > r {
             let mut below = row::<W>(&tile[k]);
             Width::<W>::subtract(&mut below, pivot[k] * inverse, &lanes);
@@ -503,12 +506,13 @@ fn factorise_in_order<const W: usize>(tile: &mut Tile<W>) -> bool
 where
     Width<W>: Rows<W>,
 {
-    let (mut poison, mut fits) = (0.0, true);
+    let mut poison = 0.0;
+    let mut fits = true;
     each_row!(W, |r| {
         let inverse = 1.0 / tile[r][r];
         poison += poison_of(tile[r][r], inverse);
         each_row!(W, |k| if k > r {
-            fits &= (tile[k][r] * tile[k][r] * inverse).abs() <= GROWTH * tile[k][k].abs();
+            fits &= (tile[k][r] * tile[k][r] * inverse).abs() <= MAX_GROWTH_IN_ORDER * tile[k][k].abs();
         });
         take_pivot(tile, r, inverse);
     });
@@ -549,8 +553,9 @@ fn has_grown_moderately<const W: usize>(factor: &Tile<W>, order: &RowOrder<W>, b
     let upper = |k: usize, j: usize| if k < j { factor[k][j].abs() } else { 1.0 / factor[k][k].abs() };
     (0..W).all(|i| {
         (0..W).all(|j| {
-            let (row, sum) = (order[i] as usize, (0..=i.min(j)).map(|k| lower(i, k) * upper(k, j)).sum::<f64>());
-            sum * sum <= MODERATE * MODERATE * (before[row][row] * before[j][j]).abs()
+            let row = order[i] as usize;
+            let sum = (0..=i.min(j)).map(|k| lower(i, k) * upper(k, j)).sum::<f64>();
+            sum * sum <= MAX_CANCELLATION * MAX_CANCELLATION * (before[row][row] * before[j][j]).abs()
         })
     })
 }
@@ -628,7 +633,7 @@ where
 /// Inverts the factors of [`factorise_symmetric`] for [`solve_symmetric`]: L^-T (unit diagonal)
 /// above the diagonal, D^-1 on it.
 #[inline(always)]
-pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut Upper<W>)
+pub fn invert_symmetric<const W: usize>(factor: &Tile<W>, out: &mut UpperTriangle<W>)
 where
     Width<W>: Rows<W>,
 {
@@ -692,8 +697,9 @@ where
 /// U^-1 L^-1 x with the inverted triangles of [`invert`]. Two products take half the time of two
 /// substitutions, in which each entry waits for the one before.
 #[inline(always)]
-pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
-    let (mut y, mut z) = ([0.0; W], [0.0; W]);
+pub fn solve<const W: usize>(inverses: &Tile<W>, x: &BlockVector<W>) -> BlockVector<W> {
+    let mut y = [0.0; W];
+    let mut z = [0.0; W];
     each_row!(W, |r| {
         let mut sums = [x[r], 0.0];
         each_row!(W, |k| if k < r {
@@ -713,12 +719,13 @@ pub fn solve<const W: usize>(inverses: &Tile<W>, x: &Part<W>) -> Part<W> {
 
 /// L^-T D^-1 L^-1 x with the inverted triangles of [`invert_symmetric`].
 #[inline(always)]
-pub fn solve_symmetric<const W: usize>(inverses: &Upper<W>, x: &Part<W>) -> Part<W>
+pub fn solve_symmetric<const W: usize>(inverses: &UpperTriangle<W>, x: &BlockVector<W>) -> BlockVector<W>
 where
     Width<W>: Rows<W>,
 {
     let inverses = inverses.as_ref();
-    let (mut y, mut z) = ([0.0; W], [0.0; W]);
+    let mut y = [0.0; W];
+    let mut z = [0.0; W];
     each_row!(W, |r| {
         let mut sums = [x[r], 0.0];
         each_row!(W, |k| if k < r {
@@ -739,7 +746,7 @@ where
 
 /// Entries of x in the order of the pivots, P x.
 #[inline(always)]
-pub fn reordered<const W: usize>(order: &RowOrder<W>, x: &Part<W>) -> Part<W> {
+pub fn reordered<const W: usize>(order: &RowOrder<W>, x: &BlockVector<W>) -> BlockVector<W> {
     let mut out = [0.0; W];
     each_row!(W, |r| out[r] = x[order[r] as usize]);
     out

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// Consecutive ranges that cover a list.
 #[derive(Clone, Debug, Default)]
-pub struct Runs {
+pub struct RangeList {
     count: usize,
     /// Length of each range if all are equally long
     length: usize,
@@ -12,7 +12,7 @@ pub struct Runs {
     ends: Vec<u32>,
 }
 
-impl Runs {
+impl RangeList {
     /// Appends a range of the given length.
     pub fn push(&mut self, length: usize) {
         if self.count == 0 {
@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn parts_of_one_length_and_of_several_stand_where_they_were_put() {
         for lengths in [&[][..], &[4], &[4, 4, 4], &[0, 0, 3], &[4, 4, 2, 4], &[1, 2, 3]] {
-            let mut runs = Runs::default();
+            let mut runs = RangeList::default();
             lengths.iter().for_each(|&length| runs.push(length));
             assert_eq!((runs.len(), runs.is_empty()), (lengths.len(), lengths.is_empty()));
             let mut start = 0;

@@ -4,12 +4,12 @@ use super::tile::Tile;
 use std::ops::{Index, IndexMut, Range};
 
 /// Consecutive items of a longer list, indexed by positions in the whole list.
-pub struct Stretch<T> {
+pub struct ListRange<T> {
     start: usize,
     entries: Vec<T>,
 }
 
-impl<T: Clone> Stretch<T> {
+impl<T: Clone> ListRange<T> {
     /// An empty range.
     pub fn nothing() -> Self {
         Self { start: 0, entries: Vec::new() }
@@ -45,7 +45,7 @@ impl<T: Clone> Stretch<T> {
     }
 }
 
-impl<const W: usize> Stretch<Tile<W>> {
+impl<const W: usize> ListRange<Tile<W>> {
     /// Adds the tiles of another range with equal positions.
     pub fn add_tiles(&mut self, other: &Self) {
         add(self.entries.as_flattened_mut().as_flattened_mut(), other.entries.as_flattened().as_flattened());
@@ -56,7 +56,7 @@ fn add(sums: &mut [f64], others: &[f64]) {
     sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += other);
 }
 
-impl<T> Index<usize> for Stretch<T> {
+impl<T> Index<usize> for ListRange<T> {
     type Output = T;
 
     #[inline(always)]
@@ -65,7 +65,7 @@ impl<T> Index<usize> for Stretch<T> {
     }
 }
 
-impl<T> IndexMut<usize> for Stretch<T> {
+impl<T> IndexMut<usize> for ListRange<T> {
     #[inline(always)]
     fn index_mut(&mut self, place: usize) -> &mut T {
         &mut self.entries[place - self.start]
