@@ -6,7 +6,7 @@ use super::beam_element::{
 };
 use super::parts::ModelParts;
 use super::{Amplitude, ElementInfo, Model, Motion, MotionKind, Names, SectionMatrices, Support};
-use crate::effect::elasticity::{BeamElasticity, ElasticElements, RelativeVectors};
+use crate::effect::elasticity::{ElasticElements, RotationInterpolation};
 use crate::effect::inertia::{BeamMass, Body, RigidBody};
 use crate::effect::load::{BeamGravity, BodyGravity, NodeForce, NodeLoad, NodeLoadKind};
 use crate::effect::spring::{GroundSpring, GroundSprings, Link, Links};
@@ -471,7 +471,9 @@ impl ModelBuilder {
         elastic.shrink_to_fit();
         heavy.shrink_to_fit();
         let sections = nodal.bodies(|node| self.nodes[node]);
-        effects.push(!elastic.is_empty(), BeamElasticity::<RelativeVectors>::new(elastic));
+        if !elastic.is_empty() {
+            effects.0.push(RotationInterpolation::Relative.build(elastic, true, None).elasticity);
+        }
         let mass = BeamMass::new(&mass);
         effects.push(!mass.is_empty(), mass);
         let massive: Vec<Body> = [&sections[..], &self.bodies].concat();

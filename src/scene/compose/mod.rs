@@ -12,9 +12,7 @@ use super::mesh::{BeamElement, Mesh};
 use super::output::needs;
 use crate::deck::{self, Deck, Diagnostic, EffectWord, HistoryUse, InterpolationWord, Span};
 use beamsim_core::effect::Effect;
-use beamsim_core::effect::elasticity::{
-    BeamElasticity, ElasticElements, Interpolation, RelativeVectors, StrainRateDamping, StressField, TotalVectors,
-};
+use beamsim_core::effect::elasticity::{ElasticElements, RotationInterpolation, StressField};
 use beamsim_core::effect::inertia::Body;
 use beamsim_core::effect::spring::{GroundSpring, Link};
 use beamsim_core::kernel::law::Strain;
@@ -214,15 +212,15 @@ impl Composer<'_> {
     }
 
     fn elasticity(&mut self) {
-        self.elasticity_of::<TotalVectors>(InterpolationWord::Total);
-        self.elasticity_of::<RelativeVectors>(InterpolationWord::Relative);
+        self.elasticity_of(InterpolationWord::Total, RotationInterpolation::Total);
+        self.elasticity_of(InterpolationWord::Relative, RotationInterpolation::Relative);
     }
 
-    fn elasticity_of<I: Interpolation>(&mut self, way: InterpolationWord) {
+    fn elasticity_of(&mut self, word: InterpolationWord, interpolation: RotationInterpolation) {
         let free: HashMap<String, usize> = self.free_strains();
         let mut elements = ElasticElements::default();
         self.each_element(|element| {
-            if element.beam.interpolation != way {
+            if element.beam.interpolation != word {
                 return;
             }
             let beam = element.beam;
@@ -232,27 +230,27 @@ impl Composer<'_> {
             });
         });
         elements.shrink_to_fit();
+        let name = interpolation.elasticity_name();
         if elements.is_empty() {
-            return self.reason(
-                I::NAME,
-                false,
-                if self.mesh.element_count == 0 { "no beams" } else { "no such beams" },
-            );
+            let why = if self.mesh.element_count == 0 { "no beams" } else { "no such beams" };
+            return self.reason(name, false, why);
         }
         let count = elements.two.len() + elements.three.len() + elements.four.len();
-        let effect = BeamElasticity::<I>::new(elements);
         let stressed = self.deck.effects.allow(EffectWord::GeometricStiffness);
-        let effect = Arc::new(if stressed { effect } else { effect.without_geometric_stiffness() });
-        self.reason(I::NAME, true, format!("{count} beam elements"));
-        self.out.elasticity.push(effect.clone());
-        self.out.effects.push(effect.clone());
         let [_, factor] = self.deck.damping.unwrap_or_default();
-        if factor != 0.0 && self.dynamic {
-            self.push(StrainRateDamping { elasticity: effect, factor }, "`stiffness` in [damping]".into());
+        let damping = (factor != 0.0 && self.dynamic).then_some(factor);
+        let beams = interpolation.build(elements, stressed, damping);
+        self.reason(name, true, format!("{count} beam elements"));
+        self.out.elasticity.push(beams.stresses);
+        self.out.effects.push(beams.elasticity);
+        let damping_name = interpolation.damping_name();
+        if let Some(damping) = beams.damping {
+            self.reason(damping_name, true, "`stiffness` in [damping]");
+            self.out.effects.push(damping);
         } else if !self.deck.effects.allow(EffectWord::Damping) {
-            self.reason(I::DAMPING_NAME, false, SWITCHED_OFF);
+            self.reason(damping_name, false, SWITCHED_OFF);
         } else {
-            self.reason(I::DAMPING_NAME, false, "no `stiffness` in [damping], or no stage with motion");
+            self.reason(damping_name, false, "no `stiffness` in [damping], or no stage with motion");
         }
     }
 
