@@ -330,7 +330,7 @@ impl Model {
         all
     }
 
-    /// Before a step is predicted, see [`FreeSpins::steady`].
+    /// Before a step is predicted, see [`crate::effect::FreeSpins::steady`].
     pub fn steady(&self, state: &mut State) {
         self.effects.iter().filter_map(|effect| effect.roles().spins).for_each(|spins| spins.steady(state));
     }

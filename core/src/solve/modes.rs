@@ -50,7 +50,7 @@ pub struct Matrices {
 /// A small motion x exp(s t) with its exponent and uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmallMotion {
-    /// s = growth + i omega [1/s], omega >= 0
+    /// s = growth + i omega in 1/s, omega >= 0
     pub(crate) exponent: Complex<f64>,
     /// Relative error of |s| that round-off in the stiffness may cause
     pub(crate) uncertainty: f64,
@@ -123,7 +123,7 @@ impl Matrices {
         self.mass.iter().all(|&m| m == 0.0)
     }
 
-    /// Upper bound of the lowest frequency [rad/s]: the root of the smallest K_ii / M_ii, or if
+    /// Upper bound of the lowest frequency in rad/s: the root of the smallest K_ii / M_ii, or if
     /// there is none, of the largest stiffness over the largest mass.
     pub fn softest_frequency(&self, system: &System) -> f64 {
         let Self { stiffness, mass, .. } = self;
@@ -262,7 +262,7 @@ impl<'a> ModeSearch<'a> {
         reach >= 2.0 * distance(other.into())
     }
 
-    /// Number of motions with a frequency below `omega` [rad/s] or with growth, rigid motions
+    /// Number of motions with a frequency below `omega` in rad/s or with growth, rigid motions
     /// included, of symmetric problems; `None` if it is unknown. Another shift must be factorised
     /// afterwards.
     pub fn slower(&mut self, omega: f64) -> Option<usize> {

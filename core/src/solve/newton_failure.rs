@@ -19,14 +19,14 @@ pub enum NewtonFailure {
     TurnsTooFar {
         /// Slot of the rotation
         slot: usize,
-        /// Angle of the increment [rad]
+        /// Angle of the increment in rad
         angle: f64,
     },
     /// Neighbouring nodes rotate by more than pi relative to each other in one increment.
     LeapsTooFar {
         /// Index of the element
         element: usize,
-        /// Relative rotation of its nodes [rad]
+        /// Relative rotation of its nodes in rad
         angle: f64,
     },
     /// The error of the smallest time step exceeds its tolerance.

@@ -77,7 +77,7 @@ pub struct State {
     pub(crate) fading: Arc<Vec<Fading>>,
     /// Anchor of the artificial resistance while a static stage searches for an equilibrium
     pub(crate) anchor: Option<Arc<Anchor>>,
-    /// Angle of each joint spring [rad], continued without jumps, valid at the last converged state
+    /// Angle of each joint spring in rad, continued without jumps, valid at the last converged state
     pub angles: Vec<f64>,
     /// For each rotation slot the base of the current time step, during the iterations of a step
     /// whose unknowns are increments: `q` is then the increment, `v` and `a` the material spin and

@@ -48,7 +48,7 @@ pub enum Against {
     Finest,
     /// A stored history
     Table(HistoryReader),
-    /// The values of [[expect]]
+    /// The values of `[[expect]]`
     Expectations,
 }
 

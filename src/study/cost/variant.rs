@@ -95,7 +95,7 @@ impl Variant {
         1.0 / self.count().max(1) as f64
     }
 
-    /// The step of the first dynamic stage as it is taken (see [`equal_part`]), where steps are
+    /// The step of the first dynamic stage as it is taken (see `equal_part`), where steps are
     /// fixed.
     pub fn step(&self, deck: &Deck) -> Option<f64> {
         let Pace::Steps(factor) = self.pace else { return None };

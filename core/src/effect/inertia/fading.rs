@@ -16,7 +16,7 @@ use crate::system::{
 };
 use crate::tensor::{Mat3, Vec3};
 
-/// Fading forces at all slots of nodes, see [`State::fading`].
+/// Fading forces at all slots of nodes, see `State::fading`.
 #[derive(Clone, Debug)]
 pub struct FadingInertia {
     /// The slots of nodes; true for those of rotations
