@@ -91,7 +91,7 @@ const OF_STEPS: [&str; 3] = ["step", "step_tolerance", "scheme"];
 /// Warns of keys that vary beams or dynamic stages where the deck has none.
 pub fn warn_of_idle_keys(top: &Table, deck: &Deck) {
     let Some(DeValue::Table(given)) = top.get("cost").map(|item| item.get_ref()) else { return };
-    let moves = deck.stages.iter().any(|stage| stage.body.advances_time());
+    let moves = deck.stages.iter().any(|stage| stage.body.kind().advances_time());
     for key in given.keys() {
         let name: &str = key.get_ref();
         let message = if OF_BEAMS.contains(&name) && deck.beams.is_empty() {

@@ -99,15 +99,7 @@ words! {
 }
 
 impl Words for FailureKind {
-    const ALL: &'static [(&'static str, Self)] = &{
-        let mut rows = [("", FailureKind::ALL[0]); FailureKind::ALL.len()];
-        let mut k = 0;
-        while k < rows.len() {
-            rows[k] = (FailureKind::ALL[k].name(), FailureKind::ALL[k]);
-            k += 1;
-        }
-        rows
-    };
+    const ALL: &'static [Self] = FailureKind::ALL;
 
     fn word(self) -> &'static str {
         self.name()

@@ -57,15 +57,7 @@ pub enum JointParts {
 }
 
 impl Words for JointKind {
-    const ALL: &'static [(&'static str, Self)] = &{
-        let mut rows = [("", JointKind::ALL[0]); JointKind::ALL.len()];
-        let mut k = 0;
-        while k < rows.len() {
-            rows[k] = (JointKind::ALL[k].word, JointKind::ALL[k]);
-            k += 1;
-        }
-        rows
-    };
+    const ALL: &'static [Self] = &JointKind::ALL;
 
     fn word(self) -> &'static str {
         self.word

@@ -155,6 +155,7 @@ mod tests {
     use crate::deck::{self, EffectWord, Frame, InterpolationWord, NormWord, Reduction, SchemeName, Words};
     use beamsim_core::effect::joint::JointKind;
     use beamsim_core::failure::FailureKind;
+    use beamsim_core::system::StageKind;
     use beamsim_core::warning::WarningKind;
 
     /// Keys of every table with a fixed set of them, by the path of the table in the schema.
@@ -210,7 +211,7 @@ mod tests {
             ("load.frame", words::<Frame>()),
             ("section.shape", words::<deck::section::ShapeWord>()),
             ("stage.control", words::<deck::stage::ControlWord>()),
-            ("stage.kind", words::<deck::stage::StageWord>()),
+            ("stage.kind", words::<StageKind>()),
             ("stage.scheme", words::<SchemeName>()),
             ("support.fix", words::<deck::support::DirectionWord>()),
         ]

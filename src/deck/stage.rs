@@ -5,6 +5,7 @@ use super::point::{PointRef, read_point};
 use super::reader::{Context, Item, Table, joined, kind_of};
 use super::scheme::{SchemeWord, read_scheme};
 use super::words::{Words, words};
+use beamsim_core::system::StageKind;
 use beamsim_core::warning::WarningKind;
 use toml::de::DeValue;
 
@@ -77,27 +78,13 @@ pub enum StageBody {
 }
 
 impl StageBody {
-    /// Loads come in and balance is found, by load levels or by arc length.
-    pub fn finds_balance(&self) -> bool {
+    /// The kind of the stage. Load levels and arc length are two controls of one kind.
+    pub fn kind(&self) -> StageKind {
         match self {
-            Self::Static { .. } | Self::Path { .. } => true,
-            Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => false,
-        }
-    }
-
-    /// The clock runs.
-    pub fn advances_time(&self) -> bool {
-        match self {
-            Self::Dynamic { .. } => true,
-            Self::Static { .. } | Self::Path { .. } | Self::Modal { .. } | Self::Buckling { .. } => false,
-        }
-    }
-
-    /// Mass and its inertia count.
-    pub fn needs_inertia(&self) -> bool {
-        match self {
-            Self::Dynamic { .. } | Self::Modal { .. } => true,
-            Self::Static { .. } | Self::Path { .. } | Self::Buckling { .. } => false,
+            Self::Static { .. } | Self::Path { .. } => StageKind::Static,
+            Self::Modal { .. } => StageKind::Modal,
+            Self::Buckling { .. } => StageKind::Buckling,
+            Self::Dynamic { .. } => StageKind::Dynamic,
         }
     }
 
@@ -109,27 +96,19 @@ impl StageBody {
             Self::Modal { .. } | Self::Buckling { .. } | Self::Dynamic { .. } => None,
         }
     }
-
-    /// Rows are written as it goes on.
-    pub fn writes_rows(&self) -> bool {
-        match self {
-            Self::Static { .. } | Self::Path { .. } | Self::Dynamic { .. } => true,
-            Self::Modal { .. } | Self::Buckling { .. } => false,
-        }
-    }
 }
 
-words! {
-    /// `kind = …` of a stage
-    pub enum StageWord {
-        /// Load levels or a path of equilibrium
-        Static = "static",
-        /// Time steps
-        Dynamic = "dynamic",
-        /// Small motions
-        Modal = "modal",
-        /// Critical loads
-        Buckling = "buckling",
+/// `kind = …` of a stage
+impl Words for StageKind {
+    const ALL: &'static [Self] = &[Self::Static, Self::Dynamic, Self::Modal, Self::Buckling];
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Static => "static",
+            Self::Dynamic => "dynamic",
+            Self::Modal => "modal",
+            Self::Buckling => "buckling",
+        }
     }
 }
 
@@ -186,30 +165,28 @@ pub(super) const FRAME_KEYS: [&str; 2] = ["spin", "about"];
 /// Keys of `until = { … }`.
 pub(super) const UNTIL_KEYS: [&str; 3] = ["column", "below", "above"];
 
-impl StageWord {
-    /// True for the keys that a kind of stage has.
-    fn has(self, key: &str) -> bool {
-        if ["until", "frame"].contains(&key) {
-            return match self {
-                Self::Static => true,
-                Self::Dynamic => key == "until",
-                Self::Modal | Self::Buckling => key == "frame",
-            };
-        }
-        COMMON_KEYS.contains(&key)
-            || match self {
-                Self::Static => STATIC_KEYS.contains(&key) || SHARED_KEYS.contains(&key),
-                Self::Dynamic => DYNAMIC_KEYS.contains(&key) || SHARED_KEYS.contains(&key),
-                Self::Modal | Self::Buckling => MODES_KEYS.contains(&key),
-            }
+/// True for the keys that a kind of stage has.
+fn has_key(kind: StageKind, key: &str) -> bool {
+    if ["until", "frame"].contains(&key) {
+        return match kind {
+            StageKind::Static => true,
+            StageKind::Dynamic => key == "until",
+            StageKind::Modal | StageKind::Buckling => key == "frame",
+        };
     }
+    let own = match kind {
+        StageKind::Static => STATIC_KEYS.contains(&key) || SHARED_KEYS.contains(&key),
+        StageKind::Dynamic => DYNAMIC_KEYS.contains(&key) || SHARED_KEYS.contains(&key),
+        StageKind::Modal | StageKind::Buckling => MODES_KEYS.contains(&key),
+    };
+    own || COMMON_KEYS.contains(&key)
 }
 
 pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option<Stage> {
     let table = Table::new(context, item, "[[stage]]", &KEYS)?;
     table.required("kind")?;
-    let kind = table.word::<StageWord>("kind")?.value;
-    for key in KEYS.into_iter().filter(|key| !kind.has(key)) {
+    let kind = table.word::<StageKind>("kind")?.value;
+    for key in KEYS.into_iter().filter(|key| !has_key(kind, key)) {
         table.refuse(
             key,
             match key {
@@ -220,10 +197,10 @@ pub(super) fn read_stage<'a>(context: &'a Context, item: &'a Item<'a>) -> Option
     }
     let modes = || table.required("modes").and_then(|item| context.whole(item, 1, MOST_MODES)).map(|n| n.value);
     let body = match kind {
-        StageWord::Static => read_static(&table),
-        StageWord::Dynamic => read_dynamic(&table),
-        StageWord::Modal => modes().map(|modes| StageBody::Modal { modes }),
-        StageWord::Buckling => modes().map(|modes| StageBody::Buckling { modes }),
+        StageKind::Static => read_static(&table),
+        StageKind::Dynamic => read_dynamic(&table),
+        StageKind::Modal => modes().map(|modes| StageBody::Modal { modes }),
+        StageKind::Buckling => modes().map(|modes| StageBody::Buckling { modes }),
     };
     let frame = table.optional("frame", read_frame);
     let tolerance = read_tolerance(&table);

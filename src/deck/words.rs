@@ -2,25 +2,25 @@
 
 /// A value that a deck gives by one of a few words.
 pub trait Words: Copy + 'static {
-    /// Each word with its value, in the order of messages.
-    const ALL: &'static [(&'static str, Self)];
+    /// All values, in the order of messages.
+    const ALL: &'static [Self];
 
     /// The word of a value.
     fn word(self) -> &'static str;
 
     /// The value of a word.
     fn of(word: &str) -> Option<Self> {
-        Self::ALL.iter().find(|(known, _)| *known == word).map(|(_, value)| *value)
+        Self::values().find(|value| value.word() == word)
     }
 
     /// All words.
     fn words() -> impl Iterator<Item = &'static str> {
-        Self::ALL.iter().map(|(word, _)| *word)
+        Self::values().map(Self::word)
     }
 
     /// All values.
     fn values() -> impl Iterator<Item = Self> {
-        Self::ALL.iter().map(|(_, value)| *value)
+        Self::ALL.iter().copied()
     }
 }
 
@@ -34,7 +34,7 @@ macro_rules! words {
         }
 
         impl $crate::deck::Words for $name {
-            const ALL: &'static [(&'static str, Self)] = &[$(($word, Self::$variant)),+];
+            const ALL: &'static [Self] = &[$(Self::$variant),+];
 
             fn word(self) -> &'static str {
                 match self {

@@ -59,7 +59,7 @@ fn clocks_go_forward(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 
 /// Inertia and gravity need mass: of beams, or of bodies that massless beams carry.
 fn mass_where_needed(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let inertia = |s: &deck::Stage| s.body.needs_inertia() || s.frame.is_some();
+    let inertia = |s: &deck::Stage| s.body.kind().needs_inertia() || s.frame.is_some();
     let dynamic = deck.stages.iter().any(inertia);
     let weighed = deck.gravity.as_ref().is_some_and(|g| g.value != [0.0; 3]);
     if !dynamic && !weighed {
@@ -129,7 +129,7 @@ fn warn_of_equal_places(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
 }
 
 fn warn_of_idle_initials(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
-    let dynamic = deck.stages.iter().any(|s| s.body.advances_time());
+    let dynamic = deck.stages.iter().any(|s| s.body.kind().advances_time());
     if dynamic || deck.stages.is_empty() {
         return;
     }

@@ -37,7 +37,7 @@ pub fn refuse_impossible(deck: &Deck, diagnostics: &mut Vec<Diagnostic>) {
     let incomplete = tangents.into_iter().find(|&word| !deck.effects.allow(word));
     let mut moved = false;
     for stage in &deck.stages {
-        let looks = !stage.body.writes_rows();
+        let looks = !stage.body.kind().advances_state();
         if let (true, Some(word)) = (looks, incomplete) {
             let message = format!("{} = false removes part of the tangent, which this stage needs", word.key());
             diagnostics.push(Diagnostic::error(message, stage.span.clone()));

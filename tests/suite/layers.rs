@@ -12,9 +12,8 @@ const ORDER: [&str; 19] = [
     "deck", "scene", "output", "study", "cli",
 ];
 
-/// Tables of data whose rows carry the deck's words: `deck` reads these words from the one table that the mechanics use, so that a new row
-/// is a new word.
-const DECK_ROWS: [&str; 1] = ["beamsim_core::effect::joint::JointKind"];
+/// Kinds that the mechanics describe, each once: `deck` reads words for them, so that a new kind is a new word.
+const DECK_ROWS: [&str; 2] = ["beamsim_core::effect::joint::JointKind", "beamsim_core::system::StageKind"];
 
 /// Names that decks and runs share; all may import them.
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];

@@ -260,7 +260,7 @@ impl Model {
         let normal = plane.normal();
         let aside = |(kind, value): (&SlotKind, &Vec3)| match kind {
             SlotKind::Rotation => (*value - normal * value.dot(normal)).norm(),
-            _ => value.dot(normal).abs() / self.length,
+            SlotKind::Displacement | SlotKind::Force | SlotKind::Moment => value.dot(normal).abs() / self.length,
         };
         let size = |(kind, value): (&SlotKind, &Vec3)| value.norm() / kind.scale(self.length);
         [&state.q[..], &state.v, &state.a].into_iter().all(|field| {

@@ -31,9 +31,9 @@ impl Composer<'_> {
         let mut stages = Vec::new();
         let mut moves = false;
         for (number, stage) in self.deck.stages.iter().enumerate() {
-            if stage.body.advances_time() {
+            if stage.body.kind().advances_time() {
                 moves = true;
-            } else if stage.body.finds_balance() {
+            } else if stage.body.kind().ramps_load() {
                 stages.extend(moves.then_some(number));
                 moves &= stage.until.is_some();
             }

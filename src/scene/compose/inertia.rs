@@ -126,7 +126,7 @@ impl Composer<'_> {
         }
         // One amplitude for all static stages: what one has brought in stays for the next.
         let ramped: Vec<usize> =
-            framed.iter().filter(|(_, stage)| stage.body.finds_balance()).map(|(k, _)| k + 1).collect();
+            framed.iter().filter(|(_, stage)| stage.body.kind().ramps_load()).map(|(k, _)| k + 1).collect();
         let amplitude = if ramped.is_empty() { None } else { self.amplitude(None, Some(&ramped)) };
         let (elements, nodal) =
             self.inertia_elements(|element, station, inertia| (inertia, element.between(&station.shape)));
@@ -144,7 +144,7 @@ impl Composer<'_> {
                 stage: *number,
                 spin: Vec3(frame.spin),
                 about,
-                amplitude: amplitude.filter(|_| stage.body.finds_balance()),
+                amplitude: amplitude.filter(|_| stage.body.kind().ramps_load()),
                 elements: elements.clone(),
                 bodies: bodies.clone(),
             }));

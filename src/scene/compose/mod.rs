@@ -314,7 +314,7 @@ impl Composer<'_> {
 /// True where effects of inertia are needed: by dynamic and modal stages, by outputs of momentum,
 /// and by static stages whose stability only small vibrations show.
 fn needs_mass(deck: &Deck) -> bool {
-    let dynamic = deck.stages.iter().any(|stage| stage.body.needs_inertia() || stage.frame.is_some());
+    let dynamic = deck.stages.iter().any(|stage| stage.body.kind().needs_inertia() || stage.frame.is_some());
     dynamic || needs(deck, Need::Mass) || may_flutter(deck)
 }
 
@@ -324,7 +324,7 @@ fn may_flutter(deck: &Deck) -> bool {
         deck::Frame::Space => load.moment.is_some(),
         deck::Frame::Body | deck::Frame::Section => true,
     };
-    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| stage.body.finds_balance())
+    deck.loads.iter().any(turns) && deck.stages.iter().any(|stage| stage.body.kind().ramps_load())
 }
 
 /// The stages of the deck count from 1, those of a run from 0.

@@ -36,7 +36,7 @@ impl StraightPart<'_> {
 impl Composer<'_> {
     pub(super) fn spin_holds(&mut self, connections: &[FoundJoint]) {
         let parts = self.straight_parts(&self.resisted_rotations(connections));
-        let rests = self.deck.stages.iter().any(|stage| !stage.body.needs_inertia());
+        let rests = self.deck.stages.iter().any(|stage| !stage.body.kind().needs_inertia());
         let holds = |is_free: &dyn Fn(&StraightPart) -> bool| -> Vec<SpinningPart> {
             parts.iter().filter(|part| is_free(part)).map(|part| part.hold.clone()).collect()
         };

@@ -194,7 +194,8 @@ fn sampler(
 
 /// Refuses a history that ends before the deck does.
 fn reaches_the_end(deck: &Deck, stored: &Outcome) -> Result<(), Diagnostic> {
-    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| stage.body.writes_rows()) else {
+    let Some((k, last)) = deck.stages.iter().enumerate().rev().find(|(_, stage)| stage.body.kind().advances_state())
+    else {
         return Ok(());
     };
     let start = StageClock { stage: 1, clock: 0.0 };
