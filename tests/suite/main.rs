@@ -2,6 +2,7 @@
 
 mod assembled;
 mod bad_decks;
+mod builder;
 mod coefficients;
 mod command;
 mod constraints;

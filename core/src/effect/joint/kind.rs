@@ -107,11 +107,6 @@ impl JointKind {
         },
     ];
 
-    /// The kind with a word of the deck.
-    pub fn of_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.word == word)
-    }
-
     /// True if both ends have one displacement, whose unknowns nodes at one point can share.
     pub fn shares_displacement(&self) -> bool {
         self.held == POINT
@@ -162,7 +157,7 @@ mod tests {
     #[test]
     fn words_are_unique() {
         for kind in JointKind::ALL {
-            assert_eq!(JointKind::of_word(kind.word), Some(kind));
+            assert_eq!(JointKind::ALL.into_iter().find(|other| other.word == kind.word), Some(kind));
         }
     }
 }
