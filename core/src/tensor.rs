@@ -4,6 +4,7 @@
 //! keeps all of its operations in that instruction set.
 
 use crate::scalar::{LANES, Lanes, Pack, Real, pack};
+use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 /// The array [f(0), f(1), f(2)], written out: no closure that the compiler may leave outside of a
@@ -45,11 +46,11 @@ pub fn copied(vectors: &[Vec3]) -> Vec<Vec3> {
 }
 
 /// A vector of three components.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Vec3<T = f64>(pub [T; 3]);
 
 /// A tensor of three by three components, stored by rows.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Mat3<T = f64>(pub [[T; 3]; 3]);
 
 impl Pack for Vec3 {

@@ -1,5 +1,7 @@
 //! Kinds of warnings of decks and runs. Their names are part of the interface to users.
 
+use serde::{Deserialize, Serialize};
+
 /// The subject of a warning: the aspect of an answer that it puts in doubt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum About {
@@ -32,7 +34,7 @@ impl About {
 macro_rules! warning_kinds {
     ($($(#[doc = $meaning:literal])+ $kind:ident: $name:literal, $about:ident;)+) => {
         /// Kinds of warnings.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
         pub enum WarningKind {
             $($(#[doc = $meaning])+ $kind,)+
         }

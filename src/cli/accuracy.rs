@@ -3,12 +3,13 @@
 use super::error::{CommandError, DeckError};
 use super::load::Loaded;
 use super::progress::Progress;
-use super::simulate::RunExtras;
+use super::restart::RestartArguments;
+use super::simulate::{RunExtras, Target};
 use super::thread_count::cores;
 use super::variant::{describe, paste_lines};
 use super::{console, load, signals};
 use crate::deck::{Accuracy, Deck};
-use crate::output::{Film, ReachedAccuracy, ReachedColumn};
+use crate::output::{Film, ReachedAccuracy, ReachedColumn, ResultFolder};
 use crate::scene::Scene;
 use crate::study::accuracy::{Found, reach};
 use crate::study::cost::{Journal, StudyOptions};
@@ -17,6 +18,9 @@ use crate::study::{Outcome, StudyError};
 use std::num::NonZero;
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+/// The file of the runs of a search that was stopped.
+const JOURNAL: &str = "accuracy.journal";
 
 /// Arguments of `beamsim run` besides the decks.
 #[derive(clap::Args)]
@@ -39,22 +43,32 @@ pub struct RunArguments {
     /// Also write report.html, a page that plays the run back
     #[arg(long)]
     report: bool,
+    #[command(flatten)]
+    pub restart: RestartArguments,
 }
 
-/// A scene that is ready to run.
-pub struct PreparedRun {
-    /// The scene
-    pub scene: Scene,
+/// A deck whose elements and steps are chosen.
+pub struct Chosen {
+    /// The deck
+    pub loaded: Loaded,
+    /// How far the wanted accuracy was reached, where one is wanted
+    accuracy: Option<ReachedAccuracy>,
+    /// The outputs of the run where the search has run it already
+    outcome: Option<Outcome>,
     /// How far the wanted accuracy is missed, as a message, if it is
     pub missed: Option<String>,
-    /// Additions to the results: accuracy, error bars, film
-    pub extras: RunExtras,
 }
 
 impl RunArguments {
-    /// Reads a deck, and searches for the wanted accuracy where there is one.
-    pub fn prepare(&self, name: &str, path: &Path, settings: &[String]) -> Result<PreparedRun, CommandError> {
-        let loaded = load::deck(path, settings)?;
+    /// Searches for the wanted accuracy of a deck where there is one. Runs of the search are saved
+    /// in the folder of results, so that a search that was stopped goes on.
+    pub fn choose(
+        &self,
+        name: &str,
+        path: &Path,
+        loaded: Loaded,
+        folder: &ResultFolder,
+    ) -> Result<Chosen, CommandError> {
         self.accuracy
             .map(Accuracy::check)
             .transpose()
@@ -64,41 +78,56 @@ impl RunArguments {
                 let why = "--budget limits the search for an accuracy: give --accuracy, or `accuracy` in the deck";
                 return Err(CommandError::Usage(why.into()));
             }
-            return self.with_bars(path, loaded, None, None);
+            if self.error_bars {
+                note_polylines(&loaded.deck);
+            }
+            return Ok(Chosen { loaded, accuracy: None, outcome: None, missed: None });
         };
         note_polylines(&loaded.deck);
         if self.error_bars {
             refuse_paths(&loaded.deck).map_err(|found| study_error(found.into(), path, &loaded))?;
         }
         let start = Instant::now();
-        let mut found = self.search(name, path, &loaded, &wanted)?;
+        let mut found = self.search(name, path, &loaded, &wanted, folder)?;
         print_found(name, &loaded.deck, &found, &wanted);
-        let accuracy = reached(&found, &wanted, start.elapsed());
+        let accuracy = Some(reached(&found, &wanted, start.elapsed()));
         // The text in memory is used, since the file may have changed in the meantime.
         let loaded = load::again(path, &loaded.text, &found.settings())?;
         let missed = (!found.reached).then(|| missed(&found, &wanted));
-        let prepared = self.with_bars(path, loaded, Some(accuracy), found.outcome.take())?;
-        Ok(PreparedRun { missed, ..prepared })
+        Ok(Chosen { loaded, accuracy, outcome: found.outcome.take(), missed })
     }
 
-    fn with_bars(
+    /// Additions to the results of a run that goes to a target: accuracy, error bars, film.
+    pub fn extras(&self, path: &Path, chosen: Chosen, target: &mut Target) -> Result<(Scene, RunExtras), CommandError> {
+        let Chosen { loaded, accuracy, outcome, .. } = chosen;
+        let saved = target.saved.as_mut();
+        let (bars_so_far, reel) = saved.map_or((None, None), |saved| (saved.bars.take(), saved.reel.take()));
+        let bars = match bars_so_far {
+            Some(place) => Some(ErrorBars::resume(&loaded.deck, &loaded.scene, place)),
+            None if self.error_bars => Some(bars(path, &loaded)?),
+            None => None,
+        };
+        let film = match reel {
+            Some(reel) => Some(Film::resume(&loaded.scene, reel)),
+            None => self.report.then(|| Film::of(&loaded.scene)),
+        };
+        Ok((loaded.scene, RunExtras { accuracy, outcome, bars, text: loaded.text, film }))
+    }
+
+    fn search(
         &self,
+        name: &str,
         path: &Path,
-        loaded: Loaded,
-        accuracy: Option<ReachedAccuracy>,
-        outcome: Option<Outcome>,
-    ) -> Result<PreparedRun, CommandError> {
-        let bars = if self.error_bars { Some(bars(path, &loaded)?) } else { None };
-        if self.error_bars && accuracy.is_none() {
-            note_polylines(&loaded.deck);
-        }
-        let film = self.report.then(|| Film::of(&loaded.scene));
-        let extras = RunExtras { accuracy, outcome, bars, text: loaded.text, film };
-        Ok(PreparedRun { scene: loaded.scene, missed: None, extras })
-    }
-
-    fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, CommandError> {
+        loaded: &Loaded,
+        wanted: &Accuracy,
+        folder: &ResultFolder,
+    ) -> Result<Found, CommandError> {
         signals::caught();
+        let identity = format!("beamsim {}\n{wanted:?}\n{}", env!("CARGO_PKG_VERSION"), loaded.text);
+        let mut journal = Journal::open(folder.path(), JOURNAL, &identity)?;
+        if !journal.is_empty() {
+            console::note(&format!("{name}: continues a stopped search, {} runs are done", journal.len()));
+        }
         let mut progress = Progress::new(name);
         let mut show = |done: usize, all: usize| {
             progress.show(done as f64 / all as f64, || format!("searching for the accuracy: {done} of {all} runs"));
@@ -108,15 +137,27 @@ impl RunArguments {
             budget: self.budget,
             interrupted: &signals::caught,
             progress: &mut show,
-            journal: &mut Journal::default(),
+            journal: &mut journal,
         };
         let found = reach(&loaded.text, &loaded.deck, &loaded.scene, wanted, options);
         progress.done();
-        let mut found = found.map_err(|error| study_error(error, path, loaded))?;
+        let mut found = match found {
+            Ok(found) => found,
+            Err(error) => {
+                if journal.is_empty() {
+                    journal.close()?;
+                }
+                return Err(study_error(error, path, loaded));
+            }
+        };
         match found.stopped.take() {
-            None => Ok(found),
+            None => {
+                journal.close()?;
+                Ok(found)
+            }
             Some(by) => {
                 paste_lines(&loaded.deck, &found.settings()).iter().for_each(|line| console::note(line));
+                console::note(&format!("{name}: {} runs are saved; run the command again to continue", journal.len()));
                 Err(CommandError::SearchStopped { by, missed: missed(&found, wanted) })
             }
         }

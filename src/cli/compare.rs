@@ -22,8 +22,8 @@ fn print_comparison(a: &Path, b: &Path, rtol: f64, atol: f64) -> Result<(), Comm
     if !(usable(rtol) && usable(atol)) {
         return Err(CommandError::Usage("--rtol and --atol must be finite and not negative".into()));
     }
-    let history = HistoryReader::read(a)?;
-    let stored = HistoryReader::read(b)?;
+    let read = |path: &Path| HistoryReader::read(&HistoryReader::of_results(path)?.unwrap_or_else(|| path.into()));
+    let (history, stored) = (read(a)?, read(b)?);
     let ComparedHistories { columns: table, extra } =
         study::compare(&history, &stored, rtol, atol).map_err(|error| CommandError::Unexpected(error.to_string()))?;
     json::compare(a, b, &table);

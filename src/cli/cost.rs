@@ -70,6 +70,9 @@ pub fn cost(decks: &[PathBuf], settings: &[String], wanted: &CostArguments, out:
     verdict.finish(decks.len())
 }
 
+/// The file of the runs of a study that was stopped.
+const JOURNAL: &str = "cost.journal";
+
 fn check_arguments(wanted: &CostArguments) -> Result<(), CommandError> {
     Accuracy::check(wanted.accuracy).map_err(|why| CommandError::Usage(format!("--accuracy: {why}")))?;
     match wanted.vary.iter().find(|vary| !vary.contains('=')) {
@@ -95,7 +98,7 @@ fn setting(vary: &str) -> String {
 fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &CostArguments, folder: &Path) -> Result<(), CommandError> {
     let (against, given) = reference(wanted.reference.as_deref())?;
     let identity = format!("beamsim {}\n{given}\n{}", env!("CARGO_PKG_VERSION"), loaded.text);
-    let mut journal = Journal::open(folder, &identity)?;
+    let mut journal = Journal::open(folder, JOURNAL, &identity)?;
     if !journal.is_empty() {
         console::note(&format!("{name}: continues a stopped study, {} runs are done", journal.len()));
     }

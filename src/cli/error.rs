@@ -20,6 +20,12 @@ pub enum CommandError {
     /// A file could not be read or written.
     #[error("{0}")]
     Io(String),
+    /// Another run writes to the folder of results.
+    #[error("{0}")]
+    Locked(String),
+    /// A checkpoint in the folder of results does not allow what was asked for.
+    #[error("{0}")]
+    Checkpoint(String),
     /// A simulation failed.
     #[error("{0}")]
     Run(Failure),
@@ -89,6 +95,8 @@ impl CommandError {
             Self::Deck(error) if error.is_limit => FailureKind::Limit.name(),
             Self::Deck(_) => FailureKind::Deck.name(),
             Self::Io(_) => FailureKind::Io.name(),
+            Self::Locked(_) => "locked",
+            Self::Checkpoint(_) => "checkpoint",
             Self::Run(failure) | Self::SearchStopped { by: failure, .. } => failure.name(),
             Self::Stopped { .. } => FailureKind::Interrupted.name(),
             Self::Missed(_) => "accuracy",
@@ -101,8 +109,8 @@ impl CommandError {
     /// The exit status.
     pub fn status(&self) -> Status {
         match self {
-            Self::Usage(_) | Self::Deck(_) => Status::Wrong,
-            Self::Io(_) => Status::Io,
+            Self::Usage(_) | Self::Deck(_) | Self::Checkpoint(_) => Status::Wrong,
+            Self::Io(_) | Self::Locked(_) => Status::Io,
             Self::Run(failure) | Self::SearchStopped { by: failure, .. } => Status::of_failure(failure),
             Self::Stopped { signal, .. } => Status::after(*signal),
             Self::Missed(_) => Status::Missed,
@@ -117,6 +125,8 @@ impl CommandError {
             Self::Deck(error) => &error.details,
             Self::Usage(_)
             | Self::Io(_)
+            | Self::Locked(_)
+            | Self::Checkpoint(_)
             | Self::Run(_)
             | Self::Stopped { .. }
             | Self::SearchStopped { .. }
@@ -135,7 +145,10 @@ impl CommandError {
 
 impl From<OutputError> for CommandError {
     fn from(error: OutputError) -> Self {
-        Self::io(error)
+        match error {
+            OutputError::Locked(_) => Self::Locked(error.to_string()),
+            other => Self::io(other),
+        }
     }
 }
 

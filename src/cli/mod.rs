@@ -17,6 +17,7 @@ mod new;
 mod plot;
 mod progress;
 mod report;
+mod restart;
 mod run;
 mod schema;
 mod signals;

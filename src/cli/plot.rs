@@ -224,7 +224,7 @@ fn png(_plot: &LinePlot) -> Result<Vec<u8>, CommandError> {
 
 /// The history in a folder, or the file itself.
 fn read(path: &Path, is_reference: bool) -> Result<NamedHistory, CommandError> {
-    let file = HistoryReader::of_results(path).unwrap_or_else(|| path.to_path_buf());
+    let file = HistoryReader::of_results(path)?.unwrap_or_else(|| path.to_path_buf());
     let history = HistoryReader::read(&file)?;
     let is_of_run = file.file_name().is_some_and(|name| name == "history.csv" || name == "history.partial.csv");
     let folder = file.parent().filter(|_| is_of_run).and_then(|folder| std::fs::canonicalize(folder.join(".")).ok());

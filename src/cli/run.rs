@@ -1,6 +1,6 @@
 //! `beamsim run`
 
-use super::accuracy::{PreparedRun, RunArguments};
+use super::accuracy::RunArguments;
 use super::error::CommandError;
 use super::folders::{check_names, folder};
 use super::simulate::{Finished, simulate};
@@ -8,6 +8,7 @@ use super::status::Status;
 use super::thread_count::{on_threads, threads_of};
 use super::verdict::Verdict;
 use super::{console, json, load, report, signals};
+use crate::output::ResultFolder;
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
 use std::path::{Path, PathBuf};
@@ -23,9 +24,8 @@ pub fn run(decks: &[PathBuf], settings: &[String], wanted: &RunArguments, out: O
     for (number, path) in decks.iter().enumerate() {
         let name = load::name(path);
         let folder = folder(out, &name, decks.len() > 1);
-        match wanted.prepare(&name, path, settings) {
-            Ok(prepared) => run_one(&name, path, prepared, wanted, &folder, &mut verdict),
-            Err(error) => verdict.fail(error),
+        if let Err(error) = run_one(&name, path, settings, wanted, &folder, &mut verdict) {
+            verdict.fail(error);
         }
         if let Some(signal) = signals::caught() {
             if number + 1 < decks.len() {
@@ -40,14 +40,19 @@ pub fn run(decks: &[PathBuf], settings: &[String], wanted: &RunArguments, out: O
 fn run_one(
     name: &str,
     path: &Path,
-    prepared: PreparedRun,
+    settings: &[String],
     wanted: &RunArguments,
     folder: &Path,
     verdict: &mut Verdict,
-) {
-    let PreparedRun { scene, missed, extras } = prepared;
+) -> Result<(), CommandError> {
+    let loaded = load::deck(path, settings)?;
+    let results = ResultFolder::claim(folder)?;
+    let mut chosen = wanted.choose(name, path, loaded, &results)?;
+    let mut target = wanted.restart.target(name, results, &chosen.loaded.scene)?;
+    let missed = chosen.missed.take();
+    let (scene, extras) = wanted.extras(path, chosen, &mut target)?;
     let threads = threads_of(&scene, wanted.threads);
-    let mut finished = simulate(&scene, name, Some(folder), None, extras, threads);
+    let mut finished = simulate(&scene, name, Some(target), None, extras, threads);
     summarise(name, &scene, &finished, folder);
     finished.record.iter().for_each(|record| json::run(path, folder, record));
     if let (Some(film), Some(record)) = (finished.film.take(), finished.record.take()) {
@@ -55,11 +60,8 @@ fn run_one(
         let written = report::write(&scene, name, &record, film, folder, &page);
         written.unwrap_or_else(|error| verdict.fail(error));
     }
-    match (finished.result, missed) {
-        (Err(failure), _) => verdict.fail(CommandError::Run(failure)),
-        (Ok(()), Some(missed)) => verdict.fail(CommandError::Missed(missed)),
-        (Ok(()), None) => {}
-    }
+    finished.result.map_err(CommandError::Run)?;
+    missed.map_or(Ok(()), |missed| Err(CommandError::Missed(missed)))
 }
 
 /// Prints a few lines after a run.

@@ -5,17 +5,16 @@ use super::console;
 use super::progress::Progress;
 use super::signals;
 use crate::output::{
-    FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, PartFile, ReachedAccuracy, Record, Row,
-    RowCounter, Rows, SideColumns, Units, remove_fields, remove_if_there,
+    FieldsWriter, Film, FinishedRun, HistoryWriter, ModesWriter, OutputError, ReachedAccuracy, Record, ResultFolder,
+    Row, RowCounter, Rows, SavedRun, SideColumns, Units,
 };
 use crate::scene::Scene;
 use crate::study::error_bars::ErrorBars;
 use crate::study::{self, Recorder};
 use beamsim_core::model::StageKind;
-use beamsim_core::run::{Counters, Failure, Moment, Observer, Run, Snapshot, StageResult, Warning};
+use beamsim_core::run::{Checkpoint, Counters, Failure, Moment, Observer, Run, Snapshot, StageResult, Warning};
 use beamsim_core::threads;
-use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Additions to the results of a run.
 #[derive(Default)]
@@ -48,12 +47,29 @@ pub struct Finished {
     pub threads: usize,
 }
 
-/// Runs a scene on a number of threads. With a folder its results are written there; a recorder
+/// Where the results of a run go, and where it begins.
+pub struct Target {
+    /// The folder of results
+    pub folder: ResultFolder,
+    /// Where the run goes on, if it is resumed
+    pub saved: Option<Box<SavedRun<Checkpoint>>>,
+    /// The time between checkpoints, if any are written
+    pub interval: Option<Duration>,
+}
+
+impl Target {
+    /// A folder for a run that begins at its start, and cannot be resumed.
+    pub fn without_checkpoints(folder: ResultFolder) -> Self {
+        Self { folder, saved: None, interval: None }
+    }
+}
+
+/// Runs a scene on a number of threads. With a target its results are written there; a recorder
 /// follows the expectations of the deck.
 pub fn simulate(
     scene: &Scene,
     name: &str,
-    folder: Option<&Path>,
+    target: Option<Target>,
     recorder: Option<&mut Recorder>,
     extras: RunExtras,
     threads: usize,
@@ -62,42 +78,44 @@ pub fn simulate(
     // From here on the run itself answers signals.
     signals::caught();
     let RunExtras { accuracy, outcome, bars, text, film } = extras;
-    let opened = folder.map(|folder| open(scene, folder, bars)).transpose();
-    let (writers, opened) = match opened {
-        Ok(writers) => (writers, Ok(())),
-        Err(error) => (None, Err(Failure::Io(error.to_string()))),
+    let (results, from, opened) = match target.map(|target| Results::open(scene, target, bars)).transpose() {
+        Ok(opened) => {
+            let (results, from) = opened.unzip();
+            (results, from.flatten(), Ok(()))
+        }
+        Err(error) => (None, None, Err(Failure::Io(error.to_string()))),
     };
-    let (history, fields) = writers.map_or((None, None), |Writers { history, fields }| (Some(history), fields));
-    // A film and fields need the whole state of each row, which an outcome does not have.
-    let outcome = outcome.filter(|_| film.is_none() && fields.is_none());
+    // A film, fields and checkpoints need the whole state of each row, which an outcome does not have.
+    let needs_states = film.is_some() || from.is_some() || results.as_ref().is_some_and(|r| r.fields.is_some());
+    let outcome = outcome.filter(|_| !needs_states);
     let mut watcher = Watcher {
         scene,
-        history,
+        results,
+        unwritten: RowCounter::new(Rows { every: scene.every, interval: scene.plan.interval }),
         values: Vec::new(),
         recorder,
         progress: Progress::new(name),
         time_unit: time_unit(scene),
-        modes: ModesWriter::default(),
-        fields,
         film,
         dynamic: are_dynamic(scene),
-        rows: RowCounter::new(Rows { every: scene.every, interval: scene.plan.interval }),
     };
     let seconds_of_search = outcome.as_ref().map(|outcome| outcome.seconds);
     let threads = if seconds_of_search.is_some() { 1 } else { threads };
-    let (mut result, counters) = match (opened, outcome) {
-        (Err(failure), _) => (Err(failure), Counters::default()),
-        (Ok(()), Some(outcome)) => watcher.replay(outcome),
-        (Ok(()), None) => threads::on(threads, || Run::new(scene.plan.clone(), &mut watcher).finish()),
+    let plan = scene.plan.clone();
+    let (mut result, counters) = match (opened, outcome, from) {
+        (Err(failure), _, _) => (Err(failure), Counters::default()),
+        (Ok(()), Some(outcome), _) => watcher.replay(outcome),
+        (Ok(()), None, Some(from)) => threads::on(threads, || Run::resume(plan, from, &mut watcher).finish()),
+        (Ok(()), None, None) => threads::on(threads, || Run::new(plan, &mut watcher).finish()),
     };
     watcher.progress.done();
     let seconds = seconds_of_search.unwrap_or_else(|| start.elapsed().as_secs_f64());
     let mut record = None;
-    if let (Some(history), Some(folder)) = (watcher.history.take(), folder) {
-        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, text };
-        let content = Record::of(scene, run);
-        let writers = Writers { history, fields: watcher.fields.take() };
-        let written = write_results(writers, &watcher.modes, folder, result.is_ok(), &content);
+    if let Some(results) = watcher.results.take() {
+        let resumed = results.resumed;
+        let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, text, resumed };
+        let mut content = Record::of(scene, run);
+        let written = results.finish(&result, &mut content);
         record = Some(content);
         if let Err(error) = written {
             result = Err(Failure::Io(error.to_string()));
@@ -106,19 +124,81 @@ pub fn simulate(
     Finished { result, counters, seconds, film: watcher.film, record, threads }
 }
 
-/// The files that are written row by row.
-struct Writers {
+/// The files that are written while a run goes on.
+struct Results {
+    folder: ResultFolder,
     history: HistoryWriter,
     fields: Option<FieldsWriter>,
+    modes: ModesWriter,
+    rows: RowCounter,
+    /// How often the run was resumed
+    resumed: u32,
+    /// The time between checkpoints, if any are written
+    interval: Option<Duration>,
+    /// When the last checkpoint was written, or the run began
+    kept: Instant,
+    /// There are rows behind the last checkpoint.
+    has_new_rows: bool,
 }
 
-fn open(scene: &Scene, folder: &Path, bars: Option<ErrorBars>) -> Result<Writers, OutputError> {
-    let bars = bars.map(|bars| Box::new(bars) as Box<dyn SideColumns>);
-    let names = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
-    let history = HistoryWriter::create(folder, names, bars)?;
-    let only_dynamic = are_dynamic(scene).into_iter().all(|dynamic| dynamic);
-    let fields = scene.vtk.then(|| FieldsWriter::create(folder, scene.figure(), only_dynamic));
-    Ok(Writers { history, fields: fields.transpose()? })
+impl Results {
+    /// Opens the files of a run, and tells where it goes on, if it is resumed.
+    fn open(scene: &Scene, target: Target, bars: Option<ErrorBars>) -> Result<(Self, Option<Checkpoint>), OutputError> {
+        let Target { folder, saved, interval } = target;
+        let bars = bars.map(|bars| Box::new(bars) as Box<dyn SideColumns>);
+        let names = scene.probes.iter().flat_map(|probe| probe.names.clone()).collect();
+        let timed = are_dynamic(scene).into_iter().all(|dynamic| dynamic);
+        let rows = Rows { every: scene.every, interval: scene.plan.interval };
+        let Some(saved) = saved else {
+            folder.clean()?;
+            let history = HistoryWriter::create(&folder, names, bars)?;
+            let fields = scene.vtk.then(|| FieldsWriter::create(&folder, scene.figure(), timed)).transpose()?;
+            let (modes, rows) = (ModesWriter::default(), RowCounter::new(rows));
+            let kept = Instant::now();
+            let results =
+                Self { folder, history, fields, modes, rows, resumed: 0, interval, kept, has_new_rows: false };
+            return Ok((results, None));
+        };
+        let SavedRun { resumed, rows: seen, history, modes, fields, run, .. } = *saved;
+        let history = HistoryWriter::resume(&folder, names, bars, history)?;
+        let fields = fields.map(|place| FieldsWriter::resume(&folder, scene.figure(), timed, place)).transpose()?;
+        let rows = RowCounter::after(rows, seen);
+        let resumed = resumed + 1;
+        let kept = Instant::now();
+        let results = Self { folder, history, fields, modes, rows, resumed, interval, kept, has_new_rows: false };
+        Ok((results, Some(run)))
+    }
+
+    /// Writes a checkpoint.
+    fn keep(&mut self, scene: &Scene, film: Option<&Film>, run: &Checkpoint) -> Result<(), OutputError> {
+        let saved = SavedRun {
+            resumed: self.resumed,
+            rows: self.rows.seen(),
+            history: self.history.place()?,
+            modes: self.modes.clone(),
+            fields: self.fields.as_mut().map(FieldsWriter::place).transpose()?,
+            reel: film.map(|film| film.reel().clone()),
+            bars: self.history.side_columns().map(SideColumns::place),
+            run,
+        };
+        saved.write(scene, &self.folder)?;
+        (self.kept, self.has_new_rows) = (Instant::now(), false);
+        Ok(())
+    }
+
+    /// Gives all results their names. A run that was stopped can go on from its checkpoint.
+    fn finish(self, result: &Result<(), Failure>, record: &mut Record) -> Result<(), OutputError> {
+        let Self { folder, history, fields, modes, .. } = self;
+        let is_finished = result.is_ok();
+        let mut names = vec![history.finish(&folder, is_finished)?];
+        names.extend(fields.map(|fields| fields.finish(&folder, is_finished)).transpose()?);
+        names.extend(modes.finish(&folder)?);
+        folder.commit(&names, record)?;
+        match result {
+            Err(Failure::Interrupted { .. } | Failure::Io(_)) => Ok(()),
+            Ok(()) | Err(_) => folder.forget_checkpoint(),
+        }
+    }
 }
 
 /// For each stage whether it advances time.
@@ -132,30 +212,12 @@ fn time_unit(scene: &Scene) -> String {
     unit.map_or(String::new(), |unit| format!(" {unit}"))
 }
 
-/// Gives all results their final names. The record is on disk before any other file gets its name,
-/// and gets its own name last.
-fn write_results(
-    writers: Writers,
-    modes: &ModesWriter,
-    folder: &Path,
-    finished: bool,
-    record: &Record,
-) -> Result<(), OutputError> {
-    let (part, file) = PartFile::written(folder, "run.json", record.to_string().as_bytes())?;
-    writers.history.finish(finished)?;
-    remove_if_there(folder, "report.html")?;
-    match writers.fields {
-        Some(fields) => fields.finish(finished)?,
-        None => remove_fields(folder)?,
-    }
-    modes.finish(folder)?;
-    part.finish(&file, "run.json")
-}
-
 /// Observer of a run from the command line.
 struct Watcher<'r> {
     scene: &'r Scene,
-    history: Option<HistoryWriter>,
+    results: Option<Results>,
+    /// Numbers rows where no results are written
+    unwritten: RowCounter,
     /// The numbers of the present row
     values: Vec<f64>,
     /// Follows the expectations of the deck, where these are judged
@@ -165,18 +227,17 @@ struct Watcher<'r> {
     time_unit: String,
     /// For each stage whether it advances time
     dynamic: Vec<bool>,
-    rows: RowCounter,
-    modes: ModesWriter,
-    fields: Option<FieldsWriter>,
     film: Option<Film>,
 }
 
 impl Watcher<'_> {
     /// Writes a row of the history.
     fn write(&mut self, at: Moment, values: &[f64]) -> Result<Row, Failure> {
-        let row = self.rows.next(self.dynamic[at.stage - 1], at.time);
-        let column = self.history.as_mut().map_or(Ok(None), |history| history.row(at, values, row));
-        match column.map_err(io_failure)? {
+        let dynamic = self.dynamic[at.stage - 1];
+        let Some(results) = &mut self.results else { return Ok(self.unwritten.next(dynamic, at.time)) };
+        let row = results.rows.next(dynamic, at.time);
+        results.has_new_rows = true;
+        match results.history.row(at, values, row).map_err(io_failure)? {
             Some(node) => Err(Failure::NonFinite { at, effect: Some("a column of the history"), node }),
             None => Ok(row),
         }
@@ -186,7 +247,9 @@ impl Watcher<'_> {
     fn replay(&mut self, outcome: study::Outcome) -> (Result<(), Failure>, Counters) {
         outcome.counters.findings.warnings.iter().for_each(|warning| self.warn(warning));
         let written = outcome.history().try_for_each(|(at, values)| self.write(at, values).map(|_| ()));
-        self.modes = outcome.found;
+        if let Some(results) = &mut self.results {
+            results.modes = outcome.found;
+        }
         (written.and(outcome.ended), outcome.counters)
     }
 }
@@ -196,20 +259,34 @@ impl Observer for Watcher<'_> {
         self.recorder.iter_mut().for_each(|recorder| recorder.row(snapshot));
         let mut values = std::mem::take(&mut self.values);
         values.clear();
-        if self.history.is_some() {
+        if self.results.is_some() {
             self.scene.probes.iter().for_each(|probe| probe.read(snapshot, &mut values));
         }
         let row = self.write(snapshot.moment(), &values);
         self.values = values;
         let row = row?;
         self.film.iter_mut().for_each(|film| film.row(snapshot, row));
-        self.fields.iter_mut().try_for_each(|fields| fields.row(snapshot, row)).map_err(io_failure)
+        let fields = self.results.iter_mut().filter_map(|results| results.fields.as_mut());
+        fields.map(|fields| fields.row(snapshot, row)).collect::<Result<(), _>>().map_err(io_failure)
     }
 
     fn found(&mut self, stage: usize, result: &StageResult) -> Result<(), Failure> {
         self.recorder.iter_mut().for_each(|recorder| recorder.found(result));
-        self.modes.push(stage, result);
+        self.results.iter_mut().for_each(|results| results.modes.push(stage, result));
         Ok(())
+    }
+
+    fn wants_checkpoint(&mut self) -> bool {
+        let Some(Results { interval: Some(interval), kept, has_new_rows: true, .. }) = &self.results else {
+            return false;
+        };
+        kept.elapsed() >= *interval || signals::caught().is_some()
+    }
+
+    fn checkpoint(&mut self, checkpoint: &Checkpoint) -> Result<(), Failure> {
+        let Self { results, scene, film, .. } = self;
+        let Some(results) = results else { return Ok(()) };
+        results.keep(scene, film.as_ref(), checkpoint).map_err(io_failure)
     }
 
     fn warn(&mut self, warning: &Warning) {

@@ -3,12 +3,12 @@
 use super::error::CommandError;
 use super::folders::folder;
 use super::load::{self, Loaded};
-use super::simulate::{RunExtras, simulate};
+use super::simulate::{RunExtras, Target, simulate};
 use super::status::Status;
 use super::thread_count::threads_of;
 use super::verdict::Verdict;
 use super::{console, json, signals};
-use crate::output::OutputError;
+use crate::output::{OutputError, ResultFolder};
 use crate::study::{Judgement, Recorder, expected_failure, judge};
 use std::path::{Path, PathBuf};
 
@@ -66,7 +66,8 @@ fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> R
     };
     let mut recorder = Recorder::new(&scene);
     let extras = RunExtras { text, ..RunExtras::default() };
-    let finished = simulate(&scene, name, folder, Some(&mut recorder), extras, threads_of(&scene, None));
+    let target = folder.map(|folder| ResultFolder::claim(folder).map(Target::without_checkpoints)).transpose()?;
+    let finished = simulate(&scene, name, target, Some(&mut recorder), extras, threads_of(&scene, None));
     if let Some(signal) = signals::caught() {
         return Err(CommandError::Stopped { signal, message: format!("stopped by signal {signal}") });
     }

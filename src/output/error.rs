@@ -23,6 +23,9 @@ pub enum OutputError {
         /// The error in the content
         reason: String,
     },
+    /// Another run writes to a folder of results.
+    #[error("{}: another run is writing its results there (wait for it, or give another folder with --out)", .0.display())]
+    Locked(PathBuf),
     /// A path that ends in no file name, such as `..`.
     #[error("{}: not a file name", .0.display())]
     NoFileName(PathBuf),

@@ -4,14 +4,16 @@
 //! Elements are cells of their own order, so that curved elements look curved. Numbers follow the
 //! XML as raw bytes ("appended").
 
-use super::files::PartFile;
-use super::{OutputError, Row};
+use super::files::{FIELDS, PARTIAL_FIELDS};
+use super::{OutputError, ResultFolder, Row};
 use beamsim_core::probe::{Figure, Look};
 use beamsim_core::run::{Moment, Snapshot};
 use beamsim_core::system::State;
+use serde::{Deserialize, Serialize};
+use std::ffi::OsStr;
 use std::fmt::Write;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::fs::{self, File};
+use std::path::PathBuf;
 
 /// VTK's cell types of lines with two, three and four nodes.
 const LINES: [u8; 3] = [3, 21, 35];
@@ -19,21 +21,32 @@ const LINES: [u8; 3] = [3, 21, 35];
 const VERTEX: u8 = 1;
 
 /// A file of a row.
+#[derive(Clone, Debug, Deserialize, Serialize)]
 struct FieldFile {
     name: String,
     /// The time for ParaView
     time: f64,
 }
 
+/// Fields as far as they are written.
+#[derive(Deserialize, Serialize)]
+pub struct FieldsPlace {
+    written: Vec<FieldFile>,
+    /// A row that is written only if no other follows
+    pending: Option<(Moment, State)>,
+}
+
 /// Writes the fields of a run.
 pub struct FieldsWriter {
-    folder: PathBuf,
+    /// The folder of the files until the run has ended
     part: PathBuf,
     figure: Figure,
     /// True if every row has its own time, because all stages advance it
     timed: bool,
     /// The files so far
     written: Vec<FieldFile>,
+    /// The number of files that are safe on the disk
+    safe: usize,
     /// A row that is written only if no other follows
     pending: Option<(Moment, State)>,
 }
@@ -41,10 +54,39 @@ pub struct FieldsWriter {
 impl FieldsWriter {
     /// Creates the fields in a folder of results. `timed` is true if all stages advance time;
     /// otherwise rows are numbered for ParaView.
-    pub fn create(folder: &Path, figure: Figure, timed: bool) -> Result<Self, OutputError> {
-        let part = folder.join(format!("fields.{}.part", std::process::id()));
-        fs::create_dir_all(&part).map_err(|error| OutputError::file(&part, error))?;
-        Ok(Self { folder: folder.into(), part, figure, timed, written: Vec::new(), pending: None })
+    pub fn create(folder: &ResultFolder, figure: Figure, timed: bool) -> Result<Self, OutputError> {
+        let part = folder.part(FIELDS);
+        fs::create_dir(&part).map_err(|error| OutputError::file(&part, error))?;
+        Ok(Self { part, figure, timed, written: Vec::new(), safe: 0, pending: None })
+    }
+
+    /// Opens the fields of a run that is resumed.
+    pub fn resume(folder: &ResultFolder, figure: Figure, timed: bool, place: FieldsPlace) -> Result<Self, OutputError> {
+        let part = folder.part(FIELDS);
+        if !part.exists() {
+            folder.reopen(PARTIAL_FIELDS, FIELDS)?;
+        }
+        let FieldsPlace { written, pending } = place;
+        let own = |name: &OsStr| written.iter().any(|file| name == file.name.as_str());
+        let wrong = |error| OutputError::file(&part, error);
+        for entry in fs::read_dir(&part).map_err(wrong)? {
+            let entry = entry.map_err(wrong)?;
+            if !own(&entry.file_name()) {
+                fs::remove_file(entry.path()).map_err(wrong)?;
+            }
+        }
+        Ok(Self { figure, timed, safe: written.len(), written, pending, part })
+    }
+
+    /// Makes the files so far safe on the disk, and tells what it takes to go on behind them.
+    pub fn place(&mut self) -> Result<FieldsPlace, OutputError> {
+        for file in &self.written[self.safe..] {
+            let path = self.part.join(&file.name);
+            let synced = File::open(&path).and_then(|file| file.sync_all());
+            synced.map_err(|error| OutputError::file(&path, error))?;
+        }
+        self.safe = self.written.len();
+        Ok(FieldsPlace { written: self.written.clone(), pending: self.pending.clone() })
     }
 
     /// Takes a converged state, and writes it if its row is wanted.
@@ -69,41 +111,16 @@ impl FieldsWriter {
         Ok(())
     }
 
-    /// Gives the fields their names: `fields`, or `fields.partial` where the run failed.
-    pub fn finish(mut self, finished: bool) -> Result<(), OutputError> {
+    /// Completes the fields, and returns the name of their index: `fields.pvd`, or
+    /// `fields.partial.pvd` where the run failed.
+    pub fn finish(mut self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
         if let Some((moment, state)) = self.pending.take() {
             self.write(moment, &state)?;
         }
-        remove_fields(&self.folder)?;
-        let name = if finished { "fields" } else { "fields.partial" };
-        let place = self.folder.join(name);
-        // This fails on a folder with other files in it, which are not of beamsim.
-        fs::rename(&self.part, &place).map_err(|error| OutputError::file(&place, error))?;
-        let index = index(name, &self.written);
-        PartFile::write(&self.folder, &format!("{name}.pvd"), index.as_bytes())
-    }
-}
-
-/// Removes the fields of an earlier run: the files that its index lists, and nothing else.
-pub fn remove_fields(folder: &Path) -> Result<(), OutputError> {
-    for name in ["fields", "fields.partial"] {
-        let index = format!("{name}.pvd");
-        let Ok(listed) = fs::read_to_string(folder.join(&index)) else { continue };
-        for file in listed.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next()) {
-            if Path::new(file).parent() == Some(Path::new(name)) {
-                super::remove_if_there(folder, file)?;
-            }
-        }
-        let _ = fs::remove_dir(folder.join(name));
-        super::remove_if_there(folder, &index)?;
-    }
-    Ok(())
-}
-
-impl Drop for FieldsWriter {
-    fn drop(&mut self) {
-        // The folder is still there only if the results could not be written.
-        let _ = fs::remove_dir_all(&self.part);
+        self.place()?;
+        let (name, index_name) = if finished { (FIELDS, "fields.pvd") } else { (PARTIAL_FIELDS, "fields.partial.pvd") };
+        folder.write(index_name, index(name, &self.written).as_bytes())?;
+        Ok(index_name)
     }
 }
 

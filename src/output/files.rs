@@ -2,10 +2,16 @@
 
 use super::OutputError;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::hash::{BuildHasher, RandomState};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// An incomplete file: `name.<process>.part` beside its final place.
+/// The folder of the fields of a run that finished.
+pub const FIELDS: &str = "fields";
+/// The folder of the fields of a run that did not.
+pub const PARTIAL_FIELDS: &str = "fields.partial";
+
+/// An incomplete file: `name.<number>.part` beside its final place, with a random number.
 #[derive(Debug)]
 pub struct PartFile {
     folder: PathBuf,
@@ -16,16 +22,27 @@ impl PartFile {
     /// Creates the folder, and in it the incomplete file.
     pub fn create(folder: &Path, name: &str) -> Result<(Self, File), OutputError> {
         fs::create_dir_all(folder).map_err(|error| OutputError::file(folder, error))?;
-        // Two processes must not write into the same file.
-        let part = folder.join(format!("{name}.{}.part", std::process::id()));
-        let file = File::create(&part).map_err(|error| OutputError::file(&part, error))?;
-        Ok((Self { folder: folder.into(), part }, file))
+        loop {
+            // Process numbers are those of a container: two of them may write into one folder.
+            let number = RandomState::new().hash_one(name);
+            let part = folder.join(format!("{name}.{number:016x}.part"));
+            // What exists is neither opened nor followed.
+            match File::create_new(&part) {
+                Ok(file) => return Ok((Self { folder: folder.into(), part }, file)),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(OutputError::file(&part, error)),
+            }
+        }
     }
 
     /// Writes the whole content, still under the temporary name.
     pub fn written(folder: &Path, name: &str, content: &[u8]) -> Result<(Self, File), OutputError> {
         let (part, mut file) = Self::create(folder, name)?;
-        file.write_all(content).map_err(|error| OutputError::file(&part.part, error))?;
+        file.write_all(content).map_err(|error| {
+            // Half a file helps nobody.
+            let _ = fs::remove_file(&part.part);
+            OutputError::file(&part.part, error)
+        })?;
         Ok((part, file))
     }
 
@@ -59,7 +76,23 @@ impl PartFile {
 pub fn remove_if_there(folder: &Path, name: &str) -> Result<(), OutputError> {
     let path = folder.join(name);
     match fs::remove_file(&path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(OutputError::file(&path, error)),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(OutputError::file(&path, error)),
         Ok(()) | Err(_) => Ok(()),
     }
+}
+
+/// Removes the fields of an earlier run: the files that its index lists, and nothing else.
+pub fn remove_fields(folder: &Path) -> Result<(), OutputError> {
+    for name in [FIELDS, PARTIAL_FIELDS] {
+        let index = format!("{name}.pvd");
+        let Ok(listed) = fs::read_to_string(folder.join(&index)) else { continue };
+        for file in listed.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next()) {
+            if Path::new(file).parent() == Some(Path::new(name)) {
+                remove_if_there(folder, file)?;
+            }
+        }
+        let _ = fs::remove_dir(folder.join(name));
+        remove_if_there(folder, &index)?;
+    }
+    Ok(())
 }

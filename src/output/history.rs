@@ -1,13 +1,21 @@
 //! history.csv: one row per load level or time step, one column per number.
 
-use super::OutputError;
-use super::files::{PartFile, remove_if_there};
+use super::{OutputError, Record, ResultFolder, settle};
 use beamsim_core::probe::clocks;
 use beamsim_core::run::Moment;
+use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::fs::File;
-use std::io;
+use std::io::{self, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// The name of the history of a run that finished.
+const HISTORY: &str = "history.csv";
+/// The name of the history of a run that did not.
+const PARTIAL_HISTORY: &str = "history.partial.csv";
+/// Rows are handed to the system at least so often, as long as there are new ones.
+const FLUSH_INTERVAL: Duration = Duration::from_millis(20);
 
 /// The rows that are written: every n-th, or those at multiples of a time interval, and always the
 /// last.
@@ -56,6 +64,16 @@ impl RowCounter {
         Self { rows, seen: 0 }
     }
 
+    /// Counts on from the number of states so far.
+    pub fn after(rows: Rows, seen: u64) -> Self {
+        Self { rows, seen }
+    }
+
+    /// The number of states so far.
+    pub fn seen(&self) -> u64 {
+        self.seen
+    }
+
     /// The row of the next converged state.
     pub fn next(&mut self, dynamic: bool, time: f64) -> Row {
         let number = self.seen;
@@ -74,12 +92,47 @@ pub trait SideColumns: Send {
     fn take(&mut self, stage: usize, clock: f64, row: &[f64]) -> bool;
     /// The additional numbers of the rows that are held back, as far as they are known
     fn numbers(&self) -> Vec<f64>;
+    /// What it takes to go on behind the rows so far
+    fn place(&self) -> BarsPlace;
+}
+
+/// Error bars as far as they are known, with the runs that they come from.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct BarsPlace {
+    /// The runs that the history is compared with
+    pub companions: Vec<CompanionPlace>,
+    /// The largest estimates so far, for each companion and column
+    pub largest: Vec<Vec<f64>>,
+    /// The largest value so far of each column's kind
+    pub values: Vec<f64>,
+}
+
+/// A run that a history is compared with.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct CompanionPlace {
+    /// The moment of each row
+    pub moments: Vec<Moment>,
+    /// The columns of the history, row by row
+    pub rows: Vec<Vec<f64>>,
+    /// For each column: a difference over this is an error
+    pub divisors: Vec<f64>,
+    /// The row that was compared last
+    pub next: usize,
+}
+
+/// A history as far as it is written.
+#[derive(Deserialize, Serialize)]
+pub struct HistoryPlace {
+    /// The length of the file
+    bytes: u64,
+    /// The last row, if it is written only if no other follows
+    pending: Option<Vec<String>>,
+    /// Rows whose additional numbers are not known yet
+    held_back: Vec<Vec<String>>,
 }
 
 /// Writes the history of a run.
 pub struct HistoryWriter {
-    folder: PathBuf,
-    part: PartFile,
     writer: csv::Writer<File>,
     names: Vec<String>,
     side_columns: Option<Box<dyn SideColumns>>,
@@ -89,24 +142,29 @@ pub struct HistoryWriter {
     pending: bool,
     /// Wanted rows whose additional numbers are not known yet
     held_back: Vec<csv::ByteRecord>,
+    /// When rows were handed to the system last
+    flushed: Instant,
 }
 
 impl HistoryWriter {
     /// Creates the history in a folder, with columns of these names.
     pub fn create(
-        folder: &Path,
+        folder: &ResultFolder,
         names: Vec<String>,
         side_columns: Option<Box<dyn SideColumns>>,
     ) -> Result<Self, OutputError> {
-        let (part, file) = PartFile::create(folder, "history.csv")?;
-        let mut writer = csv::Writer::from_writer(file);
+        let mut writer = csv::Writer::from_writer(folder.create(HISTORY)?);
         let others = side_columns.as_ref().map_or(Vec::new(), |side| side.names(&names));
         let mut header: Vec<&str> = clocks().collect();
         header.extend(names.iter().chain(&others).map(String::as_str));
         writer.write_record(header)?;
-        Ok(Self {
-            folder: folder.into(),
-            part,
+        // A full disk is told before the run begins.
+        writer.flush()?;
+        Ok(Self::with(writer, names, side_columns))
+    }
+
+    fn with(writer: csv::Writer<File>, names: Vec<String>, side_columns: Option<Box<dyn SideColumns>>) -> Self {
+        Self {
             writer,
             names,
             side_columns,
@@ -114,7 +172,51 @@ impl HistoryWriter {
             record: csv::ByteRecord::new(),
             pending: false,
             held_back: Vec::new(),
+            flushed: Instant::now(),
+        }
+    }
+
+    /// Opens the history of a run that is resumed: rows behind its checkpoint are removed.
+    pub fn resume(
+        folder: &ResultFolder,
+        names: Vec<String>,
+        side_columns: Option<Box<dyn SideColumns>>,
+        place: HistoryPlace,
+    ) -> Result<Self, OutputError> {
+        if !folder.part(HISTORY).exists() {
+            folder.reopen(PARTIAL_HISTORY, HISTORY)?;
+        }
+        let path = folder.part(HISTORY);
+        let wrong = |error| OutputError::file(&path, error);
+        let mut file = File::options().read(true).write(true).open(&path).map_err(wrong)?;
+        if file.metadata().map_err(wrong)?.len() < place.bytes {
+            return Err(OutputError::content(&path, "is shorter than its checkpoint says: use --fresh"));
+        }
+        file.set_len(place.bytes).and_then(|()| file.seek(SeekFrom::End(0))).map_err(wrong)?;
+        let mut writer = Self::with(csv::Writer::from_writer(file), names, side_columns);
+        writer.pending = place.pending.is_some();
+        writer.record = place.pending.unwrap_or_default().into();
+        writer.held_back = place.held_back.into_iter().map(csv::ByteRecord::from).collect();
+        Ok(writer)
+    }
+
+    /// Makes the rows so far safe on the disk, and tells what it takes to go on behind them.
+    pub fn place(&mut self) -> Result<HistoryPlace, OutputError> {
+        self.writer.flush()?;
+        let file = self.writer.get_ref();
+        file.sync_all()?;
+        let fields =
+            |record: &csv::ByteRecord| record.iter().map(|f| String::from_utf8_lossy(f).into_owned()).collect();
+        Ok(HistoryPlace {
+            bytes: file.metadata()?.len(),
+            pending: self.pending.then(|| fields(&self.record)),
+            held_back: self.held_back.iter().map(fields).collect(),
         })
+    }
+
+    /// The additional columns.
+    pub fn side_columns(&self) -> Option<&dyn SideColumns> {
+        self.side_columns.as_deref()
     }
 
     /// Takes the numbers of a converged state, and writes them if its row is wanted. Returns the
@@ -134,6 +236,10 @@ impl HistoryWriter {
             self.hold_back(at, values, row.dynamic)?;
         } else if !self.pending {
             self.writer.write_byte_record(&self.record)?;
+        }
+        if self.flushed.elapsed() >= FLUSH_INTERVAL {
+            self.writer.flush()?;
+            self.flushed = Instant::now();
         }
         Ok(None)
     }
@@ -158,17 +264,19 @@ impl HistoryWriter {
         Ok(())
     }
 
-    /// Gives the file its name: `history.csv` if the run finished, else `history.partial.csv`.
-    pub fn finish(mut self, finished: bool) -> Result<(), OutputError> {
+    /// Completes the file, and returns the name that it is to get: `history.csv` if the run
+    /// finished, else `history.partial.csv`.
+    pub fn finish(mut self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
         if self.pending {
             self.held_back.push(std::mem::take(&mut self.record));
         }
         self.write_held_back()?;
         let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
-        let name = if finished { "history.csv" } else { "history.partial.csv" };
-        let other = if finished { "history.partial.csv" } else { "history.csv" };
-        self.part.finish(&file, name)?;
-        remove_if_there(&self.folder, other)
+        file.sync_all()?;
+        if !finished {
+            folder.rename_part(HISTORY, PARTIAL_HISTORY)?;
+        }
+        Ok(if finished { HISTORY } else { PARTIAL_HISTORY })
     }
 }
 
@@ -193,10 +301,17 @@ pub struct HistoryReader {
 
 impl HistoryReader {
     /// The path of the history in a folder of results: of a run that finished, or of one that
-    /// failed.
-    pub fn of_results(folder: &Path) -> Option<PathBuf> {
-        let names = ["history.csv", "history.partial.csv"];
-        names.map(|name| folder.join(name)).into_iter().find(|path| path.exists())
+    /// failed. `None` if there is none; an error if it is not that of the run that run.json
+    /// describes.
+    pub fn of_results(folder: &Path) -> Result<Option<PathBuf>, OutputError> {
+        settle(folder);
+        let Some(name) = [HISTORY, PARTIAL_HISTORY].into_iter().find(|name| folder.join(name).exists()) else {
+            return Ok(None);
+        };
+        if let Ok(record) = Record::read(folder) {
+            record.refuse_foreign(folder, name)?;
+        }
+        Ok(Some(folder.join(name)))
     }
 
     /// Reads a table of numbers whose first line holds the names.

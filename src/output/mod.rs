@@ -1,9 +1,11 @@
 //! The files of results. A file gets its name when it is complete: no name ever stands for half a
 //! result.
 
+mod checkpoint;
 mod error;
 mod fields;
 mod files;
+mod folder;
 mod history;
 pub(crate) mod json;
 mod modes;
@@ -12,12 +14,16 @@ mod quantities;
 mod record;
 mod report;
 
+pub use checkpoint::{Found, SavedRun};
 pub use error::OutputError;
-pub use fields::{FieldsWriter, remove_fields};
-pub use files::{PartFile, remove_if_there};
-pub use history::{HistoryReader, HistoryWriter, Row, RowCounter, Rows, SideColumns};
+pub use fields::{FieldsPlace, FieldsWriter};
+pub use files::{PartFile, remove_fields, remove_if_there};
+pub use folder::{ResultFolder, settle};
+pub use history::{
+    BarsPlace, CompanionPlace, HistoryPlace, HistoryReader, HistoryWriter, Row, RowCounter, Rows, SideColumns,
+};
 pub use modes::ModesWriter;
 pub use plot::{Axis, Boundary, Level, Line, LinePlot, LineStyle, Scale};
 pub use quantities::{Units, quantity_of};
-pub use record::{FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, WarningRecord};
-pub use report::{Film, Report};
+pub use record::{FileRecord, FinishedRun, ReachedAccuracy, ReachedColumn, Record, RunSummary, WarningRecord};
+pub use report::{Film, Reel, Report};

@@ -1,19 +1,18 @@
 //! modes.csv and buckling.csv: results of modal and buckling stages.
 
-use super::OutputError;
-use super::files::{PartFile, remove_if_there};
+use super::{OutputError, ResultFolder};
 use beamsim_core::run::{CriticalLoad, Mode, StageResult};
-use std::path::Path;
+use serde::{Deserialize, Serialize};
 
 /// Collects modes and critical loads, and writes them when the run has ended.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct ModesWriter {
     modes: Vec<Numbered<Mode>>,
     loads: Vec<Numbered<CriticalLoad>>,
 }
 
 /// A result of a stage.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 struct Numbered<T> {
     /// Stage, from 1
     stage: usize,
@@ -35,8 +34,8 @@ impl ModesWriter {
         }
     }
 
-    /// Writes the files that have rows, and removes those of an earlier run.
-    pub fn finish(&self, folder: &Path) -> Result<(), OutputError> {
+    /// Writes the files that have rows, and returns their names.
+    pub fn finish(&self, folder: &ResultFolder) -> Result<Vec<&'static str>, OutputError> {
         // Debug formatting is the shortest text that reads back to the same float.
         let mode = |Numbered { stage, number, result: Mode { omega, growth, .. } }: &Numbered<Mode>| {
             format!("{stage},{number},{omega:?},{growth:?}")
@@ -46,15 +45,12 @@ impl ModesWriter {
         };
         let modes: Vec<String> = self.modes.iter().map(mode).collect();
         let loads: Vec<String> = self.loads.iter().map(load).collect();
-        write(folder, "modes.csv", "stage,mode,omega,growth", &modes)?;
-        write(folder, "buckling.csv", "stage,mode,load,kind", &loads)
+        let tables = [("modes.csv", "stage,mode,omega,growth", modes), ("buckling.csv", "stage,mode,load,kind", loads)];
+        let mut names = Vec::new();
+        for (name, head, rows) in tables.into_iter().filter(|(_, _, rows)| !rows.is_empty()) {
+            folder.write(name, format!("{head}\n{}\n", rows.join("\n")).as_bytes())?;
+            names.push(name);
+        }
+        Ok(names)
     }
-}
-
-fn write(folder: &Path, name: &str, head: &str, rows: &[String]) -> Result<(), OutputError> {
-    if rows.is_empty() {
-        return remove_if_there(folder, name);
-    }
-    let text = format!("{head}\n{}\n", rows.join("\n"));
-    PartFile::write(folder, name, text.as_bytes())
 }

@@ -8,8 +8,13 @@ use beamsim_core::run::{Counters, Event, Failure, Moment, Place, StageStability,
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt::{self, Display, Formatter};
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::Path;
+use xxhash_rust::xxh3::Xxh3;
+
+/// Bytes of a file that are read at once
+const READ_AT_ONCE: usize = 1 << 16;
 
 /// A run that has ended.
 pub struct FinishedRun<'a> {
@@ -25,6 +30,8 @@ pub struct FinishedRun<'a> {
     pub accuracy: Option<ReachedAccuracy>,
     /// The text of the deck
     pub text: String,
+    /// How often the run was resumed
+    pub resumed: u32,
 }
 
 /// A wanted accuracy, and what was reached.
@@ -57,11 +64,51 @@ pub struct ReachedColumn {
 pub struct Record {
     version: String,
     status: String,
+    /// The other files of the run
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) files: Vec<FileRecord>,
+    /// How often the run was resumed
+    #[serde(skip_serializing_if = "is_zero")]
+    resumed: u32,
     deck: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     text: Option<String>,
     #[serde(flatten)]
     findings: Findings,
+}
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
+/// A file of a run, by which it is told from that of another run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FileRecord {
+    /// The name in the folder of results
+    pub name: String,
+    bytes: u64,
+    /// XXH3 of 64 bits, in hexadecimal digits
+    checksum: String,
+}
+
+impl FileRecord {
+    /// The file at a path, under a name.
+    pub fn of(name: &str, path: &Path) -> Result<Self, OutputError> {
+        let wrong = |error| OutputError::file(path, error);
+        let mut file = File::open(path).map_err(wrong)?;
+        let mut hasher = Xxh3::new();
+        let mut buffer = vec![0; READ_AT_ONCE];
+        let mut bytes = 0;
+        loop {
+            let count = file.read(&mut buffer).map_err(wrong)?;
+            if count == 0 {
+                break;
+            }
+            hasher.update(&buffer[..count]);
+            bytes += count as u64;
+        }
+        Ok(Self { name: name.into(), bytes, checksum: format!("{:016x}", hasher.digest()) })
+    }
 }
 
 /// The part of run.json that does not repeat the deck.
@@ -223,7 +270,7 @@ impl<'a> RunSummary<'a> {
 impl Record {
     /// The record of a run.
     pub fn of(scene: &Scene, run: FinishedRun) -> Self {
-        let FinishedRun { result, counters, seconds, threads, accuracy, text } = run;
+        let FinishedRun { result, counters, seconds, threads, accuracy, text, resumed } = run;
         let found = &counters.findings;
         let warnings = scene.warnings.iter().chain(&found.warnings);
         let findings = Findings {
@@ -245,6 +292,8 @@ impl Record {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             status: result.as_ref().map_or_else(Failure::name, |()| "finished").into(),
+            files: Vec::new(),
+            resumed,
             deck: scene.resolved.clone(),
             text: Some(text),
             findings,
@@ -253,9 +302,32 @@ impl Record {
 
     /// Reads run.json of a folder of results.
     pub fn read(folder: &Path) -> Result<Self, OutputError> {
-        let path = folder.join("run.json");
-        let bytes = fs::read(&path).map_err(|error| OutputError::file(&path, error))?;
-        serde_json::from_slice(&bytes).map_err(|error| OutputError::content(&path, error))
+        Self::read_from(&folder.join("run.json"))
+    }
+
+    /// Reads a file with the content of run.json.
+    pub fn read_from(path: &Path) -> Result<Self, OutputError> {
+        let bytes = fs::read(path).map_err(|error| OutputError::file(path, error))?;
+        serde_json::from_slice(&bytes).map_err(|error| OutputError::content(path, error))
+    }
+
+    /// True if a file of the run is not there.
+    pub fn misses_files(&self, folder: &Path) -> bool {
+        self.files.iter().any(|file| !folder.join(&file.name).exists())
+    }
+
+    /// Refuses a file of another run, or one that was changed; a record of an older version knows no
+    /// files.
+    pub fn refuse_foreign(&self, folder: &Path, name: &str) -> Result<(), OutputError> {
+        let path = folder.join(name);
+        let listed = self.files.iter().find(|file| file.name == name);
+        let reason = match listed {
+            None if self.files.is_empty() => return Ok(()),
+            Some(file) if FileRecord::of(name, &path)? == *file => return Ok(()),
+            None => "is not a file of the run that run.json describes",
+            Some(_) => "is not as the run that run.json describes has written it: it was changed, or is of another run",
+        };
+        Err(OutputError::content(&path, format!("{reason} (run the deck again, or give the file itself)")))
     }
 
     /// The text of the deck.

@@ -10,7 +10,7 @@ use super::accuracy::{divisor_in_time, divisors_in_space, left_by_newton};
 use super::cost::{Companion, Family, Mesher, Original, Pace, Patience, Sampler, Variant, dynamic_stages, trial};
 use super::outcome::{Outcome, Presence, StageClock};
 use crate::deck::{Deck, Diagnostic, Path, PointRef, Spanned, StageBody};
-use crate::output::SideColumns;
+use crate::output::{BarsPlace, CompanionPlace, SideColumns};
 use crate::scene::Scene;
 use beamsim_core::run::Failure;
 use beamsim_core::tensor::Vec3;
@@ -226,6 +226,25 @@ pub fn refuse_paths(deck: &Deck) -> Result<(), Diagnostic> {
     Ok(())
 }
 
+impl ErrorBars {
+    /// Error bars that go on from a checkpoint.
+    pub fn resume(deck: &Deck, scene: &Scene, place: BarsPlace) -> Self {
+        let BarsPlace { companions, largest, values } = place;
+        let companion = |CompanionPlace { moments, rows, divisors, next }: CompanionPlace| CompanionRun {
+            outcome: Outcome::of_rows(scene, moments, rows),
+            divisors,
+            next,
+        };
+        Self {
+            sampler: Sampler::of_rows(deck, scene, Vec::new(), Pace::Timeless),
+            companions: companions.into_iter().map(companion).collect(),
+            largest,
+            values,
+            tolerance: left_by_newton(deck),
+        }
+    }
+}
+
 impl SideColumns for ErrorBars {
     fn names(&self, columns: &[String]) -> Vec<String> {
         columns.iter().map(|column| format!("{column}.err")).collect()
@@ -255,6 +274,18 @@ impl SideColumns for ErrorBars {
         let kinds = self.sampler.scales(&with_modes);
         self.values.iter_mut().zip(&kinds).for_each(|(largest, value)| *largest = largest.max(*value));
         known
+    }
+
+    fn place(&self) -> BarsPlace {
+        let companion = |CompanionRun { outcome, divisors, next }: &CompanionRun| {
+            let (moments, rows) = outcome.history().map(|(at, row)| (at, row.to_vec())).unzip();
+            CompanionPlace { moments, rows, divisors: divisors.clone(), next: *next }
+        };
+        BarsPlace {
+            companions: self.companions.iter().map(companion).collect(),
+            largest: self.largest.clone(),
+            values: self.values.clone(),
+        }
     }
 
     fn numbers(&self) -> Vec<f64> {

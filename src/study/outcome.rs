@@ -70,6 +70,22 @@ impl Outcome {
         Self { ended, dynamic, moments, rows, found, modes, expected, attempts, counters, seconds }
     }
 
+    /// The rows of a run that finished, without its other results.
+    pub(in crate::study) fn of_rows(scene: &Scene, moments: Vec<Moment>, rows: Vec<Vec<f64>>) -> Self {
+        Self {
+            ended: Ok(()),
+            dynamic: are_dynamic(scene),
+            moments,
+            rows,
+            found: ModesWriter::default(),
+            modes: Vec::new(),
+            expected: Vec::new(),
+            attempts: 0,
+            counters: Counters::default(),
+            seconds: 0.0,
+        }
+    }
+
     /// The rows of the history, with their moments.
     pub fn history(&self) -> impl Iterator<Item = (Moment, &[f64])> {
         self.moments.iter().zip(&self.rows).map(|(&at, row)| (at, &row[..]))

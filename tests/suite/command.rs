@@ -550,7 +550,7 @@ fn interrupted(name: &str, signal: &str) -> (i32, Vec<String>) {
 
 #[test]
 fn an_interrupted_run_keeps_what_it_reached() {
-    let left = vec!["history.partial.csv".to_string(), "run.json".to_string()];
+    let left = ["checkpoint", "history.partial.csv", "run.json"].map(String::from).to_vec();
     assert_eq!(interrupted("interrupted", "-INT"), (130, left.clone()));
     assert_eq!(interrupted("terminated", "-TERM"), (143, left));
 }

@@ -167,7 +167,7 @@ fn a_study_that_was_stopped_goes_on() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cost_journal");
     let _ = std::fs::remove_dir_all(&folder);
     let text = quarter(TIP);
-    let open = |identity: &str| Journal::open(&folder, identity).unwrap();
+    let open = |identity: &str| Journal::open(&folder, "cost.journal", identity).unwrap();
     let (found, _) = stopped(&text, &Against::Finest, 1, 10, &mut open("a"));
     assert!(matches!(found, Err(StudyError::Failure(_))));
 

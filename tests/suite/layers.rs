@@ -19,7 +19,7 @@ const DECK_ROWS: [&str; 2] = ["beamsim_core::effect::joint::JointKind", "beamsim
 const BELOW_ALL: [&str; 2] = ["failure", "warning"];
 
 /// Crates that only some places may use; a place is a file or a folder.
-const CRATES: [(&str, &[&str]); 17] = [
+const CRATES: [(&str, &[&str]); 19] = [
     ("rayon", &["core/src/threads.rs"]),
     (
         "faer",
@@ -55,7 +55,9 @@ const CRATES: [(&str, &[&str]); 17] = [
             "src/cli/json.rs",
         ],
     ),
-    ("serde", &["src/output/", "src/study/", "src/cli/json.rs"]),
+    ("serde", &["src/output/", "src/study/", "src/cli/json.rs", "core/src/"]),
+    ("postcard", &["src/output/checkpoint.rs"]),
+    ("xxhash_rust", &["src/output/"]),
     ("thiserror", &["src/output/", "src/study/", "src/cli/"]),
 ];
 

@@ -19,10 +19,11 @@ use crate::kernel::turn::{StepCoefficients, Turn};
 use crate::system::{Field, State};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
+use serde::{Deserialize, Serialize};
 use std::iter::repeat_with;
 
 /// The coefficients of a generalised-alpha method (Chung & Hulbert 1993, doi:10.1115/1.2900803).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Scheme {
     /// beta
     pub(crate) beta: f64,
@@ -37,7 +38,7 @@ pub struct Scheme {
 }
 
 /// The unknowns of rotations in a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Rotations {
     /// Total rotation vectors with their rates
     Totals,
@@ -104,7 +105,7 @@ impl Scheme {
 }
 
 /// One step of a scheme.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Step {
     /// The coefficients
     pub scheme: Scheme,

@@ -34,6 +34,7 @@ use crate::rotation::{Complement, Rotation, log};
 use crate::system::{Category, DofMap, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The number of steps over which slopes of accelerations are taken.
@@ -60,8 +61,10 @@ const MAX_GROWTH_RINGING: f64 = 8.0;
 const RINGING_SHARE: f64 = 0.05;
 
 /// The error of the steps of a stage, from the step on after which it is carried.
+#[derive(Clone, Deserialize, Serialize)]
 pub(super) struct CarriedError {
-    kinds: Arc<Vec<SlotKind>>,
+    #[serde(skip)]
+    pub(super) kinds: Arc<Vec<SlotKind>>,
     length: f64,
     slots: Vec<SlotError>,
     step: Step,
@@ -74,6 +77,7 @@ pub(super) struct CarriedError {
     force: [Vec<Vec3>; 4],
     /// Errors at the end of the present step of rotations whose unknowns are increments: error,
     /// rate, rate2 and algorithmic of [`SlotError`]
+    #[serde(skip)]
     turned: Vec<(Slot, [Vec3; 4])>,
     /// The factor that scales the error to [`SCALED_ERROR`]; zero while there is no error
     scaling: f64,
@@ -89,7 +93,7 @@ pub(super) struct CarriedError {
 }
 
 /// The quantities of the present step that have been computed.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, Deserialize, Serialize)]
 enum Known {
     /// No quantity
     Nothing,
@@ -102,7 +106,7 @@ enum Known {
 /// The error of a slot. That of a rotation whose unknown is an increment is a material rotation
 /// vector, with the material errors of the spin and its rate, and the spatial error of the rate of
 /// the momentum that it carries.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, Deserialize, Serialize)]
 struct SlotError {
     /// e at the end of the last step
     error: Vec3,

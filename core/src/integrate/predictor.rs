@@ -24,6 +24,7 @@ use crate::system::{DofMap, State};
 use crate::tensor::Vec3;
 use crate::threads;
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 use std::array::from_fn;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -55,9 +56,10 @@ const REGULARISATION: f64 = 1e-11;
 type Factors = [f64; ORDER];
 
 /// The corrections of the last steps of a stage.
-#[derive(Default)]
+#[derive(Clone, Default, Deserialize, Serialize)]
 pub struct Predictor {
     /// The kind of each slot
+    #[serde(skip)]
     kinds: Arc<Vec<SlotKind>>,
     /// The weight of squares of corrections of each kind of slot
     weights: [f64; SlotKind::ALL.len()],
@@ -68,13 +70,14 @@ pub struct Predictor {
     /// The normal equations before the last step
     before: [NormalEquations; ORDER],
     /// The unknowns that the scheme has predicted for the end of the present step, by equation
+    #[serde(skip)]
     predicted: Vec<f64>,
     has_foreseen: bool,
 }
 
 /// Normal equations of factors, for corrections divided by the power [`GROWTH_POWER`] of the
 /// lengths of their steps.
-#[derive(Clone, Default)]
+#[derive(Clone, Default, Deserialize, Serialize)]
 struct NormalEquations {
     /// Lower triangle
     matrix: SMatrix<f64, ORDER, ORDER>,
@@ -82,7 +85,7 @@ struct NormalEquations {
 }
 
 /// A completed step.
-#[derive(Default)]
+#[derive(Clone, Default, Deserialize, Serialize)]
 struct PastStep {
     /// The length of the step, a time
     length: f64,
@@ -100,6 +103,11 @@ impl Predictor {
     pub fn new(model: &Model) -> Self {
         let weight = |kind: SlotKind| if kind.is_multiplier() { 0.0 } else { kind.scale(model.length).powi(-2) };
         Self { kinds: model.kinds.clone(), weights: SlotKind::ALL.map(weight), ..Self::default() }
+    }
+
+    /// The predictor with the kinds of slots of a model, which checkpoints leave out.
+    pub fn of_model(self, model: &Model) -> Self {
+        Self { kinds: model.kinds.clone(), ..self }
     }
 
     /// Begins another attempt at a step, which has no prediction yet.

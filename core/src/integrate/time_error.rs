@@ -15,6 +15,7 @@ use crate::model::{Assembly, Model, SlotKind};
 use crate::system::{DofMap, Field, Slot, State, System};
 use crate::tensor::Vec3;
 use crate::threads::{self, PART};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -40,7 +41,7 @@ const MIN_STEPS: usize = 4 * SLOPE_STEPS;
 const MIN_STAGE_SHARE: f64 = 0.125;
 
 /// The largest errors of a stage, and the largest displacement to compare them with.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Largest {
     /// Largest error of a displacement, a length
     pub displacement: f64,
@@ -78,8 +79,10 @@ impl Largest {
 pub type Correct<'a> = dyn FnMut(&System, &mut [Vec3]) -> bool + 'a;
 
 /// Data of the scene that errors depend on.
+#[derive(Clone, Deserialize, Serialize)]
 pub(super) struct Scene {
     /// The kind of each slot
+    #[serde(skip)]
     pub kinds: Arc<Vec<SlotKind>>,
     /// The length of the scene
     pub length: f64,
@@ -104,6 +107,7 @@ pub struct StepEnds<'a> {
 }
 
 /// The error of the steps of a stage.
+#[derive(Clone, Deserialize, Serialize)]
 pub struct TimeError {
     scene: Scene,
     /// q at the start of the stage
@@ -125,6 +129,15 @@ pub struct TimeError {
 }
 
 impl TimeError {
+    /// The estimator with the kinds of slots of a model, which checkpoints leave out.
+    pub fn of_model(mut self, model: &Model) -> Self {
+        self.scene.kinds = model.kinds.clone();
+        if let Some(carried) = &mut self.carried {
+            carried.kinds = model.kinds.clone();
+        }
+        self
+    }
+
     /// The error of a stage that begins in `state` with the step `first`, and lasts for `duration`.
     /// `massive` is true for each slot whose accelerations are determined by mass.
     pub fn new(

@@ -3,12 +3,13 @@
 
 use crate::scalar::{Lanes, Real};
 use crate::tensor::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// The largest number of nodes of an element.
 pub const MAX_NODES: usize = 4;
 
 /// The weights of J = s K + d C + m M. A weight of zero means: do not compute it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Weights {
     /// s, of the stiffness K = dg/dq
     pub stiffness: f64,

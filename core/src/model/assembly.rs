@@ -136,6 +136,14 @@ impl Assembly {
         Ok(())
     }
 
+    /// The state of linearisation of a linear stage, at rest, as the stage began, and the weights of
+    /// its tangent, if that is formed.
+    pub fn linear(&self) -> Option<(&State, Option<Weights>)> {
+        let linear = self.linear.as_ref()?;
+        let formed = linear.formed.filter(|&(_, revision)| revision == self.system.revision);
+        Some((&linear.origin, formed.map(|(weights, _)| weights)))
+    }
+
     /// Forms the forces of the state and the tangent of the weights; `prescribed_increment`: see
     /// [`System::clear`]. With [`Weights::NONE`] the tangent is left as it is.
     pub fn evaluate(&mut self, state: &State, weights: Weights, prescribed_increment: Option<&[Vec3]>) {

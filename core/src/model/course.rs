@@ -3,9 +3,10 @@
 
 use super::history::{HistoryClock, Phase, Reading};
 use crate::system::{StageKind, StageSet};
+use serde::{Deserialize, Serialize};
 
 /// The way of a load or a motion through one stage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub enum Course {
     /// It does nothing.
     #[default]
@@ -19,7 +20,7 @@ pub enum Course {
 }
 
 /// Values at the load factors 0 and 1, linear between them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Ramp {
     /// At load factor 0
     pub from: f64,
@@ -147,7 +148,7 @@ pub(super) struct StageStart {
 
 /// The course of a load or a motion in the present stage, and the traces of earlier stages: all of
 /// it that changes in a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Progress {
     course: Course,
     /// The value where the stage before has ended

@@ -1,6 +1,7 @@
 //! Functions of time (or of the load factor), with exact first and second derivatives.
 
 use super::{StageKind, StageSet};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A function of one variable.
@@ -44,7 +45,7 @@ pub struct Reading {
 }
 
 /// The clock of a history of chosen stages.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct HistoryClock {
     /// The time spent in earlier stages of the history
     passed: f64,

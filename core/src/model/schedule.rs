@@ -6,6 +6,7 @@ use super::stage_error::{Jump, StageError};
 use super::{Charted, Model, Motion};
 use crate::system::{Direction, DofMap, Plane, Slot, StageKind, State};
 use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// The angle by which a prescribed rotation may go in one step or load increment, in radians.
@@ -17,7 +18,7 @@ const NOT_ZERO: f64 = 1e-9;
 
 /// The courses of all loads and prescribed motions of a model. Plain data: with the state it is all
 /// of a scene that changes in a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Schedule {
     stage: usize,
     kind: StageKind,

@@ -3,10 +3,11 @@
 use crate::failure::{Cause, FailureKind};
 use crate::model::{Model, SlotKind};
 use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// When something happened.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Moment {
     /// Stage, from 1
     pub stage: usize,

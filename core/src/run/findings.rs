@@ -4,10 +4,11 @@ use super::failure::Moment;
 use super::results::Event;
 use crate::integrate::Largest;
 use crate::warning::{About, WarningKind};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A warning about a deck or a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Warning {
     /// Its kind, which has a name
     pub kind: WarningKind,
@@ -31,7 +32,7 @@ impl fmt::Display for Warning {
 }
 
 /// The stability of an equilibrium.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum StabilityVerdict {
     /// No small motion leads away from it.
     Stable,
@@ -53,7 +54,7 @@ impl StabilityVerdict {
 }
 
 /// The stability of the equilibrium in which a static stage ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct StageStability {
     /// Stage, from 1
     pub stage: usize,
@@ -78,7 +79,7 @@ impl StageStability {
 }
 
 /// The estimated errors of the fixed time steps of a dynamic stage.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct StageTimeError {
     /// Stage, from 1
     pub stage: usize,
@@ -87,7 +88,7 @@ pub struct StageTimeError {
 }
 
 /// Findings of a run.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Findings {
     /// Limit, turning and branch points of static paths
     pub events: Vec<Event>,

@@ -1,7 +1,9 @@
 //! Warnings that a run has given already.
 
+use serde::{Deserialize, Serialize};
+
 /// Warnings that have been given already, and how bad what they tell of was.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub(super) struct IssuedWarnings {
     /// That an element turns far from node to node
     pub coarse: bool,

@@ -7,15 +7,19 @@ mod issued;
 mod refusal;
 mod results;
 
+mod checkpoint;
+mod earlier_stages;
 mod energy;
 mod observer;
 mod plan;
+mod snapshot;
 
 mod hint;
 mod rehearsal;
 
 mod handover;
 mod naming;
+mod restart;
 mod spatial;
 mod stage_run;
 mod warnings;
@@ -27,12 +31,14 @@ mod statics;
 
 mod sequence;
 
+pub use checkpoint::Checkpoint;
 pub use energy::Ledger;
 pub use failure::{Failure, Moment, Place};
 pub use findings::{Findings, StabilityVerdict, StageStability, StageTimeError, Warning};
-pub use observer::{Counters, Observer, Snapshot};
+pub use observer::Observer;
 pub use plan::{Approach, InitialMotion, Plan, Stage, StageWork, TimeStepping, Until};
 pub use refusal::{refusal, refusal_help};
 pub use rehearsal::{Driven, HistoryJump, JumpKind, Rehearsal, rehearse};
 pub use results::{CriticalKind, CriticalLoad, Event, EventKind, Mode, StageResult};
 pub use sequence::Run;
+pub use snapshot::{Counters, Snapshot};

@@ -1,11 +1,12 @@
 //! The plan of a run: the scene, and the stages in their order.
 
-use super::observer::Snapshot;
+use super::snapshot::Snapshot;
 use crate::integrate::Scheme;
 use crate::model::{Model, StageContext, StageKind};
 use crate::rotation::Rotation;
 use crate::system::{Node, State};
 use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The scene and its stages.
@@ -249,7 +250,7 @@ impl StageWork {
 }
 
 /// The means of a stage where Newton does not reach a level at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Approach {
     /// Nothing
     Straight,

@@ -2,6 +2,7 @@
 
 use super::failure::Moment;
 use crate::warning::WarningKind;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The result of an analysis, beside its rows.
@@ -24,7 +25,7 @@ impl StageResult {
 }
 
 /// A small motion exp(s t), s = growth + i omega.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Mode {
     /// Imaginary part of s, not negative
     pub omega: f64,
@@ -40,7 +41,7 @@ impl Mode {
 }
 
 /// A load factor at which the tangent loses its stiffness.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct CriticalLoad {
     /// The load factor
     pub load: f64,
@@ -49,7 +50,7 @@ pub struct CriticalLoad {
 }
 
 /// Kinds of critical loads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum CriticalKind {
     /// Another branch begins; the path goes on.
     Branch,
@@ -72,7 +73,7 @@ impl CriticalKind {
 }
 
 /// Something special on a path of equilibrium.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Event {
     /// Where
     pub at: Moment,
@@ -83,7 +84,7 @@ pub struct Event {
 }
 
 /// Kinds of special points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum EventKind {
     /// The load factor is stationary.
     Limit,

@@ -1,19 +1,22 @@
 //! A run from its plan: the stages one after the other, watched by an observer.
 
 use super::buckling::Buckling;
+use super::checkpoint::{Checkpoint, StageCheckpoint};
 use super::dynamics::Dynamics;
+use super::earlier_stages::EarlierStages;
 use super::energy::Bookkeeper;
 use super::failure::Failure;
 use super::issued::IssuedWarnings;
 use super::modal::Modal;
 use super::naming::describe;
-use super::observer::{Counters, Observer};
+use super::observer::Observer;
 use super::plan::{Plan, StageWork};
 use super::rehearsal::lacking;
-use super::stage_run::{Analysis, EarlierStages, StageRun, newton_for};
+use super::snapshot::Counters;
+use super::stage_run::{Analysis, StageRun, newton_for};
 use super::statics::{ArcLength, LoadLevels};
 use crate::model::{Assembly, Model, Schedule};
-use crate::system::State;
+use crate::system::{DofMap, State};
 use std::sync::Arc;
 
 /// A run in progress, between its stages.
@@ -30,6 +33,10 @@ pub struct Run<'o> {
     issued: IssuedWarnings,
     bookkeeper: Bookkeeper,
     past: EarlierStages,
+    /// The first stage to run, from 0
+    first: usize,
+    /// Where a checkpoint has left that stage, if it had begun
+    begun: Option<StageCheckpoint>,
 }
 
 impl<'o> Run<'o> {
@@ -48,19 +55,44 @@ impl<'o> Run<'o> {
             issued: IssuedWarnings::default(),
             bookkeeper: Bookkeeper::default(),
             past: EarlierStages::default(),
+            first: 0,
+            begun: None,
+        }
+    }
+
+    /// A run that goes on from a checkpoint of the same plan.
+    pub fn resume(plan: Plan, from: Checkpoint, observer: &'o mut dyn Observer) -> Self {
+        let Checkpoint { number, schedule, state, good, counters, issued, bookkeeper, past, stage } = from;
+        let model = plan.model.clone();
+        Self {
+            plan,
+            model,
+            schedule,
+            state,
+            good,
+            observer,
+            counters,
+            issued,
+            bookkeeper,
+            past,
+            first: number,
+            begun: stage,
         }
     }
 
     /// Runs all stages. Whatever happens, the counters tell how far it came.
     pub fn finish(mut self) -> (Result<(), Failure>, Counters) {
-        let result = (0..self.plan.stages.len()).try_for_each(|number| self.run_stage(number));
+        let result = (self.first..self.plan.stages.len()).try_for_each(|number| self.run_stage(number));
         (result, self.counters)
     }
 
     /// Runs stage number `number`, from 0.
     fn run_stage(&mut self, number: usize) -> Result<(), Failure> {
         let work = self.plan.stages[number].work;
-        let mut run = self.open_stage(number)?;
+        let mut run = match self.begun.take() {
+            None => self.open_stage(number)?,
+            Some(begun) => self.open_stage_again(number, begun)?,
+        };
         let stage = &mut run;
         match work {
             StageWork::Static { steps, approach } => carry_out(LoadLevels { stage, steps, approach }),
@@ -76,6 +108,7 @@ impl<'o> Run<'o> {
 
     /// Settles loads and constraints of a stage, and analyses the pattern of its unknowns.
     fn open_stage(&mut self, number: usize) -> Result<StageRun<'_>, Failure> {
+        self.offer_checkpoint(number)?;
         let stage = &self.plan.stages[number];
         let fresh = number == 0 || self.schedule.has_fresh_loads(&self.model, number);
         let begun = self.schedule.begin_stage(&self.model, number, stage.work.kind(), &self.state);
@@ -84,10 +117,28 @@ impl<'o> Run<'o> {
         if let Some(error) = lacking(&self.model, &self.schedule, stage, number, fading, || Some(dof_map.clone())) {
             return Err(describe(error, &self.model, number));
         }
+        let mut run = self.stage_run(number, dof_map, fresh)?;
+        run.warn_of_space();
+        Ok(run)
+    }
+
+    /// Opens a stage where a checkpoint has left it.
+    fn open_stage_again(&mut self, number: usize, begun: StageCheckpoint) -> Result<StageRun<'_>, Failure> {
+        let plane = self.model.plane.filter(|_| begun.is_planar);
+        let dof_map = self.schedule.dof_map(&self.model, plane);
+        let dof_map = dof_map.map_err(|error| describe(error, &self.model, number))?;
+        let mut run = self.stage_run(number, dof_map, begun.fresh)?;
+        run.take_up(begun)?;
+        Ok(run)
+    }
+
+    /// A stage on some degrees of freedom; `fresh`: loads act for the first time in it.
+    fn stage_run(&mut self, number: usize, dof_map: DofMap, fresh: bool) -> Result<StageRun<'_>, Failure> {
+        let stage = &self.plan.stages[number];
         let plane = dof_map.plane().copied();
         let assembly = Assembly::new(&stage.context(number), dof_map, &self.model);
         let newton = newton_for(stage, &assembly, &self.model)?;
-        let mut run = StageRun {
+        Ok(StageRun {
             keeps_account: self.plan.energy,
             plan: &self.plan,
             number,
@@ -108,9 +159,26 @@ impl<'o> Run<'o> {
             fresh,
             soft: false,
             prescribed_increment: Vec::new(),
-        };
-        run.warn_of_space();
-        Ok(run)
+            resumed: None,
+        })
+    }
+
+    /// Shows the observer a checkpoint before the start of a stage, if it wants one.
+    fn offer_checkpoint(&mut self, number: usize) -> Result<(), Failure> {
+        if !self.observer.wants_checkpoint() {
+            return Ok(());
+        }
+        self.observer.checkpoint(&Checkpoint {
+            number,
+            schedule: self.schedule.clone(),
+            state: self.state.clone(),
+            good: self.good.clone(),
+            counters: self.counters.clone(),
+            issued: self.issued.clone(),
+            bookkeeper: self.bookkeeper.clone(),
+            past: self.past.clone(),
+            stage: None,
+        })
     }
 }
 

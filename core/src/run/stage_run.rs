@@ -1,11 +1,14 @@
 //! One stage of a run: its state, its unknowns, Newton's iteration, and what all kinds of stages
 //! do.
 
+use super::checkpoint::AnalysisCheckpoint;
+use super::earlier_stages::EarlierStages;
 use super::energy::Bookkeeper;
 use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
-use super::observer::{Counters, Observer, Snapshot};
+use super::observer::Observer;
 use super::plan::{Plan, Stage};
+use super::snapshot::{Counters, Snapshot};
 use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
 use crate::system::{Plane, Slot, State, System};
@@ -24,17 +27,6 @@ pub(super) trait Analysis<'r> {
 
     /// Warns of what shows only behind it, however it ended.
     fn judge(&mut self);
-}
-
-/// Facts that stages leave to later ones, beside the state and the account of the energy.
-#[derive(Default)]
-pub(super) struct EarlierStages {
-    /// The first row is written.
-    pub started: bool,
-    /// A dynamic stage has begun.
-    pub moving: bool,
-    /// The state in which the first linear stage began
-    pub origin: Option<State>,
 }
 
 /// Tells an observer how far a run has come, while the stage is in use.
@@ -87,6 +79,8 @@ pub(super) struct StageRun<'r> {
     pub prescribed_increment: Vec<Vec3>,
     /// Attempts that earlier stages have taken back
     pub cutbacks_before: u64,
+    /// Where a checkpoint has left the stage; taken by its analysis
+    pub resumed: Option<AnalysisCheckpoint>,
 }
 
 /// Newton's iteration on the system of a stage.
@@ -155,12 +149,17 @@ impl StageRun<'_> {
     /// Continues from the last good state what goes on without jumps: turns of nodes and of joints.
     fn continue_to_state(&mut self) -> Result<(), Failure> {
         self.refuse_infinities()?;
-        if let Some(plane) = &self.plane {
-            self.model.flatten(plane, self.state);
-        }
+        self.flatten();
         self.wind()?;
         self.model.remember(self.state);
         Ok(())
+    }
+
+    /// Takes out of the state what round-off has put aside of the plane.
+    pub fn flatten(&mut self) {
+        if let Some(plane) = &self.plane {
+            self.model.flatten(plane, self.state);
+        }
     }
 
     /// Passes a state on the way to a balance: it becomes the good one, turns are counted, and the

@@ -1,9 +1,11 @@
 //! Long lists of numbers to six digits, in half the memory.
 
 use crate::threads;
+use serde::{Deserialize, Serialize};
 
 /// Vectors of N numbers with six digits each. They serve comparisons and predictors, never results.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[serde(from = "Vec<u32>", into = "Vec<u32>")]
 pub struct CompressedField<const N: usize> {
     /// The upper half of each number: sign, exponent and the first twenty bits of the mantissa
     vectors: Vec<[u32; N]>,
@@ -38,6 +40,18 @@ impl<const N: usize> CompressedField<N> {
     #[inline(always)]
     pub fn get(&self, k: usize) -> [f64; N] {
         self.vectors[k].map(|half| f64::from_bits(u64::from(half) << 32))
+    }
+}
+
+impl<const N: usize> From<CompressedField<N>> for Vec<u32> {
+    fn from(field: CompressedField<N>) -> Self {
+        field.vectors.into_flattened()
+    }
+}
+
+impl<const N: usize> From<Vec<u32>> for CompressedField<N> {
+    fn from(halves: Vec<u32>) -> Self {
+        Self { vectors: halves.as_chunks().0.to_vec() }
     }
 }
 

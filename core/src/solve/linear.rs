@@ -8,6 +8,7 @@ use super::pivots::Pivots;
 use super::tangent::Tangent;
 use crate::system::{ResidualBuffer, Slot, System};
 use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Solves linear systems whose tangents share one pattern.
 ///
@@ -38,8 +39,8 @@ pub struct LinearSolver {
 }
 
 /// State of the choice between block solver and sparse LU.
-#[derive(Clone, Copy)]
-struct MethodChoice {
+#[derive(Clone, Copy, Deserialize, Serialize)]
+pub struct MethodChoice {
     in_blocks: bool,
     /// Number of solutions until the block solver is tried again, and the number after its next
     /// failure
@@ -335,6 +336,19 @@ impl LinearSolver {
             x.iter_mut().zip(&residual).for_each(|(x, correction)| *x += correction);
         }
         error <= MAX_BACKWARD_ERROR
+    }
+
+    /// State of the choice between methods.
+    pub(crate) fn choice(&self) -> MethodChoice {
+        self.choice
+    }
+
+    /// Goes on with another choice.
+    pub(crate) fn choose(&mut self, choice: MethodChoice, system: &System) {
+        if !choice.in_blocks && self.general.is_none() {
+            self.general = GeneralSolver::new(system).map(Box::new);
+        }
+        self.choice = choice;
     }
 
     /// True if the block solver is in use.

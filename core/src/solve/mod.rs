@@ -26,7 +26,7 @@ pub use general::GeneralSolver;
 pub use krylov::{Operator, Spectrum, largest_eigenvalues};
 pub use linear::{Factorisation, LinearSolver};
 pub use modes::{Matrices, ModeSearch, ModeShape, SmallMotion};
-pub use newton::Newton;
+pub use newton::{Newton, NewtonMemory};
 pub use newton_failure::NewtonFailure;
 pub use pivots::is_symmetric;
 pub use signature::Signature;

@@ -1,7 +1,7 @@
 //! Newton's iteration for one time step or load level.
 
 use super::convergence::{Convergence, Judgement, Residual, Verdict, size};
-use super::linear::{Factorisation, LinearSolver};
+use super::linear::{Factorisation, LinearSolver, MethodChoice};
 use super::newton_failure::NewtonFailure;
 use super::refinement::Refinement;
 use super::reuse::Reuse;
@@ -18,6 +18,7 @@ use crate::model::{Assembly, Charted, Model, charts};
 use crate::scalar::CompressedField;
 use crate::system::{State, System};
 use crate::tensor::{Vec3, zeros};
+use serde::{Deserialize, Serialize};
 
 /// Newton's iteration with its linear solver and buffers, kept between solutions.
 pub struct Newton {
@@ -46,6 +47,15 @@ pub struct Newton {
     given: Option<u64>,
 }
 
+/// What an iteration takes from one solution to the next.
+#[derive(Deserialize, Serialize)]
+pub struct NewtonMemory {
+    choice: MethodChoice,
+    /// Number of tangents that the last solution has required
+    tangents: usize,
+    time_error: Option<TimeError>,
+}
+
 /// Corrections below this size (relative to the length of the scene, or in radians) do not count
 /// for the contraction.
 const SMALLEST_COMPARED_CORRECTION: f64 = 1e-6;
@@ -70,6 +80,19 @@ impl Newton {
             time_error: None,
             given: None,
         }
+    }
+
+    /// What the next solution depends on, beside its state and a tangent that is given to it.
+    pub fn memory(&self) -> NewtonMemory {
+        NewtonMemory { choice: self.solver.choice(), tangents: self.reuse.before, time_error: self.time_error.clone() }
+    }
+
+    /// Goes on with the memory of another iteration.
+    pub fn recall(&mut self, memory: NewtonMemory, model: &Model, system: &System) {
+        let NewtonMemory { choice, tangents, time_error } = memory;
+        self.solver.choose(choice, system);
+        self.reuse.before = tangents;
+        self.time_error = time_error.map(|error| error.of_model(model));
     }
 
     /// Signs of the eigenvalues of a tangent, see [`LinearSolver::signature`].

@@ -35,7 +35,7 @@ pub(super) struct Reuse {
     /// Number of tangents that the current solution has required so far
     needed: usize,
     /// Number of tangents that the last solution has required; `usize::MAX` before the first
-    before: usize,
+    pub before: usize,
 }
 
 impl Reuse {

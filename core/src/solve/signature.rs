@@ -5,9 +5,10 @@ use super::linear::LinearSolver;
 use super::pivots::{Pivots, is_symmetric};
 use super::tangent::Tangent;
 use crate::system::System;
+use serde::{Deserialize, Serialize};
 
 /// Signs of the eigenvalues of a tangent on the space that satisfies the constraints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Signature {
     /// Number of negative eigenvalues of a symmetric tangent
     Negative(usize),

@@ -1,9 +1,10 @@
 //! Counters of work.
 
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Work of a run, summed up.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Work {
     /// Number of corrections of Newton's iteration whose forces were evaluated
     pub iterations: u64,

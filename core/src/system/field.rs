@@ -2,12 +2,13 @@
 
 use crate::tensor::{Vec3, zeros};
 use crate::threads;
+use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 /// A 3-vector per slot with copy-on-write storage: in statics the rates of all states share one
 /// list of zeros.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Field(Arc<Vec<Vec3>>);
 
 impl Field {

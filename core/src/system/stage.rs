@@ -1,7 +1,9 @@
 //! Properties of a stage that effects and amplitudes depend on.
 
+use serde::{Deserialize, Serialize};
+
 /// Kind of a stage, by its time and load factor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum StageKind {
     /// The load factor rises from 0 to 1 at constant time.
     Static,

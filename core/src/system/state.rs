@@ -8,6 +8,7 @@ use crate::kernel::turn::Turn;
 use crate::rotation::Rotation;
 use crate::tensor::{Mat3, Vec3, copied, zeros};
 use crate::threads;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -24,7 +25,7 @@ pub struct Node {
 }
 
 /// Force at a slot that fades to zero as the load factor of a static stage rises.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Fading {
     /// Full force, at load factor 0, on the side of the internal forces (global components)
     pub(crate) force: Vec3,
@@ -35,7 +36,7 @@ pub struct Fading {
 
 /// Unknowns towards which the artificial resistance of a static stage pulls, see
 /// [`crate::effect::resistance`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Anchor {
     /// Stiffness, force per displacement, at every node
     pub(crate) resistance: f64,
@@ -44,7 +45,7 @@ pub struct Anchor {
 }
 
 /// The variables of a run. Effects are functions of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct State {
     /// Time of the run, constant in static stages
     pub time: f64,
@@ -82,6 +83,7 @@ pub struct State {
     /// For each rotation slot the base of the current time step, during the iterations of a step
     /// whose unknowns are increments: `q` is then the increment, `v` and `a` the material spin and
     /// its rate. Otherwise empty: rotation vectors are total.
+    #[serde(skip)]
     pub turns: Vec<Option<Turn>>,
 }
 

@@ -8,6 +8,7 @@ use beamsim_core::probe::{Figure, Look, Place};
 use beamsim_core::run::Snapshot;
 use beamsim_core::system::{Node, State};
 use beamsim_core::tensor::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::HashSet;
 
@@ -70,6 +71,14 @@ pub struct Film {
     /// Numbers of the nodes that are shown, beam by beam, then the bodies, then the ends of links
     shown: Vec<Vec<usize>>,
     names: Vec<(String, usize)>,
+    reel: Reel,
+    supports: Vec<usize>,
+    joints: Vec<usize>,
+}
+
+/// What was recorded so far.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct Reel {
     /// Rows of the history so far
     written: usize,
     frames: Vec<Frame>,
@@ -77,12 +86,20 @@ pub struct Film {
     stride: usize,
     /// The last row: its number and its state
     pending: Option<(usize, State)>,
-    events: Vec<Value>,
+    events: Vec<FilmEvent>,
     before: [u64; 2],
-    supports: Vec<usize>,
-    joints: Vec<usize>,
 }
 
+/// Something that happened on the way to a row.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+struct FilmEvent {
+    /// Of the history
+    row: usize,
+    kind: String,
+    text: String,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
 struct Frame {
     /// Of the history
     row: usize,
@@ -103,42 +120,47 @@ impl Film {
             figure,
             shown,
             names,
-            written: 0,
-            frames: Vec::new(),
-            stride: 1,
-            pending: None,
-            events: Vec::new(),
-            before: [0; 2],
+            reel: Reel { written: 0, frames: Vec::new(), stride: 1, pending: None, events: Vec::new(), before: [0; 2] },
             supports: supported(scene, &places),
             joints: parted(&places),
         }
     }
 
+    /// Of a scene whose run is resumed.
+    pub fn resume(scene: &Scene, reel: Reel) -> Self {
+        Self { reel, ..Self::of(scene) }
+    }
+
+    /// What was recorded so far.
+    pub fn reel(&self) -> &Reel {
+        &self.reel
+    }
+
     /// Takes a converged state, if its row is written.
     pub fn row(&mut self, at: &Snapshot, row: Row) {
         self.note_events(at);
-        let due = row.wanted && self.written.is_multiple_of(self.stride);
-        self.pending = None;
+        let due = row.wanted && self.reel.written.is_multiple_of(self.reel.stride);
+        self.reel.pending = None;
         if due {
-            self.frames.push(self.frame(self.written, at.state));
+            self.reel.frames.push(self.frame(self.reel.written, at.state));
             self.thin();
         } else {
             // The last row is always written.
-            self.pending = Some((self.written, at.state.clone()));
+            self.reel.pending = Some((self.reel.written, at.state.clone()));
         }
-        self.written += usize::from(row.wanted);
+        self.reel.written += usize::from(row.wanted);
     }
 
     fn note_events(&mut self, at: &Snapshot) {
         let now = [at.counters.work.chart_switches, at.counters.cutbacks];
         for (k, (kind, one)) in [("chart_switch", "chart switch"), ("cutback", "cut-back")].into_iter().enumerate() {
-            let count = now[k] - self.before[k];
-            if count > 0 && self.events.len() < MOST_EVENTS {
+            let count = now[k] - self.reel.before[k];
+            if count > 0 && self.reel.events.len() < MOST_EVENTS {
                 let text = if count == 1 { one.to_string() } else { format!("{count} × {one}") };
-                self.events.push(json!({ "row": self.written, "kind": kind, "text": text }));
+                self.reel.events.push(FilmEvent { row: self.reel.written, kind: kind.into(), text });
             }
         }
-        self.before = now;
+        self.reel.before = now;
     }
 
     fn frame(&self, row: usize, state: &State) -> Frame {
@@ -157,21 +179,21 @@ impl Film {
         let points: usize = self.shown.iter().map(Vec::len).sum();
         let most =
             (MOST_LOOKS / points.max(1)).clamp(LEAST_FRAMES, MOST_FRAMES).min(MOST_LOOKS_EVER.div_ceil(points.max(1)));
-        if self.frames.len() > 2 * most {
-            self.stride *= 2;
-            let stride = self.stride;
-            self.frames.retain(|frame| frame.row.is_multiple_of(stride));
+        if self.reel.frames.len() > 2 * most {
+            self.reel.stride *= 2;
+            let stride = self.reel.stride;
+            self.reel.frames.retain(|frame| frame.row.is_multiple_of(stride));
         }
     }
 
     /// Rows of the history that have a frame, after the run; the history has so many rows.
     pub fn end(&mut self, rows: usize) -> Vec<usize> {
-        let last = self.pending.take().map(|(row, state)| self.frame(row, &state));
-        self.frames.extend(last);
+        let last = self.reel.pending.take().map(|(row, state)| self.frame(row, &state));
+        self.reel.frames.extend(last);
         // A run that was stopped has written less than the one that was filmed for it.
-        self.frames.retain(|frame| frame.row < rows);
-        self.events.retain(|event| event["row"].as_u64().is_some_and(|row| (row as usize) < rows));
-        self.frames.iter().map(|frame| frame.row).collect()
+        self.reel.frames.retain(|frame| frame.row < rows);
+        self.reel.events.retain(|event| event.row < rows);
+        self.reel.frames.iter().map(|frame| frame.row).collect()
     }
 
     /// As the page takes it; `row` gives the number of a row of the history among those that are shown.
@@ -188,7 +210,7 @@ impl Film {
         let nodes = |all: &[usize]| all.iter().map(|node| json!({ "node": node })).collect::<Vec<_>>();
         let bodies: Vec<usize> = (first..first + self.figure.bodies.len()).collect();
         let ends: Vec<usize> = (first + bodies.len()..places.len()).collect();
-        let frames = || self.frames.iter();
+        let frames = || self.reel.frames.iter();
         json!({
             "nodes": places.len(),
             "names": self.names.iter().map(|(name, node)| json!({ "name": name, "node": node })).collect::<Vec<_>>(),
@@ -202,13 +224,13 @@ impl Film {
             "places": base64(frames().flat_map(|frame| frame.places.as_flattened()).flat_map(|x| x.to_le_bytes())),
             "turns": base64(frames().flat_map(|frame| frame.turns.as_flattened()).flat_map(|x| x.to_le_bytes())),
             "fields": self.fields(units),
-            "events": self.events.iter().map(|event| at_row(event, row)).collect::<Vec<_>>(),
+            "events": self.reel.events.iter().map(|event| at_row(event, row)).collect::<Vec<_>>(),
         })
     }
 
     /// The fields that are more than round-off.
     fn fields(&self, units: &Units) -> Vec<Value> {
-        let of = |k: usize| self.frames.iter().flat_map(move |frame| frame.fields.iter().map(move |all| all[k]));
+        let of = |k: usize| self.reel.frames.iter().flat_map(move |frame| frame.fields.iter().map(move |all| all[k]));
         let size = |k: usize| of(k).fold(0.0_f32, |size, x| size.max(x.abs()));
         let sizes: Vec<f32> = (0..FIELDS.len()).map(size).collect();
         let mut shown = Vec::new();
@@ -245,10 +267,9 @@ fn parted(places: &[(Node, Vec3)]) -> Vec<usize> {
 }
 
 /// An event at the row where it is shown.
-fn at_row(event: &Value, row: &dyn Fn(usize) -> usize) -> Value {
-    let mut event = event.clone();
-    event["row"] = json!(row(event["row"].as_u64().unwrap_or(0) as usize));
-    event
+fn at_row(event: &FilmEvent, row: &dyn Fn(usize) -> usize) -> Value {
+    let FilmEvent { row: of, kind, text } = event;
+    json!({ "row": row(*of), "kind": kind, "text": text })
 }
 
 fn fields(look: &Look) -> [f32; 7] {

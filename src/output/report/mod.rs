@@ -4,7 +4,7 @@
 mod encode;
 mod film;
 
-pub use film::Film;
+pub use film::{Film, Reel};
 
 use super::{HistoryReader, OutputError, PartFile, Record, Units};
 use beamsim_core::probe::{COLUMNS, ColumnGroup, ColumnPart};
@@ -33,7 +33,7 @@ impl Report<'_> {
     }
 
     fn page(&self, results: &Path, mut film: Film) -> Result<String, OutputError> {
-        let history = HistoryReader::of_results(results).map(|path| HistoryReader::read(&path)).transpose()?;
+        let history = HistoryReader::of_results(results)?.map(|path| HistoryReader::read(&path)).transpose()?;
         let history = history.unwrap_or(HistoryReader { names: Vec::new(), rows: Vec::new() });
         // The last row of a run that was stopped is the one of that moment, which the film passes
         // over.

@@ -10,10 +10,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// The name of the file: JSON, a line for the study and one for each run.
-const NAME: &str = "cost.journal";
-
-/// Saves runs by their settings.
+/// Saves runs by their settings, in a file of JSON: a line for the study and one for each run.
 #[derive(Default)]
 pub struct Journal {
     known: HashMap<String, Trial>,
@@ -41,17 +38,17 @@ struct Entry<'a> {
 }
 
 impl Journal {
-    /// Opens the journal in a folder. Runs of the study `identity` are read, those of other studies
+    /// Opens the journal of a name in a folder. Runs of the study `identity` are read, those of other studies
     /// are forgotten.
-    pub fn open(folder: &Path, identity: &str) -> Result<Self, OutputError> {
-        let path = folder.join(NAME);
+    pub fn open(folder: &Path, name: &str, identity: &str) -> Result<Self, OutputError> {
+        let path = folder.join(name);
         let known = fs::read_to_string(&path).ok().and_then(|text| read(&text, identity)).unwrap_or_default();
         // The file is written anew, since the last line of a stopped study may be incomplete.
         let mut content = line(&Heading { study: identity.into() });
         for (key, trial) in &known {
             content.extend(line(&Entry { settings: key.into(), run: Cow::Borrowed(trial) }));
         }
-        PartFile::write(folder, NAME, &content)?;
+        PartFile::write(folder, name, &content)?;
         let file = OpenOptions::new().append(true).open(&path).map_err(|error| OutputError::file(&path, error))?;
         Ok(Self { known, file: Some(OpenFile { path, file }), write_error: None })
     }

@@ -4,6 +4,7 @@ use crate::integrate::{Increments, Scheme};
 use crate::model::{Model, SlotKind};
 use crate::rotation::Rotation;
 use crate::system::State;
+use serde::{Deserialize, Serialize};
 
 /// Chooses the length of steps.
 ///
@@ -12,7 +13,7 @@ use crate::system::State;
 /// Errors of steps add up, so each step is given its share of the tolerance, by its part of the
 /// stage; a step whose largest error is above its share is rejected, and the next is chosen so that
 /// it should be a little below.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Control {
     /// The method
     pub scheme: Scheme,

@@ -1,12 +1,15 @@
 //! Dynamic stages: time steps, fixed or such that adapt to their local error.
 
 mod adaptive;
+pub(super) mod checkpoint;
 mod grid;
 mod judgement;
 mod start;
 
 use self::adaptive::Control;
+use self::checkpoint::{DynamicsCheckpoint, StepsCheckpoint};
 use self::grid::Grid;
+use super::checkpoint::AnalysisCheckpoint;
 use super::energy::{EnergyGuard, Growth};
 use super::failure::Failure;
 use super::plan::TimeStepping;
@@ -76,19 +79,13 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
     }
 
     fn run(&mut self) -> Result<(), Failure> {
-        self.start()?;
-        self.find_rates();
-        match self.settings.adaptive {
-            None => {
-                self.follow_errors();
-                self.run_fixed()
-            }
-            Some(tolerance) => {
-                let span = self.settings.end - self.stage.state.time;
-                let control =
-                    Control::new(tolerance, span, self.settings.step, self.settings.scheme, self.massive.clone());
-                self.run_adaptive(control)
-            }
+        let steps = match self.stage.resumed.take() {
+            Some(AnalysisCheckpoint::Dynamics(checkpoint)) => self.take_up(checkpoint),
+            None | Some(AnalysisCheckpoint::Levels(_) | AnalysisCheckpoint::ArcLength(_)) => self.begin()?,
+        };
+        match steps {
+            StepsCheckpoint::Fixed { start, taken } => self.run_fixed(start, taken),
+            StepsCheckpoint::Adaptive(control) => self.run_adaptive(control),
         }
     }
 
@@ -99,6 +96,58 @@ impl<'r> Analysis<'r> for Dynamics<'_, 'r> {
 }
 
 impl Dynamics<'_, '_> {
+    /// Begins the stage.
+    fn begin(&mut self) -> Result<StepsCheckpoint, Failure> {
+        self.start()?;
+        self.find_rates();
+        let start = self.stage.state.time;
+        Ok(match self.settings.adaptive {
+            None => {
+                self.follow_errors();
+                StepsCheckpoint::Fixed { start, taken: 0 }
+            }
+            Some(tolerance) => {
+                let TimeStepping { end, step, scheme, .. } = self.settings;
+                StepsCheckpoint::Adaptive(Control::new(tolerance, end - start, step, scheme, self.massive.clone()))
+            }
+        })
+    }
+
+    /// Takes up the stage where a checkpoint has left it.
+    fn take_up(&mut self, checkpoint: DynamicsCheckpoint) -> StepsCheckpoint {
+        let DynamicsCheckpoint { last_length, predictor, massive, rateless, guard, steps } = checkpoint;
+        (self.last_length, self.massive, self.rateless, self.guard) = (last_length, massive, rateless, guard);
+        self.predictor = predictor.of_model(self.stage.model);
+        match steps {
+            // The deck may ask for rows at other instants now.
+            StepsCheckpoint::Fixed { start, taken } if !self.lies_on_grid(start, taken) => {
+                StepsCheckpoint::Fixed { start: self.stage.state.time, taken: 0 }
+            }
+            steps @ (StepsCheckpoint::Fixed { .. } | StepsCheckpoint::Adaptive(_)) => steps,
+        }
+    }
+
+    /// True if the present time is that of step `taken` of the grid from `start`.
+    fn lies_on_grid(&self, start: f64, taken: u64) -> bool {
+        let time = if taken == 0 { start } else { self.grid_from(start).step(taken).0 };
+        time == self.stage.state.time
+    }
+
+    /// Shows the observer where the stage is, if it wants that.
+    fn offer_checkpoint(&mut self, steps: impl FnOnce() -> StepsCheckpoint) -> Result<(), Failure> {
+        let Self { stage, last_length, predictor, massive, rateless, guard, .. } = self;
+        stage.offer_checkpoint(|| {
+            AnalysisCheckpoint::Dynamics(DynamicsCheckpoint {
+                last_length: *last_length,
+                predictor: predictor.clone(),
+                massive: massive.clone(),
+                rateless: rateless.clone(),
+                guard: guard.clone(),
+                steps: steps(),
+            })
+        })
+    }
+
     /// The first step.
     fn first_step(&self) -> Step {
         Step { scheme: self.settings.scheme, length: self.settings.step }
@@ -113,17 +162,20 @@ impl Dynamics<'_, '_> {
         newton.time_error = Some(TimeError::new(model, assembly, state, increments, &self.massive, first, duration));
     }
 
-    /// Rows at start + k step, the last one at `end`.
-    fn run_fixed(&mut self) -> Result<(), Failure> {
+    /// Rows at start + k step, the last one at `end`; of the grid that begins at `start` some steps
+    /// are `taken` already.
+    fn run_fixed(&mut self, mut start: f64, mut taken: u64) -> Result<(), Failure> {
         while self.stage.state.time < self.settings.end {
-            let grid = self.next_grid();
-            for number in 1..=grid.steps {
+            let grid = self.grid_from(start);
+            for number in taken + 1..=grid.steps {
+                self.offer_checkpoint(|| StepsCheckpoint::Fixed { start, taken: number - 1 })?;
                 let (next, length) = grid.step(number);
                 let last = self.stride(Step { scheme: self.settings.scheme, length }, next)?;
                 if self.complete(&last)? {
                     return Ok(());
                 }
             }
+            (start, taken) = (self.stage.state.time, 0);
         }
         Ok(())
     }
@@ -184,6 +236,7 @@ impl Dynamics<'_, '_> {
     /// one.
     fn run_adaptive(&mut self, mut control: Control) -> Result<(), Failure> {
         while self.stage.state.time < self.settings.end {
+            self.offer_checkpoint(|| StepsCheckpoint::Adaptive(control.clone()))?;
             let (next, length) = control.propose(self.stage.state.time, self.next_corner());
             self.tell_time(next)?;
             let step = Step { scheme: control.scheme, length };
@@ -343,25 +396,25 @@ impl Dynamics<'_, '_> {
         named
     }
 
-    /// The steps to the end; where rows are wanted at multiples of an interval, equal steps to the
+    /// The steps from `start` to the end; where rows are wanted at multiples of an interval, equal steps to the
     /// next of those.
-    fn next_grid(&self) -> Grid {
-        let stop = self.next_stop();
+    fn grid_from(&self, start: f64) -> Grid {
+        let stop = self.next_stop(start);
         let over = if self.stage.plan.interval.is_some() { Grid::equal } else { Grid::over };
-        over(self.stage.state.time, stop, self.settings.step)
+        over(start, stop, self.settings.step)
     }
 
-    /// The next instant that must be hit.
-    fn next_stop(&self) -> f64 {
+    /// The next instant after `time` that must be hit.
+    fn next_stop(&self, time: f64) -> f64 {
         let Some(interval) = self.stage.plan.interval else { return self.settings.end };
-        let next = ((self.stage.state.time / interval + 1e-9).floor() + 1.0) * interval;
+        let next = ((time / interval + 1e-9).floor() + 1.0) * interval;
         if next >= self.settings.end - 1e-9 * interval { self.settings.end } else { next }
     }
 
     /// The next instant that must be hit, or at which a load or a motion takes another course: what
     /// begins and ends within a step would leave no trace in the accelerations at its ends.
     fn next_corner(&self) -> f64 {
-        let stop = self.next_stop();
+        let stop = self.next_stop(self.stage.state.time);
         self.stage.schedule.next_corner(self.stage.model, self.stage.state.time).map_or(stop, |corner| corner.min(stop))
     }
 

@@ -1,13 +1,14 @@
 //! Watches the total energy of a dynamic stage.
 
 use super::ledger::Ledger;
+use serde::{Deserialize, Serialize};
 
 /// Consecutive steps over which the energy must be too large: a single peak is the trapezoidal rule
 /// of the account.
 const RUNNING: usize = 3;
 
 /// Follows the total from the start of a stage.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct EnergyGuard {
     limit: f64,
     floor: f64,
@@ -19,7 +20,7 @@ pub struct EnergyGuard {
 }
 
 /// How far the total departs from that of the run's start, both ways.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 struct Balance {
     /// At the start of the run
     first: f64,

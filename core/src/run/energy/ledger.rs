@@ -6,9 +6,10 @@ use crate::rotation::{Rotation, log, unwound};
 use crate::system::{Category, DofMap, Slot, State, System};
 use crate::tensor::{Vec3, zeros};
 use crate::threads::{self, PART};
+use serde::{Deserialize, Serialize};
 
 /// Energies of one state and the work of loads, gravity and motions so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Ledger {
     /// Kinetic energy
     pub kinetic: f64,
@@ -28,7 +29,7 @@ impl Ledger {
 }
 
 /// Keeps the account from step to step.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct Bookkeeper {
     ledger: Ledger,
     /// The total that an exact solution keeps; known while the account is open

@@ -2,11 +2,14 @@
 //! it turns back.
 
 use super::begin;
+use super::checkpoint::{ArcLengthCheckpoint, PathProgress, RateSigns};
 use super::levels::Levels;
-use super::path::{Path, PathPoint, PathTarget};
+use super::path::PathTarget;
+use super::path_point::{Path, PathPoint};
 use super::stability::{conclude, tell_of_points};
 use crate::kernel::Weights;
 use crate::model::{StageError, StageKind};
+use crate::run::checkpoint::AnalysisCheckpoint;
 use crate::run::failure::Failure;
 use crate::run::results::EventKind;
 use crate::run::spatial::SpatialLook;
@@ -66,16 +69,14 @@ impl<'r> Analysis<'r> for ArcLength<'_, 'r> {
 
     /// Follows the path until the load factor first reaches 1, or `until`, or `max_steps`.
     fn run(&mut self) -> Result<(), Failure> {
-        let Self { stage, steps, max_steps } = self;
         let mut space = SpatialLook::default();
-        if let Some(loose) = begin(stage, &mut space)? {
-            return Err(loose);
-        }
-        let Some(mut path) = Path::new(stage, *steps)? else {
-            return Err(stage.describe(StageError::NothingGrows(StageKind::Static)));
+        let (mut path, progress) = match self.stage.resumed.take() {
+            Some(AnalysisCheckpoint::ArcLength(ArcLengthCheckpoint { path, progress })) => (path, progress),
+            None | Some(AnalysisCheckpoint::Levels(_) | AnalysisCheckpoint::Dynamics(_)) => self.begin(&mut space)?,
         };
+        let Self { stage, max_steps, .. } = self;
         let bounds = Bounds { increments: *max_steps, patience: *max_steps, are_whole_stage: true };
-        let arrival = Follower { stage, space: &mut space, path: &mut path }.go_to(1.0, bounds)?;
+        let arrival = Follower { stage, space: &mut space, path: &mut path, progress }.go_to(1.0, bounds)?;
         if arrival == Arrival::OutOfSteps {
             let at = stage.moment();
             let message = format!("the path was stopped after `max_steps` = {max_steps} increments at {at}");
@@ -89,6 +90,20 @@ impl<'r> Analysis<'r> for ArcLength<'_, 'r> {
     }
 }
 
+impl ArcLength<'_, '_> {
+    /// Begins the path.
+    fn begin(&mut self, space: &mut SpatialLook) -> Result<(Path, PathProgress), Failure> {
+        if let Some(loose) = begin(self.stage, space)? {
+            return Err(loose);
+        }
+        let Some(path) = Path::new(self.stage, self.steps)? else {
+            return Err(self.stage.describe(StageError::NothingGrows(StageKind::Static)));
+        };
+        let progress = PathProgress::new(&path);
+        Ok((path, progress))
+    }
+}
+
 /// From the present state along its path until that comes to the load factor `goal`: around limit
 /// points that load control cannot pass.
 pub fn detour(stage: &mut StageRun, space: &mut SpatialLook, levels: &Levels, goal: f64) -> Result<Arrival, Failure> {
@@ -96,16 +111,8 @@ pub fn detour(stage: &mut StageRun, space: &mut SpatialLook, levels: &Levels, go
     let Some(mut path) = Path::onward(stage, &levels.start, increment)? else { return Ok(Arrival::Nowhere) };
     let patience = LONGEST_DETOUR.max((DETOUR_OF_LEVEL / levels.level).ceil() as usize);
     let bounds = Bounds { increments: LONGEST_PATH * patience, patience, are_whole_stage: false };
-    Follower { stage, space, path: &mut path }.go_to(goal, bounds)
-}
-
-/// The signs that were passed last: on a located point itself they are nobody's.
-#[derive(Clone, Copy)]
-struct RateSigns {
-    /// The load factor grows.
-    rising: bool,
-    /// The displacement that the loads do work on grows.
-    working: bool,
+    let progress = PathProgress::new(&path);
+    Follower { stage, space, path: &mut path, progress }.go_to(goal, bounds)
 }
 
 impl RateSigns {
@@ -123,22 +130,22 @@ struct Follower<'f, 'r> {
     stage: &'f mut StageRun<'r>,
     space: &'f mut SpatialLook,
     path: &'f mut Path,
+    progress: PathProgress,
 }
 
 impl Follower<'_, '_> {
     /// Goes on until the load factor reaches `goal` from below, or `until`, or a bound.
     fn go_to(&mut self, goal: f64, bounds: Bounds) -> Result<Arrival, Failure> {
-        let (mut highest, mut in_vain) = (self.stage.state.load, 0);
-        let mut signs = RateSigns { rising: self.path.here.load_rate > 0.0, working: self.path.here.work_rate > 0.0 };
         let goal = PathTarget::Load(goal);
-        for number in 0..bounds.increments {
-            if in_vain >= bounds.patience {
-                break;
+        while self.progress.increments < bounds.increments && self.progress.in_vain < bounds.patience {
+            if bounds.are_whole_stage {
+                self.offer_checkpoint()?;
             }
-            let done = if bounds.are_whole_stage { number as f64 / bounds.increments as f64 } else { self.path.begun };
-            self.stage.tell_progress(done)?;
+            let behind = self.progress.increments as f64 / bounds.increments as f64;
+            self.stage.tell_progress(if bounds.are_whole_stage { behind } else { self.path.begun })?;
+            self.progress.increments += 1;
             let (next, length) = self.path.step(self.stage)?;
-            let targets = self.targets(&next, signs, goal);
+            let targets = self.targets(&next, self.progress.signs, goal);
             let (mut arrived, mut target) = self.nearest(next, length, &targets)?;
             if targets.contains(&goal) && target.is_none_or(|target| target == goal) {
                 if !self.hit(goal, &mut arrived) && self.path.shorten() {
@@ -147,10 +154,11 @@ impl Follower<'_, '_> {
                 }
                 target = Some(goal);
             }
-            signs.pass(target);
+            self.progress.signs.pass(target);
             self.arrive(arrived, target)?;
-            in_vain = if self.stage.state.load > highest { 0 } else { in_vain + 1 };
-            highest = highest.max(self.stage.state.load);
+            let PathProgress { in_vain, highest, .. } = &mut self.progress;
+            *in_vain = if self.stage.state.load > *highest { 0 } else { *in_vain + 1 };
+            *highest = highest.max(self.stage.state.load);
             if self.stage.is_over() {
                 return Ok(Arrival::Until);
             }
@@ -159,6 +167,15 @@ impl Follower<'_, '_> {
             }
         }
         Ok(Arrival::OutOfSteps)
+    }
+
+    /// Shows the observer where the path is, if it wants that.
+    fn offer_checkpoint(&mut self) -> Result<(), Failure> {
+        let Self { stage, path, progress, .. } = self;
+        stage.offer_checkpoint(|| {
+            let path: &Path = path;
+            AnalysisCheckpoint::ArcLength(ArcLengthCheckpoint { path: path.clone(), progress: *progress })
+        })
     }
 
     /// The special points between here and the next point.

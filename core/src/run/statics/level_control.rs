@@ -3,9 +3,11 @@
 
 use super::arc_length::{Arrival, detour};
 use super::begin;
+use super::checkpoint::LevelsCheckpoint;
 use super::levels::{Levels, ReachedBy};
 use super::rest;
 use super::stability::{Stability, conclude, tell_of_points};
+use crate::run::checkpoint::AnalysisCheckpoint;
 use crate::run::failure::Failure;
 use crate::run::plan::Approach;
 use crate::run::spatial::SpatialLook;
@@ -54,15 +56,36 @@ impl<'r> Analysis<'r> for LoadLevels<'_, 'r> {
     }
 
     fn run(&mut self) -> Result<(), Failure> {
-        let mut space = SpatialLook::default();
-        let loose = begin(self.stage, &mut space)?;
-        let levels = Levels::new(self.stage.state.kept(), self.steps, self.approach);
-        let stability = Stability::new(self.stage);
-        LevelControl { stage: self.stage, space, levels, stability, loose }.go(self.steps)
+        match self.stage.resumed.take() {
+            Some(AnalysisCheckpoint::Levels(checkpoint)) => self.take_up(checkpoint),
+            None | Some(AnalysisCheckpoint::ArcLength(_) | AnalysisCheckpoint::Dynamics(_)) => self.begin(),
+        }
     }
 
     fn judge(&mut self) {
         self.stage.warn_of_standstill();
+    }
+}
+
+impl LoadLevels<'_, '_> {
+    /// Goes through all levels.
+    fn begin(&mut self) -> Result<(), Failure> {
+        let mut space = SpatialLook::default();
+        let loose = begin(self.stage, &mut space)?;
+        let levels = Levels::new(self.stage.state.kept(), self.steps, self.approach);
+        let stability = Stability::new(self.stage);
+        let at_start = stability.signature;
+        self.stage.good.copy_from(self.stage.state);
+        LevelControl { stage: self.stage, space, levels, stability, at_start, loose }.go(0, self.steps)
+    }
+
+    /// Goes on from where a checkpoint has left the stage.
+    fn take_up(&mut self, checkpoint: LevelsCheckpoint) -> Result<(), Failure> {
+        let LevelsCheckpoint { reached, levels, follows_signs, signature, at_start } = checkpoint;
+        let stability = Stability::again(follows_signs, signature);
+        self.stage.make_again(|stage| stability.follow_again(stage));
+        let space = SpatialLook::default();
+        LevelControl { stage: self.stage, space, levels, stability, at_start, loose: None }.go(reached, self.steps)
     }
 }
 
@@ -72,16 +95,17 @@ struct LevelControl<'s, 'r> {
     space: SpatialLook,
     levels: Levels,
     stability: Stability,
+    /// The signs of pivots before the first level
+    at_start: Option<Signature>,
     /// The mechanism that nothing holds before the first level
     loose: Option<Failure>,
 }
 
 impl LevelControl<'_, '_> {
-    /// Goes through all levels.
-    fn go(&mut self, steps: usize) -> Result<(), Failure> {
-        let at_start = self.stability.signature;
-        self.stage.good.copy_from(self.stage.state);
-        for number in 1..=steps {
+    /// Goes through the levels after the first `reached` ones.
+    fn go(&mut self, reached: usize, steps: usize) -> Result<(), Failure> {
+        for number in reached + 1..=steps {
+            self.offer_checkpoint(number - 1)?;
             let reached = self.reach(number as f64 / steps as f64)?;
             if reached == Reached::Level {
                 self.stage.counters.steps += 1;
@@ -92,8 +116,26 @@ impl LevelControl<'_, '_> {
             }
         }
         // What is linear keeps the tangent of its start.
-        let signature = if self.stage.is_linear() { at_start } else { self.stability.signature };
+        let signature = if self.stage.is_linear() { self.at_start } else { self.stability.signature };
         conclude(self.stage, &mut self.space, signature, false)
+    }
+
+    /// Shows the observer where the stage is, if it wants that. Before the first level a mechanism
+    /// may be known that levels hold: the stage is then begun again.
+    fn offer_checkpoint(&mut self, reached: usize) -> Result<(), Failure> {
+        if reached == 0 {
+            return Ok(());
+        }
+        let Self { stage, levels, stability, at_start, .. } = self;
+        stage.offer_checkpoint(|| {
+            AnalysisCheckpoint::Levels(LevelsCheckpoint {
+                reached,
+                levels: levels.clone(),
+                follows_signs: stability.counts(),
+                signature: stability.signature,
+                at_start: *at_start,
+            })
+        })
     }
 
     /// Goes from the last good state to the load factor `target`: at once, in smaller steps, or

@@ -7,6 +7,7 @@ use crate::scalar::CompressedField;
 use crate::system::State;
 use crate::tensor::Vec3;
 use crate::threads;
+use serde::{Deserialize, Serialize};
 
 /// The smallest part of a level that is tried.
 const SMALLEST_PART: f64 = 1.0 / 4096.0;
@@ -31,7 +32,7 @@ const BACK: f64 = -0.5;
 
 /// How a stage has come to its last good state. Where levels lead on, one that is not reached is a
 /// limit of the path: the state of rest behind it is not looked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
 pub(super) enum ReachedBy {
     /// It is that of its start.
     Start,
@@ -42,6 +43,7 @@ pub(super) enum ReachedBy {
 }
 
 /// The levels of a stage.
+#[derive(Clone, Deserialize, Serialize)]
 pub(super) struct Levels {
     /// The state before the first
     pub start: State,

@@ -1,10 +1,12 @@
 //! Static stages: balance at growing loads, by load levels or along a path by arc length.
 
 mod arc_length;
+pub(super) mod checkpoint;
 mod level_control;
 mod levels;
 mod load_control;
 mod path;
+mod path_point;
 mod rest;
 mod stability;
 

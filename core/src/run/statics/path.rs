@@ -12,11 +12,12 @@
 //! the load factor; rotation vectors follow through the equations, so that no chart enters.
 
 use super::load_control::PathDirection;
+use super::path_point::{Path, PathPoint};
 use crate::kernel::Weights;
 use crate::model::{SlotKind, charts};
 use crate::run::failure::Failure;
 use crate::run::stage_run::StageRun;
-use crate::solve::{self, Judgement, NewtonFailure, Signature, Tangent, Verdict, mechanism, timed};
+use crate::solve::{self, Judgement, NewtonFailure, Tangent, Verdict, mechanism, timed};
 use crate::system::State;
 use crate::tensor::Vec3;
 
@@ -42,20 +43,6 @@ const FLIGHT: f64 = 100.0;
 /// The length, over the step, to which a special point is located.
 const LOCATED: f64 = 1e-9;
 
-/// A point of the path and its unit tangent.
-#[derive(Clone)]
-pub struct PathPoint {
-    pub state: State,
-    tangent: Vec<Vec3>,
-    /// The tangent's part in the load factor
-    pub load_rate: f64,
-    /// The rate of the displacement that the loads do work on
-    pub work_rate: f64,
-    pub signature: Option<Signature>,
-    /// It is a limit point: one pivot is next to zero, with the sign of round-off
-    pub on_limit: bool,
-}
-
 /// A special point between two points of a path, as a function that changes its sign there.
 #[derive(Clone, Copy, PartialEq)]
 pub enum PathTarget {
@@ -72,21 +59,6 @@ impl PathTarget {
             Self::Load(load) => point.state.load - load,
         }
     }
-}
-
-/// A path being followed.
-pub struct Path {
-    /// The load factor at which it was begun
-    pub begun: f64,
-    pub here: PathPoint,
-    /// The length of the next step
-    length: f64,
-    /// Length of the first step
-    first: f64,
-    /// The tangent's part in the load factor at the beginning
-    first_rate: f64,
-    /// 1/U^2
-    scale: f64,
 }
 
 impl Path {

@@ -41,6 +41,16 @@ impl Stability {
         Self { counts: !stage.is_linear(), signature }
     }
 
+    /// Where a checkpoint has left it.
+    pub fn again(counts: bool, signature: Option<Signature>) -> Self {
+        Self { counts, signature }
+    }
+
+    /// True if pivots are followed.
+    pub fn counts(&self) -> bool {
+        self.counts
+    }
+
     /// At the run's state; `None` where it is not known.
     pub fn look(&mut self, stage: &mut StageRun) -> Option<Signature> {
         if !self.counts {
@@ -51,6 +61,17 @@ impl Stability {
         // Where nothing tells, nothing will next.
         self.counts = signature.is_some();
         signature
+    }
+
+    /// Forms and factorises the tangent of the run's state again, as [`Stability::look`] has left
+    /// it for the next solution.
+    pub fn follow_again(&self, stage: &mut StageRun) {
+        if !self.counts {
+            return;
+        }
+        let StageRun { assembly, newton, state, counters, .. } = stage;
+        newton.signature_at(assembly, state, &mut counters.work);
+        newton.begin_with(&assembly.system);
     }
 
     /// The number of eigenvalues whose sign has changed, at least.

@@ -1,0 +1,77 @@
+//! A run between two of its rows, as plain data: what it takes to go on from there as if it had
+//! never stopped, with the same results to the last bit.
+//!
+//! A checkpoint contains what changes in a run: state, courses of loads, accounts, counters, and
+//! where its stage is. What follows from the plan (effects, patterns, factors) is made again, and
+//! the counters are those of before.
+
+use super::dynamics::checkpoint::DynamicsCheckpoint;
+use super::earlier_stages::EarlierStages;
+use super::energy::Bookkeeper;
+use super::issued::IssuedWarnings;
+use super::snapshot::Counters;
+use super::statics::checkpoint::{ArcLengthCheckpoint, LevelsCheckpoint};
+use crate::kernel::Weights;
+use crate::model::Schedule;
+use crate::solve::NewtonMemory;
+use crate::system::State;
+use crate::tensor::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// A run between two rows.
+#[derive(Deserialize, Serialize)]
+pub struct Checkpoint {
+    /// The stage, from 0
+    pub(super) number: usize,
+    pub(super) schedule: Schedule,
+    pub(super) state: State,
+    /// The last converged state
+    pub(super) good: State,
+    pub(super) counters: Counters,
+    pub(super) issued: IssuedWarnings,
+    pub(super) bookkeeper: Bookkeeper,
+    pub(super) past: EarlierStages,
+    /// Where the stage is; `None` before its start
+    pub(super) stage: Option<StageCheckpoint>,
+}
+
+impl Checkpoint {
+    /// The number of steps and levels that lie behind.
+    pub fn steps(&self) -> u64 {
+        self.counters.steps
+    }
+}
+
+/// A stage between two rows.
+#[derive(Deserialize, Serialize)]
+pub(super) struct StageCheckpoint {
+    /// The stage is treated in the plane of the scene.
+    pub is_planar: bool,
+    pub fresh: bool,
+    pub soft: bool,
+    pub keeps_account: bool,
+    pub cutbacks_before: u64,
+    pub prescribed_increment: Vec<Vec3>,
+    /// The numbers of evaluated instances, by effect
+    pub evaluations: Vec<u64>,
+    pub linear: Option<LinearCheckpoint>,
+    pub newton: NewtonMemory,
+    pub analysis: AnalysisCheckpoint,
+}
+
+/// A linear stage between two rows.
+#[derive(Deserialize, Serialize)]
+pub(super) struct LinearCheckpoint {
+    /// The state of linearisation, with the clock and the loads of the start of the stage
+    pub origin: State,
+    /// The weights of the tangent that is factorised
+    pub factorised: Option<Weights>,
+}
+
+/// An analysis between two rows.
+#[derive(Deserialize, Serialize)]
+pub(super) enum AnalysisCheckpoint {
+    Levels(LevelsCheckpoint),
+    ArcLength(ArcLengthCheckpoint),
+    Dynamics(DynamicsCheckpoint),
+}

@@ -1,0 +1,27 @@
+//! A dynamic stage as part of a checkpoint.
+
+use super::adaptive::Control;
+use crate::integrate::Predictor;
+use crate::run::energy::EnergyGuard;
+use serde::{Deserialize, Serialize};
+
+/// A dynamic stage between two rows.
+#[derive(Deserialize, Serialize)]
+pub(in crate::run) struct DynamicsCheckpoint {
+    /// The length of the last step
+    pub last_length: f64,
+    pub predictor: Predictor,
+    pub massive: Vec<bool>,
+    pub rateless: Vec<usize>,
+    pub guard: Option<EnergyGuard>,
+    pub steps: StepsCheckpoint,
+}
+
+/// Where the steps of a dynamic stage are.
+#[derive(Deserialize, Serialize)]
+pub(in crate::run) enum StepsCheckpoint {
+    /// Fixed steps: the start of the present grid, and the number of its steps that are taken
+    Fixed { start: f64, taken: u64 },
+    /// Steps that adapt to their local error
+    Adaptive(Control),
+}

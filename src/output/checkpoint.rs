@@ -1,0 +1,139 @@
+//! The file `checkpoint` in a folder of results: a run that can go on from one of its rows.
+//!
+//! It begins with a line of text and a checksum of the rest, which holds the version of the program
+//! and a fingerprint of the deck before everything else, so that they can be read from files of
+//! other versions.
+
+use super::folder::CHECKPOINT;
+use super::history::HistoryPlace;
+use super::{BarsPlace, FieldsPlace, ModesWriter, OutputError, Reel, ResultFolder};
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// The first line of the file.
+const MAGIC: &[u8] = b"beamsim checkpoint\n";
+/// The version of the program, and that of the form of the file, which changes with any structure
+/// that is stored.
+const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " 1");
+/// The length of the checksum, in bytes
+const CHECKSUM: usize = 8;
+
+/// Who wrote a checkpoint, and of what.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+struct Origin {
+    program: String,
+    /// Of the deck, see [`fingerprint`]
+    deck: u64,
+}
+
+/// A run that can go on, with its files as far as they are written. `R` is the run itself:
+/// [`Checkpoint`](beamsim_core::run::Checkpoint), or a reference to it.
+#[derive(Deserialize, Serialize)]
+pub struct SavedRun<R> {
+    /// How often the run has been resumed already
+    pub resumed: u32,
+    /// Converged states so far
+    pub rows: u64,
+    /// The rows of the history that are written
+    pub history: HistoryPlace,
+    /// Modes and critical loads so far
+    pub modes: ModesWriter,
+    /// The fields that are written
+    pub fields: Option<FieldsPlace>,
+    /// The shapes for the report so far
+    pub reel: Option<Reel>,
+    /// The error bars so far
+    pub bars: Option<BarsPlace>,
+    /// The run
+    pub run: R,
+}
+
+/// A checkpoint that was found in a folder of results.
+pub enum Found<R> {
+    /// There is none.
+    Nothing,
+    /// One of this deck and program
+    Own(Box<SavedRun<R>>),
+    /// One that cannot be used, and why
+    Other(String),
+}
+
+impl<R: Serialize> SavedRun<R> {
+    /// Writes the checkpoint of a scene, whole or not at all. The files that it tells of must be
+    /// safe on the disk.
+    pub fn write(&self, scene: &Scene, folder: &ResultFolder) -> Result<(), OutputError> {
+        let path = folder.path().join(CHECKPOINT);
+        let wrong = |error: postcard::Error| OutputError::content(&path, error);
+        let origin = Origin { program: PROGRAM.into(), deck: fingerprint(scene) };
+        let body = postcard::to_stdvec(&origin).map_err(wrong)?;
+        let body = postcard::to_extend(self, body).map_err(wrong)?;
+        let checksum = xxh3_64(&body).to_le_bytes();
+        folder.replace(CHECKPOINT, &[MAGIC, &checksum, &body].concat())
+    }
+}
+
+impl<R: for<'de> Deserialize<'de>> Found<R> {
+    /// The checkpoint in a folder, as one of this scene.
+    pub fn read(scene: &Scene, folder: &Path) -> Result<Self, OutputError> {
+        let path = folder.join(CHECKPOINT);
+        if !path.exists() {
+            return Ok(Self::Nothing);
+        }
+        let bytes = fs::read(&path).map_err(|error| OutputError::file(&path, error))?;
+        let Some(body) = body(&bytes) else { return Ok(Self::Other("it is damaged".into())) };
+        let damaged = |_| Ok(Self::Other(format!("it was not written by beamsim {}", env!("CARGO_PKG_VERSION"))));
+        let (origin, rest) = match postcard::take_from_bytes::<Origin>(body) {
+            Ok(read) => read,
+            Err(error) => return damaged(error),
+        };
+        if origin.program != PROGRAM {
+            return Ok(Self::Other("it was written by another version of beamsim".into()));
+        }
+        if origin.deck != fingerprint(scene) {
+            return Ok(Self::Other("it belongs to another deck".into()));
+        }
+        postcard::from_bytes(rest).map_or_else(damaged, |saved| Ok(Self::Own(Box::new(saved))))
+    }
+}
+
+/// What follows the checksum, if that is right.
+fn body(bytes: &[u8]) -> Option<&[u8]> {
+    let (checksum, body) = bytes.strip_prefix(MAGIC)?.split_first_chunk::<CHECKSUM>()?;
+    (xxh3_64(body).to_le_bytes() == *checksum).then_some(body)
+}
+
+/// A fingerprint of a deck as far as it decides what a run computes: its numbers and words without
+/// the ends of stages and the choice of rows, which may change when a run is resumed.
+fn fingerprint(scene: &Scene) -> u64 {
+    let mut deck = scene.resolved.clone();
+    let stages = deck.get_mut("stage").and_then(Value::as_array_mut);
+    for stage in stages.into_iter().flatten().filter_map(Value::as_object_mut) {
+        stage.retain(|key, _| !["end", "until"].contains(&key.as_str()));
+    }
+    if let Some(output) = deck.get_mut("output").and_then(Value::as_object_mut) {
+        output.retain(|key, _| !["every", "interval"].contains(&key.as_str()));
+    }
+    xxh3_64(deck.to_string().as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_damaged_file_is_told_from_a_whole_one() {
+        let content = b"anything";
+        let whole = [MAGIC, &xxh3_64(content).to_le_bytes(), content].concat();
+        assert_eq!(body(&whole), Some(&content[..]));
+        for cut in 0..whole.len() {
+            assert_eq!(body(&whole[..cut]), None, "cut at {cut}");
+            let mut flipped = whole.clone();
+            flipped[cut] ^= 1;
+            assert_eq!(body(&flipped), None, "flipped at {cut}");
+        }
+    }
+}

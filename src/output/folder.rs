@@ -1,0 +1,273 @@
+//! A folder of results: one run at a time writes to it, and all files of a run get their names
+//! together.
+//!
+//! While a run goes on its files end in `.part`. At its end run.json lists the others with their
+//! lengths and checksums. The files of the run before are removed, run.json gets its name, and then
+//! the others get theirs: a crash between two of these leaves files missing, never files of two
+//! runs side by side, and the next command that opens the folder completes what was begun.
+
+use super::files::{FIELDS, PARTIAL_FIELDS};
+use super::record::{FileRecord, Record};
+use super::{OutputError, remove_fields, remove_if_there};
+use std::fs::{self, File, TryLockError};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// The file that a run locks as long as it lasts.
+const LOCK: &str = ".lock";
+/// The name of the record.
+const RECORD: &str = "run.json";
+/// The file of a run that can be resumed.
+pub const CHECKPOINT: &str = "checkpoint";
+/// The files that a run may write, beside its fields and its record.
+const TABLES: [&str; 4] = ["history.csv", "history.partial.csv", "modes.csv", "buckling.csv"];
+
+/// The name of a file that is not complete.
+fn part(name: &str) -> String {
+    format!("{name}.part")
+}
+
+/// A folder of results that no other run writes to as long as this value lives.
+#[derive(Debug)]
+pub struct ResultFolder {
+    path: PathBuf,
+    /// The folder was not there before.
+    is_new: bool,
+    /// Locked; `None` where the file system has no locks
+    lock: Option<File>,
+}
+
+impl ResultFolder {
+    /// Claims a folder, which is created where it is missing. Fails where another run writes to it,
+    /// or where something is in the way of the results.
+    pub fn claim(path: &Path) -> Result<Self, OutputError> {
+        let is_new = !path.exists();
+        fs::create_dir_all(path).map_err(|error| OutputError::file(path, error))?;
+        let folder = Self { path: path.into(), is_new, lock: lock(path)? };
+        folder.refuse_obstacles()?;
+        complete(path)?;
+        Ok(folder)
+    }
+
+    /// The path of the folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Removes what runs that were killed have left unfinished.
+    pub fn clean(&self) -> Result<(), OutputError> {
+        for name in TABLES.into_iter().chain([RECORD, CHECKPOINT, "fields.pvd", "fields.partial.pvd"]) {
+            remove_if_there(&self.path, &part(name))?;
+        }
+        let fields = self.path.join(part(FIELDS));
+        if fields.is_dir() {
+            fs::remove_dir_all(&fields).map_err(|error| OutputError::file(&fields, error))?;
+        }
+        self.forget_checkpoint()
+    }
+
+    /// Removes the checkpoint of a run that has ended.
+    pub fn forget_checkpoint(&self) -> Result<(), OutputError> {
+        remove_if_there(&self.path, CHECKPOINT)
+    }
+
+    /// Creates a file, which gets its name with the others.
+    pub fn create(&self, name: &str) -> Result<File, OutputError> {
+        let path = self.path.join(part(name));
+        remove_if_there(&self.path, &part(name))?;
+        // What exists is neither opened nor followed.
+        File::create_new(&path).map_err(|error| OutputError::file(&path, error))
+    }
+
+    /// Writes a whole file, which gets its name with the others.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<(), OutputError> {
+        let mut file = self.create(name)?;
+        let written = file.write_all(content).and_then(|()| file.sync_all());
+        written.map_err(|error| OutputError::file(&self.path.join(part(name)), error))
+    }
+
+    /// Writes a whole file, which replaces the one of its name at once.
+    pub fn replace(&self, name: &str, content: &[u8]) -> Result<(), OutputError> {
+        self.write(name, content)?;
+        let path = self.path.join(name);
+        fs::rename(self.path.join(part(name)), &path).map_err(|error| OutputError::file(&path, error))?;
+        sync(&self.path);
+        Ok(())
+    }
+
+    /// The path of a file that is not complete.
+    pub fn part(&self, name: &str) -> PathBuf {
+        self.path.join(part(name))
+    }
+
+    /// Gives an incomplete file another name to come to.
+    pub fn rename_part(&self, from: &str, to: &str) -> Result<(), OutputError> {
+        let to = self.part(to);
+        fs::rename(self.part(from), &to).map_err(|error| OutputError::file(&to, error))
+    }
+
+    /// Makes a complete file, or a folder, incomplete again.
+    pub fn reopen(&self, name: &str, as_part_of: &str) -> Result<(), OutputError> {
+        let from = self.path.join(name);
+        fs::rename(&from, self.part(as_part_of)).map_err(|error| OutputError::file(&from, error))
+    }
+
+    /// Gives the files of a run their names, all together, with the record, which lists them.
+    pub fn commit(&self, names: &[&str], record: &mut Record) -> Result<(), OutputError> {
+        record.files = names.iter().map(|name| self.listed(name)).collect::<Result<_, _>>()?;
+        self.write(RECORD, record.to_string().as_bytes())?;
+        sync(&self.path);
+        complete(&self.path)
+    }
+
+    fn listed(&self, name: &str) -> Result<FileRecord, OutputError> {
+        FileRecord::of(name, &self.part(name))
+    }
+
+    /// Refuses what stands in the way of results, before a run begins.
+    fn refuse_obstacles(&self) -> Result<(), OutputError> {
+        for name in TABLES.into_iter().chain([RECORD, CHECKPOINT, "report.html", "fields.pvd", "fields.partial.pvd"]) {
+            refuse_obstacle(&self.path.join(name))?;
+            refuse_obstacle(&self.path.join(part(name)))?;
+        }
+        [FIELDS, PARTIAL_FIELDS].iter().try_for_each(|name| self.refuse_foreign_fields(name))
+    }
+
+    /// Refuses a folder of fields with files that its index does not list.
+    fn refuse_foreign_fields(&self, name: &str) -> Result<(), OutputError> {
+        let folder = self.path.join(name);
+        let Ok(entries) = fs::read_dir(&folder) else {
+            return match fs::symlink_metadata(&folder) {
+                Ok(_) => Err(OutputError::content(&folder, "is in the way of the results: it is not a folder")),
+                Err(_) => Ok(()),
+            };
+        };
+        let index = fs::read_to_string(self.path.join(format!("{name}.pvd"))).unwrap_or_default();
+        for entry in entries.flatten() {
+            let file = entry.file_name();
+            if !index.contains(&format!("file=\"{name}/{}\"", file.to_string_lossy())) {
+                let reason = format!(
+                    "is in the way of the results: the fields of a run would replace this folder, which contains {} \
+                     (move it away)",
+                    file.to_string_lossy()
+                );
+                return Err(OutputError::content(&folder, reason));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for ResultFolder {
+    fn drop(&mut self) {
+        if self.lock.is_some() {
+            // A lock that stays behind is nobody's: the next run takes it.
+            let _ = fs::remove_file(self.path.join(LOCK));
+        }
+        if self.is_new {
+            // Only an empty folder can be removed.
+            let _ = fs::remove_dir(&self.path);
+        }
+    }
+}
+
+/// Locks a folder. Locks of files hold between containers, and end with their process.
+fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
+    let path = folder.join(LOCK);
+    refuse_obstacle(&path)?;
+    loop {
+        let file = File::options().write(true).create(true).truncate(false).open(&path);
+        let file = file.map_err(|error| OutputError::file(&path, error))?;
+        match file.try_lock() {
+            Ok(()) if is_at(&file, &path) => return Ok(Some(file)),
+            // The run before has removed the file in the meantime.
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(OutputError::Locked(folder.into())),
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(None),
+            Err(TryLockError::Error(error)) => return Err(OutputError::file(&path, error)),
+        }
+    }
+}
+
+/// True if a path still leads to an open file.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let place = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+    match (file.metadata(), fs::symlink_metadata(path)) {
+        (Ok(own), Ok(there)) => place(own) == place(there),
+        (Err(_), _) | (_, Err(_)) => false,
+    }
+}
+
+/// True if a path still leads to an open file: elsewhere open files cannot be removed.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// Refuses to replace what is not a plain file.
+fn refuse_obstacle(path: &Path) -> Result<(), OutputError> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if !found.is_file() => {
+            let kind = if found.is_dir() {
+                "a folder"
+            } else if found.is_symlink() {
+                "a link"
+            } else {
+                "a device or pipe"
+            };
+            Err(OutputError::content(path, format!("is in the way of the results: it is {kind} (move it away)")))
+        }
+        Ok(_) | Err(_) => Ok(()),
+    }
+}
+
+/// Completes a commit that was cut short: the names of the files that a complete record lists.
+fn complete(folder: &Path) -> Result<(), OutputError> {
+    let rename = |from: String, to: &str| {
+        let path = folder.join(to);
+        fs::rename(folder.join(from), &path).map_err(|error| OutputError::file(&path, error))
+    };
+    if let Ok(record) = Record::read_from(&folder.join(part(RECORD))) {
+        if record.files.iter().all(|file| is_whole(folder, file)) {
+            TABLES.iter().try_for_each(|name| remove_if_there(folder, name))?;
+            remove_if_there(folder, "report.html")?;
+            remove_fields(folder)?;
+            rename(part(RECORD), RECORD)?;
+        }
+    }
+    let Ok(record) = Record::read(folder) else { return Ok(()) };
+    for file in &record.files {
+        let name = &file.name;
+        if folder.join(name).exists() || !is_whole(folder, file) {
+            continue;
+        }
+        if let Some(fields) = name.strip_suffix(".pvd") {
+            if folder.join(part(FIELDS)).is_dir() {
+                rename(part(FIELDS), fields)?;
+            }
+        }
+        rename(part(name), name)?;
+    }
+    sync(folder);
+    Ok(())
+}
+
+/// True if a file of a record is there under its temporary name, and complete.
+fn is_whole(folder: &Path, file: &FileRecord) -> bool {
+    FileRecord::of(&file.name, &folder.join(part(&file.name))).is_ok_and(|found| found == *file)
+}
+
+/// Completes in a folder what a run that was killed has left half-named, unless a run is at work.
+pub fn settle(folder: &Path) {
+    if folder.join(part(RECORD)).exists() || Record::read(folder).is_ok_and(|record| record.misses_files(folder)) {
+        drop(ResultFolder::claim(folder));
+    }
+}
+
+/// Asks the file system to keep the names of a folder.
+fn sync(folder: &Path) {
+    // Not every system can: then names are as safe as they are.
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}
