@@ -47,6 +47,10 @@ pub struct Finished {
     pub threads: usize,
 }
 
+/// Bytes that are taken for run.json when a run begins. Longer ones, of decks with long tables, may
+/// find no room.
+const RESERVED: usize = 64 << 10;
+
 /// Where the results of a run go, and where it begins.
 pub struct Target {
     /// The folder of results
@@ -111,11 +115,15 @@ pub fn simulate(
     watcher.progress.done();
     let seconds = seconds_of_search.unwrap_or_else(|| start.elapsed().as_secs_f64());
     let mut record = None;
-    if let Some(results) = watcher.results.take() {
+    if let Some(mut results) = watcher.results.take() {
+        let completed = results.complete(result.is_ok());
+        if let (Ok(()), Err(error)) = (&result, completed) {
+            result = Err(Failure::Io(error.to_string()));
+        }
         let resumed = results.resumed;
         let run = FinishedRun { result: &result, counters: &counters, seconds, threads, accuracy, text, resumed };
         let mut content = Record::of(scene, run);
-        let written = results.finish(&result, &mut content);
+        let written = results.commit(&result, &mut content);
         record = Some(content);
         if let Err(error) = written {
             result = Err(Failure::Io(error.to_string()));
@@ -139,6 +147,8 @@ struct Results {
     kept: Instant,
     /// There are rows behind the last checkpoint.
     has_new_rows: bool,
+    /// The names of the files that are complete
+    names: Vec<&'static str>,
 }
 
 impl Results {
@@ -151,21 +161,44 @@ impl Results {
         let rows = Rows { every: scene.every, interval: scene.plan.interval };
         let Some(saved) = saved else {
             folder.clean()?;
+            folder.reserve(RESERVED)?;
             let history = HistoryWriter::create(&folder, names, bars)?;
             let fields = scene.vtk.then(|| FieldsWriter::create(&folder, scene.figure(), timed)).transpose()?;
             let (modes, rows) = (ModesWriter::default(), RowCounter::new(rows));
             let kept = Instant::now();
-            let results =
-                Self { folder, history, fields, modes, rows, resumed: 0, interval, kept, has_new_rows: false };
+            let results = Self {
+                folder,
+                history,
+                fields,
+                modes,
+                rows,
+                resumed: 0,
+                interval,
+                kept,
+                has_new_rows: false,
+                names: Vec::new(),
+            };
             return Ok((results, None));
         };
         let SavedRun { resumed, rows: seen, history, modes, fields, run, .. } = *saved;
+        folder.reserve(RESERVED)?;
         let history = HistoryWriter::resume(&folder, names, bars, history)?;
         let fields = fields.map(|place| FieldsWriter::resume(&folder, scene.figure(), timed, place)).transpose()?;
         let rows = RowCounter::after(rows, seen);
         let resumed = resumed + 1;
         let kept = Instant::now();
-        let results = Self { folder, history, fields, modes, rows, resumed, interval, kept, has_new_rows: false };
+        let results = Self {
+            folder,
+            history,
+            fields,
+            modes,
+            rows,
+            resumed,
+            interval,
+            kept,
+            has_new_rows: false,
+            names: Vec::new(),
+        };
         Ok((results, Some(run)))
     }
 
@@ -186,13 +219,22 @@ impl Results {
         Ok(())
     }
 
+    /// Completes all files but the record. Those that can be written are, whatever fails.
+    fn complete(&mut self, is_finished: bool) -> Result<(), OutputError> {
+        let history = self.history.complete();
+        let is_finished = is_finished && history.is_ok();
+        let modes = self.modes.finish(&self.folder).map(|names| self.names.extend(names));
+        let fields = self
+            .fields
+            .take()
+            .map_or(Ok(()), |fields| fields.finish(&self.folder, is_finished).map(|name| self.names.push(name)));
+        history.and(modes).and(fields)
+    }
+
     /// Gives all results their names. A run that was stopped can go on from its checkpoint.
-    fn finish(self, result: &Result<(), Failure>, record: &mut Record) -> Result<(), OutputError> {
-        let Self { folder, history, fields, modes, .. } = self;
-        let is_finished = result.is_ok();
-        let mut names = vec![history.finish(&folder, is_finished)?];
-        names.extend(fields.map(|fields| fields.finish(&folder, is_finished)).transpose()?);
-        names.extend(modes.finish(&folder)?);
+    fn commit(self, result: &Result<(), Failure>, record: &mut Record) -> Result<(), OutputError> {
+        let Self { folder, history, mut names, .. } = self;
+        names.push(history.close(&folder, result.is_ok())?);
         folder.commit(&names, record)?;
         match result {
             Err(Failure::Interrupted { .. } | Failure::Io(_)) => Ok(()),

@@ -71,6 +71,12 @@ impl ResultFolder {
         remove_if_there(&self.path, CHECKPOINT)
     }
 
+    /// Takes space for a file that is written at the end, so that a disk that fills up meanwhile has
+    /// room for it.
+    pub fn reserve(&self, bytes: usize) -> Result<(), OutputError> {
+        self.write(RECORD, &vec![b' '; bytes])
+    }
+
     /// Creates a file, which gets its name with the others.
     pub fn create(&self, name: &str) -> Result<File, OutputError> {
         let path = self.path.join(part(name));
@@ -115,9 +121,23 @@ impl ResultFolder {
     /// Gives the files of a run their names, all together, with the record, which lists them.
     pub fn commit(&self, names: &[&str], record: &mut Record) -> Result<(), OutputError> {
         record.files = names.iter().map(|name| self.listed(name)).collect::<Result<_, _>>()?;
-        self.write(RECORD, record.to_string().as_bytes())?;
+        self.write_over(RECORD, record.to_string().as_bytes())?;
         sync(&self.path);
         complete(&self.path)
+    }
+
+    /// Writes a whole file over the space that was taken for it.
+    fn write_over(&self, name: &str, content: &[u8]) -> Result<(), OutputError> {
+        let path = self.part(name);
+        if !fs::symlink_metadata(&path).is_ok_and(|found| found.is_file()) {
+            return self.write(name, content);
+        }
+        let written = File::options().write(true).open(&path).and_then(|mut file| {
+            file.write_all(content)?;
+            file.set_len(content.len() as u64)?;
+            file.sync_all()
+        });
+        written.map_err(|error| OutputError::file(&path, error))
     }
 
     fn listed(&self, name: &str) -> Result<FileRecord, OutputError> {

@@ -6,7 +6,7 @@ use beamsim_core::run::Moment;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::fs::File;
-use std::io::{self, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 const HISTORY: &str = "history.csv";
 /// The name of the history of a run that did not.
 const PARTIAL_HISTORY: &str = "history.partial.csv";
+/// Bytes that a row has at most
+const LONGEST_ROW: u64 = 64 << 20;
 /// Rows are handed to the system at least so often, as long as there are new ones.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -264,20 +266,44 @@ impl HistoryWriter {
         Ok(())
     }
 
-    /// Completes the file, and returns the name that it is to get: `history.csv` if the run
-    /// finished, else `history.partial.csv`.
-    pub fn finish(mut self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
-        if self.pending {
+    /// Writes the rows that are left, and makes them safe on the disk.
+    pub fn complete(&mut self) -> Result<(), OutputError> {
+        if std::mem::take(&mut self.pending) {
             self.held_back.push(std::mem::take(&mut self.record));
         }
         self.write_held_back()?;
-        let file = self.writer.into_inner().map_err(|e| io::Error::other(e.to_string()))?;
-        file.sync_all()?;
-        if !finished {
-            folder.rename_part(HISTORY, PARTIAL_HISTORY)?;
-        }
-        Ok(if finished { HISTORY } else { PARTIAL_HISTORY })
+        self.writer.flush()?;
+        Ok(self.writer.get_ref().sync_all()?)
     }
+
+    /// Closes the file, and returns the name that it is to get: `history.csv` if the run finished,
+    /// else `history.partial.csv`. Half a row, where the disk was full, is removed.
+    pub fn close(self, folder: &ResultFolder, finished: bool) -> Result<&'static str, OutputError> {
+        if finished {
+            return Ok(HISTORY);
+        }
+        // What is still in memory could not be written before, and is dropped.
+        drop(self.writer);
+        let path = folder.part(HISTORY);
+        keep_whole_rows(&path).map_err(|error| OutputError::file(&path, error))?;
+        folder.rename_part(HISTORY, PARTIAL_HISTORY)?;
+        Ok(PARTIAL_HISTORY)
+    }
+}
+
+/// Cuts a table behind its last whole row.
+fn keep_whole_rows(path: &Path) -> io::Result<()> {
+    let mut file = File::options().read(true).write(true).open(path)?;
+    let length = file.metadata()?.len();
+    let mut tail = Vec::new();
+    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_ROW)))?;
+    file.read_to_end(&mut tail)?;
+    let half_row = tail.iter().rev().position(|&byte| byte == b'\n').unwrap_or(tail.len());
+    if half_row > 0 {
+        file.set_len(length - half_row as u64)?;
+        file.sync_all()?;
+    }
+    Ok(())
 }
 
 /// Adds numbers to a record. Debug formatting is the shortest text that reads back to the same

@@ -28,6 +28,7 @@ mod random;
 mod relative;
 mod report;
 mod rest;
+mod restart;
 mod resume;
 mod rotations;
 mod scenes;
