@@ -357,3 +357,20 @@ impl HistoryReader {
         Ok(Self { names, rows })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn half_a_row_is_cut_off() {
+        let path = std::env::temp_dir().join(format!("beamsim-rows-{}", std::process::id()));
+        for (written, kept) in [("a,b\n1,2\n3,", "a,b\n1,2\n"), ("a,b\n1,2\n", "a,b\n1,2\n"), ("a,", ""), ("", "")] {
+            fs::write(&path, written).unwrap();
+            keep_whole_rows(&path).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), kept, "{written:?}");
+        }
+        fs::remove_file(&path).unwrap();
+    }
+}
