@@ -149,7 +149,6 @@ impl StageRun<'_> {
     /// Continues from the last good state what goes on without jumps: turns of nodes and of joints.
     fn continue_to_state(&mut self) -> Result<(), Failure> {
         self.refuse_infinities()?;
-        self.flatten();
         self.wind()?;
         self.model.remember(self.state);
         Ok(())
@@ -166,6 +165,7 @@ impl StageRun<'_> {
     /// work of its forces is booked. No row.
     pub fn pass_through(&mut self, system: &System) -> Result<(), Failure> {
         self.state.anchor = None;
+        self.flatten();
         self.continue_to_state()?;
         if self.plan.energy {
             self.bookkeeper.add_step(self.model, self.state, system);

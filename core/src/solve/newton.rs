@@ -82,6 +82,11 @@ impl Newton {
         }
     }
 
+    /// True if the next solution starts with the tangent of the system.
+    pub fn is_given(&self, system: &System) -> bool {
+        self.given == Some(system.revision)
+    }
+
     /// What the next solution depends on, beside its state and a tangent that is given to it.
     pub fn memory(&self) -> NewtonMemory {
         NewtonMemory { choice: self.solver.choice(), tangents: self.reuse.before, time_error: self.time_error.clone() }

@@ -216,6 +216,7 @@ impl Dynamics<'_, '_> {
 
     /// Settles a step that is taken, written or not.
     fn settle(&mut self, step: &Step) -> Result<(), Failure> {
+        self.stage.flatten();
         self.stage.accept()?;
         self.settle_charts(step);
         Ok(())
@@ -369,6 +370,7 @@ impl Dynamics<'_, '_> {
 
     /// Completes a step that is taken: account, row, charts. True if the stage is over.
     fn complete(&mut self, step: &Step) -> Result<bool, Failure> {
+        self.stage.flatten();
         self.stage.accept()?;
         self.stage.counters.steps += 1;
         self.stage.show()?;

@@ -13,6 +13,8 @@ pub(in crate::run) struct LevelsCheckpoint {
     pub(super) levels: Levels,
     /// The signs of pivots are followed.
     pub follows_signs: bool,
+    /// The stiffness of the last level is the first tangent of the next.
+    pub is_given: bool,
     /// The signs of pivots at the last level
     pub signature: Option<Signature>,
     /// The signs of pivots before the first level

@@ -65,10 +65,7 @@ impl Stability {
 
     /// Forms and factorises the tangent of the run's state again, as [`Stability::look`] has left
     /// it for the next solution.
-    pub fn follow_again(&self, stage: &mut StageRun) {
-        if !self.counts {
-            return;
-        }
+    pub fn follow_again(stage: &mut StageRun) {
         let StageRun { assembly, newton, state, counters, .. } = stage;
         newton.signature_at(assembly, state, &mut counters.work);
         newton.begin_with(&assembly.system);
