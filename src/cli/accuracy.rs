@@ -98,7 +98,8 @@ impl RunArguments {
     }
 
     fn search(&self, name: &str, path: &Path, loaded: &Loaded, wanted: &Accuracy) -> Result<Found, CommandError> {
-        signals::caught();
+        // A signal stops the search, which tells how far it came.
+        let _kept = signals::keep();
         let mut progress = Progress::new(name);
         let mut show = |done: usize, all: usize| {
             progress.show(done as f64 / all as f64, || format!("searching for the accuracy: {done} of {all} runs"));

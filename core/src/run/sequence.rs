@@ -3,14 +3,14 @@
 use super::buckling::Buckling;
 use super::dynamics::Dynamics;
 use super::energy::Bookkeeper;
-use super::failure::Failure;
+use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
 use super::modal::Modal;
 use super::naming::describe;
 use super::observer::{Counters, Observer};
 use super::plan::{Plan, StageWork};
 use super::rehearsal::lacking;
-use super::stage_run::{Analysis, EarlierStages, StageRun, newton_for};
+use super::stage_run::{Analysis, EarlierStages, StageRun, newton_for, unless_interrupted};
 use super::statics::{ArcLength, LoadLevels};
 use crate::model::{Assembly, Model, Schedule};
 use crate::system::State;
@@ -57,8 +57,17 @@ impl<'o> Run<'o> {
         (result, self.counters)
     }
 
-    /// Runs stage number `number`, from 0.
+    /// Runs stage number `number`, from 0. After a request to stop it has come to no other end.
     fn run_stage(&mut self, number: usize) -> Result<(), Failure> {
+        let result = self.carry_out_stage(number);
+        if matches!(result, Err(Failure::Io(_) | Failure::Interrupted { .. })) {
+            return result;
+        }
+        let at = Moment { stage: number + 1, time: self.state.time, load: self.state.load };
+        unless_interrupted(at).and(result)
+    }
+
+    fn carry_out_stage(&mut self, number: usize) -> Result<(), Failure> {
         let work = self.plan.stages[number].work;
         let mut run = self.open_stage(number)?;
         let stage = &mut run;
@@ -108,6 +117,7 @@ impl<'o> Run<'o> {
             fresh,
             soft: false,
             prescribed_increment: Vec::new(),
+            is_judged: false,
         };
         run.warn_of_space();
         Ok(run)
@@ -117,6 +127,7 @@ impl<'o> Run<'o> {
 /// Runs an analysis, sums up its work, and warns of what shows behind it, however it ended.
 fn carry_out<'r>(mut analysis: impl Analysis<'r>) -> Result<(), Failure> {
     let result = analysis.run();
+    analysis.stage().is_judged = true;
     analysis.stage().close();
     analysis.judge();
     result

@@ -31,15 +31,24 @@ impl CompressedColumns {
 
     /// The pattern without values.
     pub fn structure(&self) -> SymbolicSparseColMatRef<'_, u32> {
-        let n = self.starts.len() - 1;
+        let n = self.count();
         SymbolicSparseColMatRef::new_checked(n, n, &self.starts, None, &self.rows)
     }
 
-    /// The pattern with the values of the tangent of a system.
-    pub fn matrix(&mut self, system: &System) -> SparseColMatRef<'_, u32, f64> {
+    /// Takes the values of the tangent of a system.
+    pub fn take(&mut self, system: &System) {
         for (value, &place) in self.values.iter_mut().zip(&self.places) {
             *value = system.values[place as usize];
         }
+    }
+
+    /// The pattern with the values taken last.
+    pub fn matrix(&self) -> SparseColMatRef<'_, u32, f64> {
         SparseColMatRef::new(self.structure(), &self.values)
+    }
+
+    /// The number of columns.
+    pub fn count(&self) -> usize {
+        self.starts.len() - 1
     }
 }
