@@ -552,7 +552,8 @@ fn interrupted(name: &str, signal: &str) -> (i32, Vec<String>) {
 fn an_interrupted_run_keeps_what_it_reached() {
     let left = vec!["history.partial.csv".to_string(), "run.json".to_string()];
     assert_eq!(interrupted("interrupted", "-INT"), (130, left.clone()));
-    assert_eq!(interrupted("terminated", "-TERM"), (143, left));
+    assert_eq!(interrupted("terminated", "-TERM"), (143, left.clone()));
+    assert_eq!(interrupted("hung_up", "-HUP"), (129, left));
 }
 
 #[test]

@@ -31,6 +31,7 @@ mod rest;
 mod rotations;
 mod scenes;
 mod schemes;
+mod signals;
 mod solvers;
 mod stages;
 mod statics;
