@@ -16,7 +16,8 @@ pub fn request(signal: i32) {
     let _ = SIGNAL.compare_exchange(0, signal, Ordering::Relaxed, Ordering::Relaxed);
 }
 
-/// Withdraws the request, so that other work can begin.
+/// Withdraws the request, so that other work can begin. No work may be under way, which could take
+/// what was left half-done for whole.
 pub fn withdraw() {
     SIGNAL.store(0, Ordering::Relaxed);
 }
