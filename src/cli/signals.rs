@@ -80,13 +80,19 @@ fn is_ignored(signal: i32) -> Option<bool> {
     Some(mask >> (signal - 1) & 1 == 1)
 }
 
+/// A signal that was heard.
+struct Heard {
+    signal: i32,
+    at: Instant,
+}
+
 /// Hears a signal, after the `first` one if there was one.
-fn hear(signal: i32, first: &mut Option<(i32, Instant)>) {
-    match *first {
-        Some((_, at)) if at.elapsed() < ONE_REQUEST => {}
-        Some((signal, _)) => exit(signal),
+fn hear(signal: i32, first: &mut Option<Heard>) {
+    match first {
+        Some(first) if first.at.elapsed() < ONE_REQUEST => {}
+        Some(first) => exit(first.signal),
         None => {
-            *first = Some((signal, Instant::now()));
+            *first = Some(Heard { signal, at: Instant::now() });
             // No work may begin to keep results while the process ends.
             let kept = kept();
             if *kept == 0 {

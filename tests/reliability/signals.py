@@ -325,6 +325,9 @@ def main():
     parser.add_argument("--instants", type=int, default=50)
     arguments = parser.parse_args()
     binary = os.path.abspath(arguments.binary)
+    # Processes inherit what `nohup` and shells switch off.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
     for kind in arguments.kinds or ["static", "modal", "buckling", "dynamic"]:
         rng = random.Random(f"{arguments.seed} {kind}")
         if kind == "commands":

@@ -236,30 +236,46 @@ fn output(command: &mut Command) -> Result<String, CommandError> {
     unless_stopped(&name)?;
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().map_err(|error| refuse(format!("{error}; is Slurm installed here?")))?;
-    let pipes = (child.stdout.take(), child.stderr.take());
-    let printed = threads::unless_interrupted(move || read_both(pipes.0, pipes.1));
-    let ended = printed.and_then(|(answer, complaint)| Some((wait_for(&mut child)?, answer, complaint)));
-    let Some((is_fine, answer, complaint)) = ended else {
-        // It may hang: Slurm's controller does not answer, or a file system.
-        let _ = child.kill();
-        let _ = child.wait();
-        unless_stopped(&name)?;
-        return Err(refuse("it was lost before it ended".into()));
-    };
-    if is_fine { Ok(answer) } else { Err(refuse(complaint.trim().to_string())) }
+    let out = child.stdout.take();
+    let errors = child.stderr.take();
+    let printed = threads::unless_interrupted(move || Printed::read(out, errors));
+    match printed.zip(wait_for(&mut child)) {
+        Some((Printed { answer, .. }, true)) => Ok(answer),
+        Some((Printed { complaint, .. }, false)) => Err(refuse(complaint.trim().to_string())),
+        None => {
+            // It may hang: Slurm's controller does not answer, or a file system.
+            let _ = child.kill();
+            let _ = child.wait();
+            unless_stopped(&name)?;
+            Err(refuse("it was lost before it ended".into()))
+        }
+    }
 }
 
-/// Reads both outputs of a process to their ends.
-fn read_both(out: Option<impl Read + Send>, errors: Option<impl Read + Send>) -> (String, String) {
-    fn read(pipe: Option<impl Read>) -> String {
-        let mut bytes = Vec::new();
-        let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
-        String::from_utf8_lossy(&bytes).into_owned()
+/// What a process has printed.
+struct Printed {
+    /// Standard output
+    answer: String,
+    /// Standard error
+    complaint: String,
+}
+
+impl Printed {
+    /// Reads both outputs of a process to their ends.
+    fn read(out: Option<impl Read + Send>, errors: Option<impl Read + Send>) -> Self {
+        thread::scope(|scope| {
+            let complaint = scope.spawn(|| read(errors));
+            Self { answer: read(out), complaint: complaint.join().unwrap_or_default() }
+        })
     }
-    thread::scope(|scope| {
-        let errors = scope.spawn(|| read(errors));
-        (read(out), errors.join().unwrap_or_default())
-    })
+}
+
+/// Reads a pipe to its end.
+fn read(pipe: Option<impl Read>) -> String {
+    let mut bytes = Vec::new();
+    // What came before an error is there.
+    let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 /// Waits for a process that has closed its outputs: true if it was successful, `None` after a
