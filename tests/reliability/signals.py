@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures how soon beamsim ends after a signal at a random instant.
 
-    python3 tests/reliability/signals.py BINARY [--seed 1] [--instants 50] [KIND ...]
+    python3 tests/reliability/signals.py BINARY [--seed 1] [--instants 50] [--elements N] [--wait S] [KIND ...]
 
 KIND is static, modal, buckling, dynamic, rest, path, net, dense (runs of 10 to 100,000 elements, by the instant), or
 commands (the other subcommands). Each instant starts a process, waits a random time, sends INT, TERM or HUP, and
@@ -19,8 +19,6 @@ import tempfile
 import time
 
 LIMIT = 1.0
-# The longest wait before a signal, in seconds.
-LONGEST_WAIT = 6.0
 
 SECTION = """
 [section.rod]
@@ -95,8 +93,8 @@ steps = 20
 """
 
 
-def arm(rng, kind):
-    n = int(10 ** rng.uniform(1, 5))
+def arm(rng, kind, elements):
+    n = elements or int(10 ** rng.uniform(1, 5))
     # A force across the beam is symmetric in no plane but that of the scene.
     force = {"static": "[0, 3, 40]", "path": "[0, 3, 40]", "modal": "[0, 0, 0.1]", "buckling": "[-1, 0, 0]",
              "dynamic": "[0, 1, 2]"}[kind]
@@ -105,12 +103,12 @@ def arm(rng, kind):
     return f"{n} elements", text + "[[stage]]\n" + STAGES[kind].format(modes=modes) + "\n"
 
 
-def rest(rng, _):
-    n = int(10 ** rng.uniform(1, 4))
+def rest(rng, _, elements):
+    n = elements or int(10 ** rng.uniform(1, 4))
     return f"{n} elements", REST.format(n=n)
 
 
-def net(rng, _):
+def net(rng, _, __):
     """A square net of beams: the factors have fill."""
     m = rng.choice([5, 10, 20, 40])
     points, beams = [], []
@@ -132,7 +130,7 @@ def net(rng, _):
     return f"net of {m} x {m}", text
 
 
-def dense(rng, _):
+def dense(rng, _, __):
     """Nodes that are all tied to one another by springs: too much fill for factors in blocks."""
     m = rng.choice([60, 120, 240])
     points = [f"p{i} = [{i}, {rng.uniform(-1, 1):.3f}, {rng.uniform(-1, 1):.3f}]" for i in range(m)]
@@ -211,15 +209,15 @@ def judge(folder, status, number, out):
     return wrong
 
 
-def study(binary, kind, rng, instants):
+def study(binary, kind, rng, instants, elements, longest):
     rows, bad, done = [], [], 0
     while len(rows) < instants and done < 4 * instants:
         folder = tempfile.mkdtemp(prefix="signals-")
-        what, text = MAKERS[kind](rng, kind)
+        what, text = MAKERS[kind](rng, kind, elements)
         with open(os.path.join(folder, "deck.toml"), "w") as file:
             file.write(text)
         number = rng.choice([signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-        wait = LONGEST_WAIT * rng.random() ** 2
+        wait = longest * rng.random() ** 2
         threads = rng.choice(["1", "2"])
         words = ["run", "deck.toml", "-q", "--threads", threads, "--out", "o"]
         answer, status = send(binary, words, folder, wait, number)
@@ -323,6 +321,8 @@ def main():
     parser.add_argument("kinds", nargs="*", metavar="KIND")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--instants", type=int, default=50)
+    parser.add_argument("--elements", type=int, help="size of all runs (default: from 10 to 100,000)")
+    parser.add_argument("--wait", type=float, default=6.0, help="longest time before a signal, in seconds")
     arguments = parser.parse_args()
     binary = os.path.abspath(arguments.binary)
     # Processes inherit what `nohup` and shells switch off.
@@ -333,7 +333,7 @@ def main():
         if kind == "commands":
             commands(binary, rng, arguments.instants)
         else:
-            study(binary, kind, rng, arguments.instants)
+            study(binary, kind, rng, arguments.instants, arguments.elements, arguments.wait)
 
 
 if __name__ == "__main__":
