@@ -31,7 +31,7 @@ impl GeneralSolver {
     /// Analyses the pattern of a system. `None` if memory is not available, or after a request to
     /// stop.
     pub fn new(system: &System) -> Option<Self> {
-        let columns = CompressedColumns::new(&system.pattern);
+        let columns = CompressedColumns::new(&system.pattern)?;
         let sparse_lu = match columns.count() > LONG_FACTORISATION {
             true => threads::unless_interrupted(|| SparseLu::new(columns)).flatten(),
             false => SparseLu::new(columns),
