@@ -69,7 +69,7 @@ fn a_request_ends_work_without_a_verdict() {
     assert_eq!(interrupt::requested(), None);
     assert_eq!(threads::unless_interrupted(|| 7), Some(7));
     let statics = Stage::statics(20).work;
-    let of_statics = Plan::new(column(400), vec![Stage::new(statics)]);
+    let of_statics = Plan::new(column(100), vec![Stage::new(statics)]);
     let works = [statics, StageWork::Path { steps: 20, max_steps: 30 }, StageWork::Buckling { modes: 3 }];
 
     // From a row on.
@@ -98,7 +98,7 @@ fn a_request_ends_work_without_a_verdict() {
 
     // At any instant.
     for work in works {
-        let plan = Plan::new(column(400), vec![Stage::new(work)]);
+        let plan = Plan::new(column(100), vec![Stage::new(work)]);
         let begun = Instant::now();
         let (whole, counted, told) = run(&plan, None);
         let duration = begun.elapsed();
@@ -106,8 +106,8 @@ fn a_request_ends_work_without_a_verdict() {
         let messages = |counters: &Counters| -> Vec<String> {
             counters.findings.warnings.iter().map(ToString::to_string).collect()
         };
-        for number in 0..40 {
-            let delay = duration.mul_f64((f64::from(number) + 0.5) / 40.0);
+        for number in 0..20 {
+            let delay = duration.mul_f64((f64::from(number) + 0.5) / 20.0);
             let is_over = AtomicBool::new(false);
             let (result, counters, recorder) = thread::scope(|scope| {
                 scope.spawn(|| request_after(delay, &is_over));
