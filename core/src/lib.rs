@@ -41,6 +41,8 @@
 pub mod failure;
 pub mod warning;
 
+pub mod interrupt;
+
 pub mod threads;
 
 pub mod scalar;

@@ -3,14 +3,21 @@
 //! Work is cut by the scene alone, never by the number of threads, and results of items are
 //! combined in the order of the items: results are equal on any number of threads, to the last bit.
 
+use crate::interrupt;
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use std::io;
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::panic;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, Scope, ScopedJoinHandle};
+use std::time::Duration;
 
 /// Bytes of stack of each thread, as the main thread has them on most systems.
 const STACK_BYTES: usize = 8 << 20;
+
+/// Time between looks for a request to stop, while work without looks of its own is under way.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Runs work that may use `threads` threads. With one thread, or if the system gives no more, the
 /// work runs serially.
@@ -28,6 +35,40 @@ pub fn beside<'scope, R: Send + 'scope>(
     work: impl FnOnce() -> R + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, R>> {
     thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work)
+}
+
+/// Runs work that cannot look for a request to stop itself, such as a long call into another crate,
+/// on a thread of its own. `None` after a request: the work is then left to itself, and its result
+/// is dropped. It must not use threads of the pool.
+pub fn unless_interrupted<R: Send + 'static>(work: impl FnOnce() -> R + Send + 'static) -> Option<R> {
+    if interrupt::is_requested() {
+        return None;
+    }
+    let (sender, receiver) = mpsc::channel();
+    let waiting = Arc::new(Mutex::new(Some(work)));
+    let taken = waiting.clone();
+    let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let run = move || {
+        if let Some(work) = take(&taken) {
+            // Nobody receives what comes after a request.
+            let _ = sender.send(work());
+        }
+    };
+    let Ok(thread) = thread::Builder::new().stack_size(STACK_BYTES).spawn(run) else {
+        return take(&waiting).map(|work| work());
+    };
+    loop {
+        match receiver.recv_timeout(LOOK) {
+            Ok(result) => return Some(result),
+            Err(RecvTimeoutError::Timeout) if interrupt::is_requested() => return None,
+            Err(RecvTimeoutError::Timeout) => {}
+            // The work panicked.
+            Err(RecvTimeoutError::Disconnected) => match thread.join() {
+                Ok(()) => return None,
+                Err(panic) => panic::resume_unwind(panic),
+            },
+        }
+    }
 }
 
 /// Calls `work` with each item.

@@ -122,7 +122,8 @@ impl RunArguments {
         wanted: &Accuracy,
         folder: &ResultFolder,
     ) -> Result<Found, CommandError> {
-        signals::caught();
+        // A signal stops the search, which tells how far it came.
+        let _kept = signals::keep();
         let identity = format!("beamsim {}\n{wanted:?}\n{}", env!("CARGO_PKG_VERSION"), loaded.text);
         let mut journal = Journal::open(folder.path(), JOURNAL, &identity)?;
         if !journal.is_empty() {

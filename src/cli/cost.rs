@@ -55,7 +55,6 @@ pub fn cost(decks: &[PathBuf], settings: &[String], wanted: &CostArguments, out:
         return verdict.finish(1);
     }
     let settings: Vec<String> = settings.iter().cloned().chain(wanted.vary.iter().map(|vary| setting(vary))).collect();
-    signals::caught();
     for path in decks {
         let name = load::name(path);
         let folder = folder(out, &name, decks.len() > 1);
@@ -98,6 +97,8 @@ fn setting(vary: &str) -> String {
 fn one(name: &str, path: &Path, loaded: &Loaded, wanted: &CostArguments, folder: &Path) -> Result<(), CommandError> {
     let (against, given) = reference(wanted.reference.as_deref())?;
     let identity = format!("beamsim {}\n{given}\n{}", env!("CARGO_PKG_VERSION"), loaded.text);
+    // A signal stops the study, and the journal has the runs that are done.
+    let _kept = signals::keep();
     let mut journal = Journal::open(folder, JOURNAL, &identity)?;
     if !journal.is_empty() {
         console::note(&format!("{name}: continues a stopped study, {} runs are done", journal.len()));

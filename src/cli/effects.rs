@@ -18,15 +18,11 @@ pub fn effects(decks: &[PathBuf], settings: &[String], tolerance: f64, out: Opti
         verdict.fail(error);
         return verdict.finish(1);
     }
-    signals::caught();
     for path in decks {
         let name = load::name(path);
         let folder = folder(out, &name, decks.len() > 1);
         if let Err(error) = one(&name, path, settings, tolerance, &folder) {
             verdict.fail(error);
-        }
-        if signals::caught().is_some() {
-            break;
         }
     }
     verdict.finish(decks.len())

@@ -32,7 +32,7 @@ pub enum CommandError {
     /// A signal stopped the command between simulations.
     #[error("{message}")]
     Stopped {
-        /// SIGINT is 2, SIGTERM 15
+        /// SIGHUP is 1, SIGINT 2, SIGTERM 15
         signal: i32,
         /// The last line
         message: String,

@@ -36,8 +36,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 const AFTER_HELP: &str = "Exit status: 0 success; 1 an expectation or comparison failed; 2 the deck or the command line is \
-                          wrong; 3 the simulation failed; 4 a file could not be read or written; 5 an accuracy was not reached; 130 or \
-                          143 interrupted.";
+                          wrong; 3 the simulation failed; 4 a file could not be read or written; 5 an accuracy was not reached; 129, \
+                          130 or 143 interrupted.";
 
 /// Simulates slender parts with large deflections and rotations.
 #[derive(Parser)]
@@ -193,6 +193,7 @@ enum Command {
 
 /// Parses the command line and runs the command.
 pub fn main() -> ExitCode {
+    signals::listen();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return ExitCode::from(usage(&error) as u8),

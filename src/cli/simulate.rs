@@ -79,8 +79,8 @@ pub fn simulate(
     threads: usize,
 ) -> Finished {
     let start = Instant::now();
-    // From here on the run itself answers signals.
-    signals::caught();
+    // From here on a signal stops the run, and what it has reached is written.
+    let _kept = target.as_ref().map(|_| signals::keep());
     let RunExtras { accuracy, outcome, bars, text, film } = extras;
     let (results, from, opened) = match target.map(|target| Results::open(scene, target, bars)).transpose() {
         Ok(opened) => {
@@ -339,10 +339,7 @@ impl Observer for Watcher<'_> {
     fn progress(&mut self, at: Moment, done: f64) -> Result<(), Failure> {
         let time_unit = &self.time_unit;
         self.progress.show(done, || format!("time {:.6}{time_unit}, load factor {:.4}", at.time, at.load));
-        match signals::caught() {
-            Some(signal) => Err(Failure::Interrupted { at, signal }),
-            None => Ok(()),
-        }
+        Ok(())
     }
 }
 

@@ -2,6 +2,7 @@
 
 use beamsim_core::failure::{Cause, FailureKind};
 use beamsim_core::run::Failure;
+use signal_hook::consts::{SIGHUP, SIGTERM};
 
 /// The exit status of a command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -19,6 +20,8 @@ pub enum Status {
     Io = 4,
     /// The wanted accuracy was not reached; the results are the best that were found
     Missed = 5,
+    /// SIGHUP
+    HungUp = 129,
     /// SIGINT
     Interrupted = 130,
     /// SIGTERM
@@ -46,6 +49,11 @@ impl Status {
 
     /// The exit status of a process that a signal ended.
     pub fn after(signal: i32) -> Self {
-        if signal == 15 { Self::Terminated } else { Self::Interrupted }
+        match signal {
+            SIGHUP => Self::HungUp,
+            SIGTERM => Self::Terminated,
+            // Also where a time limit has stopped a run.
+            _ => Self::Interrupted,
+        }
     }
 }

@@ -78,18 +78,31 @@ fn one(path: &Path, name: &str, settings: &[String], folder: Option<&Path>) -> R
 
 /// Folders are replaced by the decks in them, in the order of their names, subfolders last.
 fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, OutputError> {
+    expand_within(paths, &mut Vec::new())
+}
+
+/// Expands paths that lie `within` these folders. A link back to one of them is passed over.
+fn expand_within(paths: &[PathBuf], within: &mut Vec<PathBuf>) -> Result<Vec<PathBuf>, OutputError> {
     let mut decks = Vec::new();
     for path in paths {
         if !path.is_dir() {
             decks.push(path.clone());
             continue;
         }
+        let folder = std::fs::canonicalize(path).map_err(|error| OutputError::file(path, error))?;
+        if within.contains(&folder) {
+            continue;
+        }
         let entries = std::fs::read_dir(path).map_err(|error| OutputError::file(path, error))?;
         let mut entries: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|e| e.path())).collect();
         entries.sort();
         let (folders, files): (Vec<_>, Vec<_>) = entries.into_iter().partition(|entry| entry.is_dir());
-        decks.extend(files.into_iter().filter(|file| file.extension().is_some_and(|e| e == "toml")));
-        decks.extend(expand(&folders)?);
+        // Pipes and devices are no decks: nobody may ever write to them.
+        let is_deck = |file: &PathBuf| file.extension().is_some_and(|e| e == "toml") && file.is_file();
+        decks.extend(files.into_iter().filter(is_deck));
+        within.push(folder);
+        decks.extend(expand_within(&folders, within)?);
+        within.pop();
     }
     Ok(decks)
 }

@@ -552,7 +552,8 @@ fn interrupted(name: &str, signal: &str) -> (i32, Vec<String>) {
 fn an_interrupted_run_keeps_what_it_reached() {
     let left = ["checkpoint", "history.partial.csv", "run.json"].map(String::from).to_vec();
     assert_eq!(interrupted("interrupted", "-INT"), (130, left.clone()));
-    assert_eq!(interrupted("terminated", "-TERM"), (143, left));
+    assert_eq!(interrupted("terminated", "-TERM"), (143, left.clone()));
+    assert_eq!(interrupted("hung_up", "-HUP"), (129, left));
 }
 
 #[test]

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 /// From the bottom to the top; each imports only what stands before it, and `deck`, the words, only the names of failures and
 /// warnings, and [`DECK_ROWS`].
 #[rustfmt::skip]
-const ORDER: [&str; 19] = [
-    "failure", "warning", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "run", "probe",
+const ORDER: [&str; 20] = [
+    "failure", "warning", "interrupt", "threads", "scalar", "tensor", "rotation", "kernel", "system", "effect", "model", "integrate", "solve", "run", "probe",
     "deck", "scene", "output", "study", "cli",
 ];
 

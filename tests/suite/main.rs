@@ -33,6 +33,7 @@ mod resume;
 mod rotations;
 mod scenes;
 mod schemes;
+mod signals;
 mod solvers;
 mod stages;
 mod statics;

@@ -3,6 +3,7 @@
 use super::linear::LinearisedSystem;
 use super::{Model, StageContext};
 use crate::effect::{Effect, PlanarForm, RoundOff, TangentForm};
+use crate::interrupt;
 use crate::kernel::Weights;
 use crate::system::{
     Assembler, Category, Connectivity, DofMap, FrameConflict, Memory, Pattern, Plane, State, Symmetry, System,
@@ -199,10 +200,14 @@ impl Assembly {
     }
 
     /// Adds forces and tangents, in parallel over the regions of a large scene, each after
-    /// `make_ready`; then those of the instances that lie in no region.
+    /// `make_ready`; then those of the instances that lie in no region. After a request to stop
+    /// they stay incomplete.
     fn add_effects(&mut self, state: &State, weights: Weights, make_ready: impl Fn(&mut SystemSlice) + Send + Sync) {
         let Self { effects, system, evaluations, .. } = self;
         system.each_part(|part| {
+            if interrupt::is_requested() {
+                return;
+            }
             make_ready(part);
             add_part(effects, state, weights, part);
         });

@@ -1,6 +1,7 @@
 //! Changes of the charts of rotation vectors at nodes, and the choice of charts in elements.
 
 use super::{Charted, ElementInfo};
+use crate::interrupt;
 use crate::kernel::seam;
 use crate::rotation::{Complement, Rotation, log, relative_angle, unwound};
 use crate::system::{Slot, State};
@@ -45,7 +46,7 @@ const SETTLED_CHANGE: f64 = 1.0;
 const NEAR_WHOLE_TURN: f64 = 0.5;
 
 /// Replaces every rotation vector longer than pi + `band` by its complement, with its rates, until
-/// none is left. Returns the number of changes.
+/// none is left. Returns the number of changes. After a request to stop some may be left.
 ///
 /// `lag` is the time by which the algorithmic acceleration lies ahead of the state; `None` if it is
 /// the rate of a momentum, which does not depend on charts.
@@ -54,6 +55,10 @@ pub fn switch(state: &mut State, rotations: &[Slot], band: f64, lag: Option<f64>
     state.unwrapped_mut();
     let mut switched = 0;
     for slot in rotations.iter().skip_while(|slot| **slot != first).map(|&slot| slot as usize) {
+        // A wild correction may turn many nodes by many thousand turns.
+        if interrupt::is_requested() {
+            break;
+        }
         for _ in 0..MAX_COMPLEMENTS {
             let p = state.q[slot];
             if !is_beyond(p, band) {

@@ -130,7 +130,7 @@ pub enum Failure {
     Interrupted {
         /// When
         at: Moment,
-        /// SIGINT is 2, SIGTERM 15
+        /// SIGHUP is 1, SIGINT 2, SIGTERM 15
         signal: i32,
     },
 }

@@ -39,6 +39,7 @@ impl StageRun<'_> {
             NewtonFailure::NotFinite { effect, slot } => {
                 Failure::NonFinite { at, effect, node: self.model.node_at(slot) }
             }
+            NewtonFailure::Interrupted(signal) => Failure::Interrupted { at, signal },
         }
     }
 

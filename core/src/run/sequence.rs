@@ -5,7 +5,7 @@ use super::checkpoint::{Checkpoint, StageCheckpoint};
 use super::dynamics::Dynamics;
 use super::earlier_stages::EarlierStages;
 use super::energy::Bookkeeper;
-use super::failure::Failure;
+use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
 use super::modal::Modal;
 use super::naming::describe;
@@ -13,7 +13,7 @@ use super::observer::Observer;
 use super::plan::{Plan, StageWork};
 use super::rehearsal::lacking;
 use super::snapshot::Counters;
-use super::stage_run::{Analysis, StageRun, newton_for};
+use super::stage_run::{Analysis, StageRun, newton_for, unless_interrupted};
 use super::statics::{ArcLength, LoadLevels};
 use crate::model::{Assembly, Model, Schedule};
 use crate::system::{DofMap, State};
@@ -86,8 +86,17 @@ impl<'o> Run<'o> {
         (result, self.counters)
     }
 
-    /// Runs stage number `number`, from 0.
+    /// Runs stage number `number`, from 0. After a request to stop it has come to no other end.
     fn run_stage(&mut self, number: usize) -> Result<(), Failure> {
+        let result = self.carry_out_stage(number);
+        if matches!(result, Err(Failure::Io(_) | Failure::Interrupted { .. })) {
+            return result;
+        }
+        let at = Moment { stage: number + 1, time: self.state.time, load: self.state.load };
+        unless_interrupted(at).and(result)
+    }
+
+    fn carry_out_stage(&mut self, number: usize) -> Result<(), Failure> {
         let work = self.plan.stages[number].work;
         let mut run = match self.begun.take() {
             None => self.open_stage(number)?,
@@ -160,6 +169,7 @@ impl<'o> Run<'o> {
             soft: false,
             prescribed_increment: Vec::new(),
             resumed: None,
+            is_judged: false,
         })
     }
 
@@ -185,6 +195,7 @@ impl<'o> Run<'o> {
 /// Runs an analysis, sums up its work, and warns of what shows behind it, however it ended.
 fn carry_out<'r>(mut analysis: impl Analysis<'r>) -> Result<(), Failure> {
     let result = analysis.run();
+    analysis.stage().is_judged = true;
     analysis.stage().close();
     analysis.judge();
     result

@@ -8,7 +8,9 @@ use super::failure::{Failure, Moment};
 use super::issued::IssuedWarnings;
 use super::observer::Observer;
 use super::plan::{Plan, Stage};
+use super::results::StageResult;
 use super::snapshot::{Counters, Snapshot};
+use crate::interrupt;
 use crate::model::{Assembly, Charted, Model, Motion, Schedule, StageError, Timeline, charts};
 use crate::solve::{Convergence, LinearSolver, Newton, NewtonFailure};
 use crate::system::{Plane, Slot, State, System};
@@ -40,8 +42,9 @@ pub(super) struct Teller<'t> {
 }
 
 impl Teller<'_> {
-    /// `done`: the part of the stage that lies behind, from 0 to 1.
+    /// `done`: the part of the stage that lies behind, from 0 to 1. `Err` if work is asked to stop.
     pub fn tell(&mut self, done: f64) -> Result<(), Failure> {
+        unless_interrupted(self.at)?;
         self.observer.progress(self.at, (self.number as f64 + done) / self.stages as f64)
     }
 }
@@ -81,6 +84,8 @@ pub(super) struct StageRun<'r> {
     pub cutbacks_before: u64,
     /// Where a checkpoint has left the stage; taken by its analysis
     pub resumed: Option<AnalysisCheckpoint>,
+    /// The analysis is at its end, and judged.
+    pub is_judged: bool,
 }
 
 /// Newton's iteration on the system of a stage.
@@ -92,7 +97,24 @@ pub(super) fn newton_for(stage: &Stage, assembly: &Assembly, model: &Model) -> R
     Ok(Newton::new(convergence, stage.max_iterations, solver, &assembly.system))
 }
 
+/// `Err`, with the moment `at`, if work is asked to stop.
+pub(super) fn unless_interrupted(at: Moment) -> Result<(), Failure> {
+    interrupt::requested().map_or(Ok(()), |signal| Err(Failure::Interrupted { at, signal }))
+}
+
 impl StageRun<'_> {
+    /// `Err` if work is asked to stop: then the last look may have been interrupted, and is no
+    /// reason for any verdict.
+    pub fn unless_interrupted(&self) -> Result<(), Failure> {
+        unless_interrupted(self.moment())
+    }
+
+    /// Goes back to the last good state after an interrupted attempt.
+    pub fn stop(&mut self, signal: i32) -> Failure {
+        self.state.copy_from(self.good);
+        Failure::Interrupted { at: self.moment(), signal }
+    }
+
     /// The stage in the plan.
     pub fn stage(&self) -> &Stage {
         &self.plan.stages[self.number]
@@ -137,6 +159,7 @@ impl StageRun<'_> {
 
     /// Accepts a converged state: turns are counted, the mesh is judged, work is booked.
     pub fn accept(&mut self) -> Result<(), Failure> {
+        self.unless_interrupted()?;
         self.continue_to_state()?;
         self.judge_mesh()?;
         self.counters.mixed_elements += self.state.mixed.iter().filter(|&&mask| mask != 0).count() as u64;
@@ -164,6 +187,7 @@ impl StageRun<'_> {
     /// Passes a state on the way to a balance: it becomes the good one, turns are counted, and the
     /// work of its forces is booked. No row.
     pub fn pass_through(&mut self, system: &System) -> Result<(), Failure> {
+        self.unless_interrupted()?;
         self.state.anchor = None;
         self.flatten();
         self.continue_to_state()?;
@@ -182,10 +206,17 @@ impl StageRun<'_> {
 
     /// Shows a row to the observer.
     pub fn show(&mut self) -> Result<(), Failure> {
+        self.unless_interrupted()?;
         // The observer is borrowed beside what it looks at.
         let Self { observer, state, model, counters, bookkeeper, number, assembly, .. } = self;
         let ledger = bookkeeper.ledger();
         observer.row(&Snapshot { stage: *number + 1, state, system: &assembly.system, model, ledger, counters })
+    }
+
+    /// Gives the result of an analysis to the observer.
+    pub fn give(&mut self, result: &StageResult) -> Result<(), Failure> {
+        self.unless_interrupted()?;
+        self.observer.found(self.number + 1, result)
     }
 
     fn snapshot(&self) -> Snapshot<'_> {

@@ -4,6 +4,7 @@ use super::energy::is_unbalanced;
 use super::failure::Moment;
 use super::findings::Warning;
 use super::stage_run::StageRun;
+use crate::interrupt;
 use crate::kernel::Weights;
 use crate::model::charts;
 use crate::solve::{Convergence, Verdict};
@@ -25,6 +26,10 @@ impl StageRun<'_> {
 
     /// Warns of something that happened at some moment.
     pub fn warn_at(&mut self, kind: WarningKind, at: Moment, message: impl Into<String>) {
+        // An interrupted look tells nothing.
+        if interrupt::is_requested() && !self.is_judged {
+            return;
+        }
         let warning = Warning { kind, at: Some(at), message: message.into() };
         self.observer.warn(&warning);
         self.counters.findings.warnings.push(warning);

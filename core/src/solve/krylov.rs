@@ -3,7 +3,9 @@
 //! Blocks find multiple eigenvalues, such as the bending modes of a round section. The basis is
 //! orthonormal in an inner product x . W y in which the operator is symmetric, if there is one.
 
+use crate::interrupt;
 use crate::scalar::{LANES, Lanes};
+use crate::threads;
 use faer::linalg::solvers::{Eigen, SelfAdjointEigen};
 use faer::{Mat, Side};
 use nalgebra::Complex;
@@ -12,7 +14,7 @@ use nalgebra::Complex;
 pub trait Operator {
     /// Length of its vectors
     fn size(&self) -> usize;
-    /// Image of a vector; `None` if the computation fails.
+    /// Image of a vector; `None` if the computation fails or is interrupted.
     fn apply(&mut self, x: &[f64]) -> Option<Vec<f64>>;
     /// W x, with the possibly semidefinite W of the inner product.
     fn weigh(&mut self, x: &[f64]) -> Vec<f64>;
@@ -34,6 +36,9 @@ pub struct Spectrum {
 const ROUGH_BASIS_SIZE: usize = 12;
 /// Number of vectors in a block
 const BLOCK_SIZE: usize = 6;
+/// Size of a projection above which its eigenvalues may take long, and have a thread of their own so
+/// that a request to stop need not wait for them
+const LONG_PROJECTION: usize = 100;
 /// Relative change of eigenvalues between two projections at which they have converged
 const EIGENVALUE_TOLERANCE: f64 = 1e-11;
 /// Vectors that orthogonalisation reduces to this part of their norm are linearly dependent on the
@@ -41,20 +46,21 @@ const EIGENVALUE_TOLERANCE: f64 = 1e-11;
 const DEPENDENT_NORM_RATIO: f64 = 1e-11;
 
 /// The `wanted` eigenvalues of largest magnitude, descending; fewer if the space has fewer
-/// dimensions. `None` if an image cannot be computed.
+/// dimensions. `None` if an image cannot be computed, or after a request to stop.
 pub fn largest_eigenvalues(operator: &mut dyn Operator, wanted: usize) -> Option<Spectrum> {
     let most = operator.size().min(24 * wanted + 160);
     eigenvalues_within(operator, wanted, most)
 }
 
 /// Rough estimates of the eigenvalues of largest magnitude from a few images. `None` if an image
-/// cannot be computed.
+/// cannot be computed, or after a request to stop.
 pub fn roughly_largest_eigenvalues(operator: &mut dyn Operator) -> Option<Vec<Complex<f64>>> {
     let most = operator.size().min(ROUGH_BASIS_SIZE);
     eigenvalues_within(operator, most, most).map(|spectrum| spectrum.values)
 }
 
-/// Eigenvalues from a basis of at most `most` vectors. `None` if an image cannot be computed.
+/// Eigenvalues from a basis of at most `most` vectors. `None` if an image cannot be computed, or
+/// after a request to stop.
 fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -> Option<Spectrum> {
     let size = operator.size();
     if size == 0 {
@@ -70,28 +76,39 @@ fn eigenvalues_within(operator: &mut dyn Operator, wanted: usize, most: usize) -
     let mut look = 0;
     loop {
         let first = space.basis.len();
-        block.drain(..).for_each(|vector| space.add(operator, vector, most));
+        for vector in block.drain(..) {
+            space.add(operator, vector, most);
+            if interrupt::is_requested() {
+                return None;
+            }
+        }
         if space.basis.len() == first {
-            return Some(space.into_spectrum(operator.is_symmetric(), wanted));
+            return space.into_spectrum(operator.is_symmetric(), wanted);
         }
         for k in first..space.basis.len() {
+            if interrupt::is_requested() {
+                return None;
+            }
             let image = operator.apply(&space.basis[k])?;
             space.images.push(image.clone());
             block.push(image);
         }
         space.project(first);
+        if interrupt::is_requested() {
+            return None;
+        }
         if space.basis.len() < look && space.basis.len() < most {
             continue;
         }
         look = space.basis.len() + space.basis.len() / 4;
         // A few more eigenvalues than wanted must converge, lest the second of a pair is missed.
         let guard = wanted + BLOCK_SIZE;
-        let now = space.eigenvalues(operator.is_symmetric(), guard);
+        let now = space.eigenvalues(operator.is_symmetric(), guard)?;
         let same = |(a, b): (&Complex<f64>, &Complex<f64>)| (a - b).norm() <= EIGENVALUE_TOLERANCE * a.norm();
         let still =
             now.len() == last.len() && now.len() >= wanted.min(size) && now.iter().zip(&last).take(guard).all(same);
         if still || space.basis.len() >= most {
-            return Some(space.into_spectrum(operator.is_symmetric(), wanted));
+            return space.into_spectrum(operator.is_symmetric(), wanted);
         }
         last = now;
     }
@@ -177,6 +194,9 @@ impl KrylovSpace {
         // Two passes suffice (Kahan, Parlett).
         for _ in 0..2 {
             for (own, heavy) in self.basis.iter().zip(&self.weighed) {
+                if interrupt::is_requested() {
+                    return;
+                }
                 let along = dot(heavy, &vector);
                 vector.iter_mut().zip(own).for_each(|(v, o)| *v -= along * o);
             }
@@ -198,6 +218,9 @@ impl KrylovSpace {
             if i >= first {
                 self.projected.push(Vec::new());
             }
+            if interrupt::is_requested() {
+                return;
+            }
             let known = self.projected[i].len();
             for image in &self.images[known..] {
                 self.projected[i].push(dot(heavy, image));
@@ -215,38 +238,67 @@ impl KrylovSpace {
         Mat::from_fn(n, n, |i, j| self.projected[i][j])
     }
 
-    fn eigenvalues(&self, is_symmetric: bool, wanted: usize) -> Vec<Complex<f64>> {
-        let mut values: Vec<Complex<f64>> = if is_symmetric {
-            let values = self.symmetric_part().self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
-            values.into_iter().map(|value| Complex::new(value, 0.0)).collect()
-        } else {
-            self.matrix().eigenvalues().unwrap_or_default()
+    /// `None` after a request to stop.
+    fn eigenvalues(&self, is_symmetric: bool, wanted: usize) -> Option<Vec<Complex<f64>>> {
+        let mut values = match is_symmetric {
+            true => on_projection(self.symmetric_part(), symmetric_eigenvalues)?,
+            false => on_projection(self.matrix(), eigenvalues)?,
         };
         values.sort_by(largest_first);
         values.truncate(wanted);
-        values
+        Some(values)
     }
 
-    fn into_spectrum(self, is_symmetric: bool, wanted: usize) -> Spectrum {
-        let n = self.projected.len();
-        let mut pairs: Vec<(Complex<f64>, Vec<Complex<f64>>)> = if is_symmetric {
-            match SelfAdjointEigen::new(self.symmetric_part().as_ref(), Side::Lower) {
-                Ok(eigen) => {
-                    let vector = |k: usize| eigen.U().col(k).iter().map(|&v| Complex::new(v, 0.0)).collect();
-                    (0..n).map(|k| (Complex::new(eigen.S()[k], 0.0), vector(k))).collect()
-                }
-                Err(_) => Vec::new(),
-            }
-        } else {
-            match Eigen::new_from_real(self.matrix().as_ref()) {
-                Ok(eigen) => (0..n).map(|k| (eigen.S()[k], eigen.U().col(k).iter().copied().collect())).collect(),
-                Err(_) => Vec::new(),
-            }
+    /// `None` after a request to stop.
+    fn into_spectrum(self, is_symmetric: bool, wanted: usize) -> Option<Spectrum> {
+        let mut pairs = match is_symmetric {
+            true => on_projection(self.symmetric_part(), symmetric_eigenpairs)?,
+            false => on_projection(self.matrix(), eigenpairs)?,
         };
         pairs.sort_by(|a, b| largest_first(&a.0, &b.0));
         pairs.truncate(wanted);
         let (values, coordinates) = pairs.into_iter().unzip();
-        Spectrum { values, coordinates, space: self }
+        Some(Spectrum { values, coordinates, space: self })
+    }
+}
+
+/// An eigenvalue of a projection with its eigenvector.
+type Eigenpair = (Complex<f64>, Vec<Complex<f64>>);
+
+/// A result of `solve` for a projection. `None` after a request to stop.
+fn on_projection<R: Send + 'static>(projection: Mat<f64>, solve: fn(&Mat<f64>) -> R) -> Option<R> {
+    match projection.nrows() > LONG_PROJECTION {
+        true => threads::unless_interrupted(move || solve(&projection)),
+        false => Some(solve(&projection)),
+    }
+}
+
+fn symmetric_eigenvalues(matrix: &Mat<f64>) -> Vec<Complex<f64>> {
+    let values = matrix.self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
+    values.into_iter().map(|value| Complex::new(value, 0.0)).collect()
+}
+
+fn eigenvalues(matrix: &Mat<f64>) -> Vec<Complex<f64>> {
+    matrix.eigenvalues().unwrap_or_default()
+}
+
+fn symmetric_eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
+    match SelfAdjointEigen::new(matrix.as_ref(), Side::Lower) {
+        Ok(eigen) => {
+            let vector = |k: usize| eigen.U().col(k).iter().map(|&v| Complex::new(v, 0.0)).collect();
+            (0..matrix.nrows()).map(|k| (Complex::new(eigen.S()[k], 0.0), vector(k))).collect()
+        }
+        Err(_) => Vec::new(),
+    }
+}
+
+fn eigenpairs(matrix: &Mat<f64>) -> Vec<Eigenpair> {
+    match Eigen::new_from_real(matrix.as_ref()) {
+        Ok(eigen) => {
+            let vector = |k: usize| eigen.U().col(k).iter().copied().collect();
+            (0..matrix.nrows()).map(|k| (eigen.S()[k], vector(k))).collect()
+        }
+        Err(_) => Vec::new(),
     }
 }
 

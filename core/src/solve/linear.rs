@@ -6,6 +6,7 @@ use super::constraints::Constraints;
 use super::general::GeneralSolver;
 use super::pivots::Pivots;
 use super::tangent::Tangent;
+use crate::interrupt;
 use crate::system::{ResidualBuffer, Slot, System};
 use crate::tensor::Vec3;
 use serde::{Deserialize, Serialize};
@@ -322,6 +323,9 @@ impl LinearSolver {
         let mut error = f64::INFINITY;
         for _ in 0..=MAX_REFINEMENTS {
             let now = system.residual(wanted, x, &mut self.leftover);
+            if interrupt::is_requested() {
+                return false;
+            }
             // A refinement that increases the error shows that only round-off is left.
             if now <= ACCEPTED_BACKWARD_ERROR || now >= error {
                 error = error.min(now);
@@ -371,6 +375,10 @@ impl LinearSolver {
     /// Changes to sparse LU, until the block solver is tried again, and factorises the tangent;
     /// `false` on failure.
     pub(super) fn leave_blocks(&mut self, system: &System) -> bool {
+        // An interrupted factorisation is no reason to change the method.
+        if interrupt::is_requested() {
+            return false;
+        }
         if self.general.is_none() {
             self.general = GeneralSolver::new(system).map(Box::new);
         }

@@ -4,6 +4,7 @@ use super::krylov::{Operator, Spectrum, largest_eigenvalues, roughly_largest_eig
 use super::linear::LinearSolver;
 use super::pivots::is_symmetric;
 use super::softest::lost_part;
+use crate::interrupt;
 use crate::system::{Symmetry, System};
 use nalgebra::Complex;
 
@@ -295,7 +296,7 @@ impl<'a> ModeSearch<'a> {
     }
 
     /// The motions nearest to the shift factorised last, nearest first, without those that fail
-    /// verification. `None` if a solution fails.
+    /// verification. `None` if a solution fails, or after a request to stop.
     pub fn nearest(&mut self, wanted: usize) -> Option<Vec<SmallMotion>> {
         let room = match self.form {
             ProblemForm::Symmetric | ProblemForm::Undamped => wanted,
@@ -312,6 +313,9 @@ impl<'a> ModeSearch<'a> {
         };
         let mut found = Vec::new();
         for (number, &theta) in spectrum.values.iter().enumerate().filter(|(_, theta)| theta.norm() > 0.0) {
+            if interrupt::is_requested() {
+                return None;
+            }
             let exponent = form.exponent(shift, theta);
             // One exponent of each conjugate pair is kept.
             let upper = exponent.im > 0.0 || (exponent.im == 0.0 && theta.im >= 0.0);
@@ -325,7 +329,11 @@ impl<'a> ModeSearch<'a> {
         self.system.values.copy_from_slice(&self.matrices.stiffness);
         self.system.revision += 1;
         let mut motions = Vec::new();
-        for motion in found.into_iter().filter_map(|(number, exponent)| self.check(&spectrum, number, exponent)) {
+        for (number, exponent) in found {
+            if interrupt::is_requested() {
+                return None;
+            }
+            let Some(motion) = self.check(&spectrum, number, exponent) else { continue };
             let s = motion.exponent;
             // Flutter: if s is an exponent, so is -s* (complex conjugate), of equal frequency.
             let twin = form == ProblemForm::Undamped && s.re > MIN_FLUTTER_RATIO * s.norm() && s.im > 0.0;

@@ -162,7 +162,9 @@ impl Newton {
             has_formed_anew: false,
         };
         solution.begin();
-        solution.find()
+        let found = solution.find();
+        // Whatever it ended with, an interrupted solution is none.
+        NewtonFailure::unless_interrupted().and(found)
     }
 
     /// Passes the last time step to the error estimator.
@@ -213,8 +215,10 @@ impl Solution<'_> {
 
     fn find(&mut self) -> Result<(), NewtonFailure> {
         loop {
+            NewtonFailure::unless_interrupted()?;
             let forms = self.forms_tangent();
             let Judgement { verdict, residual } = self.evaluate(forms);
+            NewtonFailure::unless_interrupted()?;
             if self.decide(verdict, residual, forms)? == Decision::Done {
                 return Ok(());
             }
@@ -306,7 +310,9 @@ impl Solution<'_> {
         // The residual of the linear solve is negligible beside the error of an older tangent.
         let looks = self.newton.reuse.is_own();
         let prescribed_increment = self.prescribed_increment.take();
-        if !self.substitute(prescribed_increment, looks) {
+        let is_solved = self.substitute(prescribed_increment, looks);
+        NewtonFailure::unless_interrupted()?;
+        if !is_solved {
             return Err(NewtonFailure::Singular(self.mechanism()));
         }
         self.iterations += 1;

@@ -2,6 +2,7 @@
 
 use super::convergence::Residual;
 use super::softest::NullVector;
+use crate::interrupt;
 use crate::model::Assembly;
 use crate::system::State;
 
@@ -47,9 +48,16 @@ pub enum NewtonFailure {
         /// Slot of the force
         slot: usize,
     },
+    /// Asked to stop by a signal, by its number
+    Interrupted(i32),
 }
 
 impl NewtonFailure {
+    /// `Err` if work is asked to stop.
+    pub fn unless_interrupted() -> Result<(), Self> {
+        interrupt::requested().map_or(Ok(()), |signal| Err(Self::Interrupted(signal)))
+    }
+
     /// Failure by a force that is not finite, with the effect that computed it. A sum that
     /// overflows belongs to no single effect.
     pub fn not_finite(assembly: &mut Assembly, state: &State) -> Self {

@@ -2,6 +2,7 @@
 
 use super::linear::LinearSolver;
 use super::tangent::Tangent;
+use crate::interrupt;
 use crate::kernel::WIDTH;
 use crate::scalar::Instructions;
 use crate::system::{DofMap, System};
@@ -60,8 +61,12 @@ impl LinearSolver {
 
     /// Direction in which the tangent has the least stiffness, by inverse iteration; for a tangent
     /// that stays, with the last factorisation. Unknowns are scaled by their diagonal, so that
-    /// forces and moments compare. `None` if there are no equations or the iteration fails.
+    /// forces and moments compare. `None` if there are no equations, the iteration fails or is
+    /// interrupted.
     pub fn softest(&mut self, tangent: &mut Tangent) -> Option<NullVector> {
+        if interrupt::is_requested() {
+            return None;
+        }
         let system = tangent.look();
         if system.pattern.dof_map.count() == 0 {
             return None;
@@ -135,6 +140,9 @@ impl LinearSolver {
     /// Direction of least stiffness after a failed factorisation, of a tangent with a slightly
     /// raised diagonal.
     fn null_vector_of_shifted(&mut self, system: &System, broke_down: bool) -> Option<NullVector> {
+        if interrupt::is_requested() {
+            return None;
+        }
         let mut shifted = system.clone();
         // Multipliers have a zero diagonal and get a small compliance.
         let shift = |value: f64| if value == 0.0 { -1e-12 } else { value * (1.0 + 1e-10) };

@@ -95,7 +95,8 @@ struct Part {
 /// Runs a sweep, or a part of one.
 pub fn sweep(wanted: &SweepArguments) -> Status {
     let mut verdict = Verdict::default();
-    signals::caught();
+    // A signal stops the points that are running; those that are done are saved.
+    let _kept = signals::keep();
     if let Err(error) = one(wanted) {
         verdict.fail(error);
     }

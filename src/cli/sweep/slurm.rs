@@ -12,11 +12,13 @@ use crate::cli::progress::Progress;
 use crate::cli::{console, signals};
 use crate::output::{OutputError, PartFile};
 use crate::study::sweep::PointResult;
+use beamsim_core::threads;
 use std::collections::HashMap;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::thread::sleep;
+use std::process::{Child, Command, Stdio};
+use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
 /// Largest number of tasks of an array where Slurm does not tell its limit.
@@ -28,6 +30,9 @@ const MAX_CHECKS_WITHOUT_FILE: usize = 3;
 
 /// Time between checks for a signal.
 const SIGNAL_CHECK: Duration = Duration::from_millis(50);
+
+/// Time between checks whether a process has ended that has closed its outputs.
+const EXIT_CHECK: Duration = Duration::from_millis(5);
 
 /// States of a task that has ended.
 const ENDED: [&str; 10] = [
@@ -74,6 +79,7 @@ impl Array<'_> {
         let tasks: Vec<Vec<usize>> = points.chunks(each).map(<[usize]>::to_vec).collect();
         let words = |task: &Vec<usize>| task.iter().map(|k| (k + 1).to_string()).collect::<Vec<_>>().join(",");
         let lines: String = tasks.iter().map(|task| words(task) + "\n").collect();
+        unless_stopped("sbatch")?;
         // Tasks fail at once where the folder of their logs is missing.
         fs::create_dir_all(self.folder.join("log")).map_err(|error| io(&self.folder, error))?;
         self.write("tasks", &lines)?;
@@ -154,6 +160,7 @@ impl Array<'_> {
         while !open.is_empty() && wait(poll) {
             let states = match self.states() {
                 Ok(states) => states,
+                Err(CommandError::Stopped { .. }) => break,
                 Err(error) => {
                     // The queue could not be read: the next check may succeed.
                     progress.note(&format!("warning[{}]: {error}", error.name()));
@@ -226,11 +233,67 @@ fn largest_array() -> usize {
 fn output(command: &mut Command) -> Result<String, CommandError> {
     let name = command.get_program().to_string_lossy().into_owned();
     let refuse = |why: String| CommandError::Io(format!("{name}: {why}"));
-    let done = command.output().map_err(|error| refuse(format!("{error}; is Slurm installed here?")))?;
-    if done.status.success() {
-        return Ok(String::from_utf8_lossy(&done.stdout).into_owned());
+    unless_stopped(&name)?;
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().map_err(|error| refuse(format!("{error}; is Slurm installed here?")))?;
+    let out = child.stdout.take();
+    let errors = child.stderr.take();
+    let printed = threads::unless_interrupted(move || Printed::read(out, errors));
+    match printed.zip(wait_for(&mut child)) {
+        Some((Printed { answer, .. }, true)) => Ok(answer),
+        Some((Printed { complaint, .. }, false)) => Err(refuse(complaint.trim().to_string())),
+        None => {
+            // It may hang: Slurm's controller does not answer, or a file system.
+            let _ = child.kill();
+            let _ = child.wait();
+            unless_stopped(&name)?;
+            Err(refuse("it was lost before it ended".into()))
+        }
     }
-    Err(refuse(String::from_utf8_lossy(&done.stderr).trim().to_string()))
+}
+
+/// What a process has printed.
+struct Printed {
+    /// Standard output
+    answer: String,
+    /// Standard error
+    complaint: String,
+}
+
+impl Printed {
+    /// Reads both outputs of a process to their ends.
+    fn read(out: Option<impl Read + Send>, errors: Option<impl Read + Send>) -> Self {
+        thread::scope(|scope| {
+            let complaint = scope.spawn(|| read(errors));
+            Self { answer: read(out), complaint: complaint.join().unwrap_or_default() }
+        })
+    }
+}
+
+/// Reads a pipe to its end.
+fn read(pipe: Option<impl Read>) -> String {
+    let mut bytes = Vec::new();
+    // What came before an error is there.
+    let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Waits for a process that has closed its outputs: true if it was successful, `None` after a
+/// signal.
+fn wait_for(child: &mut Child) -> Option<bool> {
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return Some(status.success()),
+            Ok(None) if signals::caught().is_none() => sleep(EXIT_CHECK),
+            Ok(None) | Err(_) => return None,
+        }
+    }
+}
+
+/// `Err` after a signal: a command of Slurm is then stopped, or not begun.
+fn unless_stopped(name: &str) -> Result<(), CommandError> {
+    let message = format!("stopped before `{name}` answered; run the command again to continue");
+    signals::caught().map_or(Ok(()), |signal| Err(CommandError::Stopped { signal, message }))
 }
 
 fn quoted(word: &str) -> String {

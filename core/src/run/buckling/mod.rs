@@ -80,7 +80,7 @@ impl<'r> Analysis<'r> for Buckling<'_, 'r> {
         self.stage.counters.work.uncertainty = uncertainty;
         found.sort_by(|a, b| rank(a.load, load).total_cmp(&rank(b.load, load)));
         self.stage.counters.steps += 1;
-        self.stage.observer.found(self.stage.number + 1, &StageResult::CriticalLoads(found))
+        self.stage.give(&StageResult::CriticalLoads(found))
     }
 
     fn judge(&mut self) {
@@ -155,7 +155,7 @@ impl Buckling<'_, '_> {
             let target = search.target();
             self.stage.go_back_to(&search.here);
             self.stage.tell_progress(done(search.come()))?;
-            let walked = continue_path(self.stage, target);
+            let walked = continue_path(self.stage, target)?;
             if walked != Walked::There || has_leapt(self.stage, &search.here)? {
                 // Load control ends at limit points, or comes down on another branch.
                 search.end_at(target, walked);
@@ -191,7 +191,7 @@ impl Buckling<'_, '_> {
     /// pivots. The state is then that point.
     fn goes_on(&mut self, search: &CriticalSearch, load: f64, negative: Option<usize>) -> Result<bool, Failure> {
         self.stage.go_back_to(&search.here);
-        let walked = continue_path(self.stage, load + search.way * BEHIND * load.abs());
+        let walked = continue_path(self.stage, load + search.way * BEHIND * load.abs())?;
         Ok(walked == Walked::There
             && !has_leapt(self.stage, &search.here)?
             && negative.is_some_and(|most| negative_pivots(self.stage).is_some_and(|count| count <= most)))
@@ -242,7 +242,7 @@ impl Buckling<'_, '_> {
             }
             let none = negative_pivots(self.stage);
             self.stage.good.copy_from(self.stage.state);
-            if continue_path(self.stage, load + STRIDE_AHEAD * (critical - load)) != Walked::There
+            if continue_path(self.stage, load + STRIDE_AHEAD * (critical - load))? != Walked::There
                 || negative_pivots(self.stage) != none
             {
                 break;
@@ -272,7 +272,7 @@ impl Buckling<'_, '_> {
                 return Ok(CriticalLoad { load: critical, kind: CriticalKind::Branch });
             }
             let target = critical - 0.5 * NEAR * (critical - self.stage.state.load).signum() * critical.abs();
-            walked = continue_path(self.stage, target);
+            walked = continue_path(self.stage, target)?;
             if walked != Walked::There {
                 break;
             }

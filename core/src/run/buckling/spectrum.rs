@@ -41,6 +41,7 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
     let mut tangent = Tangent::that_stays(assembly, state);
     if !done {
         let vector = mechanism(&mut newton.solver, &mut tangent, model);
+        stage.unless_interrupted()?;
         return Err(stage.name_mechanism(vector, &stage.assembly.system));
     }
     // A stable state of a conservative scene: the tangent is an inner product in which everything
@@ -52,6 +53,7 @@ pub fn critical_loads(stage: &mut StageRun, modes: usize) -> Result<Vec<f64>, Fa
     let mut operator = Softening { system, varied: &varied, solver: &mut newton.solver, symmetric };
     let found = largest_eigenvalues(&mut operator, 4 * modes + 8).unwrap_or_default().values;
     let load = state.load;
+    stage.unless_interrupted()?;
     let real = |theta: &&Complex<f64>| theta.norm() > 0.0 && theta.im.abs() <= REAL * theta.norm();
     let mut loads: Vec<f64> = found.iter().filter(real).map(|theta| load + 1.0 / theta.re).collect();
     loads.sort_by(|a, b| rank(*a, load).total_cmp(&rank(*b, load)));

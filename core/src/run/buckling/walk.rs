@@ -31,18 +31,20 @@ pub enum Walked {
 }
 
 /// Goes along the path to a load factor in steps that shrink where they must.
-pub fn continue_path(stage: &mut StageRun, target: f64) -> Walked {
+pub fn continue_path(stage: &mut StageRun, target: f64) -> Result<Walked, Failure> {
     let start = stage.state.load;
     let (mut done, mut part) = (0.0, 1.0_f64);
     stage.good.copy_from(stage.state);
     while done < 1.0 {
         let next = (done + part).min(1.0);
         let load = if next == 1.0 { target } else { start + (target - start) * next };
-        let Some(moved) = step_along(stage, load) else {
+        let moved = step_along(stage, load);
+        stage.unless_interrupted()?;
+        let Some(moved) = moved else {
             stage.state.copy_from(stage.good);
             part *= 0.25;
             if part < SMALLEST_PART {
-                return Walked::Short;
+                return Ok(Walked::Short);
             }
             continue;
         };
@@ -50,14 +52,14 @@ pub fn continue_path(stage: &mut StageRun, target: f64) -> Walked {
         charts::wind(stage.state, stage.good, &stage.charted.rotations);
         if charts::coarsest(stage.state, &stage.charted.elements, charts::COARSE).is_some() {
             stage.state.copy_from(stage.good);
-            return Walked::TooCoarse;
+            return Ok(Walked::TooCoarse);
         }
         stage.model.remember(stage.state);
         stage.good.copy_from(stage.state);
         done = next;
         part *= if moved < 0.5 * STRIDE { 2.0 } else { 1.0 };
     }
-    Walked::There
+    Ok(Walked::There)
 }
 
 /// One step along the path: how far it moved, where it came down near by.
@@ -84,7 +86,7 @@ pub fn has_leapt(stage: &mut StageRun, from: &State) -> Result<bool, Failure> {
     let far = distance(stage.model, from, &to) > (LEAP * ahead).max(NO_MOTION);
     stage.state.copy_from(&to);
     let leapt =
-        far || continue_path(stage, from.load) != Walked::There || distance(stage.model, from, stage.state) > SAME;
+        far || continue_path(stage, from.load)? != Walked::There || distance(stage.model, from, stage.state) > SAME;
     stage.state.copy_from(&to);
     stage.good.copy_from(&to);
     Ok(leapt)

@@ -200,6 +200,7 @@ impl Dynamics<'_, '_> {
                     self.settle(&step)?;
                     self.close_joints()?;
                 }
+                Err(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
                 Err(failure) => {
                     step.length *= 0.5;
                     parts *= 2;
@@ -255,6 +256,7 @@ impl Dynamics<'_, '_> {
                     }
                     taken
                 }
+                Err(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
                 Err(failure) if at_floor => return Err(self.give_up(failure)),
                 Err(_) => control.fail(length),
             };

@@ -161,6 +161,7 @@ impl Dynamics<'_, '_> {
         let factorised = massless.is_none() && solver.factorise_new(&mut mass).is_done;
         let system = mass.system();
         if !factorised || !solver.solve(system, &mut right_hand_side) {
+            self.stage.unless_interrupted()?;
             let named = self.stage.name_mechanism(massless, &self.stage.assembly.system);
             return if self.is_held(&named) { Ok(None) } else { Err(named) };
         }

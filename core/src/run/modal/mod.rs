@@ -42,13 +42,16 @@ impl<'r> Analysis<'r> for Modal<'_, 'r> {
         let matrices = self.matrices()?;
         let found = self.find(&matrices)?;
         let mut listed = listed(&found, self.modes);
-        listed.iter_mut().for_each(|motion| self.refine(motion));
+        for motion in &mut listed {
+            self.stage.unless_interrupted()?;
+            self.refine(motion);
+        }
         self.warn_of_modes(&found, &listed);
         self.stage.counters.steps += 1;
         // What moved moves on.
         self.stage.state.copy_rates(&moving);
         let listed = listed.iter().map(mode).collect();
-        self.stage.observer.found(self.stage.number + 1, &StageResult::Modes(listed))
+        self.stage.give(&StageResult::Modes(listed))
     }
 
     /// Nothing is off: motions go on behind a modal stage.
@@ -86,6 +89,7 @@ impl Modal<'_, '_> {
         let mut search = ModeSearch::new(&mut assembly.system, &mut newton.solver, matrices, rigid);
         let tell = &mut |done| teller.tell(done);
         let found = find_modes(&mut search, shift, self.modes, tell, &mut counters.work)?;
+        self.stage.unless_interrupted()?;
         found.ok_or_else(|| Failure::Limit("the modes could not be found: a solve with the tangent failed".into()))
     }
 
@@ -97,6 +101,7 @@ impl Modal<'_, '_> {
         counters.work.factorisations += 1;
         let done = newton.solver.factorise_surely(&assembly.system);
         let loose = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, state), model);
+        self.stage.unless_interrupted()?;
         if done && loose.is_none() {
             return Ok(());
         }

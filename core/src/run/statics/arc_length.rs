@@ -148,7 +148,9 @@ impl Follower<'_, '_> {
             let targets = self.targets(&next, self.progress.signs, goal);
             let (mut arrived, mut target) = self.nearest(next, length, &targets)?;
             if targets.contains(&goal) && target.is_none_or(|target| target == goal) {
-                if !self.hit(goal, &mut arrived) && self.path.shorten() {
+                let is_hit = self.hit(goal, &mut arrived);
+                self.stage.unless_interrupted()?;
+                if !is_hit && self.path.shorten() {
                     self.stage.counters.cutbacks += 1;
                     continue;
                 }

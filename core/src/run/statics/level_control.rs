@@ -157,6 +157,7 @@ impl LevelControl<'_, '_> {
             self.stage.tell_progress(next)?;
             match self.try_step(next) {
                 StepOutcome::Good(signature) => self.take_step(signature)?,
+                StepOutcome::Failed(NewtonFailure::Interrupted(signal)) => return Err(self.stage.stop(signal)),
                 _ if self.levels.halve(self.stage.soft) => {
                     self.stage.counters.cutbacks += 1;
                     self.stage.state.copy_all_but_rates(self.stage.good);
@@ -207,6 +208,9 @@ impl LevelControl<'_, '_> {
             return StepOutcome::Failed(failure);
         }
         let signature = self.stability.look(self.stage);
+        if let Err(failure) = NewtonFailure::unless_interrupted() {
+            return StepOutcome::Failed(failure);
+        }
         let StageRun { model, good, state, newton, soft, .. } = &*self.stage;
         let changes = self.stability.changes_to(signature);
         if *soft {

@@ -65,6 +65,7 @@ impl StageRun<'_> {
         counters.work.factorisations += 1;
         if !(newton.solver.factorise(system) && newton.solver.solve(system, &mut solution)) {
             let vector = mechanism(&mut newton.solver, &mut Tangent::that_stays(assembly, state), model);
+            self.unless_interrupted()?;
             return Err(self.name_mechanism(vector, &self.assembly.system));
         }
         let mut rate = vec![Vec3::ZERO; pull.len()];

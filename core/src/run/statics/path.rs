@@ -140,6 +140,7 @@ impl Path {
         let StageRun { assembly, newton, .. } = stage;
         let mut tangent = Tangent::that_may_go(assembly, stage.state, Weights::STIFFNESS);
         let signature = newton.solver.signature(&mut tangent);
+        stage.unless_interrupted()?;
         let along = dot(stage, &rate, &before.tangent) * self.scale + before.load_rate;
         let size = (squared(stage, &rate) * self.scale + 1.0).sqrt();
         let load_rate = if along < 0.0 { -1.0 / size } else { 1.0 / size };
@@ -184,6 +185,10 @@ impl Path {
                 }
                 Err(failure) => Some(failure),
             };
+            if let Some(NewtonFailure::Interrupted(signal)) = failure {
+                stage.state.copy_from(&self.here.state);
+                return Err(Failure::Interrupted { at: stage.moment(), signal });
+            }
             stage.counters.cutbacks += 1;
             self.length = 0.5 * length;
             if let (Some(failure), true) = (failure, self.length < SHORTEST * self.first) {
@@ -231,6 +236,7 @@ impl Path {
         let mut last = None;
         let (mut iterations, mut history) = (0, Vec::new());
         loop {
+            NewtonFailure::unless_interrupted()?;
             // Held directions are put where they belong, free of the round-off of predictor and
             // corrections.
             stage.schedule.set_clock(stage.model, stage.state, self.here.state.time, load);
@@ -241,6 +247,7 @@ impl Path {
             let Judgement { verdict, residual } =
                 newton.convergence.judge(stage.model, &assembly.system, round_off, last);
             history.push(residual.ratio);
+            NewtonFailure::unless_interrupted()?;
             match verdict {
                 Verdict::Converged | Verdict::Noisy => return Ok(iterations),
                 Verdict::NotFinite => return Err(NewtonFailure::not_finite(assembly, stage.state)),
@@ -289,6 +296,7 @@ impl Path {
         let solved = timed(&mut work.solve_seconds, || {
             solver.factorise(system) && solver.solve(system, &mut back) && solver.solve(system, &mut along)
         });
+        NewtonFailure::unless_interrupted()?;
         if !solved {
             return Err(NewtonFailure::Singular(mechanism(
                 solver,

@@ -158,7 +158,9 @@ impl<'s, 'r> Descent<'s, 'r> {
             self.stage.tell_progress(start.load)?;
             self.steps -= 1;
             let first = lifts.then_some(load);
-            if !self.step_against(resistance, first) {
+            let has_moved = self.step_against(resistance, first);
+            self.stage.unless_interrupted()?;
+            if !has_moved {
                 self.stage.counters.cutbacks += 1;
                 resistance *= HARDER;
                 self.stage.state.copy_all_but_rates(self.stage.good);
@@ -175,7 +177,9 @@ impl<'s, 'r> Descent<'s, 'r> {
             if moved >= SLOW || growing > 0 {
                 continue;
             }
-            if !self.balances(load) {
+            let is_balanced = self.balances(load);
+            self.stage.unless_interrupted()?;
+            if !is_balanced {
                 if moved < STANDING {
                     return Ok(false);
                 }
@@ -183,6 +187,7 @@ impl<'s, 'r> Descent<'s, 'r> {
             }
             let StageRun { assembly, newton, state, counters, .. } = &mut *self.stage;
             let signature = newton.signature_at(assembly, state, &mut counters.work);
+            self.stage.unless_interrupted()?;
             if signature.is_none_or(|signature| !signature.tells_unstable()) {
                 self.stage.good.copy_all_but_rates(self.stage.state);
                 return Ok(true);

@@ -95,6 +95,7 @@ pub(super) fn conclude(
     signature: Option<Signature>,
     on_limit: bool,
 ) -> Result<(), Failure> {
+    stage.unless_interrupted()?;
     let negative = signature.and_then(Signature::negative);
     stage.warn_of_instability(negative);
     let number = stage.number + 1;
@@ -110,6 +111,7 @@ pub(super) fn conclude(
         stage.warn_of_vibrations(vibrations);
         found = stability_of(number, vibrations);
     }
+    stage.unless_interrupted()?;
     stage.counters.findings.stability.push(found);
     match aside {
         Some(more @ 1..) if stage.issued.unstable != Some(stage.number) => stage.warn_out_of_plane(more),
@@ -138,6 +140,7 @@ pub(super) fn tell_of_points(
     before: Option<Signature>,
     after: Option<Signature>,
 ) -> Result<(), Failure> {
+    stage.unless_interrupted()?;
     let changed = before.zip(after).is_some_and(|(before, after)| before.changes_to(after) > 0);
     let after = after.and_then(Signature::negative);
     let kind = kind.or_else(|| changed.then_some(EventKind::Branch));

@@ -2,6 +2,7 @@
 //! for a pattern.
 
 use super::order::{self, EliminationOrder};
+use crate::interrupt;
 use crate::system::{IdleRow, Pattern};
 use std::ops::Range;
 
@@ -107,7 +108,7 @@ pub struct Elimination {
 
 impl Elimination {
     /// Elimination in the order of [`order::find`], without fill on chains and trees. `None` if
-    /// fill exceeds its limit, or memory for the analysis is not available.
+    /// fill exceeds its limit, memory for the analysis is not available, or work is asked to stop.
     pub fn new(pattern: &Pattern, multipliers: &[u32], fill: FillLimit) -> Option<Self> {
         let most = match fill {
             FillLimit::Little => MAX_FILL_RATIO * pattern.pairs(),
@@ -116,11 +117,8 @@ impl Elimination {
         let EliminationOrder { order, branches, neighbours } = order::find(pattern, multipliers, most)?;
         let starts = neighbours.starts;
         let later = neighbours.later;
-        let (target_starts, mut targets) = targets(&starts, &later);
-        let mut changed = targets.clone();
-        changed.sort_unstable();
-        changed.dedup();
-        targets.iter_mut().for_each(|block| *block = changed.partition_point(|other| other < block) as u32);
+        let (target_starts, mut targets) = targets(&starts, &later)?;
+        let changed = number_changed(&mut targets, later.len());
         let trunk = branches.last().map_or(0, |branch| branch.end)..order.len();
         let row_of = order::inverse(&order);
         let mut out = Self {
@@ -295,15 +293,35 @@ fn find(starts: &[u32], later: &[u32], i: u32, j: u32) -> usize {
     start + neighbours.partition_point(|&other| other < j)
 }
 
-fn targets(starts: &[u32], later: &[u32]) -> (Vec<u32>, Vec<u32>) {
+/// For each row the position of its first target, and for each pair of later neighbours the block
+/// in which they are coupled. `None` after a request to stop.
+fn targets(starts: &[u32], later: &[u32]) -> Option<(Vec<u32>, Vec<u32>)> {
     let mut begins = Vec::with_capacity(starts.len());
     let mut targets = Vec::new();
     for row in 0..starts.len() - 1 {
         begins.push(targets.len() as u32);
         let neighbours = &later[starts[row] as usize..starts[row + 1] as usize];
         for (k, &b) in neighbours.iter().enumerate() {
+            if interrupt::is_requested() {
+                return None;
+            }
             targets.extend(neighbours[..k].iter().map(|&a| find(starts, later, a, b) as u32));
         }
     }
-    if targets.is_empty() { Default::default() } else { (begins, targets) }
+    Some(if targets.is_empty() { Default::default() } else { (begins, targets) })
+}
+
+/// The blocks among `blocks` that are targets, ascending. Targets then count these instead of all
+/// blocks.
+fn number_changed(targets: &mut [u32], blocks: usize) -> Vec<u32> {
+    if targets.is_empty() {
+        return Vec::new();
+    }
+    // First a mark, then the number of each changed block.
+    let mut numbers = vec![0_u32; blocks];
+    targets.iter().for_each(|&block| numbers[block as usize] = 1);
+    let changed: Vec<u32> = (0..).zip(&numbers).filter(|(_, mark)| **mark == 1).map(|(block, _)| block).collect();
+    (0..).zip(&changed).for_each(|(number, &block)| numbers[block as usize] = number);
+    targets.iter_mut().for_each(|block| *block = numbers[*block as usize]);
+    changed
 }

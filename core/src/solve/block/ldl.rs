@@ -5,6 +5,7 @@ use super::elimination::Elimination;
 use super::list_range::ListRange;
 use super::pieces::{LaterTargets, Piece, PieceFactors, PivotSigns};
 use super::tile::{self, BlockVector, DiagonalTiles, Rows, StoredBlock, Tile, UpperTriangle, Width};
+use crate::interrupt;
 use crate::system::upper_entry;
 use std::ops::Range;
 
@@ -110,6 +111,9 @@ where
             let mut target = elimination.first_target(row);
             before.clear();
             for k in neighbours.clone() {
+                if interrupt::is_requested() {
+                    return None;
+                }
                 let forward = |block: &Tile<W>| tile::forward_symmetric(&factor, block, &mut y);
                 StoredBlock::find(elimination.below(k), beside, changed).with(forward);
                 for w in &*before {

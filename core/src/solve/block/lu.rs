@@ -6,6 +6,7 @@ use super::elimination::Elimination;
 use super::list_range::ListRange;
 use super::pieces::{LaterTargets, Piece, PieceFactors, PivotSigns};
 use super::tile::{self, BlockVector, DiagonalTiles, RowOrder, Rows, StoredBlock, Tile, Width};
+use crate::interrupt;
 use std::ops::Range;
 
 /// Rows of a block LU factorisation, with P A_kk = L U the diagonal tile at the elimination of row
@@ -126,6 +127,9 @@ where
             let mut target = elimination.first_target(row);
             before.clear();
             for k in neighbours.clone() {
+                if interrupt::is_requested() {
+                    return None;
+                }
                 let is_one = elimination.is_one(k);
                 let both = |block: &Tile<W>| {
                     tile::forward_upper(&factor, block, &mut w);

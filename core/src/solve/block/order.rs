@@ -6,7 +6,9 @@
 //! towards any of its cliques (Rose, Tarjan and Lueker 1976, doi:10.1137/0205021), here towards a
 //! clique in its middle.
 
+use crate::interrupt;
 use crate::system::{Adjacency, Pattern};
+use crate::threads;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -22,6 +24,10 @@ const MAX_TRUNK_ROWS: usize = 64;
 
 /// Number of parts of equal size into which branches are divided if the tree permits
 const BRANCH_PARTS: usize = 16;
+
+/// Number of rows above which the search for an order may take long, and has a thread of its own
+/// so that a request to stop need not wait for it.
+const LONG_ORDERING: usize = 5000;
 
 /// Row number that means no row, as the parent of a root
 const NO_ROW: u32 = u32::MAX;
@@ -47,7 +53,7 @@ pub struct Neighbours {
 
 impl Neighbours {
     /// Later neighbours: those in the pattern, and those that result from fill. `None` if there are
-    /// more than `most`.
+    /// more than `most`, or after a request to stop.
     fn new(adjacency: &Adjacency, order: &[u32], most: usize) -> Option<Self> {
         let n = order.len();
         let row_of = inverse(order);
@@ -78,7 +84,7 @@ impl Neighbours {
             if let Some(&parent) = later.get(start) {
                 children[parent as usize].push(row as u32);
             }
-            if later.len() > most {
+            if later.len() > most || interrupt::is_requested() {
                 return None;
             }
             starts.push(later.len() as u32);
@@ -134,8 +140,8 @@ impl Neighbours {
 }
 
 /// Order for a pattern, in which the node blocks of `multipliers` come after those they are coupled
-/// with. `None` if the factor has more than `most` blocks right of the diagonal, or memory is not
-/// available.
+/// with. `None` if the factor has more than `most` blocks right of the diagonal, memory is not
+/// available, or work is asked to stop.
 pub fn find(pattern: &Pattern, multipliers: &[u32], most: usize) -> Option<EliminationOrder> {
     let adjacency = &pattern.adjacency();
     let order = match multipliers {
@@ -201,7 +207,17 @@ fn constrained(node_blocks: usize, adjacency: &Adjacency, multipliers: &[u32]) -
     Some(order)
 }
 
+/// Order of minimum degree. `None` if memory is not available, or after a request to stop.
 fn minimum_degree(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>> {
+    if n <= LONG_ORDERING {
+        return minimum_degree_of(n, column_starts, rows);
+    }
+    let column_starts = column_starts.to_vec();
+    let rows = rows.to_vec();
+    threads::unless_interrupted(move || minimum_degree_of(n, &column_starts, &rows)).flatten()
+}
+
+fn minimum_degree_of(n: usize, column_starts: &[u32], rows: &[u32]) -> Option<Vec<u32>> {
     let structure = SymbolicSparseColMatRef::new_checked(n, n, column_starts, None, rows);
     let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, rows.len())).ok()?;
     let mut order = vec![0_u32; n];
