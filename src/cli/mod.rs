@@ -28,7 +28,8 @@ mod variant;
 mod verdict;
 mod verify;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use error::CommandError;
 use status::Status;
 use std::path::PathBuf;
@@ -192,9 +193,9 @@ enum Command {
 
 /// Parses the command line and runs the command.
 pub fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let arguments = match parse() {
         Ok(arguments) => arguments,
-        Err(error) => return ExitCode::from(usage(&error) as u8),
+        Err(error) => return ExitCode::from(usage(error) as u8),
     };
     console::configure(arguments.print_options);
     let status = match arguments.command {
@@ -218,6 +219,17 @@ pub fn main() -> ExitCode {
     ExitCode::from(with_warnings(status) as u8)
 }
 
+/// The command line. A negative number is the value of the option before it.
+fn parse() -> Result<Arguments, clap::Error> {
+    let command = Arguments::command().mut_subcommands(|subcommand| {
+        subcommand.mut_args(|argument| {
+            let is_option = !argument.is_positional() && argument.get_action().takes_values();
+            if is_option { argument.allow_negative_numbers(true) } else { argument }
+        })
+    });
+    Arguments::from_arg_matches(&command.try_get_matches()?)
+}
+
 /// The exit status with `--deny-warnings`: a success with warnings becomes a failure.
 fn with_warnings(status: Status) -> Status {
     let count = console::warnings();
@@ -231,14 +243,16 @@ fn with_warnings(status: Status) -> Status {
 
 /// Prints help and version, which clap returns as errors too; everything else is a wrong command
 /// line.
-fn usage(error: &clap::Error) -> Status {
-    let text = error.render();
+fn usage(mut error: clap::Error) -> Status {
+    if error.kind() == ErrorKind::UnknownArgument {
+        advise(&mut error);
+    }
+    let text = error.render().to_string();
     if error.exit_code() == 0 {
-        console::answer(text.to_string().trim_end());
+        console::answer(text.trim_end());
         return Status::Fine;
     }
-    let text = text.to_string();
-    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         console::note(text.trim_end());
         console::error("usage", "a command is needed");
         return Status::Wrong;
@@ -249,4 +263,17 @@ fn usage(error: &clap::Error) -> Status {
     }
     console::error("usage", first.trim_start_matches("error: "));
     Status::Wrong
+}
+
+/// Replaces the advice to write `-- -5s`, which would make a deck of a value that begins with `-`.
+fn advise(error: &mut clap::Error) {
+    let Some(ContextValue::StyledStrs(mut tips)) = error.remove(ContextKind::Suggested) else { return };
+    tips.retain(|tip| !tip.to_string().starts_with("to pass "));
+    let argument = error.get(ContextKind::InvalidArg).map_or(String::new(), ToString::to_string);
+    if argument.starts_with('-') && !argument.starts_with("--") {
+        tips.push("join a value that begins with `-` to its option by `=`, such as --option=-1:1".into());
+    }
+    if !tips.is_empty() {
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));
+    }
 }
