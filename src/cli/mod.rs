@@ -270,8 +270,8 @@ fn advise(error: &mut clap::Error) {
     let Some(ContextValue::StyledStrs(mut tips)) = error.remove(ContextKind::Suggested) else { return };
     tips.retain(|tip| !tip.to_string().starts_with("to pass "));
     let argument = error.get(ContextKind::InvalidArg).map_or(String::new(), ToString::to_string);
-    if argument.starts_with('-') && !argument.starts_with("--") {
-        tips.push("join a value that begins with `-` to its option by `=`, such as --option=-1:1".into());
+    if argument.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
+        tips.push("join a value that begins with `-` to its option by `=`, such as --option=-1e-3".into());
     }
     if !tips.is_empty() {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(tips));

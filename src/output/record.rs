@@ -11,6 +11,9 @@ use std::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::Path;
 
+/// The status of a run that did not fail.
+const FINISHED: &str = "finished";
+
 /// A run that has ended.
 pub struct FinishedRun<'a> {
     /// Success, or why it failed
@@ -244,7 +247,7 @@ impl Record {
         };
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            status: result.as_ref().map_or_else(Failure::name, |()| "finished").into(),
+            status: result.as_ref().map_or_else(Failure::name, |()| FINISHED).into(),
             deck: scene.resolved.clone(),
             text: Some(text),
             findings,
@@ -271,6 +274,11 @@ impl Record {
     /// Labels of the units of the deck.
     pub fn units(&self) -> Units {
         Units::of_deck(&self.deck)
+    }
+
+    /// The name of the failure that ended the run, if it did not finish.
+    pub fn failure(&self) -> Option<&str> {
+        Some(self.status.as_str()).filter(|status| !["", FINISHED].contains(status))
     }
 
     /// True if a signal ended the run.
