@@ -166,11 +166,14 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Explain a key or a table of the deck
-    #[command(after_help = "Examples:\n  beamsim explain stage.scheme\n  beamsim explain deck")]
+    /// Explain a key, a table or a word of the deck, or a column of the results
+    #[command(
+        after_help = "Examples:\n  beamsim explain stage.scheme\n  beamsim explain cylindrical\n  beamsim explain tip.uz\n  beamsim explain deck"
+    )]
     Explain {
-        /// Key or table, such as elements, beam.elements or [[beam]]; `deck` lists all tables
-        key: String,
+        /// Key (elements, beam.elements), table ([[beam]]), word (cylindrical, limit_point) or column
+        /// (tip.uz); `deck` lists all tables
+        name: String,
     },
     /// Print the JSON Schema of the deck, for editors
     #[command(after_help = "Example:\n  beamsim schema > beamsim.schema.json")]
@@ -211,7 +214,7 @@ pub fn main() -> ExitCode {
         }
         Command::Sweep { wanted } => sweep::sweep(&wanted),
         Command::New { template, out } => new::new(template, out.as_deref()),
-        Command::Explain { key } => explain::explain(&key),
+        Command::Explain { name } => explain::explain(&name),
         Command::Schema => schema::schema(),
         Command::Completions { shell } => completions::completions(shell, Arguments::command()),
         Command::Manual { out } => manual::manual(Arguments::command(), out.as_deref()),
