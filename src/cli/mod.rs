@@ -35,13 +35,14 @@ use status::Status;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+const START: &str = "A deck is a text file that describes beams, supports, loads and stages. To begin:\n  beamsim new                     writes the deck cantilever.toml\n  beamsim run cantilever.toml     simulates it, and says where the results are";
 const AFTER_HELP: &str = "Exit status: 0 success; 1 an expectation or comparison failed; 2 the deck or the command line is \
                           wrong; 3 the simulation failed; 4 a file could not be read or written; 5 an accuracy was not reached; 130 or \
                           143 interrupted.";
 
 /// Simulates slender parts with large deflections and rotations.
 #[derive(Parser)]
-#[command(version, about, after_help = AFTER_HELP)]
+#[command(version, about, after_help = format!("{START}\n\n{AFTER_HELP}"))]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -52,10 +53,11 @@ struct Arguments {
 /// Decks and changes to them.
 #[derive(clap::Args)]
 struct DeckArguments {
-    /// Decks (TOML)
+    /// Decks (TOML files)
     #[arg(required = true, value_name = "DECK")]
     decks: Vec<PathBuf>,
-    /// Change a value of the deck: param.L=12, stage.0.step=0.01, section.leg.EA=2e6
+    /// Change a value of the deck; may be repeated: param.L=12, section.leg.EA=2e6, stage.0.step=0.01
+    /// (the first [[stage]])
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -81,7 +83,8 @@ enum Command {
         #[command(flatten)]
         input: DeckArguments,
     },
-    /// Run decks and compare the results with their [[expect]] tables
+    /// Run decks, or all decks in folders, and compare the results with the values in their [[expect]]
+    /// tables
     #[command(after_help = "Examples:\n  beamsim verify decks\n  beamsim verify arm.toml --out results")]
     Verify {
         #[command(flatten)]
@@ -90,21 +93,21 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// Compare a history with a stored one
+    /// Compare a history with a stored one, column by column
     #[command(after_help = "Example:\n  beamsim compare results/arm/history.csv stored.csv --rtol 1e-6")]
     Compare {
         /// History (CSV)
         a: PathBuf,
-        /// Stored history to compare with (CSV)
+        /// Stored history (CSV); its columns are compared
         b: PathBuf,
-        /// Allowed relative difference
-        #[arg(long, default_value_t = 1e-9)]
+        /// Allowed difference relative to the stored value
+        #[arg(long, default_value = "1e-9")]
         rtol: f64,
-        /// Allowed absolute difference
-        #[arg(long, default_value_t = 1e-12)]
+        /// Allowed absolute difference, added to the relative one
+        #[arg(long, default_value = "1e-12")]
         atol: f64,
     },
-    /// Find the cheapest elements, order and step for each accuracy, from many runs of a deck
+    /// Run a deck with many meshes and steps, and find the cheapest for each accuracy
     #[command(
         after_help = "Examples:\n  beamsim cost arm.toml --budget 60s\n  beamsim cost arm.toml --vary elements=1,2,4 --vary order=1,2,3"
     )]
@@ -125,7 +128,7 @@ enum Command {
         #[command(flatten)]
         wanted: plot::PlotArguments,
     },
-    /// Write a page that plays a run back, with its histories, energies, effects and deck
+    /// Write a page for a browser that plays a run back, with its histories, energies, effects and deck
     #[command(after_help = "Example:\n  beamsim report results/arm")]
     Report {
         /// Folders of results
@@ -135,20 +138,21 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Switch each effect off in turn and show how results and time change
+    /// Leave out each effect (rotary inertia, shear, …) in turn and show how results and run time change
     #[command(after_help = "Example:\n  beamsim effects arm.toml --tolerance 1e-2")]
     Effects {
         #[command(flatten)]
         input: DeckArguments,
-        /// Effects are left out as long as no output changes by more than this, relative to the
-        /// largest value of its kind
-        #[arg(long, default_value_t = 1e-3)]
+        /// Largest change of the outputs by effects that count as negligible, relative to the largest
+        /// displacement, rotation, … of the run
+        #[arg(long, default_value = "1e-3")]
         tolerance: f64,
         /// Folder of the results (default: results/<deck name>)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// Run a deck with many values of its keys and write one table of results
+    /// Run a deck with many values of its keys (a point for each combination), and write one table of
+    /// results
     #[command(
         after_help = "Examples:\n  beamsim sweep arm.toml --vary section.rod.EI=50:200:4 --vary param.L=1,2\n  beamsim sweep arm.toml --vary param.L=1:3 --sample 200 --seed 7 --output tip.uz:absmax\n  beamsim sweep arm.toml --vary param.L=1:3:1000 --engine slurm --sbatch=--partition=short"
     )]
