@@ -289,6 +289,7 @@ fn plot(title: &str, found: &CostStudy) -> String {
         style: LineStyle::Background,
     };
     let of_families = families.iter().enumerate().map(|(number, family)| family_line(found, family, number));
+    let of_families = of_families.filter(|line| !line.points.is_empty());
     let outputs = match &found.outputs[..] {
         [one] => found.columns[*one].clone(),
         several => format!("{} outputs", several.len()),
