@@ -361,7 +361,7 @@ mod tests {
             assert_eq!((explain(word), similar(word, &[]).meant()), (Vec::new(), meant));
         }
         assert_eq!(similar("contact", &[]).help().unwrap(), "contact is not supported yet");
-        assert_eq!(similar("qqqqqqqqqqqqqq", &[]), Hint::None);
+        assert_eq!(similar("xylophone", &[]), Hint::None);
     }
 
     #[test]
@@ -380,10 +380,8 @@ mod tests {
         }
         assert!(count > 80, "{count}");
         let word = |name: &str, path: &str| explain(name).into_iter().find(|entry| entry.path == path).unwrap();
-        assert_eq!(
-            word("cylindrical", "joint.kind").description,
-            "The sliding along `axis`, which A carries, and the rotation about it."
-        );
+        let cylindrical = word("cylindrical", "joint.kind").description;
+        assert!(cylindrical.starts_with("The sliding along `axis`") && cylindrical.ends_with("with a body between."));
         let quaternion = word("q", "output.columns");
         assert_eq!(quaternion.description, "Unit quaternion of the rotation.");
         assert_eq!(quaternion.examples, ["columns = [\"q\"]"]);
